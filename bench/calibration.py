@@ -27,7 +27,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.criteria import is_at_floor, takes_most
 from rsea_ros.diagnosis.diagnose import nominal_problem, search
 from rsea_ros.diagnosis.evaluation import held_out_of
-from rsea_ros.diagnosis.naming.weighing import Place, weigh
+from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, weigh
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.workers import worker_pools
 
@@ -150,7 +150,7 @@ def _weighed(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
     }
 
 
-def _place(place: Place) -> list[dict[str, Any]]:
+def _place(place: CauseAndRivals) -> list[dict[str, Any]]:
     """Return the evidence for a cause and its rivals, with the size that each has."""
     return [
         asdict(w.evidence) | {"values": _values(w.claim.problem, w.claim.theta, w.claim.name)}
@@ -166,9 +166,9 @@ def _values(problem: Any, theta: Any, name: str) -> dict[str, float]:
 def _line(entry: dict[str, Any]) -> str:
     """Return one record in a line: truth, what was accepted with the spread of its lambda, time."""
     first = [place[0] for place in entry.get("places", [])]
-    right = {e["name"]: "+" if e["name"] in entry["truth"] else "WRONG" for e in first}
     said = ", ".join(
-        f"{n} {right[n]} {e['signature']['spread']:.3f}" for n, e in zip(right, first, strict=True)
+        f"{e['name']} {'+' if e['name'] in entry['truth'] else 'WRONG'} {e['signature']['spread']:.3f}"
+        for e in first
     )
     truth = "+".join([*entry["truth"], *([f"({entry['off']})"] if entry["off"] else [])])
     floor = "at floor" if entry.get("at_floor") else ""

@@ -24,7 +24,7 @@ from independent.hidden import OFF_CATALOGUE, hide, hide_off_catalogue
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
 
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.model.rig import Controller, Rig
+from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate
 from rsea_ros.signals import Channel, FloatArray, Record
@@ -235,10 +235,10 @@ def _looped(channels, rig: Rig, commanded: FloatArray, acting: FloatArray):
 def rig_of(family: str) -> Rig:
     """Return the rig of a family as a user would state it."""
     if family == "rigid":
-        return replace(load_rig("bare_drive"), controller=Controller(15.0, 120.0, 200.0))
+        return replace(load_rig("bare_drive"), controller=PositionLoop(15.0, 120.0, 200.0))
     rig = load_rig("paper_high_impedance")
     if family == "loop":
-        return replace(rig, controller=Controller(15.0, 80.0, 80.0))
+        return replace(rig, controller=PositionLoop(15.0, 80.0, 80.0))
     if family != "sea":
         return rig
     spreads = {"rotor.reflected_inertia": 1.0, "rotor.reflected_damping": 1.0, "spring.stiffness": 0.2}

@@ -38,26 +38,26 @@ class Hold:
 
 def main() -> int:
     """Run the node with a note of its faults: a line with ns of the monotonic clock and the fault each."""
-    from rsea_ros.control.controller import Reading
+    from rsea_ros.control.controller import Measurement
     from rsea_ros.nodes import controller
 
     hold = Hold(float(os.environ[HOLD]))
     signal.signal(signal.SIGUSR1, hold.toggle)
-    latch, take = controller.Controller._latch, controller.Measurements.take
+    latch, take = controller.ControllerNode._latch, controller.Measurements.take
 
-    def noted(self: controller.Controller, fault: str) -> None:
+    def noted(self: controller.ControllerNode, fault: str) -> None:
         now = time.monotonic_ns()
         latch(self, fault)
         with Path(os.environ[MARK]).open("a") as file:
             file.write(f"{now} {fault}\n")
 
-    def held(self: controller.Measurements) -> Iterator[tuple[int, Reading]]:
+    def held(self: controller.Measurements) -> Iterator[tuple[int, Measurement]]:
         arrived = list(take(self))
         if arrived:
             hold.pause()
         return iter(arrived)
 
-    controller.Controller._latch = noted  # type: ignore[method-assign]
+    controller.ControllerNode._latch = noted  # type: ignore[method-assign]
     controller.Measurements.take = held  # type: ignore[method-assign]
     return controller.main()
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from bench.driver_loop import Loop
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.limits import Fault
+from rsea_ros.hardware.limits import DeviceFault
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._devices import limits_of
 from rsea_ros.nodes.driver import TABLE
@@ -218,7 +218,7 @@ def _kill_supervisor(loop: Loop) -> None:
 HOST: dict[str, Callable[[Loop], float | None]] = {
     "stand_still": lambda loop: time.sleep(0.3),
     "kill_supervisor": _kill_supervisor,
-    "stop": lambda loop: loop.guarded.guard.trip(Fault("stopped")),
+    "stop": lambda loop: loop.guarded.guard.trip(DeviceFault("stopped")),
     "halt": lambda loop: setattr(loop.guarded.guard, "halted", True),
     "silence": lambda loop: 1.0 / RATE,
     "reboot": lambda loop: loop.device._motor.bus.reboot(),

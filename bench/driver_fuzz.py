@@ -10,7 +10,7 @@ import random
 import struct
 from pathlib import Path
 
-from rsea_ros.hardware.dynamixel.receiver import Receiver
+from rsea_ros.hardware.dynamixel.receiver import StatusFrameParser
 from rsea_ros.hardware.netft.records import Sequence, decode
 from rsea_ros.hardware.peer import protocol2
 
@@ -34,7 +34,7 @@ def _frames(strings: int) -> tuple[int, int, int]:
         packet = protocol2.status(1, 0, rng.randbytes(rng.choice((0, 3, 15, 16, 21))))
         damaged, same_length = _mutated(rng, packet) if k % 4 else (rng.randbytes(rng.randrange(60)), False)
         blind += same_length
-        for frame in Receiver().feed(damaged):
+        for frame in StatusFrameParser().feed(damaged):
             accepted += frame == packet
             wrong += frame != packet
     return accepted, wrong, blind

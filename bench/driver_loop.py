@@ -7,12 +7,11 @@ from collections.abc import Callable
 
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
-from rsea_ros.hardware.dynamixel.settings import usual_latency
+from rsea_ros.hardware.dynamixel.settings import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
-from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 STIFFNESS = 1530.456
@@ -25,10 +24,10 @@ class Loop:
                  latency: float = 0.0, limits: Limits | None = None) -> None:  # fmt: skip
         limits = limits or Limits(68.0, lost_cycles=lost_cycles)
         self.device = DynamixelNetft(
-            Motor(MotorSettings(bench.port, 4_000_000, latency=latency or usual_latency(rate))),
-            SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, ft_timeout), limits, STIFFNESS,
+            Motor(MotorConnection(bench.port, 4_000_000, latency=latency or usual_latency(rate))),
+            SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, ft_timeout), limits, STIFFNESS,
         )  # fmt: skip
-        self.guarded = Guarded(self.device, limits, rate)
+        self.guarded = GuardedDevice(self.device, limits, rate)
         self.guarded.open()
         self.guarded.enable()
         self._period, self._due = 1e9 / rate, float(time.monotonic_ns())

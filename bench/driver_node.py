@@ -56,9 +56,9 @@ def main() -> int:
     from rsea_ros.nodes._bench import Bench
 
     times = array("q")  # not objects, which the garbage collector would look at
-    step, publish = driver.Driver._step, Bench.publish
+    step, publish = driver.DriverNode._step, Bench.publish
 
-    def noted_step(self: driver.Driver, stamp: int) -> None:
+    def noted_step(self: driver.DriverNode, stamp: int) -> None:
         times.extend((stamp, time.monotonic_ns(), 0, 0))
         step(self, stamp)
 
@@ -67,7 +67,7 @@ def main() -> int:
         now = time.monotonic_ns()
         times[-2], times[-1] = state.stamp + shift - time.time_ns() + now, now
 
-    driver.Driver._step, Bench.publish = noted_step, noted_publish
+    driver.DriverNode._step, Bench.publish = noted_step, noted_publish
     atexit.register(lambda: np.save(os.environ[MARK], np.array(times).reshape(-1, 4)))
     return driver.main()
 

@@ -5,6 +5,8 @@
 
 A cell counts where its effect shows: where the rig alone, fitted, leaves more than the noise in some channel.
 Found: the effect is named, alone or among the rivals of a cause.
+Where it alone is named, z = (estimate - truth) / sigma of its parameters and of the rig's values says whether
+the intervals after a diagnosis are honest.
 """
 
 from __future__ import annotations
@@ -18,13 +20,19 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from effect_coverage_records import COMMANDS, made
+import numpy as np
+from effect_coverage_records import COMMANDS, RIG_VALUES, Made, made
 from independent.severities import SEVERITIES, SIZES
 from json_log import append_to_log, read_log
 
 from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.normal import Z95
 
+PERIODIC = ("phase", "cycles_per_revolution")
+"""Parameters with several values that mean the same."""
+DOUBTED = ", the simulation's own error included"
 SHOWS = 1.1
 """Times the noise that the fitted rig leaves, from which an effect shows."""
 MARKS = {"named": "+", "rival": "r", "other": "x", "none": "-", "hidden": ".", "error": "E"}
@@ -57,8 +65,6 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _play(args: argparse.Namespace) -> None:
-    import numpy as np
-
     done = {entry["cell"] for entry in read_log(args.log)}
     cells = list(product(args.effect or SIZES, args.work or COMMANDS, args.severity or SEVERITIES))
     order = np.random.default_rng(args.seed).permutation(len(cells))[: args.sample]
@@ -76,8 +82,8 @@ def _play(args: argparse.Namespace) -> None:
 def _outcome(effect: str, work: str, severity: str, args: argparse.Namespace) -> dict[str, Any]:
     start = time.perf_counter()
     try:
-        record, parameters = made(effect, work, severity, args.seed, args.duration)
-        result = diagnose([record], load_rig("paper_high_impedance"))
+        truth = made(effect, work, severity, args.seed, args.duration)
+        result = diagnose([truth.record], load_rig("paper_high_impedance"))
     except Exception:
         return {"outcome": "error", "error": traceback.format_exc(limit=-3), "seconds": 0.0}
     causes = [
@@ -95,8 +101,26 @@ def _outcome(effect: str, work: str, severity: str, args: argparse.Namespace) ->
         "causes": causes,
         "left": left,
         "verdict": result.verdict,
-        "parameters": dict(parameters),
+        "parameters": dict(truth.parameters),
+        "z": z_scores(result, truth) if [c["name"] for c in causes] == [effect] else {},
         "seconds": round(time.perf_counter() - start, 1),
+    }
+
+
+def z_scores(result: Diagnosis, truth: Made) -> dict[str, float]:
+    """Return how many sigmas each value of the rig and of the cause lies from its truth."""
+    (cause,) = result.causes
+    quantities = result.extended_rig.quantities
+    intervals = {name: (quantities[name].value, quantities[name].ci95) for name in truth.rig}
+    for name, e in cause.parameters.items():
+        intervals[name] = (e.value, e.statistical_ci95)
+        intervals[f"{name}{DOUBTED}"] = (e.value, e.ci95)
+    true = {**truth.rig, **truth.parameters}
+    return {
+        name: (value - true[of]) / ((ci95[1] - ci95[0]) / (2.0 * Z95))
+        for name, (value, ci95) in intervals.items()
+        if (of := name.removesuffix(DOUBTED)) in true and of not in PERIODIC
+        if ci95 is not None and ci95[0] < ci95[1]
     }
 
 
@@ -129,6 +153,25 @@ def _table(args: argparse.Namespace) -> None:
     print(f"\nmild, medium, strong; {', '.join(f'{m} {o}' for o, m in MARKS.items())}")
     print(f"found {len(found)} of {len(showing)} that show ({len(entries)} played): ", end="")
     print(f"{len(found) / max(len(showing), 1):.1%}; wrong and confirmed: {len(wrong)}")
+    _print_z_scores(entries)
+
+
+def _print_z_scores(entries: Sequence[dict[str, Any]]) -> None:
+    """Print the RMS of z of each value of the rig, of the causes' parameters, and of all."""
+    scored = [e["z"] for e in entries if e.get("z")]
+    groups: dict[str, list[float]] = {}
+    for name, z in (item for scores in scored for item in scores.items()):
+        of_cause = "causes" + DOUBTED * name.endswith(DOUBTED)
+        groups.setdefault(name if name in RIG_VALUES else of_cause, []).append(z)
+    groups["all of the noise alone"] = [z for s in scored for n, z in s.items() if not n.endswith(DOUBTED)]
+    print(f"\n| z over {len(scored)} records | values | RMS | median of abs(z) / 0.674 | abs(z) < 1.96, % |")
+    print("|---|--:|--:|--:|--:|")
+    for name, group in groups.items():
+        size = np.abs(group)
+        print(
+            f"| {name} | {len(group)} | {np.sqrt(np.mean(size**2)):.2f} | {np.median(size) / 0.6745:.2f} "
+            f"| {100.0 * np.mean(size < Z95):.0f} |"
+        )
 
 
 def _is_surely_wrong(entry: dict[str, Any]) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -26,20 +27,35 @@ from independent.solvers import _pieces, _rk4
 
 from rsea_ros.signals import FloatArray, Record
 
+RIG_VALUES = {
+    "rotor.reflected_inertia": "j_m",
+    "rotor.reflected_damping": "b_m",
+    "spring.stiffness": "k_s",
+    "spring.damping": "b_s",
+}
+"""Value of the rig, and what the second bench calls it."""
 STIFF, DAMPED = 900.0, 15.0
 """Gains of the closed loop on the deflection, N m/rad and N m s/rad."""
 SOFTNESS = 25.0 / 1500.0
 """Largest angle that the closed loop is asked for, rad."""
 
 
-def made(
-    effect: str, excitation: str, severity: str, seed: int, duration: float
-) -> tuple[Record, Mapping[str, float]]:
-    """Return a record (duration in s) and the parameters of what is hidden in it."""
+class Made(NamedTuple):
+    """A record, the parameters of what is hidden in it, and the true values of the rig, in SI units."""
+
+    record: Record
+    parameters: Mapping[str, float]
+    rig: Mapping[str, float]
+
+
+def made(effect: str, excitation: str, severity: str, seed: int, duration: float) -> Made:
+    """Return a record (duration in s) with its truth."""
     rng = np.random.default_rng([seed, *map(ord, effect + excitation + severity)])
     parameters = drawn_parameters(effect, severity, rng)
-    bench = hide(drawn_bench(rng), effect, parameters)
-    return record_command(bench, COMMANDS[excitation](bench, duration, rng), rng), parameters
+    drawn = drawn_bench(rng)
+    bench = hide(drawn, effect, parameters)
+    record = record_command(bench, COMMANDS[excitation](bench, duration, rng), rng)
+    return Made(record, parameters, {name: getattr(drawn.plant, n) for name, n in RIG_VALUES.items()})
 
 
 def _work(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:

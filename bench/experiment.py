@@ -38,11 +38,11 @@ from rsea_ros.experiment.causes import USUAL  # noqa: E402
 from rsea_ros.experiment.design import propose  # noqa: E402
 from rsea_ros.experiment.hypothesis import motion  # noqa: E402
 from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used  # noqa: E402
-from rsea_ros.experiment.proposal import Asked  # noqa: E402
+from rsea_ros.experiment.proposal import DesignRequest  # noqa: E402
 from rsea_ros.experiment.shape import at_rest_around  # noqa: E402
 from rsea_ros.experiment.weighing import weigh  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
-from rsea_ros.identification.excitation import Settings, chirp, ramped  # noqa: E402
+from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramped  # noqa: E402
 from rsea_ros.identification.workers import worker_pools  # noqa: E402
 from rsea_ros.model.rig_file import load_rig, save_rig  # noqa: E402
 from rsea_ros.model.simulation import synthesize  # noqa: E402
@@ -85,7 +85,9 @@ def is_shown(plain, bench):
 
 def fixed_chirp():
     """Return the paper's chirp without its noise, at the torque limit, N m."""
-    return chirp(Settings(rate=RATE, duration=CHIRP, amplitude=LIMITS.torque * 0.98, noise=0.0, low=0.05))
+    return chirp(
+        ExcitationSettings(rate=RATE, duration=CHIRP, amplitude=LIMITS.torque * 0.98, noise=0.0, low=0.05)
+    )
 
 
 class Fixed:
@@ -123,7 +125,7 @@ def random_multisine(rms, seed):
 
 def played(policy, first, weighing, bench, rig, rng, pools):
     """Return the outcome of a policy on a bench."""
-    asked = Asked(LIMITS, RATE, SHORTEST, probe=1.0, refine=8)
+    asked = DesignRequest(LIMITS, RATE, SHORTEST, probe=1.0, refine=8)
 
     def play(proposal):
         return record_command(bench, proposal.command, rng)
@@ -230,7 +232,7 @@ def limits(runs):
             _, bench, *_ = hidden(k * 7)
             first = record_command(bench, slow_work(), np.random.default_rng([18, k]))
             possible = weigh([first], rig, USUAL, run=pools.run).hypotheses(0.005)[:7]
-            asked = Asked(tight, RATE, probe=1.0, refine=0)
+            asked = DesignRequest(tight, RATE, probe=1.0, refine=0)
             designs.append((possible, propose(possible, asked, run=pools.run)))
         for k in range(runs):
             possible, proposal = designs[k % len(designs)]

@@ -31,7 +31,7 @@ from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.mujoco_play import play_mujoco
 from rsea_ros.exports.sdf import export_sdf
 from rsea_ros.exports.urdf import export_urdf
-from rsea_ros.identification.excitation import JOINT, Settings, excitation
+from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, rig_names
 from rsea_ros.signals import FloatArray
@@ -74,7 +74,7 @@ def _made(export: Callable[[Rig], object], name: str) -> object:
 
 def command(rig: Rig, seconds: float) -> FloatArray:
     """Return the chirp that is played, N m or rad."""
-    base = JOINT if rig.loop else Settings(amplitude=10.0, noise=2.0, high=60.0)
+    base = JOINT if rig.loop else ExcitationSettings(amplitude=10.0, noise=2.0, high=60.0)
     return excitation("chirp", replace(base, rate=RATE, duration=seconds, low=0.5))
 
 

@@ -14,12 +14,12 @@ import numpy as np
 from msg_adapters import write_record
 from rsea_ros.fleet.engine import Engine
 from rsea_ros.fleet.executor import Executor, Serial
-from rsea_ros.fleet.joints import Joint
+from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.sources import bags_of
 from rsea_ros.fleet.store import Store, TaskOutcome
-from rsea_ros.fleet.summary import Summary
+from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.task import Task, work
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig, rig_text
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
@@ -38,19 +38,19 @@ def make_fleet(folder: Path, count: int, seconds: float = 30.0) -> Path:
     rig, rng = load_rig(RIG), np.random.default_rng(1)
     for number in range(count):
         true = rig.with_values({n: rig[n] * (1.0 + SPREAD * rng.uniform(-1.0, 1.0)) for n in rig.free()})
-        u = excitation("chirp", Settings(rate=RATE, duration=seconds, seed=number))
+        u = excitation("chirp", ExcitationSettings(rate=RATE, duration=seconds, seed=number))
         record = synthesize(true, Channel(np.arange(len(u)) / RATE, u), seed=number)
         epoch = START_NS + number * WEEK_NS
         write_record(replace(record, epoch_ns=epoch), folder / f"knee-{number:03d}.mcap")
     return folder
 
 
-def knee() -> Joint:
+def knee() -> MappedJoint:
     """Return the joint of these recordings; a misfit is not diagnosed, so that each takes the same work."""
-    return Joint("knee", rig_text(load_rig(RIG)), diagnose="never")
+    return MappedJoint("knee", rig_text(load_rig(RIG)), diagnose="never")
 
 
-def run_real(store: Store, folder: Path, executor: Executor | None = None, cut: str = "") -> Summary:
+def run_real(store: Store, folder: Path, executor: Executor | None = None, cut: str = "") -> RunSummary:
     """Run the engine over real recordings. cut: truncate the one with this in its name while it is read."""
 
     def cutting(task: Task) -> TaskOutcome:

@@ -13,14 +13,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rsea_ros.fleet.engine import Engine, EngineLimits
 from rsea_ros.fleet.executor import Executor
-from rsea_ros.fleet.joints import Joint
+from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
 from rsea_ros.fleet.store import Store, TaskOutcome
-from rsea_ros.fleet.summary import Summary
+from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.task import Task
 
-KNEE = Joint("knee", "name: stub")
+KNEE = MappedJoint("knee", "name: stub")
 TAKES = "BENCH_TASK_S"
 """Environment variable: how long a stub task takes, s."""
 PARAMETERS = ("rotor.reflected_inertia", "rotor.reflected_damping", "spring.stiffness", "spring.damping")
@@ -64,7 +64,7 @@ def greedy(task: Task) -> TaskOutcome:
 
 def played(
     store: Store, folder: Path, executor: Executor, work=slow, limits: EngineLimits | None = None
-) -> Summary:
+) -> RunSummary:
     """Run the engine over a folder."""
     held = bags_of([str(folder)], [KNEE])
     return Engine(store, executor, work, lambda step, share: None, limits).run(held)

@@ -20,7 +20,7 @@ from scipy.signal import csd, welch
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from msg_adapters import read_record, write_record
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -36,7 +36,7 @@ def bench_record() -> Record:
     """Return the paper's run on a bench whose values differ from the rig's."""
     rig = load_rig("paper_high_impedance")
     true = rig.with_values({n: rig[n] * OFF for n in rig.free()})
-    u = excitation("chirp", Settings(rate=RATE, duration=DURATION))
+    u = excitation("chirp", ExcitationSettings(rate=RATE, duration=DURATION))
     return synthesize(true, Channel(np.arange(len(u)) / RATE, u), seed=1)
 
 

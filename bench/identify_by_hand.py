@@ -21,7 +21,7 @@ from scipy.signal import cont2discrete, lfilter
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
@@ -57,7 +57,7 @@ def _one(
     rig: Rig, true: FloatArray, duration: float, seed: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
     """Return relative errors by hand and by identify, the sigma that it states, and the seconds of both."""
-    u = excitation("chirp", Settings(rate=RATE, duration=duration))
+    u = excitation("chirp", ExcitationSettings(rate=RATE, duration=duration))
     bench = rig.with_values(dict(zip(NAMES, true, strict=True)))
     record = synthesize(bench, Channel(np.arange(len(u)) / RATE, u), seed=seed)
     start = time.perf_counter()

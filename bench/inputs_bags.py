@@ -11,7 +11,7 @@ import numpy as np
 
 from msg_adapters import write_record
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import measure, simulate
@@ -47,7 +47,7 @@ def command_of(case: Mapping[str, Any], rate: float, duration: float) -> FloatAr
         return _noise(size)
     if kind in ("white_noise", "chirp"):
         band = {"low": min(0.05, rate / 50.0), "high": 0.4 * rate}
-        return excitation(kind, Settings(rate=rate, duration=size / rate, seed=3, **band))
+        return excitation(kind, ExcitationSettings(rate=rate, duration=size / rate, seed=3, **band))
     made: dict[str, Callable[[], FloatArray]] = {
         "constant": lambda: np.full(size, 5.0),
         "zero": lambda: np.zeros(size),

@@ -15,6 +15,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))  # the second bench is a part of the tests
 
+from effect_coverage_records import RIG_VALUES
 from independent.bench import Bench, drawn_bench, record_run
 from scipy.signal import lfilter
 
@@ -24,13 +25,6 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record
 
 RIG = "paper_high_impedance"
-TRUTH = {
-    "rotor.reflected_inertia": "j_m",
-    "rotor.reflected_damping": "b_m",
-    "spring.stiffness": "k_s",
-    "spring.damping": "b_s",
-}
-"""Value of the rig, and what the second bench calls it."""
 COLOURED = {"ft": 0.06, "position": 1.5e-5}
 """RMS of the coloured noise, N m and rad."""
 CLOCKS = {"ft": "ft", "command": "command", "position": "joint", "velocity": "joint", "motor_torque": "joint"}
@@ -92,12 +86,12 @@ def outcome(name: str, seed: int, duration: float) -> tuple[Identification, dict
     excitation = ("chirp_noise", "multisine", "white_noise")[seed % 3]
     record = spoil(record_run(bench, seed, excitation, duration), np.random.default_rng(seed + 10_000))
     plant = bench.plant._asdict()
-    return identify([record], load_rig(RIG)), {n: plant[alias] for n, alias in TRUTH.items()}
+    return identify([record], load_rig(RIG)), {n: plant[alias] for n, alias in RIG_VALUES.items()}
 
 
 def row(name: str, seeds: Sequence[int], duration: float) -> str:
     """Return one line of the table: coverage by parameter, and the median half width of K_s."""
-    inside = dict.fromkeys(TRUTH, 0)
+    inside = dict.fromkeys(RIG_VALUES, 0)
     widths, ratios = [], []
     for seed in seeds:
         result, true = outcome(name, seed, duration)
@@ -107,7 +101,7 @@ def row(name: str, seeds: Sequence[int], duration: float) -> str:
                 if p.name == "spring.stiffness":
                     widths.append(50.0 * (p.ci95[1] - p.ci95[0]) / p.value)
         ratios.append(max(v / result.noise_rms[n] for n, v in result.residual_rms.items()))
-    shares = "".join(f"{100.0 * inside[n] / len(seeds):10.0f}" for n in TRUTH)
+    shares = "".join(f"{100.0 * inside[n] / len(seeds):10.0f}" for n in RIG_VALUES)
     return f"{name:30}{shares}{np.median(widths):14.3g}{np.median(ratios):12.2f}"
 
 

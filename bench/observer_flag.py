@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rsea_ros.model.observer import ErrorModel, Estimate, Observer
+from rsea_ros.model.observer import ErrorModel, Observer, TorqueEstimate
 from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
@@ -55,7 +55,7 @@ def _worst(rig: Rig, rate: float, error: ErrorModel, part: float) -> float:
             wrong = [
                 s - start
                 for s, y in zip(t, torque, strict=True)
-                if flag.take(s, Estimate(y, y, 0.0, error.sigma, 0.0, 0.0)) != right and s >= start
+                if flag.take(s, TorqueEstimate(y, y, 0.0, error.sigma, 0.0, 0.0)) != right and s >= start
             ]
             worst = max(worst, max(wrong, default=0.0) / allowed)
     return worst

@@ -11,7 +11,7 @@ import numpy as np
 from bench.observer_truth import true_run
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_over_end
-from rsea_ros.model.observer import Estimate, Observer, observe
+from rsea_ros.model.observer import Observer, TorqueEstimate, observe
 from rsea_ros.model.pure_torque_error import BEYOND, PURE, ErrorFlag, ErrorSettings
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
@@ -111,7 +111,7 @@ def outcome(rig: Rig, command: FloatArray, rate: float, settings: ErrorSettings,
     truth = true_run(rig, command, rate, seed=1)
     t, rows = observe(Observer(model), truth.record)
     flag = ErrorFlag(model, settings)
-    said = np.array([flag.take(s, Estimate._make(row)) for s, row in zip(t, rows, strict=True)])
+    said = np.array([flag.take(s, TorqueEstimate._make(row)) for s, row in zip(t, rows, strict=True)])
     share = windowed(truth.proximal - truth.distal, rate, settings.window)
     share /= np.maximum(windowed(truth.distal, rate, settings.window), 1e-9)
     keep = np.arange(len(share)) > SETTLE * rate
@@ -152,7 +152,7 @@ def latency(rig: Rig, before: float, after: float, rate: float) -> float:
             f = flag.edge.hz * (before if t < 1.5 else after)
             turn = np.exp(1j * (2.0 * np.pi * f * (t - 1.5) + phase))
             torque, other = 5.0 * turn.real, 5.0 * (turn / end(2j * np.pi * f)).real
-            verdict = flag.take(t, Estimate(torque, other, 0.0, 0.01, 0.01, 0.01))
+            verdict = flag.take(t, TorqueEstimate(torque, other, 0.0, 0.01, 0.01, 0.01))
             if verdict != right and t >= 1.5:
                 worst = max(worst, t - 1.5)
     return worst
@@ -172,7 +172,10 @@ def restless(rig: Rig) -> tuple[float, float]:
         other = np.fft.irfft(np.fft.rfft(torque) * inverse, count)
         judge = ErrorFlag(rig)
         pairs = zip(torque.tolist(), other.tolist(), strict=True)
-        said = [judge.take(k / rate, Estimate(d, p, 0.0, 0.01, 0.01, 0.01)) for k, (d, p) in enumerate(pairs)]
+        said = [
+            judge.take(k / rate, TorqueEstimate(d, p, 0.0, 0.01, 0.01, 0.01))
+            for k, (d, p) in enumerate(pairs)
+        ]
         worst = max(worst, (np.count_nonzero(np.diff(said[1000:])) / 59.0, float(top)))
     return worst
 

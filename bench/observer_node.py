@@ -39,9 +39,9 @@ def main() -> int:
 
         setattr(kind, name, take)
 
-    work = model.Model._work
+    work = model.ModelNode._work
 
-    def woken(self: model.Model) -> None:
+    def woken(self: model.ModelNode) -> None:
         spent[:], before = [0, 0], self._assess.count
         wall, cpu = time.perf_counter_ns(), time.thread_time_ns()
         work(self)
@@ -52,7 +52,7 @@ def main() -> int:
     noted(Observer, "_take")
     noted(PureTorque, "take")
     noted(ErrorFlag, "take")
-    model.Model._work = woken  # type: ignore[method-assign]
+    model.ModelNode._work = woken  # type: ignore[method-assign]
     atexit.register(lambda: np.save(os.environ[MARK], np.array(rows, dtype=np.int64).reshape(-1, 5)))
     return model.main()
 

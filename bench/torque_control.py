@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bench.torque_control_baselines import baselines
 from rsea_ros.cli.control import motors
-from rsea_ros.control.controller import Limits, Reading, TorqueController
+from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.harness import Arrivals, irregular
 from rsea_ros.control.human import measured
 from rsea_ros.control.impedance import moved
@@ -32,7 +32,7 @@ from rsea_ros.control.link import link_share
 from rsea_ros.control.loads import LOCKED, load_range, locked
 from rsea_ros.control.robustness import robustness
 from rsea_ros.control.study import study
-from rsea_ros.control.synthesis import Design, design
+from rsea_ros.control.synthesis import ControllerDesign, design
 from rsea_ros.control.trials import LEARNED, LONG, hardest, sine, tracked
 from rsea_ros.control.virtual import Virtual, passive_to, stiffest
 from rsea_ros.model.rig import Rig
@@ -80,7 +80,7 @@ def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     for found in designs(rig, loads, rates):
         share = link_share(rig, loads, found)
         for hz in (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0):
-            most = min(10.0, 0.8 * largest(free, hz, Limits().torque, math.inf))
+            most = min(10.0, 0.8 * largest(free, hz, TorqueLimits().torque, math.inf))
             errors = [
                 sine(free, locked(rig), found, part * most, hz, seconds=LONG, settle=LEARNED, link=link)
                 for link in (None, share)
@@ -152,7 +152,7 @@ def cost(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     for found in designs(rig, load_range(rig, free), rates):
         controller, times = TorqueController(rig, found.rate, found.gains), []
         for k in range(1000):
-            reading = Reading(math.sin(0.1 * k), 0.01 * math.cos(0.1 * k), 0.0, 1.0)
+            reading = Measurement(math.sin(0.1 * k), 0.01 * math.cos(0.1 * k), 0.0, 1.0)
             begin = time.perf_counter()
             controller.step(reading, math.sin(0.1 * k))
             times.append(time.perf_counter() - begin)
@@ -161,7 +161,7 @@ def cost(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
         yield f"{found.rate:g} Hz: {1e6 * middle:.0f} µs a step, {part}"
 
 
-def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[Design]:
+def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[ControllerDesign]:
     """Return the design at each rate."""
     return [design(rig, loads, rate) for rate in rates]
 

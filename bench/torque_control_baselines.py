@@ -23,12 +23,12 @@ from functools import partial
 
 import numpy as np
 
-from rsea_ros.control.controller import Limits, Reading, TorqueController
+from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.trials import amplitude_of, disturbed
-from rsea_ros.control.uncertainty import Case, bench
+from rsea_ros.control.uncertainty import BenchVariant, bench
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Plant
 
@@ -122,21 +122,21 @@ METHODS: dict[str, Callable[[Rig, float], Step]] = {
 }  # fmt: skip
 
 
-def cases(loads: Sequence[str]) -> dict[str, Case]:
+def cases(loads: Sequence[str]) -> dict[str, BenchVariant]:
     """Return the benches of the page."""
     return {
-        "locked": Case(LOCKED),
-        "free": Case("free x 1"),
-        "free, half": Case("free x 0.5"),
-        "locked, K_s + 10 %, b_m - 50 %": Case(LOCKED, 1.1, 0.5),
-        "locked, a sample and 2 ms late": Case(LOCKED, 1.0, 1.0, 1, 2e-3),
-        "locked, all of it and the mode": Case(LOCKED, 1.1, 0.5, 1, 2e-3, 0.3),
+        "locked": BenchVariant(LOCKED),
+        "free": BenchVariant("free x 1"),
+        "free, half": BenchVariant("free x 0.5"),
+        "locked, K_s + 10 %, b_m - 50 %": BenchVariant(LOCKED, 1.1, 0.5),
+        "locked, a sample and 2 ms late": BenchVariant(LOCKED, 1.0, 1.0, 1, 2e-3),
+        "locked, all of it and the mode": BenchVariant(LOCKED, 1.1, 0.5, 1, 2e-3, 0.3),
     }
 
 
 def error_of(step: Step, true: Rig, rate: float, amplitude: float, late: int) -> float:
     """Return the error of a sine of 5 Hz from 3 s on, over its RMS; above 1 it is of no use."""
-    plant, limit = Plant(true, rate), Limits().torque
+    plant, limit = Plant(true, rate), TorqueLimits().torque
     sample, pending, errors = plant.step(0.0), [0.0] * (1 + late), []
     for k in range(round(4.0 * rate)):
         wanted = amplitude * min(1.0, 4.0 * k / rate) ** 2 * math.sin(2.0 * math.pi * 5.0 * k / rate)
@@ -150,7 +150,7 @@ def error_of(step: Step, true: Rig, rate: float, amplitude: float, late: int) ->
 def ours(rig: Rig, rate: float, gains: Gains) -> Step:
     """Return this project's controller as the others are called."""
     controller = TorqueController(rig, rate, gains)
-    return lambda ft, velocity, r: controller.step(Reading(ft, velocity, 0.0), r)
+    return lambda ft, velocity, r: controller.step(Measurement(ft, velocity, 0.0), r)
 
 
 def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:

@@ -12,6 +12,7 @@ from msg_adapters import mcap_file, metadata, sqlite_file
 from msg_adapters.compression import ERRORS, ZSTD_MAGIC, Allowance, unpack_file, unpack_message
 from msg_adapters.contents import AND, Contents, Messages
 from rsea_ros.errors import BagError
+from rsea_ros.wording import brief
 
 SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
     ".mcap": mcap_file.scan,
@@ -22,6 +23,8 @@ TABLES = (".csv", ".tsv", ".txt", ".dat", ".mat", ".npz", ".npy", ".json", ".par
 """Suffixes of files that `rsea import` converts."""
 
 BagPath = str | Path
+_MOST_NAMED = 5
+"""Files that a message lists."""
 
 
 def read_contents(paths: BagPath | Sequence[BagPath], wanted: Collection[str] | None = None) -> Contents:
@@ -79,6 +82,7 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
     files = known.files or sorted(file for file in path.iterdir() if _suffix(file) in SCANNERS)
     if not files:
         raise BagError(f"{path}: no bag, expected a directory with .mcap or .db3 files")
+    _tell_unnamed(path, files, contents)
     parts = _scan_all(files, contents)
     contents.notes.extend(known.remarks.notes)
     contents.faults.extend(known.remarks.faults)
@@ -88,6 +92,15 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
     for topic, expected in known.counts.items():
         contents.compare(topic, expected, read[topic], metadata.NAME)
     return parts
+
+
+def _tell_unnamed(folder: Path, files: Sequence[Path], contents: Contents) -> None:
+    """Report the storage files of a folder that are not read because metadata.yaml does not name them."""
+    read = ", ".join(file.name for file in files[:_MOST_NAMED])
+    for file in sorted(folder.iterdir()):
+        if file not in files and _suffix(file) in SCANNERS:
+            detail = f"left out: {metadata.NAME} names {read} only; give {brief(file.name)} itself to read it"
+            contents.tell("unnamed_file", file.name, detail)
 
 
 def _scan_all(files: Sequence[Path], contents: Contents) -> list[Contents]:

@@ -28,7 +28,7 @@ _MANY = 32
 
 
 @dataclass(frozen=True)
-class Layout:
+class MessageLayout:
     """Where the numbers of a message lie.
 
     names: joints. fields: name -> (first byte, count of doubles). order: '<' or '>'.
@@ -50,7 +50,7 @@ class Block:
 
     rows: IntArray
     matrix: ByteMatrix
-    layout: Layout
+    layout: MessageLayout
 
     def stamps(self) -> IntArray:
         """Return the header stamps, ns, shape (n,)."""
@@ -125,7 +125,7 @@ class Walk:
         return (self._take(8 * count, 8) if count else self.at, count)
 
 
-def layout_of(raw: bytes, msgtype: str) -> Layout:
+def layout_of(raw: bytes, msgtype: str) -> MessageLayout:
     """Walk one serialised JointState or WrenchStamped. Raises ValueError for a damaged message."""
     walk = Walk(raw)
     walk.stamp_and_frame()
@@ -135,7 +135,7 @@ def layout_of(raw: bytes, msgtype: str) -> Layout:
     else:
         names = tuple([walk.name() for _ in range(walk.count())])
         fields = {name: walk.doubles(walk.count()) for name in ("position", "velocity", "effort")}
-    return Layout(names, fields, walk.order, tuple(walk.structure), walk.at)
+    return MessageLayout(names, fields, walk.order, tuple(walk.structure), walk.at)
 
 
 def blocks(
@@ -177,7 +177,7 @@ def _of_one_length(
         rows, matrix = rows[~same], matrix[~same]
         if not rows.size:
             return
-    groups: dict[tuple[object, ...], tuple[Layout, list[int]]] = {}
+    groups: dict[tuple[object, ...], tuple[MessageLayout, list[int]]] = {}
     for place, row in enumerate(rows.tolist()):
         layout = _layout_or_reason(messages[row], msgtype)
         if isinstance(layout, str):
@@ -189,7 +189,7 @@ def _of_one_length(
         yield Block(rows[places], matrix[places], layout)
 
 
-def _layout_or_reason(raw: bytes, msgtype: str) -> Layout | str:
+def _layout_or_reason(raw: bytes, msgtype: str) -> MessageLayout | str:
     try:
         return layout_of(raw, msgtype)
     except ValueError as error:

@@ -13,7 +13,7 @@ from rsea_ros.signals import Fault, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
-class Series:
+class FieldSamples:
     """One field of one topic: stamps in ns and values, both (n,); `where` is file, topic and field."""
 
     where: str
@@ -21,7 +21,7 @@ class Series:
     values: FloatArray
 
 
-def check_finite(series: Series) -> None:
+def check_finite(series: FieldSamples) -> None:
     """Raises BagError for a value that is not finite."""
     bad = np.flatnonzero(~np.isfinite(series.values))
     if bad.size:
@@ -32,7 +32,7 @@ def check_finite(series: Series) -> None:
         )
 
 
-def note_repeats(series: Series, notes: list[str]) -> None:
+def note_repeats(series: FieldSamples, notes: list[str]) -> None:
     """Leave a note of stamps that repeat."""
     repeats = np.count_nonzero(np.diff(np.sort(series.stamps)) == 0)
     if repeats:
@@ -40,7 +40,9 @@ def note_repeats(series: Series, notes: list[str]) -> None:
         notes.append(f"{series.where}: {repeats} of {total} stamps repeat, the first of each kept")
 
 
-def on_the_clock_of_the_command(series: Mapping[str, Series], told: Contents) -> dict[str, Series]:
+def on_the_clock_of_the_command(
+    series: Mapping[str, FieldSamples], told: Contents
+) -> dict[str, FieldSamples]:
     """Leave out channels without a moment in common with the command: their stamps come from another clock.
 
     A simulation from the command's first stamp to their last would go through all the years between.

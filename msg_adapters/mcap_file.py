@@ -35,7 +35,7 @@ from msg_adapters.mcap_records import (
     number,
     text,
 )
-from msg_adapters.mcap_summary import Summary, read_summary, take_statistics
+from msg_adapters.mcap_summary import McapSummary, read_summary, take_statistics
 from msg_adapters.remarks import NAME as REMARKS
 from msg_adapters.remarks import remarks_of
 
@@ -70,7 +70,7 @@ class _Scanner:
     Schemas and channels repeated in the summary replace damaged records.
     """
 
-    def __init__(self, contents: Contents, summary: Summary, allowance: Allowance) -> None:
+    def __init__(self, contents: Contents, summary: McapSummary, allowance: Allowance) -> None:
         self.contents, self.summary, self.allowance = contents, summary, allowance
         self.damage = Damage()
         self.declared = Declarations()

@@ -25,7 +25,7 @@ NO_END = "it does not end with a footer"
 
 
 @dataclass
-class Summary:
+class McapSummary:
     """counts: messages by channel. total: of all channels. chunks: first byte of each, rising.
 
     damage: why it cannot be trusted, empty where it can.
@@ -38,30 +38,30 @@ class Summary:
     damage: str = ""
 
 
-def read_summary(buffer: Buffer) -> Summary:
+def read_summary(buffer: Buffer) -> McapSummary:
     """Return the summary of a file; an empty one where it has none."""
-    summary = Summary()
+    summary = McapSummary()
     footer = len(buffer) - len(MAGIC) - RECORD.size - FOOTER_CONTENT.size
     if footer < len(MAGIC) or buffer[-len(MAGIC) :] != MAGIC:
-        return Summary(damage=NO_END)
+        return McapSummary(damage=NO_END)
     if RECORD.unpack_from(buffer, footer) != (FOOTER, FOOTER_CONTENT.size):
-        return Summary(damage=NO_END)
+        return McapSummary(damage=NO_END)
     start, _, checksum = FOOTER_CONTENT.unpack_from(buffer, footer + RECORD.size)
     if start == 0:
         return summary
     if not len(MAGIC) <= start <= footer:
-        return Summary(damage=f"the footer places the summary at byte {start}, behind its own {footer}")
+        return McapSummary(damage=f"the footer places the summary at byte {start}, behind its own {footer}")
     end = footer + RECORD.size + FOOTER_CONTENT.size - 4
     if checksum and zlib.crc32(buffer[start:end]) != checksum:
-        return Summary(damage="the checksum of the summary does not fit its content")
+        return McapSummary(damage="the checksum of the summary does not fit its content")
     try:
         _records(buffer, start, footer, summary)
     except (ValueError, struct.error) as error:
-        return Summary(damage=f"the summary is damaged: {error}")
+        return McapSummary(damage=f"the summary is damaged: {error}")
     return summary
 
 
-def _records(buffer: Buffer, at: int, stop: int, summary: Summary) -> None:
+def _records(buffer: Buffer, at: int, stop: int, summary: McapSummary) -> None:
     while at < stop:
         opcode, size = RECORD.unpack_from(buffer, at)
         first = at + RECORD.size
@@ -79,7 +79,7 @@ def _records(buffer: Buffer, at: int, stop: int, summary: Summary) -> None:
     summary.chunks.sort()
 
 
-def take_statistics(buffer: Buffer, first: int, stop: int, summary: Summary) -> None:
+def take_statistics(buffer: Buffer, first: int, stop: int, summary: McapSummary) -> None:
     """Read a STATISTICS record. Raises ValueError for a damaged one."""
     if first + STATISTICS_HEAD.size > stop:
         raise ValueError("the statistics end too early")

@@ -10,7 +10,7 @@ import math
 import struct
 from collections.abc import Sequence
 
-from msg_adapters.cdr import STAMP, Layout, layout_of
+from msg_adapters.cdr import STAMP, MessageLayout, layout_of
 from rsea_ros.errors import ParameterError
 from rsea_ros.wording import brief
 
@@ -95,7 +95,7 @@ class RawWriter:
         return bytes(self._bytes)
 
 
-def _position(layout: Layout, name: str, index: int) -> int:
+def _position(layout: MessageLayout, name: str, index: int) -> int:
     """Return the first byte of a number, 0 where the message does not have it."""
     first, count = layout.fields[name]
     return first + 8 * index if index < count else 0

@@ -9,7 +9,7 @@ import numpy as np
 
 from msg_adapters.bags import BagPath, read_contents
 from msg_adapters.cdr import Block
-from msg_adapters.checks import Series, check_finite, note_repeats, on_the_clock_of_the_command
+from msg_adapters.checks import FieldSamples, check_finite, note_repeats, on_the_clock_of_the_command
 from msg_adapters.contents import Contents, Messages
 from msg_adapters.decoding import Decoded
 from msg_adapters.health import DIAGNOSTICS, tell_health
@@ -58,7 +58,7 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
     """Make a record of serialised messages, wherever they came from; see read_record."""
     _require(source, contents, topics, strict)
     report = replace(contents, notes=list(contents.notes), faults=list(contents.faults))
-    series: dict[str, Series] = {}
+    series: dict[str, FieldSamples] = {}
     roles = [role for role in ROLES if role != "ft" or not is_inferred(contents, topics)]
     if len(roles) < len(ROLES):
         made = f"{topics.topic('ft')}: no sensor's, the stiffness of a rig times {topics.topic('deflection')}"
@@ -77,7 +77,7 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
     return _record(series, source, report, strict)
 
 
-def _record(series: Mapping[str, Series], source: str, told: Contents, strict: bool) -> Record:
+def _record(series: Mapping[str, FieldSamples], source: str, told: Contents, strict: bool) -> Record:
     """Put the series on one clock, in order."""
     epoch = min(int(one.stamps.min()) for one in series.values())
     channels: dict[str, Channel] = {}
@@ -128,7 +128,7 @@ def _held(contents: Contents) -> str:
     return ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics) or "no topic at all"
 
 
-def _require_values(source: str, series: Mapping[str, Series], strict: bool, told: Contents) -> None:
+def _require_values(source: str, series: Mapping[str, FieldSamples], strict: bool, told: Contents) -> None:
     """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
     if strict and "command" not in series and "reference" not in series:
         raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N m")
@@ -141,7 +141,7 @@ def _require_values(source: str, series: Mapping[str, Series], strict: bool, tol
 
 def _series(
     source: str, role: str, messages: Messages, topics: TopicMap, told: Contents
-) -> dict[str, Series]:
+) -> dict[str, FieldSamples]:
     """Decode one topic: channel -> series. A field that no message fills is left out."""
     topic = topics.topic(role)
     where = f"{source}: {topic}"
@@ -155,7 +155,7 @@ def _series(
     series = {}
     for channel, field in FIELDS[role].items():
         filled = decoded.filled[field]
-        one = Series(f"{where} {field}", stamps[filled], decoded.values[field][filled])
+        one = FieldSamples(f"{where} {field}", stamps[filled], decoded.values[field][filled])
         if np.isnan(one.values).all():
             if one.values.size:
                 told.notes.append(f"{one.where}: not a number in every message, taken as not measured")
@@ -163,7 +163,7 @@ def _series(
         stray = far_apart(one.stamps)
         if stray.any():
             told.faults.append(stray_fault(stray, channel))
-            one = Series(one.where, one.stamps[~stray], one.values[~stray])
+            one = FieldSamples(one.where, one.stamps[~stray], one.values[~stray])
         series[channel] = one
     return series
 

@@ -16,7 +16,7 @@ from rsea_ros.wording import brief
 
 NAME = "rsea"
 NOTES, FAULTS = "rsea_notes", "rsea_faults"
-KEPT = frozenset({"rows_left_out", "missing_values"})
+KEPT = frozenset({"rows_left_out", "missing_values", "coarse_stamps"})
 """Faults that no reader of the bag could find again."""
 _LONGEST, _MOST = 500, 50
 

@@ -37,7 +37,7 @@ _NO_NUMBERS = "cbmMSUV"
 """Kinds of numpy arrays that numpy would turn into numbers that nobody meant."""
 
 
-class Table(Protocol):
+class NamedColumns(Protocol):
     """A table with named columns, such as a pandas or Polars DataFrame."""
 
     def __getitem__(self, name: str, /) -> Any: ...
@@ -66,7 +66,7 @@ def record_from_arrays(t: npt.ArrayLike, source: str, channels: Mapping[str, npt
     return Record({name: Channel(stamps - stamps[0], y) for name, y in values.items()}, source)
 
 
-def record_from_table(table: Table, columns: Mapping[str, str], time: str, source: str) -> Record:
+def record_from_table(table: NamedColumns, columns: Mapping[str, str], time: str, source: str) -> Record:
     """Return a record of named columns. columns: column by channel; time: the column of the stamps, s.
 
     Raises ChannelError for a column that the table lacks, and as record_from_arrays does.
@@ -118,7 +118,7 @@ def _check_stamps(stamps: FloatArray, source: str) -> None:
         )
 
 
-def _column(table: Table, column: str, source: str) -> Any:
+def _column(table: NamedColumns, column: str, source: str) -> Any:
     try:
         return table[column]
     except (KeyError, IndexError, ValueError) as error:

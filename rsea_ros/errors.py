@@ -47,6 +47,10 @@ class IdentificationError(RseaError, ValueError):
     """Data that cannot give the requested parameters."""
 
 
+class BenchmarkError(RseaError, ValueError):
+    """A data set, a truth or answers of the cause-naming benchmark that are not as its rules say."""
+
+
 class OutputError(RseaError, OSError):
     """A file that cannot be written: its name is taken, or it is an input."""
 

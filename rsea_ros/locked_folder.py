@@ -37,7 +37,7 @@ class LockedFolder:
 
 
 @dataclass(frozen=True)
-class Left:
+class AbandonedFolder:
     """A folder whose process is gone. changed: s since the epoch, when a name in it last changed."""
 
     path: Path
@@ -69,7 +69,7 @@ def make_locked(parent: Path, kind: str, mode: int = 0o700) -> LockedFolder:
     return LockedFolder(path, lock)
 
 
-def left(parent: Path, kind: str) -> Iterator[Left]:
+def left(parent: Path, kind: str) -> Iterator[AbandonedFolder]:
     """Yield folders of a kind and of this user in a folder whose process is gone; each is locked meanwhile.
 
     Safe for two processes at once, and beside running writers: the lock of a folder is held while it is
@@ -81,7 +81,7 @@ def left(parent: Path, kind: str) -> Iterator[Left]:
     for entry in entries:
         with suppress(OSError), _locked(Path(entry)) as folder:
             if folder.st_uid == os.geteuid():
-                yield Left(Path(entry), folder.st_mtime)
+                yield AbandonedFolder(Path(entry), folder.st_mtime)
 
 
 @contextmanager

@@ -29,7 +29,7 @@ from rsea_ros.staging import Stage, make_stage
 
 
 @dataclass(frozen=True)
-class Place:
+class Destination:
     """Where results go.
 
     force: files that exist may be replaced. fresh: the first of NAME, NAME-2, NAME-3, … that does not exist.
@@ -47,8 +47,8 @@ class NewFiles:
     Raises OutputError for a name that is taken, OSError where the system refuses; both name the final file.
     """
 
-    def __init__(self, place: Place | str | Path) -> None:
-        self._place = place if isinstance(place, Place) else Place(Path(place))
+    def __init__(self, place: Destination | str | Path) -> None:
+        self._place = place if isinstance(place, Destination) else Destination(Path(place))
         self.folder = self._place.folder
         self._names: list[str] = []
         self._made: list[Path] = []
@@ -122,7 +122,7 @@ def write_file(path: str | Path, content: str | bytes, *, force: bool = False) -
     """Write one file into a folder that exists, and return its path. Raises as NewFiles does."""
     with naming(Path(path)):
         Path(path).parent.stat()
-    with NewFiles(Place(Path(path).parent, force)) as new:
+    with NewFiles(Destination(Path(path).parent, force)) as new:
         return new.write(Path(path).name, content)
 
 
@@ -164,9 +164,9 @@ def check_free(
 
 
 def _touches(path: Path, one: Path) -> bool:
-    """Return whether a path is an input, by any name, or lies directly in it."""
-    whole = one.resolve()
-    return whole in (path.resolve(), path.resolve().parent) or (path.exists() and path.samefile(one))
+    """Return whether a path is an input, by any name, or lies in it."""
+    whole, place = one.resolve(), path.resolve()
+    return whole in (place, *place.parents) or (path.exists() and path.samefile(one))
 
 
 def _name_finally(error: BaseException | None, stage: Path, folder: Path) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from rsea_ros.locked_folder import Left, LockedFolder, left, make_locked, new_name
+from rsea_ros.locked_folder import AbandonedFolder, LockedFolder, left, make_locked, new_name
 
 KIND, REMOVABLE = "old", "stage"
 """A folder of the first kind is put back, one of the second is removed by the next writer."""
@@ -70,7 +70,7 @@ def put_back(parent: Path) -> None:
                 folder.path.rmdir()
 
 
-def _put_back(old: Path, target: Path, folder: Left) -> None:
+def _put_back(old: Path, target: Path, folder: AbandonedFolder) -> None:
     """Give one file or folder its name back. Raises OSError."""
     if not os.path.lexists(target):
         os.rename(old, target)

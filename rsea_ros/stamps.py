@@ -8,6 +8,7 @@ density: late samples are never denser in time than the ticks of the clock.
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -45,6 +46,11 @@ LONGEST_PAUSE_NS = _LONGEST_PAUSE * 1e9
 _FEW = 0.01
 """Share of a channel's samples that lie far from all others: they are stray, not the run."""
 
+_FEWEST = 10
+"""Samples of a channel: fewer say little of when it started."""
+_ABSENT, _ABSENT_PERIODS, _ABSENT_SHARE = 0.5, 10.0, 0.02
+"""s, sample periods, and share of the run: as late as that a sensor may start, by the start of a recorder."""
+
 _EXPLAIN_GAPS = ("duplicate_stamps", "dropped_samples")
 """Kinds of faults that include the gaps once they are reported."""
 
@@ -69,9 +75,41 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         _check_even(channel, f"{record.source}: {name}")
         faults += _dropped(channel, name, int(repeated.sum()))
         channels[name] = channel
+    repaired = record.with_channels(**channels)
     explained = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}
     new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in explained]
-    return record.with_channels(**channels), new
+    return repaired, [*new, *(fault for fault in _absent(repaired) if fault not in record.faults)]
+
+
+def _absent(record: Record) -> list[Fault]:
+    """Return a fault for each sensor that starts late or ends early, and for commands that end early.
+
+    Commands that start after the sensors are usual: the bench runs before its excitation does.
+    """
+    driving = record.driving
+    if driving is None or len(driving) < _FEWEST:
+        return []
+    last = max(float(c.t[-1]) for c in record.channels.values() if len(c))
+    faults = []
+    for name, channel in record.channels.items():
+        if len(channel) < _FEWEST:
+            continue
+        start, stop = (driving.t[0], driving.t[-1]) if channel is not driving else (channel.t[0], last)
+        longest = max(_ABSENT, _ABSENT_PERIODS * _period(channel.t), _ABSENT_SHARE * float(stop - start))
+        late, early = float(channel.t[0] - start), float(stop - channel.t[-1])
+        spans = [(late, start, channel.t[0])] if late > longest else []
+        spans += [(early, channel.t[-1], stop)] if early > longest else []
+        if spans:
+            held = ", the last command is held" if channel is driving else ""
+            faults.append(_absence(name, spans, float(stop - start), held))
+    return faults
+
+
+def _absence(name: str, spans: Sequence[tuple[float, float, float]], whole: float, then: str) -> Fault:
+    """Return the fault of the spans without a channel: length, begin and end each, s. whole: the run, s."""
+    lost = sum(length for length, _, _ in spans)
+    detail = " and ".join(f"nothing from {a:.4g} s to {b:.4g} s" for _, a, b in spans)
+    return Fault("partly_recorded", name, lost / whole, detail + then, lost, "s")
 
 
 def _repeat(t: FloatArray) -> float:

@@ -57,6 +57,7 @@ OWN = {
     "exports": BASE | {"effects", "model", "design"},
     "paper": BASE | {"effects", "model", "identification", "design"},
     "watch": BASE,
+    "benchmark": CORE,
     "hardware": BASE,
     "hardware.simulated": BASE | {"model"},
     "msg_adapters": BASE,
@@ -67,7 +68,7 @@ OWN = {
     "nodes": CORE | AROUND | {"hardware", "report", "msg_adapters", "one_thread", "watch"},
     "cli": CORE
     | AROUND
-    | {"paper", "hardware", "report", "msg_adapters", "nodes", "one_thread", "fleet", "watch"},
+    | {"paper", "hardware", "report", "msg_adapters", "nodes", "one_thread", "fleet", "watch", "benchmark"},
     "__main__": {"cli"},
     "__init__": CORE | {"library"},
     "compiler_cache": set(),
@@ -143,6 +144,7 @@ FOREIGN = {
     "exports": NUMERIC | {"mujoco", "fmpy", "pythonfmu3"},
     "paper": NUMERIC,
     "watch": {"tornado"},
+    "benchmark": {"numpy"},
     "signals": {"numpy"},
     "arrays": {"numpy"},
     "library": {"numpy", "plotly", "rich"},

@@ -153,11 +153,11 @@ def test_an_impossible_command_is_refused(tmp_path, capsys, arguments, words):
 
 
 def test_a_rig_without_noise_is_controlled(tmp_path):
-    from rsea_ros.control.trials import Trial, restlessness
+    from rsea_ros.control.trials import TrialResult, restlessness
 
     value = restlessness(load_rig("cycloidal"), design=None)
     assert np.isnan(value)
-    assert Trial("held", value, "1", 1.1).met is None
+    assert TrialResult("held", value, "1", 1.1).met is None
 
 
 def test_a_simulation_that_runs_away_is_refused():

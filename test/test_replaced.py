@@ -12,7 +12,7 @@ import pytest
 
 from rsea_ros import files, replaced
 from rsea_ros.locked_folder import LEFT_AFTER, make_locked, name_of
-from rsea_ros.new_files import NewFiles, Place, check_free
+from rsea_ros.new_files import Destination, NewFiles, check_free
 from rsea_ros.replaced import KIND, put_back
 from rsea_ros.staging import make_stage, remove_left
 
@@ -169,7 +169,7 @@ def test_a_restored_name_is_refused_before_any_work(tmp_path):
 
 def test_the_next_results_clear_up_first(tmp_path):
     aside(tmp_path, "a")
-    with NewFiles(Place(tmp_path, force=True)) as new:
+    with NewFiles(Destination(tmp_path, force=True)) as new:
         new.write("b", "new")
     assert texts(tmp_path) == {"a": "old", "b": "new"}
 

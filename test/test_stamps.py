@@ -127,3 +127,27 @@ def test_a_log_polled_at_two_intervals_lost_nothing():
     kept = 4.2e-3 * (np.arange(2000) + 0.05 * rng.normal(size=2000))[lost]
     (fault,) = repair_stamps(Record({"ft": Channel(kept, np.sin(kept))}))[1]
     assert (fault.kind, fault.size) == ("dropped_samples", pytest.approx(100, abs=2))
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "detail"),
+    [
+        (4.0, 8.0, "nothing from 0 s to 4 s"),
+        (0.0, 3.0, "nothing from 3 s to 7.139 s"),
+        (2.0, 3.0, "nothing from 0 s to 2 s and nothing from 3 s to 7.139 s"),
+    ],
+)
+def test_a_sensor_that_starts_late_or_ends_early_is_reported_once(start, stop, detail):
+    even = np.arange(COUNT) * PERIOD
+    record, faults = repair_stamps(_record(even[(even >= start) & (even <= stop)]))
+    assert [(f.kind, f.channel, f.detail) for f in faults] == [("partly_recorded", "ft", detail)]
+    again = Record(record.channels, faults=tuple(faults))
+    assert repair_stamps(again)[1] == []
+
+
+def test_commands_that_end_early_are_reported_and_commands_that_start_late_are_not():
+    even = np.arange(COUNT) * PERIOD
+    assert repair_stamps(_record(even, command=even[even > 2.0]))[1] == []
+    ((fault,),) = (repair_stamps(_record(even, command=even[even < 5.0]))[1],)
+    assert (fault.kind, fault.channel) == ("partly_recorded", "command")
+    assert fault.detail == "nothing from 4.996 s to 7.14 s, the last command is held"

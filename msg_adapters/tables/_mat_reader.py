@@ -16,14 +16,18 @@ DAMAGED = "no MAT file that can be read, expected one up to version 7; a damaged
 _PART = re.compile(r"(?P<name>[^()]+)(?:\((?P<number>[0-9]{1,6})\))?")
 
 
-class Refused(ValueError):
+class VariableRefused(ValueError):
     """The kind of a variable, and the expected one."""
+
+
+REFUSED = VariableRefused
+"""What `read` raises for a column that holds no numbers; `_child.py` passes its words on."""
 
 
 def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int], list[Any]]:
     """Return the sizes of the vectors, and the vectors.
 
-    Raises Refused for anything but vectors of numbers.
+    Raises VariableRefused for anything but vectors of numbers.
     """
     from scipy.io import loadmat, whosmat
 
@@ -55,7 +59,9 @@ def check(place: dict[str, Any], shapes: dict[str, Any], most: int) -> None:
         expected = kind not in ("cell", "struct", "object", "opaque", "char")
         _check_shape(place, shape, kind, is_number=expected)
     if size > most:
-        raise Refused(f"variable {place['column']!r} has {size:.0f} values, expected fewer than {most}")
+        raise VariableRefused(
+            f"variable {place['column']!r} has {size:.0f} values, expected fewer than {most}"
+        )
 
 
 def vector(place: dict[str, Any], variables: dict[str, Any]) -> Any:
@@ -76,11 +82,13 @@ def _descended(place: dict[str, Any], variables: dict[str, Any]) -> Any:
     for at, part in enumerate(place["base"].split(".")):
         match = _PART.fullmatch(part)
         if match is None:
-            raise Refused(f"column {place['column']!r}: {part!r} is no name, expected log.motor(2).t")
+            raise VariableRefused(f"column {place['column']!r}: {part!r} is no name, expected log.motor(2).t")
         if at:
             names = getattr(getattr(value, "dtype", None), "names", None)
             if names is None:
-                raise Refused(f"column {place['column']!r}: {way} is not a struct, expected one with {part}")
+                raise VariableRefused(
+                    f"column {place['column']!r}: {way} is not a struct, expected one with {part}"
+                )
             if match["name"] not in names:
                 raise KeyError(f"{way}.{match['name']}", [f"{way}.{name}" for name in names])
             value = _single(value, way)[match["name"]]
@@ -89,15 +97,17 @@ def _descended(place: dict[str, Any], variables: dict[str, Any]) -> Any:
         way = f"{way}.{part}" if at else part
         if match["number"] is not None:
             if not 1 <= int(match["number"]) <= value.size:
-                raise Refused(f"{way} of {value.size}, expected a number from 1")
+                raise VariableRefused(f"{way} of {value.size}, expected a number from 1")
             value = value.ravel(order="F")[int(match["number"]) - 1 : int(match["number"])]
     return value
 
 
 def _single(value: Any, way: str) -> Any:
-    """Return the one struct of an array of them. Raises Refused for several."""
+    """Return the one struct of an array of them. Raises VariableRefused for several."""
     if value.size != 1:
-        raise Refused(f"{way} is an array of {value.size} structs, expected which: {way}(1), {way}(2), …")
+        raise VariableRefused(
+            f"{way} is an array of {value.size} structs, expected which: {way}(1), {way}(2), …"
+        )
     return value.ravel()[0]
 
 
@@ -115,7 +125,7 @@ def _check_shape(place: dict[str, Any], shape: Any, kind: object, *, is_number: 
     if is_number and len(shape) == 2 and not is_vector:
         first, last = (f"{place['base'].split('[')[0]}(:,{n})" for n in (1, shape[1]))
         wanted += f" or a column of the matrix, {first} to {last}"
-    raise Refused(f"variable {place['column']!r} is {kind} {tuple(shape)}, expected {wanted}")
+    raise VariableRefused(f"variable {place['column']!r} is {kind} {tuple(shape)}, expected {wanted}")
 
 
 def _product(shape: Any) -> float:

@@ -15,12 +15,19 @@ MEMORY, SECONDS = 4 << 30, 60
 DAMAGED = "no Parquet file that can be read; a damaged file?"
 
 
-class Refused(ValueError):
+class ColumnRefused(ValueError):
     """The kind of a column, and the expected one."""
 
 
+REFUSED = ColumnRefused
+"""What `read` raises for a column that holds no numbers; `_child.py` passes its words on."""
+
+
 def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int], Iterator[Any]]:
-    """Return the sizes of the columns, and their parts one by one. Raises Refused for other than numbers."""
+    """Return the sizes of the columns, and their parts one by one.
+
+    Raises ColumnRefused for other than numbers.
+    """
     import pyarrow as pa
     from pyarrow.parquet import ParquetFile
 
@@ -28,9 +35,9 @@ def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int]
     file = ParquetFile(path)
     rows = file.metadata.num_rows
     if rows * len(places) > limit:
-        raise Refused(f"{rows} rows of {len(places)} columns, expected fewer than {limit} numbers")
+        raise ColumnRefused(f"{rows} rows of {len(places)} columns, expected fewer than {limit} numbers")
     if rows < 2:
-        raise Refused(f"{rows} rows, expected a record")
+        raise ColumnRefused(f"{rows} rows, expected a record")
     fields = [_field(place, file.schema_arrow) for place in places]
     ways = zip(places, fields, strict=True)
     parts = (part for place, (name, way) in ways for part in _vectors(file, name, way, place))
@@ -38,7 +45,7 @@ def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int]
 
 
 def _field(place: dict[str, Any], schema: Any) -> tuple[str, list[str]]:
-    """Return the column of the file, and the way through its fields. Raises KeyError and Refused."""
+    """Return the column of the file, and the way through its fields. Raises KeyError and ColumnRefused."""
     import pyarrow as pa
 
     base = place["base"]
@@ -48,7 +55,9 @@ def _field(place: dict[str, Any], schema: Any) -> tuple[str, list[str]]:
     way, kind = base[len(name) + 1 :].split(".") if base != name else [], schema.field(name).type
     for part in way:
         if not pa.types.is_struct(kind) or part not in [field.name for field in kind]:
-            raise Refused(f"column {place['column']!r}: {name} is {kind}, expected a struct with {part}")
+            raise ColumnRefused(
+                f"column {place['column']!r}: {name} is {kind}, expected a struct with {part}"
+            )
         kind = kind.field(part).type
     _check_kind(place, kind)
     return name, way
@@ -61,11 +70,11 @@ def _check_kind(place: dict[str, Any], kind: Any) -> None:
     element = kind.value_type if is_list else kind
     column = place["column"]
     if is_list and (place["index"] is None or place["is_row"]):
-        raise Refused(f"column {column!r} is {kind}, expected one number of it: {place['base']}[0]")
+        raise ColumnRefused(f"column {column!r} is {kind}, expected one number of it: {place['base']}[0]")
     if not is_list and place["index"] is not None:
-        raise Refused(f"column {column!r} is {kind}, expected lists of numbers")
+        raise ColumnRefused(f"column {column!r} is {kind}, expected lists of numbers")
     if not (_is_number(element) or _is_time(element) or types.is_null(element)):
-        raise Refused(f"column {column!r} is {kind}, expected numbers")
+        raise ColumnRefused(f"column {column!r} is {kind}, expected numbers")
 
 
 def _is_number(kind: Any) -> bool:
@@ -97,7 +106,7 @@ def _vectors(file: Any, name: str, way: list[str], place: dict[str, Any]) -> Ite
                     chunk = pc.list_element(chunk, place["index"])
                 except (pa.ArrowInvalid, pa.ArrowIndexError):
                     least = pc.min(pc.list_value_length(chunk)).as_py()
-                    raise Refused(
+                    raise ColumnRefused(
                         f"column {place['column']!r} has a list of {least} numbers, expected more than "
                         f"{place['index']}"
                     ) from None

@@ -17,7 +17,7 @@ _MATLAB = re.compile(r"(?P<base>.+)\((?:(?P<row>[0-9]{1,4}),:|:,(?P<column>[0-9]
 
 
 @dataclass(frozen=True)
-class Place:
+class ElementAddress:
     """Where the values of a column are: in `base`, all of it or number `index`, from 0.
 
     is_row: of the first axis (the samples are along the second), otherwise of the second.
@@ -28,15 +28,15 @@ class Place:
     is_row: bool = False
 
 
-def place_of(column: str) -> Place:
+def place_of(column: str) -> ElementAddress:
     """Return the place that the name of a column says."""
     text = column.replace(" ", "") if column.endswith(("]", ")")) else column
     for pattern, first in ((_ELEMENT, 0), (_MATLAB, 1)):
         match = pattern.fullmatch(text)
         number = match and (match["row"] or match["column"])
         if match and number and int(number) >= first:
-            return Place(match["base"], int(number) - first, match["row"] is not None)
-    return Place(column)
+            return ElementAddress(match["base"], int(number) - first, match["row"] is not None)
+    return ElementAddress(column)
 
 
 def base_and_index(column: str, names: Sequence[str]) -> tuple[str, int | None]:

@@ -30,16 +30,21 @@ READERS: Mapping[str, Callable[[Path, Sequence[str]], Table]] = {
 
 
 def read_columns(
-    path: Path, columns: Sequence[str], delimiter: str | None = None, header: bool | None = None
+    path: Path,
+    columns: Sequence[str],
+    delimiter: str | None = None,
+    header: bool | None = None,
+    decimal: str = ".",
 ) -> Table:
     """Return the requested columns.
 
-    Text files name their columns in the first row; without names they are called 1, 2, ….
+    Text files name their columns in the first row, below a preamble at most; without names they are called
+    1, 2, …. decimal: their decimal sign.
     Raises ImportMapError with file, line, column, value and expectation.
     """
     reader = READERS.get(path.suffix.lower())
     try:
-        return reader(path, columns) if reader else read_text(path, columns, delimiter, header)
+        return reader(path, columns) if reader else read_text(path, columns, delimiter, header, decimal)
     except (gzip.BadGzipFile, zlib.error, EOFError):
         raise ImportMapError(f"{path}: damaged or no gzip file, expected a packed table") from None
     except OSError as error:

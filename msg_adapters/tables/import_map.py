@@ -6,6 +6,7 @@ where: {column: test_nr, below: 100}          # optional: only these rows; also 
 runs: {column: episode_index}                 # optional: a file of several runs, one for each value
 delimiter: ";"                                # optional: text files only, else seen from the first line
 header: false                                 # optional: text files only, else seen from the first line
+decimal: ","                                  # optional: text files only, else a point
 channels:
   position: {column: phi, unit: deg, sign: -1}
   velocity: {file: states.csv, column: "rates[2]", unit: rad/s}   # of a file in the directory that is read
@@ -24,7 +25,7 @@ from pathlib import Path
 from msg_adapters.tables.elements import is_open
 from msg_adapters.tables.keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
 from msg_adapters.tables.layout import DELIMITERS
-from msg_adapters.tables.terms import Term, checked_keys, column_name, number, term_of, terms_of
+from msg_adapters.tables.terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
 from msg_adapters.tables.units import CHANNELS, LINEAR, unit
 from rsea_ros import strict_yaml
 from rsea_ros.errors import FieldError, ImportMapError
@@ -32,7 +33,7 @@ from rsea_ros.wording import shown
 
 
 @dataclass(frozen=True)
-class Rows:
+class RowFilter:
     """Rows that count: start <= value of the column < stop, or value = equals."""
 
     column: str
@@ -46,14 +47,15 @@ class ImportMap:
     """A checked import map. time: the column of stamps and its gain to s; or rate, Hz."""
 
     path: Path
-    channels: Mapping[str, tuple[Term, ...]]
-    time: Term | None
+    channels: Mapping[str, tuple[ChannelTerm, ...]]
+    time: ChannelTerm | None
     rate: float | None
-    where: Rows | None = None
+    where: RowFilter | None = None
     delimiter: str | None = None
     about: str = ""
     runs: str | None = None
     header: bool | None = None
+    decimal: str = "."
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -116,6 +118,7 @@ def _map(path: Path, document: object) -> ImportMap:
         delimiter=_delimiter(body.get("delimiter")),
         runs=_runs(body["runs"]) if "runs" in body else None,
         header=_header(body.get("header")),
+        decimal=_decimal(body.get("decimal", ".")),
         about=" ".join(str(body.get("about", "")).split()),
     )
 
@@ -139,7 +142,13 @@ def _header(value: object) -> bool | None:
     raise FieldError(f"header is {shown(value)}, expected true or false", "header")
 
 
-def _one_kind(channels: dict[str, tuple[Term, ...]]) -> dict[str, tuple[Term, ...]]:
+def _decimal(value: object) -> str:
+    if value in (".", ","):
+        return str(value)
+    raise FieldError(f"decimal is {shown(value)}, expected '.' or ','", "decimal")
+
+
+def _one_kind(channels: dict[str, tuple[ChannelTerm, ...]]) -> dict[str, tuple[ChannelTerm, ...]]:
     """Refuse a map without channels, and one that mixes a linear with a rotary machine."""
     if not channels:
         raise FieldError(f"channels is empty, expected some of {', '.join(CHANNELS)}", "channels")
@@ -154,13 +163,13 @@ def _one_kind(channels: dict[str, tuple[Term, ...]]) -> dict[str, tuple[Term, ..
     return channels
 
 
-def _rows(value: object) -> Rows:
+def _rows(value: object) -> RowFilter:
     body = checked_keys(value, "where", WHERE)
     limits = {key: number(body[key], f"where.{key}") for key in ("from", "below", "equals") if key in body}
     if not limits:
         raise FieldError("where: expected one of from, below, equals", "where")
     column = column_name(body["column"], "where.column")
-    return Rows(column, limits.get("from"), limits.get("below"), limits.get("equals"))
+    return RowFilter(column, limits.get("from"), limits.get("below"), limits.get("equals"))
 
 
 def _delimiter(value: object) -> str | None:

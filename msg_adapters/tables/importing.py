@@ -11,9 +11,9 @@ import numpy as np
 
 from msg_adapters.tables.clock import repaired
 from msg_adapters.tables.files import read_columns
-from msg_adapters.tables.import_map import ImportMap, Rows
+from msg_adapters.tables.import_map import ImportMap, RowFilter
 from msg_adapters.tables.table import Table
-from msg_adapters.tables.terms import Term
+from msg_adapters.tables.terms import ChannelTerm
 from rsea_ros.errors import ImportMapError
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
 
@@ -49,7 +49,7 @@ class _Part:
 
     t: FloatArray
     values: Mapping[str, FloatArray]
-    note: str
+    notes: tuple[str, ...]
     faults: tuple[Fault, ...]
 
 
@@ -105,7 +105,7 @@ def _file(path: Path, name: str, mapping: ImportMap) -> Path:
 def _table(path: Path, name: str, maps: Sequence[ImportMap]) -> Table:
     """Read the columns that all joints need from a file."""
     columns = dict.fromkeys(column for mapping in maps for column in mapping.of_file(name).columns())
-    return read_columns(path, list(columns), maps[0].delimiter, maps[0].header)
+    return read_columns(path, list(columns), maps[0].delimiter, maps[0].header, maps[0].decimal)
 
 
 def _runs(path: str | Path, tables: Mapping[str, Table], mapping: ImportMap) -> list[float | None]:
@@ -122,9 +122,9 @@ def _runs(path: str | Path, tables: Mapping[str, Table], mapping: ImportMap) -> 
 def _part(path: Path, table: Table, mapping: ImportMap, run: float | None) -> _Part:
     with _naming(path, mapping, run):
         keep, undated = _rows_kept(table, mapping, run)
-        stamps, note = _stamps(table, mapping, keep)
+        stamps, repeats = _stamps(path, table, mapping, keep)
         values = {name: _values(table, terms, keep, stamps) for name, terms in mapping.channels.items()}
-    return _Part(stamps, values, note, tuple(_rows_left_out(path, table, undated)))
+    return _Part(stamps, values, table.notes, (*_rows_left_out(path, table, undated), *repeats))
 
 
 def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Record:
@@ -141,7 +141,7 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
     lines = [f"{fault.channel}: {fault.detail}" for fault in faults]
     notes = (
         f"imported from {Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
-        *(part.note for part in parts),
+        *(note for part in parts for note in part.notes),
         *lines,
     )
     return Record(channels, str(path), epoch, tuple(filter(None, notes)), tuple(faults))
@@ -176,7 +176,7 @@ def _rows_kept(table: Table, mapping: ImportMap, run: float | None) -> tuple[Boo
     return keep, undated
 
 
-def _spread(table: Table, where: Rows | None) -> str:
+def _spread(table: Table, where: RowFilter | None) -> str:
     if where is None:
         return ""
     values = table[where.column]
@@ -197,7 +197,9 @@ def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fau
         yield Fault("rows_left_out", name, undated / table.rows, detail)
 
 
-def _channel(name: str, t: FloatArray, y: FloatArray, terms: Sequence[Term]) -> tuple[Channel, list[Fault]]:
+def _channel(
+    name: str, t: FloatArray, y: FloatArray, terms: Sequence[ChannelTerm]
+) -> tuple[Channel, list[Fault]]:
     """Return a channel without its missing values, and their fault."""
     columns = " + ".join(term.column for term in terms)
     if np.isinf(y).any():
@@ -221,14 +223,16 @@ def _arrivals(name: str, channel: Channel) -> Channel:
     return Channel(channel.t[new], channel.y[new])
 
 
-def _stamps(table: Table, mapping: ImportMap, keep: BoolArray) -> tuple[FloatArray, str]:
-    """Return the stamp of each valid row, s, increasing, and the repairs.
+def _stamps(
+    path: Path, table: Table, mapping: ImportMap, keep: BoolArray
+) -> tuple[FloatArray, list[Fault]]:
+    """Return the stamp of each valid row, s, increasing, and the fault of stamps that repeat.
 
     Stamps that repeat are spread over all dated rows of a run, those that `where` leaves out included.
     """
     if mapping.time is None:
         start = int(np.argmax(keep)) if mapping.runs is not None else 0
-        return (np.flatnonzero(keep) - start) / float(mapping.rate or 1.0), ""
+        return (np.flatnonzero(keep) - start) / float(mapping.rate or 1.0), []
     whole = ~np.isnan(_column_of(table, mapping.time.columns))
     if mapping.runs is not None:
         whole &= table[mapping.runs] == table[mapping.runs][np.argmax(keep)]
@@ -241,8 +245,10 @@ def _stamps(table: Table, mapping: ImportMap, keep: BoolArray) -> tuple[FloatArr
         raise ImportMapError(f"{mapping.time.column} of row {dated[at] + 1} goes back ({steps})")
     if t[-1] == t[0]:
         raise ImportMapError(f"{mapping.time.column} is {t[0]:g} s in every row, expected a clock that runs")
-    t, note = repaired(t)
-    return t[keep[dated]], note
+    spread, detail = repaired(t)
+    share = float(np.mean(np.diff(t, prepend=-np.inf) == 0.0))
+    faults = [Fault("coarse_stamps", path.name, share, detail)] if detail else []
+    return spread[keep[dated]], faults
 
 
 def _column_of(table: Table, columns: Sequence[str]) -> FloatArray:
@@ -260,7 +266,7 @@ def _check_range(start: float, stop: float, epoch_ns: int) -> None:
         )
 
 
-def _values(table: Table, terms: Sequence[Term], keep: BoolArray, t: FloatArray) -> FloatArray:
+def _values(table: Table, terms: Sequence[ChannelTerm], keep: BoolArray, t: FloatArray) -> FloatArray:
     """Return a channel in the rows that count. t: their stamps, s. Raises ValueError for an expression."""
     total = np.zeros(len(t))
     with np.errstate(over="ignore", invalid="ignore"):

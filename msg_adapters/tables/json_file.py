@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from msg_adapters.tables.child import finite_table
-from msg_adapters.tables.elements import Place, place_of
+from msg_adapters.tables.elements import ElementAddress, place_of
 from msg_adapters.tables.table import Table, check_size, index_of
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import brief, no_utf_8, shown
@@ -119,7 +119,7 @@ def _names(value: Any, before: str = "", depth: int = 0) -> Iterable[str]:
         yield from below or [way]
 
 
-def _element(cell: Any, place: Place, column: str, at: int) -> Any:
+def _element(cell: Any, place: ElementAddress, column: str, at: int) -> Any:
     assert place.index is not None
     if not isinstance(cell, list) or place.index >= len(cell):
         raise ValueError(
@@ -128,7 +128,7 @@ def _element(cell: Any, place: Place, column: str, at: int) -> Any:
     return cell[place.index]
 
 
-def _number(cell: Any, place: Place, column: str, at: int) -> float:
+def _number(cell: Any, place: ElementAddress, column: str, at: int) -> float:
     """Return a number, NaN for null. Raises ValueError for anything else."""
     if cell is None:
         return math.nan

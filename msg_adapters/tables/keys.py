@@ -23,6 +23,7 @@ MAP = (
         "detected from the first line",
         "separator of the cells of a text file; `blanks`: one or more blanks or tabs",
     ),
+    Key("decimal", "`.` `,`", "`.`", "decimal sign of a text file: `1,5` is 1.5 where it is a comma"),
     Key("channels", "mapping", NEEDED, "for each channel a column, or a list of columns to add"),
 )
 TIME = (

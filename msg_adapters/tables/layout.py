@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from msg_adapters.tables.elements import base_and_index
+from msg_adapters.tables.numerals import is_numeral
 from msg_adapters.tables.table import index_of
-from rsea_ros.decimal_number import is_decimal
 
 COMMENT = "#"
 BLANKS = " "
@@ -19,7 +19,7 @@ DELIMITERS = {",": ",", ";": ";", "\t": "\t", "|": "|", " ": BLANKS, "tab": "\t"
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """names: of the columns. headed: whether they are in the first valid line."""
 
     delimiter: str
@@ -60,30 +60,38 @@ def index_in(column: str, names: Sequence[str]) -> int:
 
 
 def layout_of(
-    first: str, columns: Sequence[str], path: Path, delimiter: str | None, header: bool | None = None
-) -> Layout:
-    """Return the layout by the first line that counts.
+    lines: Sequence[str], columns: Sequence[str], path: Path, delimiter: str | None,
+    header: bool | None = None, decimal: str = ".",
+) -> tuple[int, TextLayout]:  # fmt: skip
+    """Return which of the first lines that count begins the table, and the layout by it.
 
-    header: whether that line names the columns; None: if not all of it is numbers. Without a delimiter it
-    is the first of several with which the line has the requested columns; otherwise the one that makes
-    most cells.
+    header: whether that line names the columns; None: if no delimiter makes numbers of all of it. It is the
+    first line, or below a preamble the first that names all requested columns. Without a delimiter it is the
+    first of several with which the line has the requested columns; otherwise the one that makes most cells.
     """
     usual = "\t" if ".tsv" in path.suffixes else ","
-    tried = [delimiter] if delimiter else list(dict.fromkeys([usual, "\t", ";", ",", "|", BLANKS]))
-    layouts = [_layout(first, one, header) for one in tried]
-    fitting = (layout for layout in layouts if all(_has(layout, column) for column in columns))
-    return next(fitting, max(layouts, key=lambda layout: len(layout.names)))
+    known = [one for one in (usual, "\t", ";", ",", "|", BLANKS) if one != decimal]
+    tried = [delimiter] if delimiter else list(dict.fromkeys(known))
+    layouts = [_layout(lines[0], one, header) for one in tried]
+    for layout in sorted(layouts, key=lambda layout: layout.headed):
+        if all(_has(layout, column) for column in columns):
+            return 0, layout
+    for at, line in enumerate(lines[1:] if header is not False else (), 1):
+        for layout in (_layout(line, one, header) for one in tried):
+            if layout.headed and all(base_and_index(c, layout.names)[0] in layout.names for c in columns):
+                return at, layout
+    return 0, max(layouts, key=lambda layout: len(layout.names))
 
 
-def _has(layout: Layout, column: str) -> bool:
+def _has(layout: TextLayout, column: str) -> bool:
     base, _ = base_and_index(column, layout.names)
     return base in layout.names or (base.isdecimal() and 1 <= int(base[:6]) <= len(layout.names))
 
 
-def _layout(first: str, delimiter: str, header: bool | None) -> Layout:
+def _layout(first: str, delimiter: str, header: bool | None) -> TextLayout:
     cells = split(first, delimiter)
     while cells[1:] and not cells[-1]:
         cells.pop()
-    if all(map(is_decimal, cells)) if header is None else not header:
-        return Layout(delimiter, tuple(str(number + 1) for number in range(len(cells))), headed=False)
-    return Layout(delimiter, tuple(cells), headed=True)
+    if all(map(is_numeral, cells)) if header is None else not header:
+        return TextLayout(delimiter, tuple(str(number + 1) for number in range(len(cells))), headed=False)
+    return TextLayout(delimiter, tuple(cells), headed=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from msg_adapters.tables.child import finite_table
-from msg_adapters.tables.elements import Place, place_of
+from msg_adapters.tables.elements import ElementAddress, place_of
 from msg_adapters.tables.table import LARGEST, Table, index_of
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import brief
@@ -54,7 +54,7 @@ def read_npy(path: Path, columns: Sequence[str]) -> Table:
     return finite_table(vectors)
 
 
-def _known(place: Place, names: Sequence[str]) -> Place:
+def _known(place: ElementAddress, names: Sequence[str]) -> ElementAddress:
     """Return a place whose array is in the file. Raises ValueError for another."""
     if _root(place.base, names) not in names:
         index_of(place.base, names)
@@ -98,7 +98,7 @@ def _rewound(file: IO[bytes]) -> Iterator[IO[bytes]]:
     yield file
 
 
-def _numbers(column: str, place: Place, arrays: Any, names: Any) -> FloatArray:
+def _numbers(column: str, place: ElementAddress, arrays: Any, names: Any) -> FloatArray:
     root = _root(place.base, names)
     values, field = arrays[root], place.base[len(root) + 1 :]
     if field:

@@ -18,13 +18,14 @@ class Table:
     """Columns by name, shape (n,) each, n > 0; NaN where a cell was empty or `nan`.
 
     rows: of the file, those that were left out included. left_out: how many of them had too few or too
-    many fields. first: place of the first of these, for people.
+    many fields. first: place of the first of these, for people. notes: lines of the file that are no rows.
     """
 
     columns: Mapping[str, FloatArray]
     rows: int
     left_out: int = 0
     first: str = ""
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]

@@ -20,7 +20,7 @@ LARGEST = 1e300
 
 
 @dataclass(frozen=True)
-class Term:
+class ChannelTerm:
     """A part of a channel, in SI: sign · scale · column · (SI factor of its unit) + constant.
 
     expression: of columns, in the place of the column. file: in the directory that is read; empty for the one
@@ -40,7 +40,7 @@ class Term:
         """The columns that it needs."""
         return (self.column,) if self.expression is None else self.expression.columns
 
-    def at(self, index: int | None) -> Term:
+    def at(self, index: int | None) -> ChannelTerm:
         """Return the term for one number of lists in cells."""
         if self.expression is None:
             return replace(self, column=chosen(self.column, index))
@@ -48,7 +48,7 @@ class Term:
         return replace(self, column=text, expression=parse(text))
 
 
-def terms_of(channel: str, value: object) -> tuple[Term, ...]:
+def terms_of(channel: str, value: object) -> tuple[ChannelTerm, ...]:
     parts = value if isinstance(value, list) else [value]
     if not parts:
         raise FieldError(
@@ -63,7 +63,7 @@ def terms_of(channel: str, value: object) -> tuple[Term, ...]:
     return terms
 
 
-def term_of(field: str, value: object, dimension: str) -> Term:
+def term_of(field: str, value: object, dimension: str) -> ChannelTerm:
     """Return a term. A unit of another dimension than the channel's needs a scale that converts it."""
     body = checked_keys(value, field, TERM)
     try:
@@ -88,7 +88,7 @@ def term_of(field: str, value: object, dimension: str) -> Term:
     constant = number(body.get("constant", 0), f"{field}.constant")
     file = _file(body.get("file", ""), f"{field}.file")
     held = _flag(body.get("held", False), f"{field}.held")
-    return Term(column, str(body["unit"]), sign * factor * scale, constant, file, expression, held)
+    return ChannelTerm(column, str(body["unit"]), sign * factor * scale, constant, file, expression, held)
 
 
 def _expression(body: Mapping[str, Any], field: str) -> Expression | None:

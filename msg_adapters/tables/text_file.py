@@ -2,42 +2,72 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
 
 from msg_adapters.tables.elements import base_and_index, number_in
-from msg_adapters.tables.layout import BLANKS, Layout, counts, index_in, layout_of
+from msg_adapters.tables.layout import BLANKS, TextLayout, counts, index_in, layout_of
 from msg_adapters.tables.lines import blocks_of_lines
+from msg_adapters.tables.numerals import has_decimal_comma, numeral
 from msg_adapters.tables.table import Table, check_size
 from rsea_ros.decimal_number import is_decimal
 from rsea_ros.signals import FloatArray
-from rsea_ros.wording import shown
+from rsea_ros.wording import brief, shown
 
 MISSING = {"", "-", "--", "na", "n/a", "#n/a", "nan", "nil", "none", "null"}
 """What stands, in small letters, where there is no value."""
+_FIRST_OF_NUMBERS = frozenset("0123456789+-.")
+_LONGEST = 200
+"""Characters of a line in a note."""
 MOST_LEFT_OUT = 0.1
 """Of the rows. With more of them the table is not what its first line says."""
-_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
+_PREAMBLE = 100
+"""Lines that count among which the names of the columns are sought."""
 
 
 def read_text(
-    path: Path, columns: Sequence[str], delimiter: str | None, header: bool | None = None
+    path: Path,
+    columns: Sequence[str],
+    delimiter: str | None,
+    header: bool | None = None,
+    decimal: str = ".",
 ) -> Table:
-    """Return the requested columns. Raises ValueError with line, column, value and expectation."""
-    numbered = _numbered_blocks(path)
-    first = next(((number, line) for block in numbered for number, line in block), None)
-    if first is None:
+    """Return the requested columns. Raises ValueError with line, column, value and expectation.
+
+    Lines above the names of the columns, and one of units below them, are left out with a note.
+    """
+    head = list(islice(chain.from_iterable(_numbered_blocks(path)), _PREAMBLE))
+    if not head:
         raise ValueError("empty file, expected a row of column names and rows of numbers")
-    layout = layout_of(first[1], columns, path, delimiter, header)
+    at, layout = layout_of([line for _, line in head], columns, path, delimiter, header, decimal)
+    first, notes = head[at][0] + layout.headed, _preamble(head[:at])
     places = {column: base_and_index(column, layout.names) for column in columns}
     indices = {column: index_in(base, layout.names) for column, (base, _) in places.items()}
-    reader = _Reader(layout, indices, {column: element for column, (_, element) in places.items()})
+    if layout.headed and head[at + 1 :] and is_row_of_texts(layout.cells(head[at + 1][1])):
+        number, line = head[at + 1]
+        first, notes = number + 1, (*notes, f"line {number} is taken for the units: {brief(line, _LONGEST)}")
+    elements = {column: element for column, (_, element) in places.items()}
+    reader = _Reader(layout, indices, elements, decimal)
     for block in _numbered_blocks(path):
-        reader.add([row for row in block if not (layout.headed and row == first)])
-    return reader.table()
+        reader.add([row for row in block if row[0] >= first])
+    return replace(reader.table(), notes=notes)
+
+
+def _preamble(lines: Sequence[tuple[int, str]]) -> tuple[str, ...]:
+    """Return the note of the lines above the names of the columns."""
+    if not lines:
+        return ()
+    return (f"lines {lines[0][0]} to {lines[-1][0]} above the names of the columns are left out",)
+
+
+def is_row_of_texts(cells: Sequence[str]) -> bool:
+    """Return whether a row has texts and neither a number nor a list: the units of its columns."""
+    filled = [cell for cell in cells if cell.lower() not in MISSING]
+    return bool(filled) and not any(cell[0] in _FIRST_OF_NUMBERS or "," in cell for cell in filled)
 
 
 def _numbered_blocks(path: Path) -> Iterator[list[tuple[int, str]]]:
@@ -52,10 +82,11 @@ class _Reader:
     """Collects columns block by block."""
 
     def __init__(
-        self, layout: Layout, indices: dict[str, int], elements: dict[str, int | None]
+        self, layout: TextLayout, indices: dict[str, int], elements: dict[str, int | None], decimal: str
     ) -> None:
         """elements: by column, which number of a list in its cells, None for cells of one number."""
         self._layout = layout
+        self._decimal = decimal
         self._indices = indices
         self._elements = elements
         self._has_lists = any(element is not None for element in elements.values())
@@ -95,6 +126,8 @@ class _Reader:
             return None
         delimiter = None if layout.delimiter == BLANKS else layout.delimiter
         indices = list(self._indices.values())
+        if self._decimal == "," and delimiter != ",":
+            lines = [line.replace(",", ".") for line in lines]
         try:
             table = np.loadtxt(lines, delimiter=delimiter, usecols=indices, comments=None, ndmin=2)
         except ValueError:
@@ -117,18 +150,19 @@ class _Reader:
     def _value(self, line: int, column: str, cell: str) -> float:
         element = self._elements[column]
         if element is None:
-            return _value(line, column, cell)
+            return _value(line, column, cell, self._decimal)
         try:
             number = number_in(cell, element)
         except ValueError as error:
             raise ValueError(f"line {line}, column {column!r} is {shown(cell)}, {error}") from None
-        return _value(line, column, number)
+        return _value(line, column, number, self._decimal)
 
 
-def _value(line: int, column: str, cell: str) -> float:
-    if is_decimal(cell):
-        return float(cell)
+def _value(line: int, column: str, cell: str, decimal: str) -> float:
+    number = cell if is_decimal(cell) else numeral(cell, decimal)
+    if is_decimal(number):
+        return float(number)
     if cell.lower() in MISSING:
         return float("nan")
-    hint = ", with a decimal point" if _COMMA.fullmatch(cell) else ""
+    hint = ', with a decimal point (or `decimal: ","` in the map)' if has_decimal_comma(cell) else ""
     raise ValueError(f"line {line}, column {column!r} is {shown(cell)}, expected a finite number{hint}")

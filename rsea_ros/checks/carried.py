@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings
+from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig import Rig
@@ -23,7 +24,13 @@ def held_against(record: Record, rig: Rig, axis: str = "torque.z", *, masks: boo
     Raises IdentificationError where nothing moves.
     """
     require_motion(record)
-    return with_faults(record, check_record(record, rig, axis), masks=masks)
+    return with_faults(noted(record, rig), check_record(record, rig, axis), masks=masks)
+
+
+def noted(record: Record, rig: Rig) -> Record:
+    """Return the record with a note of the channels that its rig makes no use of."""
+    sentence = unused_sentence(record, rig)
+    return replace(record, notes=(*record.notes, sentence)) if sentence else record
 
 
 def with_faults(record: Record, found: Findings, *, masks: bool) -> Record:

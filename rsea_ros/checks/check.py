@@ -17,12 +17,14 @@ from rsea_ros.checks.lag import in_step, lag_findings, lags
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.offset_findings import offset_findings
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.rig_values import value_findings
 from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
+from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.extent import bounded
@@ -36,9 +38,11 @@ Wrench = Callable[[], Mapping[str, Channel]]
 """Reads the other axes of the wrench, by their names for --axis."""
 _WHOLE = 0.1
 """Share of masked samples above which a channel's response is not compared."""
+_BRIDGED = 0.01
+"""Share of masked samples above which the lines that bridge them are no measure of a sensor's noise."""
 _IN_COMMON = 0.3
 """Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
-FAULTY = ("sign", "scale", "smoothing", "clock_offset", "clock_drift", "wrong_rig")
+FAULTY = ("sign", "scale", "offset", "smoothing", "clock_offset", "clock_drift", "wrong_rig")
 """Kinds of findings that every result made from the record repeats, where they are not green."""
 
 
@@ -89,8 +93,7 @@ def _of_targets(f: Finding) -> Finding:
 
 def _topics(record: Record, rig: Rig) -> list[Finding]:
     have = ", ".join(record.channels)
-    unused = ", ".join(n for n in record.channels if not _takes(rig, n))
-    have += f"; a rig without a spring makes no use of {unused}" if unused else ""
+    have = "; ".join(filter(None, (have, unused_sentence(record, rig))))
     if "command" in record:
         return [Finding("green", "topics", "", float(len(record.channels)), "1", detail=have)]
     return [
@@ -103,11 +106,6 @@ def _topics(record: Record, rig: Rig) -> list[Finding]:
             remedy="record the commands, or name their topic with --topic",
         )
     ]
-
-
-def _takes(rig: Rig, channel: str) -> bool:
-    """Return whether a fit of the rig uses a channel; a drive without a spring is judged by its torque."""
-    return rig.measures(channel) and not (is_inverse(rig) and channel == "velocity")
 
 
 def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Finding]:
@@ -134,7 +132,10 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
         findings = lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
     readings, matched = _matched(record, compared, rig, axis)
-    findings += [*noises(record, rig), *matched]
+    scaled = any(f.kind == "scale" and f.channel == "ft" and f.light == "red" for f in matched)
+    matched += [] if scaled else offset_findings(record, compared)
+    bridged = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) > _BRIDGED * len(bad)}
+    findings += [*noises(record, rig, but=bridged), *matched]
     if readings is None or late or _is_elsewhere(findings):
         return findings
     return [*findings, *_linearised(checked, rig, readings, values)]

@@ -12,7 +12,9 @@ import numpy as np
 
 from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side, sides
-from rsea_ros.checks.motion import is_commanded, motion_beside
+from rsea_ros.checks.frozen import SMALLEST_SHARE, frozen, longest, while_others_moved
+from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.stamp_findings import repeats_of
 from rsea_ros.identification.quantum import FEW, step_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
@@ -23,8 +25,8 @@ _SPIKE = 12.0
 """A sample further than this many spreads of the ten around it from their median is an outlier."""
 _CLIPPED = 8
 """As many samples at exactly the largest value, some of them in a row, are clipping."""
-_SMALLEST_SHARE = 1e-3
-_SLOW = 0.25
+_SLOWLY = 0.1
+"""Of the usual step from sample to sample: a motion that ends, not one that a limit cuts off."""
 _COARSE = 5.0
 """Steps larger than this multiple of those of the rig's sensor are reported."""
 
@@ -84,8 +86,9 @@ def _masked(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
         if kind in _WHILE_MOVING:
             marked = while_others_moved(record, name, marked, kind)
         share = np.count_nonzero(marked) / max(len(marked), 1)
-        if share > (_SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
-            faults.append(Fault(kind, name, share))
+        if share > (SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
+            where = longest(channel, marked) if kind == "frozen_samples" else ""
+            faults.append(Fault(kind, name, share, where))
             bad |= marked
     return bad, faults
 
@@ -139,20 +142,33 @@ def outliers(channel: Channel, name: str) -> BoolArray:
 
 
 def clipping(channel: Channel, name: str) -> BoolArray:
-    """Return which samples lie at exactly the largest or smallest value, where many do in a row."""
+    """Return which samples lie at exactly the largest or smallest value, where many do in a row.
+
+    Of a log that repeats each value, the values count. A motion that slows down to the extreme value rests.
+    """
     bad = np.zeros(len(channel), bool)
     if name in ("command", "reference", "motor_torque") or not np.isfinite(channel.y).any():
         return bad
+    arrived = channel.y[:: repeats_of(channel.y)]
     for extreme in (np.nanmax(channel.y), np.nanmin(channel.y)):
-        at = channel.y == extreme
+        at = arrived == extreme
         in_a_row = at[1:] & at[:-1]
-        if (
-            at.sum() >= _CLIPPED
-            and in_a_row.sum() >= _CLIPPED // 2
-            and not _common(channel.y, float(extreme))
-        ):
-            bad |= at
+        many = at.sum() >= _CLIPPED and in_a_row.sum() >= _CLIPPED // 2
+        if many and not _common(arrived, float(extreme)) and not _rests(arrived, at):
+            bad |= channel.y == extreme
     return bad
+
+
+def _rests(y: FloatArray, at: BoolArray) -> bool:
+    """Return whether a channel comes to some values, or leaves them, far slower than it moves elsewhere."""
+    step = np.nan_to_num(np.abs(np.diff(y)))
+    edges = [step[at[1:] & ~at[:-1]], step[at[:-1] & ~at[1:]]]
+    moving = step[step > 0.0]
+    if not len(moving) or not all(map(len, edges)):
+        return False
+    usual = float(np.median(moving[moving > 1.5 * moving.min()])) if np.ptp(moving) > 0.0 else 0.0
+    slow = max(1.5 * float(moving.min()), _SLOWLY * usual)
+    return bool(min(map(np.median, edges)) <= slow < usual)
 
 
 def _common(y: FloatArray, extreme: float) -> bool:
@@ -167,63 +183,6 @@ def _common(y: FloatArray, extreme: float) -> bool:
     return bool(counts[k] < 4 * max(int(inside), 1))
 
 
-def frozen(channel: Channel, name: str) -> BoolArray:
-    """Return which samples repeat the one before more often than a quantum explains.
-
-    With a quantum, neighbouring values may be equal by chance; then as many differ by one quantum, plus or
-    minus three standard deviations. A sensor that repeats every other sample or more is slower than the log,
-    which is no fault; but a few runs far longer than all others are.
-    """
-    if name in ("command", "reference"):
-        return np.zeros(len(channel), bool)
-    step = np.diff(channel.y, prepend=np.nan)
-    repeat: BoolArray = step == 0.0
-    moving = np.abs(step[np.isfinite(step) & ~repeat])
-    if not len(moving):
-        return repeat
-    by_chance = float((moving < 1.5 * float(moving.min())).sum()) / 2.0
-    surplus = float(repeat.sum()) - 1.5 * by_chance - 3.0 * float(np.sqrt(repeat.sum()))
-    is_fault = max(5.0, _SMALLEST_SHARE * len(channel)) < surplus < _SLOW * len(channel)
-    return repeat if is_fault else repeat & in_long_runs(repeat, channel.rate)
-
-
-def in_long_runs(repeat: BoolArray, rate: float) -> BoolArray:
-    """Return which samples lie in a run of repeats far longer than the usual one. rate: Hz."""
-    number = np.cumsum(~repeat)
-    length = np.bincount(number)
-    usual = float(np.quantile(length[length > 0], 0.95))
-    long: BoolArray = length[number] > max(_LONG_RUN * usual, _LONGEST_RUN * rate)
-    return long
-
-
-def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str) -> BoolArray:
-    """Return the suspect samples, none if the machine mostly stood still then.
-
-    A sensor that holds a value while nothing moves is sound: at rest, at a limit of the torque, stuck. One
-    that freezes does so in fast and in slow motion alike, a coarse one rather in slow motion.
-    """
-    motion = motion_beside(record, name) if suspect.any() else None
-    if motion is None or not motion.moved.any():
-        return suspect if motion is None else np.zeros(len(suspect), bool)
-    if kind != "frozen_samples":
-        return _mostly(suspect, motion.moved)
-    long = suspect & in_long_runs(suspect, record[name].rate)
-    fast = motion.moved & (motion.speed > np.median(motion.speed[motion.moved]))
-    return _mostly(long, motion.moved) | _mostly(suspect & ~long, fast)
-
-
-def _mostly(suspect: BoolArray, clearly: BoolArray) -> BoolArray:
-    """Return the suspect samples if enough of them fall into motion, else none."""
-    enough = suspect.any() and clearly[suspect].mean() > _MOVED
-    return suspect if enough else np.zeros(len(suspect), bool)
-
-
-_MOVED = 0.3
-"""Share of the suspect samples that must fall into motion; a sensor that freezes at any time reaches more."""
-_LONG_RUN = 20.0
-"""Times the usual run of equal values: a longer one is no slow sensor."""
-_LONGEST_RUN = 0.5
-"""s. No coarse quantum holds a value so long while the machine moves."""
 _WHILE_MOVING = ("clipping", "frozen_samples")
 
 FINDERS: Mapping[str, Callable[[Channel, str], BoolArray]] = {

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from rsea_ros.checks.factors import Factor
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.checks.gains import SHAPED, Reading, Readings
+from rsea_ros.checks.gains import SHAPED, ChannelCorrection, Readings
 from rsea_ros.checks.shape import FittedShape
 from rsea_ros.checks.spectra import Quotient
 from rsea_ros.model.rig import Rig
@@ -48,7 +48,7 @@ def strangers(quotients: Sequence[Quotient]) -> list[Finding]:
     ]
 
 
-def _of_channel(r: Reading, axis: str) -> list[Finding]:
+def _of_channel(r: ChannelCorrection, axis: str) -> list[Finding]:
     findings = []
     if r.sign < 0.0:
         findings.append(

@@ -32,12 +32,14 @@ _CLEAR = 60.0
 """Difference of phase costs from which the better sign needs no trial."""
 _EXACT = 0.4
 """Logarithm: what is left of every gain where two units at once are to be believed."""
+_WITHIN = 2.0
+"""Spreads of a rig's inertia that a drive without a spring may be off: its torque is that of the inertia."""
 _NEAR = 0.7
 """Logarithm: so close to a factor's value a gain must be for the factor to be tried."""
 
 
 @dataclass(frozen=True)
-class Reading:
+class ChannelCorrection:
     """The corrections of a channel. sign: -1 where it is reversed. factor: None for SI at the gear output.
 
     also: other factors that these data cannot distinguish. gain: the remaining logarithm of its gain
@@ -56,7 +58,7 @@ class Reading:
 class Readings:
     """Readings by channel, the command's too; the fit as the data stand, and with the readings applied."""
 
-    channels: Mapping[str, Reading]
+    channels: Mapping[str, ChannelCorrection]
     plain: FittedShape
     applied: FittedShape
 
@@ -68,7 +70,9 @@ def readings_of(quotients: Mapping[str, Quotient], rig: Rig) -> Readings | None:
         return None
     plain = fit.fit({n: Prior() for n in fit.channels})
     if all(abs(plain.gain[n]) < ALLOWED and plain.error[n] < SHAPED for n in fit.channels):
-        return Readings({n: Reading(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain)
+        return Readings(
+            {n: ChannelCorrection(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain
+        )
     return _tried(fit, plain, quotients, rig)
 
 
@@ -85,11 +89,15 @@ def _tried(fit: ShapeFit, plain: FittedShape, quotients: Mapping[str, Quotient],
     applied = fit.fit({n: _prior(n, by_channel) for n in fit.channels})
     shaped = float(np.median(list(applied.error.values()))) < SHAPED
     if not shaped or applied.cost > plain.cost - _BETTER:
-        return Readings({n: Reading(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain)
+        return Readings(
+            {n: ChannelCorrection(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain
+        )
     return Readings({n: _believed(r, quotients, applied) for n, r in by_channel.items()}, plain, applied)
 
 
-def _believed(reading: Reading, quotients: Mapping[str, Quotient], applied: FittedShape) -> Reading:
+def _believed(
+    reading: ChannelCorrection, quotients: Mapping[str, Quotient], applied: FittedShape
+) -> ChannelCorrection:
     """Return the reading, unchanged where the channel does not have the rig's shape or may be limited."""
     q = quotients.get(reading.channel)
     if q is None:
@@ -97,7 +105,7 @@ def _believed(reading: Reading, quotients: Mapping[str, Quotient], applied: Fitt
     of_a_limit = reading.factor is not None and abs(math.log(reading.factor.value)) < 3.0
     weak = q.related < _RELATED and of_a_limit
     if weak or applied.error.get(reading.channel, 0.0) > SHAPED:
-        return Reading(reading.channel, 1.0, None, reading.gain)
+        return ChannelCorrection(reading.channel, 1.0, None, reading.gain)
     return reading
 
 
@@ -141,7 +149,7 @@ def _command_apart(
 
 def _in_a_unit_of_the_command(
     signs: Mapping[str, float], gains: Mapping[str, float], rig: Rig
-) -> dict[str, Reading] | None:
+) -> dict[str, ChannelCorrection] | None:
     """Return readings in which a unit of the command makes every gain one of a unit, None where none does.
 
     Commands in mN m make every sensor look a thousand times too small, in addition to its own unit.
@@ -154,29 +162,36 @@ def _in_a_unit_of_the_command(
         readings = {n: _named(n, signs[n], gain, rig) for n, gain in moved.items()}
         exact = not any(r.odd or abs(r.gain) > _EXACT for r in readings.values())
         if exact and any(r.factor is None for n, r in readings.items() if n != "motor_torque"):
-            readings["command"] = Reading("command", 1.0, factor, 0.0)
+            readings["command"] = ChannelCorrection("command", 1.0, factor, 0.0)
             tried.append(readings)
     return min(tried, key=_oddness, default=None)
 
 
-def _oddness(readings: Mapping[str, Reading]) -> tuple[int, float]:
+def _oddness(readings: Mapping[str, ChannelCorrection]) -> tuple[int, float]:
     """Return how many channels are in another unit, and the remaining gains."""
     return sum(r.factor is not None for r in readings.values()), sum(abs(r.gain) for r in readings.values())
 
 
-def _named(channel: str, sign: float, gain: float, rig: Rig) -> Reading:
+def _named(channel: str, sign: float, gain: float, rig: Rig) -> ChannelCorrection:
     """Return the reading with the factor that comes nearest to a gain, none for a gain that is allowed."""
     if abs(gain) < ALLOWED:
-        return Reading(channel, sign, None, gain)
+        return ChannelCorrection(channel, sign, None, gain)
     known = sorted(factors(channel, rig), key=lambda f: abs(math.log(f.value) - gain))
     left = gain - math.log(known[0].value)
     if abs(left) > _NEAR:
-        return Reading(channel, sign, None, gain, odd=True)
+        of_inertia = rig.rigid_spring and channel == "motor_torque"
+        odd = not of_inertia or abs(gain) > _WITHIN * inertia_spread(rig)
+        return ChannelCorrection(channel, sign, None, gain, odd=odd)
     also = tuple(f for f in known[1:] if abs(math.log(f.value / known[0].value)) < _ALIKE)
-    return Reading(channel, sign, known[0], left, also=also)
+    return ChannelCorrection(channel, sign, known[0], left, also=also)
 
 
-def _prior(channel: str, found: Mapping[str, Reading]) -> Prior:
+def inertia_spread(rig: Rig) -> float:
+    """Return the largest spread of the inertias that a fit may move."""
+    return max((rig.spread(n) for n in rig.free() if n.endswith("inertia")), default=0.0)
+
+
+def _prior(channel: str, found: Mapping[str, ChannelCorrection]) -> Prior:
     """Return the prior of a channel's quotient by the readings: its factor over the command's."""
     sign, mean, doubt = 1.0, 0.0, Prior().doubt
     for name, side in ((channel, 1.0), ("command", -1.0)):

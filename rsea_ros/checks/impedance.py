@@ -16,6 +16,7 @@ import numpy as np
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.gain_findings import RIGHT_RIG
+from rsea_ros.checks.gains import inertia_spread
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.inverse import CUT_OFF
@@ -40,7 +41,7 @@ _SHAPED = 0.35
 
 
 @dataclass(frozen=True)
-class Impedance:
+class ImpedanceFit:
     """K (N m/rad) and J (kg m^2) with one sigma each, and the median residual of the fit over Z."""
 
     stiffness: float
@@ -72,7 +73,7 @@ def impedance_findings(side: Side | None, rig: Rig) -> list[Finding]:
         return [_another("stiffness", measured.stiffness, "N m/rad", stiffness, swing)]
     factor = measured.inertia / inertia
     sure = measured.inertia > 2.0 * _SURE * measured.inertia_sd
-    if sure and abs(math.log(factor)) > max(math.log(_FAR), _ELSEWHERE * _spread(rig)):
+    if sure and abs(math.log(factor)) > max(math.log(_FAR), _ELSEWHERE * inertia_spread(rig)):
         return [_another("inertia", measured.inertia, "kg m^2", inertia, f"{factor:.2g} times the rig's")]
     return []
 
@@ -90,12 +91,7 @@ def _another(key: str, value: float, unit: str, expected: float, detail: str) ->
     )
 
 
-def _spread(rig: Rig) -> float:
-    """Return the largest spread of the inertias that a fit may move."""
-    return max((rig.spread(n) for n in rig.free() if n.endswith("inertia")), default=0.0)
-
-
-def impedance_of(side: Side, rig: Rig) -> Impedance | None:
+def impedance_of(side: Side, rig: Rig) -> ImpedanceFit | None:
     """Return the impedance that a record shows; None where too few lines are coherent."""
     q = quotient("motor_torque", side.t, side.p, side.y)
     m = mechanics(rig, linear_gravity=True)
@@ -110,7 +106,7 @@ def impedance_of(side: Side, rig: Rig) -> Impedance | None:
     return _fitted(nominal / q.value[keep], w, q, q.sd[keep])
 
 
-def _fitted(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> Impedance:
+def _fitted(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> ImpedanceFit:
     """Return K and J from the real part of Z, each line by its doubt."""
     doubt = np.abs(z) * np.hypot(sd, _MODEL_ERROR)
     rows = np.column_stack([np.ones(len(w)), -(w**2)])
@@ -119,7 +115,7 @@ def _fitted(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> Impeda
     stiffness, inertia = (inverse @ (z.real / doubt)) / size
     stiffness_sd, inertia_sd = np.linalg.norm(inverse, axis=1) / size
     left = np.abs(z.real - rows @ [stiffness, inertia]) / np.abs(z)
-    return Impedance(
+    return ImpedanceFit(
         stiffness=float(stiffness),
         stiffness_sd=float(stiffness_sd),
         inertia=float(inertia),

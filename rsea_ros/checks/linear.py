@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.checks.linear_rows import LinearSetting, LinearState, Rows, left_of, on_time, rows_of
+from rsea_ros.checks.linear_rows import LinearisedRows, LinearSetting, LinearState, left_of, on_time, rows_of
 from rsea_ros.checks.linear_step import gauss_newton_step
 from rsea_ros.checks.shape import FittedShape
 from rsea_ros.identification.problem import Problem, case_from, channels_that_tell
@@ -46,7 +46,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearisedFit:
     """The result of the linearised fit. offset: s at the start of the record, drift: s/s, by channel.
 
     misfit: RMS of the residual over the noise by channel.
@@ -62,7 +62,7 @@ class Linear:
     theta: FloatArray
 
 
-def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: FittedShape) -> Linear:
+def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: FittedShape) -> LinearisedFit:
     """Return the linearised fit from where the quick fit of the shape ended.
 
     Only the LONGEST of the record in which the command changes most is looked at. Raises IdentificationError
@@ -90,7 +90,9 @@ def _setting(
     return LinearSetting(record, start, case, rig, timed, values), state
 
 
-def _descended(setting: LinearSetting, state: LinearState) -> tuple[LinearState, Rows, FloatArray, bool]:
+def _descended(
+    setting: LinearSetting, state: LinearState
+) -> tuple[LinearState, LinearisedRows, FloatArray, bool]:
     """Return where the rounds end: the state, rows, one sigma of each unknown, whether the clocks stand."""
     rows = rows_of(setting, left_of(setting, state))
     step, sd = gauss_newton_step(rows, setting, state)
@@ -134,10 +136,12 @@ def _cut(
     return record.between(begin, end), {n: masked[n][keep] for n, keep in inside.items() if n in masked}
 
 
-def _linear(setting: LinearSetting, state: LinearState, rows: Rows, sd: FloatArray, settled: bool) -> Linear:
+def _linear(
+    setting: LinearSetting, state: LinearState, rows: LinearisedRows, sd: FloatArray, settled: bool
+) -> LinearisedFit:
     n, m = len(setting.values), len(setting.timed)
     late, grows = np.hypot(sd[n : n + m], _RESOLUTION), sd[n + m : n + 2 * m]
-    return Linear(
+    return LinearisedFit(
         offset={c: Number(float(state.offset[k]), float(late[k])) for k, c in enumerate(setting.timed)},
         drift={c: Number(float(state.drift[k]), float(grows[k])) for k, c in enumerate(setting.timed)},
         misfit=dict(zip(setting.timed, rows.left.misfit.tolist(), strict=True)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.checks.linear import Linear, Number
+from rsea_ros.checks.linear import LinearisedFit, Number
 from rsea_ros.model.rig import CLOCK_DOUBT
 
 _ALLOWED = 3.0 * CLOCK_DOUBT
@@ -20,7 +20,7 @@ JOINT = ("velocity", "position")
 _RELATIVE = "against the model; a delay of the drive looks the same"
 
 
-def clock_findings(linear: Linear, duration: float) -> list[Finding]:
+def clock_findings(linear: LinearisedFit, duration: float) -> list[Finding]:
     """Return offset and drift of every sensor's stamps against the command's. duration: of the record, s."""
     if not linear.settled:
         return [Finding("green", "clock_offset", "", detail="not determined beside what the rig leaves")]
@@ -31,7 +31,7 @@ def clock_findings(linear: Linear, duration: float) -> list[Finding]:
     return findings
 
 
-def _offset(name: str, offset: Number, linear: Linear) -> Finding:
+def _offset(name: str, offset: Number, linear: LinearisedFit) -> Finding:
     """Return the finding of an offset; only sensors that disagree with each other make a fault."""
     if offset.sd > _OPEN:
         return _left_open("clock_offset", name, offset.sd)
@@ -60,7 +60,7 @@ def _offset(name: str, offset: Number, linear: Linear) -> Finding:
     )
 
 
-def _drift(name: str, drift: Number, linear: Linear, duration: float) -> Finding:
+def _drift(name: str, drift: Number, linear: LinearisedFit, duration: float) -> Finding:
     if drift.sd * duration > _OPEN:
         return _left_open("clock_drift", name, drift.sd * duration)
     low, high = drift.ci95
@@ -86,11 +86,11 @@ def _left_open(kind: str, name: str, sd: float) -> Finding:
     return Finding("green", kind, name, detail=detail)
 
 
-def _is_clear(linear: Linear, names: Sequence[str]) -> bool:
+def _is_clear(linear: LinearisedFit, names: Sequence[str]) -> bool:
     return all(linear.misfit[n] < _BESIDE for n in names)
 
 
-def _beside(linear: Linear, name: str) -> str:
+def _beside(linear: LinearisedFit, name: str) -> str:
     misfit = linear.misfit[name]
     return (
         ""

@@ -62,7 +62,7 @@ def on_time(record: Record, start: float, timed: Sequence[str], state: LinearSta
 
 
 @dataclass(frozen=True)
-class Left:
+class FitResidual:
     """The residual of a state: residual over noise, shape (m,), with its problem and state.
 
     plain: derivatives of each channel's residual by bias and gain, shape (m, 2). of: channel of each row.
@@ -94,21 +94,21 @@ class Slope(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Rows:
+class LinearisedRows:
     """Residual r (m,) and derivatives (m, n) in units of the misfit.
 
     Columns: the rig's values, then for each channel its clock, drift, bias and gain. block: of each row.
     slope: from which the derivatives are computed.
     """
 
-    left: Left
+    left: FitResidual
     slope: Slope
     residual: FloatArray
     matrix: FloatArray
     block: IntArray
 
 
-def left_of(setting: LinearSetting, state: LinearState) -> Left:
+def left_of(setting: LinearSetting, state: LinearState) -> FitResidual:
     """Return the residual of a state, by one simulation."""
     record = on_time(setting.record, setting.start, setting.timed, state)
     case = replace(setting.case, drive=drive_of(record, setting.rig))
@@ -118,7 +118,7 @@ def left_of(setting: LinearSetting, state: LinearState) -> Left:
     residual, of = problem.residual(theta), _channel_of(case, setting.timed)
     noise, y = _of_rows(case, case.noise, setting.timed), _of_rows(case, case.measured, setting.timed)
     plain = np.column_stack([1.0 / noise, y / noise + residual])
-    return Left(problem, theta, residual, plain, of, _misfits(residual, plain, of, len(setting.timed)))
+    return FitResidual(problem, theta, residual, plain, of, _misfits(residual, plain, of, len(setting.timed)))
 
 
 def _channel_of(case: Case, timed: Sequence[str]) -> IntArray:
@@ -141,7 +141,7 @@ def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> F
     return np.array(misfits)
 
 
-def rows_of(setting: LinearSetting, left: Left, known: Slope | None = None) -> Rows:
+def rows_of(setting: LinearSetting, left: FitResidual, known: Slope | None = None) -> LinearisedRows:
     """Lay out the rows about a state: one simulation for each unknown, none where a slope is known near."""
     (case,), n, at = left.problem.cases, len(setting.values), left.theta
     if known is None or not known.holds_at(at, left.problem.unknowns):
@@ -154,4 +154,4 @@ def rows_of(setting: LinearSetting, left: Left, known: Slope | None = None) -> R
     weight = 1.0 / np.maximum(left.misfit, _LEAST_MISFIT)[left.of]
     block = np.floor((t - t.min()) / min(BLOCK, case.duration / _BLOCKS)).astype(np.int64)
     matrix = np.column_stack([moved, *columns]) * weight[:, None]
-    return Rows(left, known, left.residual * weight, matrix, block)
+    return LinearisedRows(left, known, left.residual * weight, matrix, block)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.checks.linear_rows import LinearSetting, LinearState, Rows
+from rsea_ros.checks.linear_rows import LinearisedRows, LinearSetting, LinearState
 from rsea_ros.identification.unknowns import Unknown, start_vector
 from rsea_ros.signals import FloatArray
 
@@ -17,7 +17,7 @@ _WIDER = 3.0
 
 
 def gauss_newton_step(
-    rows: Rows, setting: LinearSetting, state: LinearState
+    rows: LinearisedRows, setting: LinearSetting, state: LinearState
 ) -> tuple[FloatArray, FloatArray]:
     """Return the step of every unknown and its one sigma."""
     m, matrix = len(setting.timed), rows.matrix
@@ -35,7 +35,7 @@ def gauss_newton_step(
     return step, np.sqrt(np.maximum(np.diag(covariance), np.diag(inverse)))
 
 
-def _scores(rows: Rows, left: FloatArray) -> FloatArray:
+def _scores(rows: LinearisedRows, left: FloatArray) -> FloatArray:
     """Return the sum of the scores of each block, shape (blocks, unknowns)."""
     first = np.flatnonzero(np.diff(rows.block, prepend=-1))
     parts = np.add.reduceat(rows.matrix * left[:, None], first, axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -30,9 +31,17 @@ class MotionBeside(NamedTuple):
     speed: FloatArray
 
 
-def motion_beside(record: Record, name: str) -> MotionBeside | None:
-    """Return how another channel moved at the samples of a channel, None without another channel."""
-    witness = next((n for n in WITNESSES.get(name, ()) if n in record and _is_witness(record[n])), None)
+def witness_of(record: Record, name: str, but: Collection[str] = ()) -> str | None:
+    """Return the channel that says best whether another had something to measure, None without any.
+
+    but: channels that are not to be trusted.
+    """
+    able = (n for n in WITNESSES.get(name, ()) if n in record and n not in but and _is_witness(record[n]))
+    return next(able, None)
+
+
+def motion_beside(record: Record, name: str, witness: str | None) -> MotionBeside | None:
+    """Return how a witness moved at the samples of a channel, None without a witness."""
     if witness is None:
         return None
     t, channel = record[name].t, record[witness]

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.gain_findings import RIGHT_RIG
-from rsea_ros.checks.linear import Linear
+from rsea_ros.checks.linear import LinearisedFit
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.estimates import parameters_of
 from rsea_ros.identification.misfit import reweighted
@@ -25,7 +25,7 @@ from rsea_ros.normal import Z95
 _STEPS = 8
 
 
-def value_findings(linear: Linear, rig: Rig) -> list[Finding]:
+def value_findings(linear: LinearisedFit, rig: Rig) -> list[Finding]:
     """Return for each value of the rig whether these data determine it, and those that are far off."""
     unknowns = unknowns_of_rig(rig)
     if not unknowns:

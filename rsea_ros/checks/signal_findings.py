@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 from numpy.fft import rfft, rfftfreq
@@ -86,11 +87,14 @@ def band(record: Record) -> tuple[float, float]:
     return low, high
 
 
-def noises(record: Record, rig: Rig) -> list[Finding]:
-    """Return the noise of every sensor beside the rig's. record: finite values, rising stamps."""
+def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]:
+    """Return the noise of every sensor beside the rig's. record: finite values, rising stamps.
+
+    but: channels of which a part was masked and bridged.
+    """
     findings = []
     for name, sensor in rig.sensors.items():
-        if name not in record or "command" not in record or len(record[name]) < 64:
+        if name not in record or name in but or "command" not in record or len(record[name]) < 64:
             continue
         stated = max(sensor.noise, 0.5 * sensor.quantum)
         noise = noise_floor(record, name, sensor)

@@ -7,11 +7,13 @@ import math
 import numpy as np
 
 from rsea_ros.checks.finding import Finding, Light
+from rsea_ros.model.drive import SLOW
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, FloatArray, Record
 from rsea_ros.stamps import polls_unevenly
 
+_AS_SECONDS = "are the stamps in s, not in ms or µs? If so, "
 _RED_SHARE = 0.2
 """Of a channel's samples: more bad ones make the channel, not some samples, doubtful."""
 _PER_CYCLE = 4.0
@@ -28,6 +30,9 @@ _REMEDIES = {
     "missing_topic": "record it, or name its topic with --topic",
     "frozen_samples": "look at the sensor's driver: it repeats its last value",
     "dropped_samples": "record with a deeper queue, on a quieter machine",
+    "coarse_stamps": "log stamps as fine as the samples",
+    "partly_recorded": "start the recorder first and stop it last, or cut the run with --from and --to",
+    "unnamed_file": "remove it, or give its own name to read it",
     "duplicate_stamps": "stamp at acquisition, not on arrival",
     "clock_jump": "keep the clocks from being set during a run",
     "out_of_order": "sort by the stamps of the headers; nothing else to do",
@@ -42,7 +47,7 @@ _REMEDIES = {
 def fault_finding(fault: Fault) -> Finding:
     """Return the finding of a fault of the data."""
     bad = fault.kind == "dead_channel" or (fault.kind != "missing_topic" and fault.share > _RED_SHARE)
-    whole = fault.kind in ("missing_topic", "coarse_steps", "clock_jump")
+    whole = fault.kind in ("missing_topic", "coarse_steps", "coarse_stamps", "clock_jump", "partly_recorded")
     light: Light = "red" if bad and not whole else "amber"
     share = None if whole or not math.isfinite(fault.share) else 100.0 * fault.share
     value, unit = (fault.size, fault.unit) if fault.size is not None else (share, "%" if share else "")
@@ -81,7 +86,7 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float) ->
             "Hz",
             expected=expected,
             detail=longest,
-            remedy="record faster, or name the right rig with --rig",
+            remedy=f"{_AS_SECONDS if rate < SLOW else ''}record faster, or name the right rig with --rig",
         )
     if rate < _SLOW * command:
         return Finding(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rsea_ros.checks.carried import with_faults
+from rsea_ros.checks.carried import noted, with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings
+from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.cli._lines import say
 from rsea_ros.model.rig import Rig
@@ -24,8 +25,10 @@ def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, mask
         require_motion(record)
     found = [check_record(record, rig, axis) for record in records]
     if not quiet:
+        for sentence in dict.fromkeys(filter(None, (unused_sentence(r, rig) for r in records))):
+            say(sentence)
         print_warnings(found, rig)
-    return [with_faults(r, f, masks=masks) for r, f in zip(records, found, strict=True)]
+    return [with_faults(noted(r, rig), f, masks=masks) for r, f in zip(records, found, strict=True)]
 
 
 def print_warnings(found: Sequence[Findings], rig: Rig) -> None:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 COMPILER = "rsea_ros.compiler"
 
 
-class _Line(logging.Handler):
+class _LineHandler(logging.Handler):
     """Writes each message as a line on stderr."""
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -24,7 +24,7 @@ def compiling_told() -> Iterator[None]:
     if sys.stderr is None or not sys.stderr.isatty():
         yield
         return
-    logger, line = logging.getLogger(COMPILER), _Line()
+    logger, line = logging.getLogger(COMPILER), _LineHandler()
     level = logger.level
     logger.addHandler(line)
     logger.setLevel(logging.INFO)

@@ -14,7 +14,7 @@ from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
 from rsea_ros.fleet.executor import Executor, serial
 from rsea_ros.fleet.joints import Diagnose, load_joints
-from rsea_ros.fleet.summary import Summary
+from rsea_ros.fleet.summary import RunSummary
 
 if TYPE_CHECKING:
     from rsea_ros.fleet.plan import Held
@@ -73,7 +73,7 @@ def bags_in(args: argparse.Namespace) -> list[Held]:
     return bags_of(args.sources, joints)
 
 
-def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> Summary:
+def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunSummary:
     """Write the rows of all new recordings, and return the outcomes."""
     from rsea_ros.fleet.engine import Engine, EngineLimits
     from rsea_ros.fleet.plan import is_anything_new

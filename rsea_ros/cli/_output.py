@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rsea_ros.errors import OutputError
-from rsea_ros.new_files import Place, check_free
+from rsea_ros.new_files import Destination, check_free, unused
 
 FOUND = 1
 """Exit status for a finding listed in --fail-on."""
@@ -59,15 +59,16 @@ def results_place(
     default: str | Path,
     names: Sequence[str],
     inputs: Iterable[str | Path | None] = (),
-) -> Place:
+) -> Destination:
     """Return the folder of the results: --out, else a free name (NAME, NAME-2, …).
 
     Raises OutputError, before any work, if --out is a file, holds results, or is the folder of an input.
     """
     if args.out is None:
-        return Place(Path(default), fresh=True)
+        check_free([unused(Path(default))], inputs=list(filter(None, inputs)))
+        return Destination(Path(default), fresh=True)
     folder = Path(args.out)
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"--out {folder}: is a file, expected a directory or a new name")
     check_free((folder / name for name in names), force=args.force, inputs=list(filter(None, inputs)))
-    return Place(folder, args.force)
+    return Destination(folder, args.force)

@@ -18,7 +18,7 @@ _ASCII = {
 }  # fmt: skip
 
 
-class Shown:
+class EscapedStream:
     """A text stream that shows control characters; colours pass on a terminal."""
 
     def __init__(self, stream: TextIO) -> None:
@@ -43,7 +43,7 @@ def shown() -> Iterator[None]:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="rsea")
-    sys.stdout = Shown(before)
+    sys.stdout = EscapedStream(before)
     try:
         yield
     finally:

@@ -88,6 +88,7 @@ def add_window_options(parser: argparse.ArgumentParser) -> None:
 def cut(record: Record, args: argparse.Namespace) -> Record:
     """Return the part of a record selected by the options; stamps keep their origin except for --shift.
 
+    Which channels cover the whole of it is for the checks to say again.
     Raises ParameterError for an invalid or empty window, and for a shift of an unknown channel.
     """
     record = _shifted(record, args.shift)
@@ -102,7 +103,8 @@ def cut(record: Record, args: argparse.Namespace) -> Record:
             f"window {begin:g} to {end:g} s: no sample of {record.source} (0 to {length:.3f} s), "
             "expected some commands"
         )
-    return replace(part, channels=channels)
+    faults = tuple(f for f in part.faults if f.kind != "partly_recorded")
+    return replace(part, channels=channels, faults=faults)
 
 
 def _shifted(record: Record, shifts: Sequence[str]) -> Record:
@@ -116,9 +118,23 @@ def _shifted(record: Record, shifts: Sequence[str]) -> Record:
         if name not in record or not math.isfinite(seconds):
             known = ", ".join(record.channels)
             raise ParameterError(f"--shift {shift}: expected CHANNEL=S, S in s, CHANNEL one of {known}")
-        channel = record[name]
-        record = record.with_channels(**{name: Channel(channel.t + seconds, channel.y)})
+        channel = Channel(record[name].t + seconds, record[name].y)
+        _check_beside_others(record, name, channel, shift)
+        record = record.with_channels(**{name: channel})
     return record
+
+
+def _check_beside_others(record: Record, name: str, channel: Channel, shift: str) -> None:
+    """Raise ParameterError for a shift after which a channel has no moment in common with the others."""
+    others = [c for n, c in record.channels.items() if n != name and len(c)]
+    if not others or not len(channel):
+        return
+    start, stop = (float(limit(c.t[at] for c in others)) for limit, at in ((min, 0), (max, -1)))
+    if channel.t[0] > stop or channel.t[-1] < start:
+        raise ParameterError(
+            f"--shift {shift}: moves {name} to {channel.t[0]:.4g} to {channel.t[-1]:.4g} s, "
+            f"expected a moment in common with the other channels, {start:.4g} to {stop:.4g} s"
+        )
 
 
 def _window(args: argparse.Namespace) -> tuple[float, float]:

@@ -15,10 +15,10 @@ from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._output import path
 from rsea_ros.cli._runs import RIG
 from rsea_ros.errors import ParameterError
-from rsea_ros.hardware.peer.bus import Bus
+from rsea_ros.hardware.peer.bus import EmulatedBus
 from rsea_ros.hardware.peer.ft import ForceSensor
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import KEPT, Motor
+from rsea_ros.hardware.peer.motor import KEPT, EmulatedMotor
 from rsea_ros.hardware.peer.registers import MODELS
 from rsea_ros.hardware.peer.requests import LineRequests
 from rsea_ros.hardware.peer.station import Station
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     wrong = Misbehaviour(seed=args.seed)
     kept = KEPT if args.requests else 0  # nobody else can ask for the logs
     plants, motors = _motors(args, kept)
-    bus, sensor = Bus(args.port, motors, wrong, kept), ForceSensor(plants[0], args.ft_rate, wrong)
+    bus, sensor = EmulatedBus(args.port, motors, wrong, kept), ForceSensor(plants[0], args.ft_rate, wrong)
     stop, stopping = os.pipe()
     inlet = sys.stdin.fileno() if args.requests else stop
     requests = LineRequests(motors, bus, sensor, wrong, inlet, sys.stdout.fileno())
@@ -89,13 +89,13 @@ def _place(args: argparse.Namespace, sensor: ForceSensor) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice], list[Motor]]:
+def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice], list[EmulatedMotor]]:
     """Return the running plant of each motor, and the motors, with the IDs 1, 2, …"""
     rig = load_rig(args.rig)
     plants, motors = [], []
     for place, model in enumerate(args.model):
         plant = SimulatedDevice(rig, PLANT_RATE, seed=args.seed + place, clock=time.monotonic_ns)
-        motor = Motor(model, plant, args.torque_constant, kept=kept)
+        motor = EmulatedMotor(model, plant, args.torque_constant, kept=kept)
         motor.put("id", place + 1)
         motor.put("return_delay", args.return_delay)
         plant.open()

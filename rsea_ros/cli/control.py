@@ -13,7 +13,7 @@ from rsea_ros.new_files import NewFiles
 from rsea_ros.report.file_names import CONTROL_JSON, REPORT
 
 if TYPE_CHECKING:
-    from rsea_ros.control.study import Motor, Study
+    from rsea_ros.control.study import MotorLimits, Study
     from rsea_ros.model.rig import Rig
 
 HELP = "design the torque controller of a rig: gains, margins, trials in simulation, output impedance"
@@ -64,21 +64,21 @@ def run(args: argparse.Namespace) -> int:
     return 1 if args.fail_on and missed else 0
 
 
-def motors(rig: Rig) -> list[Motor]:
+def motors(rig: Rig) -> list[MotorLimits]:
     """Return the limit of the driver, and those of the catalogue unit with the gear ratio of the rig."""
-    from rsea_ros.control.controller import Limits
-    from rsea_ros.control.study import Motor
+    from rsea_ros.control.controller import TorqueLimits
+    from rsea_ros.control.study import MotorLimits
     from rsea_ros.design.catalogue import catalogue
 
-    limit, where = Limits().torque, "torque_limit of config/nodes/driver.yaml"
-    found = [Motor("driver's limit", limit, float("inf"), where)]
+    limit, where = TorqueLimits().torque, "torque_limit of config/nodes/driver.yaml"
+    found = [MotorLimits("driver's limit", limit, float("inf"), where)]
     for unit in catalogue().values():
         if unit["ratio"] == rig["gear.ratio"]:
             speed = unit.values.get("no_load_speed", float("inf"))
             for kind in ("continuous_torque", "peak_torque"):
                 if kind in unit.values:
                     name = f"{unit.name}, {kind.partition('_')[0]}"
-                    found.append(Motor(name, unit[kind], speed, unit.sources[kind]))
+                    found.append(MotorLimits(name, unit[kind], speed, unit.sources[kind]))
     return found
 
 

@@ -15,7 +15,7 @@ from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, prin
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import FieldError, ParameterError
-from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.new_files import Destination, NewFiles
 from rsea_ros.report.file_names import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MODEL, REPORT
 
 if TYPE_CHECKING:
@@ -58,11 +58,11 @@ def run(args: argparse.Namespace) -> int:
     """Design the run and write it."""
     from rsea_ros.experiment.advice import advise
     from rsea_ros.experiment.limits import limits_from
-    from rsea_ros.experiment.proposal import Asked
+    from rsea_ros.experiment.proposal import DesignRequest
     from rsea_ros.identification.workers import worker_pools
 
     place = results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
-    asked = Asked(
+    asked = DesignRequest(
         limits_from(args.limits), args.rate, min(0.5, args.longest), args.longest, refine=args.refine
     )
     models = [model for path in args.models for model in models_in(path)]
@@ -120,7 +120,7 @@ def _possible(
     return kept, dict(weighing.cases[0].noise), excluded
 
 
-def written(advice: Advice, place: Place, args: argparse.Namespace) -> Path:
+def written(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
     from rsea_ros.experiment.run_file import run_text
     from rsea_ros.report.experiment.json import advice_json

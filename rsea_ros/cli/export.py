@@ -129,9 +129,9 @@ def _excitation(rig: Rig, args: argparse.Namespace, rate: float) -> Any:
     """Return the chirp that verifies the export, N m or rad."""
     from dataclasses import replace
 
-    from rsea_ros.identification.excitation import JOINT, Settings, excitation
+    from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
 
-    default = JOINT if rig.loop else Settings(amplitude=10.0, noise=2.0, high=60.0)
+    default = JOINT if rig.loop else ExcitationSettings(amplitude=10.0, noise=2.0, high=60.0)
     size = args.amplitude or default.amplitude
     noise = default.noise * size / default.amplitude
     low = max(0.5, 1.0 / args.duration)

@@ -14,7 +14,7 @@ from rsea_ros.cli._numbers import whole_numbers
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import OutputError
-from rsea_ros.new_files import NewFiles, Place, check_free
+from rsea_ros.new_files import Destination, NewFiles, check_free
 
 HELP = "convert a measurement (CSV, MAT, Parquet, NPZ, JSON) to a bag by a map of its columns"
 EXAMPLE = "rsea import run.csv --map map.yaml --out run"
@@ -63,7 +63,7 @@ def _write_several(args: argparse.Namespace, mapping: ImportMap) -> list[str]:
     lines: list[str] = []
     if folder.suffix in (".mcap", ".db3"):
         raise OutputError(f"{folder}: is one bag, expected a folder for several")
-    with NewFiles(Place(folder, args.force)) as new:
+    with NewFiles(Destination(folder, args.force)) as new:
         for file in args.files:
             for imported in import_records(file, mapping, args.index):
                 name = Path(file).name.partition(".")[0] + imported.name

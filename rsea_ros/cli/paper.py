@@ -11,7 +11,7 @@ from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
-from rsea_ros.new_files import NewFiles, Place, check_free
+from rsea_ros.new_files import Destination, NewFiles, check_free
 from rsea_ros.report.file_names import PAPER_JSON, REPORT
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def _figures(args: argparse.Namespace) -> int:
 
     figures = documentation_figures()
     check_free((args.figures / name for name in figures), force=args.force)
-    with NewFiles(Place(args.figures, args.force)) as new:
+    with NewFiles(Destination(args.figures, args.force)) as new:
         written = [new.write(name, svg) for name, svg in figures.items()]
     for file in written:
         print(file)
@@ -106,7 +106,7 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
     """Simulate the paper's tests, each through a bag."""
     import numpy as np
 
-    from rsea_ros.identification.excitation import Settings, excitation
+    from rsea_ros.identification.excitation import ExcitationSettings, excitation
     from rsea_ros.identification.frequency_response import estimate_response
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.model.simulation import synthesize
@@ -118,7 +118,7 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
         return through_bag(new.staged(f"{name}.mcap"), record)
 
     tell("high impedance", 0.0)
-    values = excitation("chirp", Settings(rate=RATE, duration=args.duration, seed=args.seed))
+    values = excitation("chirp", ExcitationSettings(rate=RATE, duration=args.duration, seed=args.seed))
     command = Channel(np.arange(len(values)) / RATE, values)
     rig = load_rig(CLAMPED)
     clamped = estimate_response(bag(rig.name, synthesize(rig, command, seed=args.seed)), "ft")

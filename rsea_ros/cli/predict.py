@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from msg_adapters import read_record
+from rsea_ros.checks.faults import check
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.model.prediction import Comparison, predict
@@ -43,14 +45,15 @@ def run(args: argparse.Namespace) -> int:
         check_free([Path(args.out)], force=args.force, inputs=[args.bag, args.model])
     record = read_record([args.bag], topics=topic_map(args), strict=False)
     record, faults = repair_stamps(record)
-    record = cut(record, args)
-    comparisons = predict(load_rig(args.model), record)
+    record = cut(replace(record, faults=(*record.faults, *faults)), args)
+    rig = load_rig(args.model)
+    comparisons = predict(rig, record)
     if args.out:
         write_text(args.out, _table(comparisons), force=args.force)
     errors = {
         n: numbers({"rms_error": c.rms_error, "fit_percent": c.fit_percent}) for n, c in comparisons.items()
     }
-    told = [fault_json(fault) for fault in (*record.faults, *faults)]
+    told = [fault_json(fault) for fault in check(record, rig).faults]
     print(json.dumps({"channels": errors, "data": {"faults": told}}, indent=2))
     return 0
 

@@ -15,7 +15,7 @@ from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.decimal_number import is_decimal
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import ParameterError
-from rsea_ros.identification.excitation import JOINT, KINDS, Settings, check_limits, excitation
+from rsea_ros.identification.excitation import JOINT, KINDS, ExcitationSettings, check_limits, excitation
 from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -33,7 +33,7 @@ _MOST_TORQUE, _MOST_TURNED = 100.0, 3.2
 
 
 def _default(name: str) -> str:
-    return f"(default {getattr(Settings(), name):g}, for a position loop {getattr(JOINT, name):g})"
+    return f"(default {getattr(ExcitationSettings(), name):g}, for a position loop {getattr(JOINT, name):g})"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="switch an effect on, SI units; without parameters its typical size. Effects: "
         + ", ".join(catalogue()),
     )
-    default = Settings()
+    default = ExcitationSettings()
     parser.add_argument(
         "--excitation",
         default="chirp",
@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     rig = load_rig(args.rig)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
     check_effects(rig.effects)
-    settings = _settings(args, JOINT if rig.loop else Settings())
+    settings = _settings(args, JOINT if rig.loop else ExcitationSettings())
     values = excitation(args.excitation, settings)
     limit, unit = (_MOST_TURNED, "rad") if rig.loop else (_MOST_TORQUE, "N m")
     check_limits(values, limit if args.limit is None else args.limit, settings.rate, unit)
@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _settings(args: argparse.Namespace, default: Settings) -> Settings:
+def _settings(args: argparse.Namespace, default: ExcitationSettings) -> ExcitationSettings:
     """Return the excitation of the options, with the defaults of this kind of rig."""
     asked = {
         "rate": args.rate,

@@ -25,7 +25,7 @@ import numpy as np
 
 from rsea_ros.control.acted import Acted
 from rsea_ros.control.compensation import Compensation, compensation
-from rsea_ros.control.law import Gains, Law, State, feedback, hold, law_of
+from rsea_ros.control.law import FeedbackLaw, FeedbackState, Gains, feedback, hold, law_of
 from rsea_ros.control.learning import Learning
 from rsea_ros.control.link import LinkMotion, LinkShare
 from rsea_ros.control.loads import lightest, load_range, locked
@@ -44,7 +44,7 @@ CORNER = 80.0
 
 
 @dataclass(frozen=True)
-class Limits:
+class TorqueLimits:
     """torque: N m. slew: N m/s. ramp: s in which the limit grows after the start."""
 
     torque: float = 68.0
@@ -53,7 +53,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Reading:
+class Measurement:
     """One sample of the bench: N m, rad/s, rad; motor_torque: N m, nan if unknown.
 
     The measured torque shows a command that came late or was cut down by the driver; whether it is that of
@@ -87,36 +87,37 @@ class TorqueController:
     Method: docs/control.md. Not to be confused with the node `controller`, which runs it on topics.
     """
 
-    def __init__(self, rig: Rig, rate: float, gains: Gains | None = None, *, limits: Limits | None = None,
-                 compensate: Collection[str] | None = None, preview: bool = False, learn: bool = True,
-                 corner: float = CORNER, link: LinkShare | None = None) -> None:  # fmt: skip
+    def __init__(self, rig: Rig, rate: float, gains: Gains | None = None, *,
+                 limits: TorqueLimits | None = None, compensate: Collection[str] | None = None,
+                 preview: bool = False, learn: bool = True, corner: float = CORNER,
+                 link: LinkShare | None = None) -> None:  # fmt: skip
         """rate: Hz. gains: by default those of `synthesis.design`, which takes 2 to 3 s.
 
         limits: torque, slew and ramp. compensate: effects of the rig to compensate, by default all that have
         a law for it. preview: the desired torque is known two samples ahead, so it is not predicted. corner:
-        of the prediction, Hz. link: what of the motion in `Reading.link` is fed forward (link.link_share), by
-        default nothing. learn: learn load and drive; use False inside an outer loop whose desired
-        torque follows the motion (virtual.py), because learning would change its impedance.
+        of the prediction, Hz. link: share of the motion in `Measurement.link` that is fed forward
+        (link.link_share), by default nothing. learn: learn load and drive; use False inside an outer loop
+        whose desired torque follows the motion (virtual.py), because learning would change its impedance.
         Raises ParameterError for a rig whose torque cannot be controlled.
         """
         gains = gains or design(rig, load_range(rig, lightest(rig)), rate).gains
-        self._law: Law = law_of(rig, rate, gains)
+        self._law: FeedbackLaw = law_of(rig, rate, gains)
         self.learned = Learning(rig, self._law)
         self._reference = Reference(sampled(locked(rig), rate), self._law, self.learned)
         self._compensation: Compensation = compensation(rig, compensate)
         self._prediction, self._acted = Prediction(corner, 1.0 / rate), Acted(1.0 / rate)
-        self._preview, self._learn, self._limits = preview, learn, limits or Limits()
+        self._preview, self._learn, self._limits = preview, learn, limits or TorqueLimits()
         self._link = LinkMotion(self._law, link or LinkShare(), FOLLOWED * self._limits.torque)
-        self.start(Reading(0.0, 0.0, 0.0))
+        self.start(Measurement(0.0, 0.0, 0.0))
 
-    def start(self, reading: Reading, desired: float = 0.0) -> None:
+    def start(self, reading: Measurement, desired: float = 0.0) -> None:
         """Restart without a jump, from the present state of the bench and its motor torque."""
         torque = reading.motor_torque if math.isfinite(reading.motor_torque) else 0.0
         self._reference.start(reading.ft, reading.velocity, desired)
         self.learned.start(reading.ft, reading.velocity)
         self._prediction.start(desired)
         self._link.start(reading.link)
-        self._state = State(ft=reading.ft, velocity=reading.velocity, newest=torque, applied=torque)
+        self._state = FeedbackState(ft=reading.ft, velocity=reading.velocity, newest=torque, applied=torque)
         self._acted.start(torque)
         self._begin = self._sent = self._sent_before = torque
         self._known = self._learned = (0.0, 0.0)
@@ -125,7 +126,7 @@ class TorqueController:
 
     def step(
         self,
-        reading: Reading,
+        reading: Measurement,
         desired: float,
         missed: int = 0,
         *,
@@ -178,13 +179,13 @@ class TorqueController:
         self._reference.advance(self._reference.torque(ahead), float(ahead[0]))
         self._remember(hold(self._state, self._state.newest), self._sent, self._known[1], self._learned[1])
 
-    def _remember(self, state: State, torque: float, known: float, learned: float) -> None:
+    def _remember(self, state: FeedbackState, torque: float, known: float, learned: float) -> None:
         self._state = state
         self._sent_before, self._sent, self._known = self._sent, torque, (self._known[1], known)
         self._learned = self._learned[1], learned
         self._age += 1
 
-    def _compare(self, reading: Reading, offset: float) -> tuple[float, float, Reading]:
+    def _compare(self, reading: Measurement, offset: float) -> tuple[float, float, Measurement]:
         """Return how far the model is ahead in torque (N m) and speed (rad/s), and the reading at its place.
 
         Both are compared at one instant: torque at that of ft, speed at that of the other measurements.
@@ -197,7 +198,9 @@ class TorqueController:
         placed = replace(reading, ft=reading.ft - torque + ft, velocity=reading.velocity - speed + velocity)
         return torque - reading.ft, speed - reading.velocity, placed
 
-    def _hear(self, reading: Reading, missed: int, error: float, slowness: float, *, in_time: bool) -> None:
+    def _hear(
+        self, reading: Measurement, missed: int, error: float, slowness: float, *, in_time: bool
+    ) -> None:
         """Learn from a sample, and take the measured motor torque for the one that acted.
 
         After lost samples, those between are read on a straight line.
@@ -220,7 +223,7 @@ class TorqueController:
             applied=acted if math.isfinite(acted) else s.applied,
         )
 
-    def _compensated(self, reading: Reading, forward: float) -> float:
+    def _compensated(self, reading: Measurement, forward: float) -> float:
         """Return the torque against friction and ripple, N m, of the motion that the model will make."""
         c, model = self._compensation, self._reference
         if not (c.frictions or c.ripples):

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.control.controller import Limits, TorqueController
+from rsea_ros.control.controller import TorqueController, TorqueLimits
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.loads import locked
-from rsea_ros.control.synthesis import Design
+from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
 
-UNLIMITED = Limits(torque=1e6, slew=1e12, ramp=0.0)
+UNLIMITED = TorqueLimits(torque=1e6, slew=1e12, ramp=0.0)
 SINES = (1.0, 2.0, 3.0, 5.0, 10.0, 15.0, 20.0, 27.0, 35.0, 50.0, 70.0, 120.0, 200.0, 400.0)
 """Hz, of which those below HIGHEST of the rate are tried."""
 HIGHEST = 0.46
@@ -82,14 +82,18 @@ class Step:
     settling: float
 
 
-def following(true: Rig, model: Rig, design: Design, *, late: int = 0, learn: bool = True) -> Following:
+def following(
+    true: Rig, model: Rig, design: ControllerDesign, *, late: int = 0, learn: bool = True
+) -> Following:
     """Follow sines on a bench without noise and limits; the controller does not know its load."""
     hz = np.array([f for f in SINES if f < HIGHEST * design.rate])
     found = [_sine(true, locked(model), design, float(f), late, learn) for f in hz]
     return Following(hz, np.array([t for t, _ in found]), np.array([m for _, m in found]))
 
 
-def _sine(true: Rig, model: Rig, design: Design, hz: float, late: int, learn: bool) -> tuple[complex, float]:
+def _sine(
+    true: Rig, model: Rig, design: ControllerDesign, hz: float, late: int, learn: bool
+) -> tuple[complex, float]:
     rate = design.rate
     n = round((WAIT + max((PERIODS if hz > FEW else FEW) / hz, 0.25)) * rate)
     wanted = np.sin(2.0 * np.pi * hz * np.arange(n) / rate)
@@ -100,7 +104,9 @@ def _sine(true: Rig, model: Rig, design: Design, hz: float, late: int, learn: bo
     return complex(np.sum(run.ft * turn) / scale), float(abs(np.sum(run.command * turn) / scale))
 
 
-def step_response(true: Rig, model: Rig, design: Design, *, late: int = 0, seconds: float = 1.5) -> Step:
+def step_response(
+    true: Rig, model: Rig, design: ControllerDesign, *, late: int = 0, seconds: float = 1.5
+) -> Step:
     """Return the answer to a step from rest, within the motor's limits, without noise."""
     rate = design.rate
     wanted = np.where(np.arange(round(seconds * rate)) < 0.3 * rate, 0.0, STEP)

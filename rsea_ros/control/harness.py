@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.control.controller import Reading, TorqueController
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.grid import Grid
 from rsea_ros.control.lateness import Lateness
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.simulation import Plant, Sample
+from rsea_ros.model.simulation import Plant, PlantSample
 from rsea_ros.signals import FloatArray
 
 PARTS = 10
@@ -20,7 +20,7 @@ LONG_AGO = 10**12
 
 
 @dataclass(frozen=True)
-class Trace:
+class ControlTrace:
     """One run: t (s), desired, ft and command (N m), velocity (rad/s), all at the samples, shape (n,)."""
 
     t: FloatArray
@@ -46,7 +46,7 @@ def closed_loop(
     seed: int = 0,
     ahead: int = 0,
     late: int = 0,
-) -> Trace:
+) -> ControlTrace:
     """Run a controller on a simulated rig from rest. desired: N m at the samples, shape (n,).
 
     A command that is computed at a sample acts from the next one on: one sample of delay. late: samples
@@ -61,7 +61,9 @@ def closed_loop(
         rows[k] = sample.ft, command, sample.velocity
         sample = plant.step(pending.pop(0))
         pending.append(command)
-    return Trace(np.arange(len(desired)) / rate, np.asarray(desired), rows[:, 0], rows[:, 1], rows[:, 2])
+    return ControlTrace(
+        np.arange(len(desired)) / rate, np.asarray(desired), rows[:, 0], rows[:, 1], rows[:, 2]
+    )
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def irregular(
     arrivals: Arrivals,
     *,
     seed: int = 0,
-) -> Trace:
+) -> ControlTrace:
     """Run a controller on a simulated rig with measurements and commands that come when they come.
 
     As the node does it: a grid gives each stamp its place, lateness fades the feedback. Held to a part
@@ -117,9 +119,9 @@ def irregular(
         sample = plant.step(torque)
         torques.append(sample.ft)
     n = np.array(rows)
-    return Trace(np.arange(len(n)) / rate, np.asarray(desired), n[:, 0], n[:, 1], n[:, 2])
+    return ControlTrace(np.arange(len(n)) / rate, np.asarray(desired), n[:, 0], n[:, 1], n[:, 2])
 
 
-def _reading(sample: Sample) -> Reading:
+def _reading(sample: PlantSample) -> Measurement:
     link = sample.position - sample.deflection
-    return Reading(sample.ft, sample.velocity, sample.position, sample.motor_torque, link=link)
+    return Measurement(sample.ft, sample.velocity, sample.position, sample.motor_torque, link=link)

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import expm
 
-from rsea_ros.control.controller import Reading, TorqueController
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.following import UNLIMITED
 from rsea_ros.control.link import LinkShare
-from rsea_ros.control.synthesis import Design
+from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.virtual import Virtual
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, PORTS, D
@@ -51,21 +51,21 @@ class Held:
         wanted = (outputs.end_torque(bench, "spring_end"), speed, angle, distal, outputs.link())
         self._c = np.vstack([read(system, output)[0] for output in wanted])
 
-    def step(self, torque: float, muscle: float) -> tuple[Reading, float]:
+    def step(self, torque: float, muscle: float) -> tuple[Measurement, float]:
         """Hold both torques (N m) for a sample; return the reading and the distal speed, rad/s."""
         self._x = self._a @ self._x + self._b @ np.array([torque, muscle])
         ft, velocity, position, distal, link = (float(y) for y in self._c @ self._x)
-        return Reading(ft, velocity, position, torque, link=link), distal
+        return Measurement(ft, velocity, position, torque, link=link), distal
 
 
 def measured(
-    rig: Rig, design: Design, virtual: Virtual, hz: FloatArray, link: LinkShare | None = None
+    rig: Rig, design: ControllerDesign, virtual: Virtual, hz: FloatArray, link: LinkShare | None = None
 ) -> ComplexArray:
     """Return Z, N m s/rad, that a muscle's sine feels at each frequency, Hz: the code that runs."""
     return np.array([_felt(rig, design, virtual, float(f), link) for f in hz])
 
 
-def _felt(rig: Rig, design: Design, virtual: Virtual, hz: float, link: LinkShare | None) -> complex:
+def _felt(rig: Rig, design: ControllerDesign, virtual: Virtual, hz: float, link: LinkShare | None) -> complex:
     rate, k_s = design.rate, rig["spring.stiffness"]
     bench = Held(rig, rate)
     controller = TorqueController(rig, rate, design.gains, limits=UNLIMITED, learn=False, link=link)

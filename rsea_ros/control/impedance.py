@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.control.law import Gains, Law, law_of
+from rsea_ros.control.law import FeedbackLaw, Gains, law_of
 from rsea_ros.control.loads import locked
 from rsea_ros.control.loop import actions, returns
 from rsea_ros.control.sampled import FT, responses, sampled, z_of
-from rsea_ros.control.uncertainty import Case, Uncertainty, bench, lags_of, mode_of
+from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench, lags_of, mode_of
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output
@@ -27,7 +27,7 @@ from rsea_ros.signals import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)
-class Impedance:
+class OutputImpedance:
     """N m s/rad at hz, shape (n,): under control, with the motor off, with the motor standing still."""
 
     hz: FloatArray
@@ -51,7 +51,7 @@ class Moved:
     path: ComplexArray | float = 1.0
     current: ComplexArray | float = 1.0
 
-    def impedance(self, law: Law, on_link: ComplexArray | float = 0.0) -> ComplexArray:
+    def impedance(self, law: FeedbackLaw, on_link: ComplexArray | float = 0.0) -> ComplexArray:
         """Return T / w_d under a law, N m s/rad, shape (n,). on_link: of `linked`, N m/rad."""
         on_ft, on_velocity, _ = actions(law, self.hz)
         sensed = self.plant.copy()
@@ -62,7 +62,7 @@ class Moved:
         felt: ComplexArray = self.torque - self.plant[FT] * self.path * asked / whole
         return felt
 
-    def ratio(self, law: Law, on_link: ComplexArray | float = 0.0) -> FloatArray:
+    def ratio(self, law: FeedbackLaw, on_link: ComplexArray | float = 0.0) -> FloatArray:
         """Return |T / w_d| over that of the bare spring. on_link: as `impedance` has it."""
         return np.abs(self.impedance(law, on_link) / self.spring)
 
@@ -75,17 +75,17 @@ def moved(rig: Rig, rate: float, hz: FloatArray) -> Moved:
     return Moved(hz, responses(sampled(locked(rig), rate), hz), torque, speed, spring)
 
 
-def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: Case, u: Uncertainty) -> Moved:
+def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: BenchVariant, u: Uncertainty) -> Moved:
     """Return what moving the distal side of a bench of the set does. hz: below half the rate."""
     path, current = lags_of(case, rate, hz)
     still = moved(bench(rig, case), rate, hz)
     return replace(still, sensor=mode_of(u.mode, case.participation, hz), path=path, current=current)
 
 
-def impedance(rig: Rig, rate: float, gains: Gains, hz: FloatArray) -> Impedance:
+def impedance(rig: Rig, rate: float, gains: Gains, hz: FloatArray) -> OutputImpedance:
     """Return the impedance of the distal side against a clamped housing. hz: below half the rate."""
     felt = moved(rig, rate, hz)
-    return Impedance(hz, felt.impedance(law_of(rig, rate, gains)), felt.torque, felt.spring)
+    return OutputImpedance(hz, felt.impedance(law_of(rig, rate, gains)), felt.torque, felt.spring)
 
 
 def _without_motor(rig: Rig, hz: FloatArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:

@@ -50,7 +50,7 @@ class Gains:
 
 
 @dataclass(frozen=True)
-class Law:
+class FeedbackLaw:
     """Coefficients of the difference equations. rate: of the spring's rate; q: of Q; wash: of H; leak, rest:
     of I."""
 
@@ -67,7 +67,7 @@ class Law:
     rest_gain: float
 
 
-class State(NamedTuple):
+class FeedbackState(NamedTuple):
     """The memory of the law: the last error, spring rate, e / (1 + s / w_l) and its integral, ft, velocity,
     w_r - w, H of that, d, Q d; the last two torques."""
 
@@ -85,11 +85,11 @@ class State(NamedTuple):
     applied: float = 0.0
 
 
-def law_of(rig: Rig, rate: float, gains: Gains) -> Law:
+def law_of(rig: Rig, rate: float, gains: Gains) -> FeedbackLaw:
     """Return the law of a rig's actuator at `rate`, Hz."""
     period, b_s = 1.0 / rate, rig["spring.damping"]
     warped = math.tan(math.pi * min(gains.q_frequency * period, 0.49))
-    return Law(
+    return FeedbackLaw(
         gains,
         rig["rotor.reflected_inertia"],
         rig["rotor.reflected_damping"],
@@ -105,8 +105,8 @@ def law_of(rig: Rig, rate: float, gains: Gains) -> Law:
 
 
 def feedback(
-    law: Law, s: State, error: float, slowness: float, ft: float, velocity: float
-) -> tuple[float, State]:
+    law: FeedbackLaw, s: FeedbackState, error: float, slowness: float, ft: float, velocity: float
+) -> tuple[float, FeedbackState]:
     """Return the torque, N m, for a sample, and the new state; `hold` has to follow.
 
     error: N m. slowness: w_r - w, rad/s. ft: N m. velocity: w, rad/s, of the gear output against the housing.
@@ -124,11 +124,11 @@ def feedback(
     unexplained = s.applied - explained
     disturbance = law.q_pole * s.disturbance + law.q_gain * (unexplained + s.unexplained)
     torque = g.k_p * error + g.k_d * rate + g.k_i * (slow + integral) + g.k_w * swing + disturbance
-    after = State(error, rate, slow, integral, ft, velocity, slowness, swing, unexplained, disturbance,
-                  s.newest, s.applied)  # fmt: skip
+    after = FeedbackState(error, rate, slow, integral, ft, velocity, slowness, swing, unexplained,
+                          disturbance, s.newest, s.applied)  # fmt: skip
     return torque, after
 
 
-def hold(s: State, torque: float) -> State:
+def hold(s: FeedbackState, torque: float) -> FeedbackState:
     """Return the state with the torque from the next sample on, for the disturbance observer."""
     return s._replace(newest=torque, applied=s.newest)

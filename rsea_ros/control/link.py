@@ -19,11 +19,11 @@ from itertools import product
 import numpy as np
 
 from rsea_ros.control.impedance import moved
-from rsea_ros.control.law import Law, law_of
+from rsea_ros.control.law import FeedbackLaw, law_of
 from rsea_ros.control.loop import linked, returns
 from rsea_ros.control.margins import encirclements
 from rsea_ros.control.sampled import LINK
-from rsea_ros.control.synthesis import SOFT, Demand, Design, grid
+from rsea_ros.control.synthesis import SOFT, ControllerDesign, DesignLimits, grid
 from rsea_ros.control.uncertainty import Uncertainty, corners, family
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
@@ -52,7 +52,7 @@ class LinkShare:
 class LinkMotion:
     """Follows the link's speed beyond what the load does for the desired torque, one sample at a time."""
 
-    def __init__(self, law: Law, share: LinkShare, most: float = math.inf) -> None:
+    def __init__(self, law: FeedbackLaw, share: LinkShare, most: float = math.inf) -> None:
         """most: N m, the largest torque; an encoder that jumps must not make more."""
         self._inertia, self._damping = share.inertia * law.inertia, share.damping * law.damping
         self._period, self._most = law.period, most
@@ -87,9 +87,11 @@ class LinkMotion:
         return self._torque
 
 
-def link_share(rig: Rig, loads: Mapping[str, Rig], design: Design, demand: Demand | None = None) -> LinkShare:
+def link_share(
+    rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign, demand: DesignLimits | None = None
+) -> LinkShare:
     """Return the parts that make the output softest with every bench of the set as robust as demanded."""
-    demand, law, u = demand or Demand(), law_of(rig, design.rate, design.gains), Uncertainty()
+    demand, law, u = demand or DesignLimits(), law_of(rig, design.rate, design.gains), Uncertainty()
     hz = grid(design.rate, 60)
     f = family(loads, corners(tuple(loads), u), u, design.rate, hz)
     still = moved(rig, design.rate, hz)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.control.law import Law, State, feedback, hold
+from rsea_ros.control.law import FeedbackLaw, FeedbackState, feedback, hold
 from rsea_ros.control.sampled import FT, VELOCITY, Sampled, z_of
 from rsea_ros.signals import ComplexArray, FloatArray
 
 
-def actions(law: Law, hz: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+def actions(law: FeedbackLaw, hz: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Return the law's responses to ft (1), velocity (N m s/rad) and applied torque (1).
 
     C + Q (1 + 1/z)/2,   k_w H + Q (J (1 - 1/z)/T + b (1 + 1/z)/2),   Q / z,   C = k_p + k_d D + k_i I
@@ -25,7 +25,7 @@ def actions(law: Law, hz: FloatArray) -> tuple[ComplexArray, ComplexArray, Compl
     return on_ft, g.k_w * wash + q * explained, q * back
 
 
-def linked(law: Law, inertia: float, damping: float, corner: float, hz: FloatArray) -> ComplexArray:
+def linked(law: FeedbackLaw, inertia: float, damping: float, corner: float, hz: FloatArray) -> ComplexArray:
     """Return what the law makes of the link's angle (N m/rad), its one sample of delay included: link.py."""
     back, pole = 1.0 / z_of(law.period, hz), np.exp(-2.0 * np.pi * corner * law.period)
     rate = (1.0 - back) / law.period
@@ -35,7 +35,7 @@ def linked(law: Law, inertia: float, damping: float, corner: float, hz: FloatArr
 
 
 def returns(
-    law: Law,
+    law: FeedbackLaw,
     plant: ComplexArray,
     hz: FloatArray,
     path: ComplexArray | float = 1.0,
@@ -54,28 +54,28 @@ def returns(
     return np.broadcast_to(own, whole.shape), whole
 
 
-def open_loop(law: Law, plant: ComplexArray, hz: FloatArray) -> ComplexArray:
+def open_loop(law: FeedbackLaw, plant: ComplexArray, hz: FloatArray) -> ComplexArray:
     """Return L, the loop broken at the motor torque behind its current, shape (…, n)."""
     own, whole = returns(law, plant, hz)
     return whole / own - 1.0
 
 
-def closed_loop_matrix(law: Law, plant: Sampled, share: float = 1.0) -> FloatArray:
+def closed_loop_matrix(law: FeedbackLaw, plant: Sampled, share: float = 1.0) -> FloatArray:
     """Return the matrix that takes bench and law from one sample to the next, without a desired torque.
 
     Its columns are the answers of `feedback` and `hold` to unit states. share: of the torque that acts.
     """
-    n, size = len(plant.a), len(plant.a) + len(State._fields)
-    columns = [_step(law, plant, unit[:n], State(*unit[n:]), share) for unit in np.eye(size)]
+    n, size = len(plant.a), len(plant.a) + len(FeedbackState._fields)
+    columns = [_step(law, plant, unit[:n], FeedbackState(*unit[n:]), share) for unit in np.eye(size)]
     return np.column_stack(columns)
 
 
-def largest_pole(law: Law, plant: Sampled, share: float = 1.0) -> float:
+def largest_pole(law: FeedbackLaw, plant: Sampled, share: float = 1.0) -> float:
     """Return the largest modulus of a closed-loop pole: stable below 1."""
     return float(np.abs(np.linalg.eigvals(closed_loop_matrix(law, plant, share))).max())
 
 
-def _step(law: Law, plant: Sampled, x: FloatArray, s: State, share: float) -> FloatArray:
+def _step(law: FeedbackLaw, plant: Sampled, x: FloatArray, s: FeedbackState, share: float) -> FloatArray:
     y = plant.c @ x
     ft, velocity = float(y[FT]), float(y[VELOCITY])
     torque, after = feedback(law, s, -ft, -velocity, ft, velocity)

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rsea_ros.control.feedforward import inverse
-from rsea_ros.control.law import Law
+from rsea_ros.control.law import FeedbackLaw
 from rsea_ros.control.learning import CREEP, Learning
 from rsea_ros.control.motion import Yielding
 from rsea_ros.control.sampled import FT, POSITION, VELOCITY, Sampled
@@ -31,7 +31,7 @@ class Reference:
     the gear should have at this sample with its load, rad/s.
     """
 
-    def __init__(self, plant: Sampled, law: Law, learned: Learning) -> None:
+    def __init__(self, plant: Sampled, law: FeedbackLaw, learned: Learning) -> None:
         """plant: the rig with both ends clamped."""
         self._plant, self._inverse, self._law = plant, inverse(plant), law
         self._learned, self._yielding = learned, Yielding(plant.period)

@@ -14,8 +14,8 @@ import numpy as np
 from rsea_ros.control.law import law_of
 from rsea_ros.control.loop import returns
 from rsea_ros.control.margins import Margins, encirclements, least, margins
-from rsea_ros.control.synthesis import Design, grid
-from rsea_ros.control.uncertainty import Case, Uncertainty, dense, family
+from rsea_ros.control.synthesis import ControllerDesign, grid
+from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, dense, family
 from rsea_ros.model.rig import Rig
 
 
@@ -27,15 +27,15 @@ class Robustness:
     cases: int
     unstable: int
     sensitivity: float
-    where: Case
+    where: BenchVariant
     margins: Margins
 
 
-def robustness(rig: Rig, loads: Mapping[str, Rig], found: Design, steps: int = 5) -> Robustness:
+def robustness(rig: Rig, loads: Mapping[str, Rig], found: ControllerDesign, steps: int = 5) -> Robustness:
     """Sweep the set. steps: values of K_s and of b_m, each."""
     u, hz, law = Uncertainty(), grid(found.rate), law_of(rig, found.rate, found.gains)
     total = unstable = 0
-    worst, where, every = 0.0, Case(""), []
+    worst, where, every = 0.0, BenchVariant(""), []
     for name in loads:
         f = family(loads, dense((name,), u, steps), u, found.rate, hz)
         own, whole = returns(law, f.plant, hz, f.path, f.current)

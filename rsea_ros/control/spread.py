@@ -19,7 +19,7 @@ from rsea_ros.control.law import law_of
 from rsea_ros.control.loads import LOCKED
 from rsea_ros.control.loop import returns
 from rsea_ros.control.sampled import FT
-from rsea_ros.control.synthesis import Design, grid
+from rsea_ros.control.synthesis import ControllerDesign, grid
 from rsea_ros.control.uncertainty import Uncertainty, corners, family, mode_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
@@ -49,7 +49,9 @@ class Softness:
     worst: float
 
 
-def spread(rig: Rig, loads: Mapping[str, Rig], design: Design, names: Collection[str] = NEAR) -> Spread:
+def spread(
+    rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign, names: Collection[str] = NEAR
+) -> Spread:
     """Return by how much torque differs between the benches of some loads and the nominal one of each."""
     hz, law = grid(design.rate, POINTS), law_of(rig, design.rate, design.gains)
     gains, phases = [], []
@@ -66,7 +68,7 @@ def spread(rig: Rig, loads: Mapping[str, Rig], design: Design, names: Collection
     return Spread(hz, *limits)
 
 
-def softness(rig: Rig, design: Design, hz: FloatArray) -> Softness:
+def softness(rig: Rig, design: ControllerDesign, hz: FloatArray) -> Softness:
     """Return the impedance of the set's locked benches. hz: below half the rate."""
     u, law = Uncertainty(), law_of(rig, design.rate, design.gains)
     benches = [moved_bench(rig, design.rate, hz, case, u) for case in corners((LOCKED,), u)]

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.control.following import Following, following
-from rsea_ros.control.impedance import Impedance, impedance
+from rsea_ros.control.impedance import OutputImpedance, impedance
 from rsea_ros.control.large_signal import Reach, reach
 from rsea_ros.control.loads import LOCKED, load_range, with_ends
 from rsea_ros.control.robustness import Robustness, robustness
 from rsea_ros.control.spread import Softness, Spread, softness, spread
-from rsea_ros.control.synthesis import Demand, Design, design
-from rsea_ros.control.trials import Compensated, Trial, compensations, hard, trials
+from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, design
+from rsea_ros.control.trials import Compensated, TrialResult, compensations, hard, trials
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
@@ -24,7 +24,7 @@ AMPLITUDES = (10.0, 20.0, 40.0)
 
 
 @dataclass(frozen=True)
-class Motor:
+class MotorLimits:
     """The motor's limits at the gear output: N m, rad/s (inf: not stated), and their source."""
 
     name: str
@@ -38,15 +38,15 @@ class AtRate:
     """One rate: design, the set swept, trials, gain of each compensation, impedance; T_d / desired of the
     clamped bench and of the free one, and what the set makes of each and of the impedance."""
 
-    design: Design
+    design: ControllerDesign
     swept: Robustness
-    trials: tuple[Trial, ...]
+    trials: tuple[TrialResult, ...]
     compensations: tuple[Compensated, ...]
     locked: Following
     free: Following
     locked_spread: Spread
     free_spread: Spread
-    impedance: Impedance
+    impedance: OutputImpedance
     softness: Softness
 
 
@@ -62,15 +62,15 @@ class Study:
     free: Rig
     resonance: float
     rates: tuple[AtRate, ...]
-    reaches: Mapping[Motor, tuple[tuple[Reach, Reach], ...]]
+    reaches: Mapping[MotorLimits, tuple[tuple[Reach, Reach], ...]]
 
 
 def study(
     rig: Rig,
     free: Rig,
     rates: Sequence[float],
-    motors: Sequence[Motor] = (),
-    demand: Demand | None = None,
+    motors: Sequence[MotorLimits] = (),
+    demand: DesignLimits | None = None,
     progress: Callable[[str, float], None] = lambda step, share: None,
 ) -> Study:
     """Return the study of a rig's actuator. free: a rig whose ends are the lightest load.
@@ -97,7 +97,7 @@ def natural_frequency(rig: Rig) -> float:
     return float(np.abs(poles[np.abs(poles) > 0.0]).min()) / (2.0 * math.pi)
 
 
-def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], found: Design) -> AtRate:
+def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], found: ControllerDesign) -> AtRate:
     swept = robustness(clamped, loads, found, steps=3)
     grid = np.geomspace(0.1, 0.45 * found.rate, 300)
     near = following(clamped, clamped, found)
@@ -117,6 +117,6 @@ def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], found: Design) 
     )
 
 
-def _reaches(clamped: Rig, light: Rig, amplitude: float, motor: Motor) -> tuple[Reach, Reach]:
+def _reaches(clamped: Rig, light: Rig, amplitude: float, motor: MotorLimits) -> tuple[Reach, Reach]:
     at, free = (reach(rig, amplitude, motor.torque, motor.speed) for rig in (clamped, light))
     return at, free

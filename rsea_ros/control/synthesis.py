@@ -56,7 +56,7 @@ HEAVY = ("x 4", "x 30", "x 100")
 
 
 @dataclass(frozen=True)
-class Demand:
+class DesignLimits:
     """Largest sensitivity of the rig itself, and of the whole set; largest impedance, over the spring's."""
 
     sensitivity: float = 2.0
@@ -65,7 +65,7 @@ class Demand:
 
 
 @dataclass(frozen=True)
-class Design:
+class ControllerDesign:
     """Gains at a rate (Hz), margins of the rig by load; friction_left: N m RMS per N m, worst of the set.
 
     sensitivity: largest of the set's corners. impedance: largest, over the spring's.
@@ -80,7 +80,7 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Problem:
+class SynthesisProblem:
     """What a design is looked for on: the corners of the set, and the locked rig moved from outside."""
 
     rig: Rig
@@ -90,7 +90,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Score:
+class RobustnessScore:
     """Sensitivity, friction left and encirclements of each case, shape (m,); |Z / Z_s|, shape (n,)."""
 
     sensitivity: FloatArray
@@ -99,9 +99,11 @@ class Score:
     softness: FloatArray
 
 
-def design(rig: Rig, loads: Mapping[str, Rig], rate: float, demand: Demand | None = None) -> Design:
+def design(
+    rig: Rig, loads: Mapping[str, Rig], rate: float, demand: DesignLimits | None = None
+) -> ControllerDesign:
     """Return the gains of a rig. Raises ParameterError where none keep the set stable with its margins."""
-    demand = demand or Demand()
+    demand = demand or DesignLimits()
     few = {name: load for name, load in loads.items() if not name.endswith(HEAVY)}
     problem = _problem(rig, few, rate, grid(rate, 60))
 
@@ -121,7 +123,7 @@ def design(rig: Rig, loads: Mapping[str, Rig], rate: float, demand: Demand | Non
     return check(rig, loads, rate, gains)
 
 
-def check(rig: Rig, loads: Mapping[str, Rig], rate: float, gains: Gains) -> Design:
+def check(rig: Rig, loads: Mapping[str, Rig], rate: float, gains: Gains) -> ControllerDesign:
     """Return margins of given gains. Raises ParameterError where a bench of the set is unstable."""
     law = law_of(rig, rate, gains)
     for name, load in loads.items():
@@ -143,7 +145,7 @@ def check(rig: Rig, loads: Mapping[str, Rig], rate: float, gains: Gains) -> Desi
     return _design(problem, gains)
 
 
-def worst(found: Design) -> str:
+def worst(found: ControllerDesign) -> str:
     """Return the least margins in words."""
     name, least = min(found.margins.items(), key=lambda item: item[1].phase)
     return (
@@ -162,16 +164,18 @@ def grid(rate: float, points: int = 150) -> FloatArray:
     )
 
 
-def _problem(rig: Rig, loads: Mapping[str, Rig], rate: float, hz: FloatArray) -> Problem:
+def _problem(rig: Rig, loads: Mapping[str, Rig], rate: float, hz: FloatArray) -> SynthesisProblem:
     u = Uncertainty()
-    return Problem(rig, rate, family(loads, corners(tuple(loads), u), u, rate, hz), moved(rig, rate, hz))
+    return SynthesisProblem(
+        rig, rate, family(loads, corners(tuple(loads), u), u, rate, hz), moved(rig, rate, hz)
+    )
 
 
-def _score(problem: Problem, gains: Gains) -> Score:
+def _score(problem: SynthesisProblem, gains: Gains) -> RobustnessScore:
     law, f = law_of(problem.rig, problem.rate, gains), problem.family
     own, whole = returns(law, f.plant, f.hz, f.path, f.current)
     sensitivity = (np.maximum(np.abs(own), 1.0) / np.abs(whole)).max(axis=1)
-    return Score(
+    return RobustnessScore(
         sensitivity,
         friction_left(f.plant[FT] * own / whole, f.hz),
         encirclements(whole),
@@ -188,7 +192,7 @@ def friction_left(response: FloatArray, hz: FloatArray) -> FloatArray:
     return total
 
 
-def _design(problem: Problem, gains: Gains) -> Design:
+def _design(problem: SynthesisProblem, gains: Gains) -> ControllerDesign:
     law, f, score = law_of(problem.rig, problem.rate, gains), problem.family, _score(problem, gains)
     own, whole = returns(law, f.plant, f.hz, f.path, f.current)
     found = {
@@ -196,7 +200,7 @@ def _design(problem: Problem, gains: Gains) -> Design:
         for k, case in enumerate(f.cases)
         if case.nominal
     }
-    return Design(
+    return ControllerDesign(
         gains,
         problem.rate,
         MappingProxyType(found),
@@ -206,14 +210,14 @@ def _design(problem: Problem, gains: Gains) -> Design:
     )
 
 
-def _lacking(problem: Problem, score: Score, demand: Demand) -> float:
+def _lacking(problem: SynthesisProblem, score: RobustnessScore, demand: DesignLimits) -> float:
     """Return by how much sensitivities are beyond the demand, as parts of it, added up; 0 when met."""
     allowed = np.where(problem.family.nominal, demand.sensitivity, demand.robust)
     over = np.maximum(0.0, score.sensitivity / allowed - 1.0)
     return float(over.sum() + 10.0 * np.count_nonzero(score.wound > 0.5))
 
 
-def _stiff(score: Score, demand: Demand) -> float:
+def _stiff(score: RobustnessScore, demand: DesignLimits) -> float:
     return max(0.0, float(score.softness.max()) / demand.impedance - 1.0)
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.control.controller import Limits, TorqueController
+from rsea_ros.control.controller import TorqueController, TorqueLimits
 from rsea_ros.control.following import Following, Step, fall, step_response
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.large_signal import largest
@@ -20,8 +20,8 @@ from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LOCKED, locked
 from rsea_ros.control.robustness import Robustness
 from rsea_ros.control.spread import Spread
-from rsea_ros.control.synthesis import Demand, Design
-from rsea_ros.control.uncertainty import Case, Uncertainty, bench
+from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
+from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench
 from rsea_ros.model.rig import EffectSetting, Rig
 
 HZ, AMPLITUDE = 5.0, 10.0
@@ -42,7 +42,7 @@ RIPPLE_HZ = 1.0
 
 
 @dataclass(frozen=True)
-class Trial:
+class TrialResult:
     """what was tried, the value, its unit, what is asked (None: nothing), and whether more is better.
 
     worst: over the set, nan where it was not looked at; allowed: what is asked of that.
@@ -82,68 +82,78 @@ class Compensated:
 
 
 def trials(
-    rig: Rig, loads: Mapping[str, Rig], design: Design, swept: Robustness, near: Following, far: Following,
-    apart: Spread, stiffest: float,
-) -> Iterator[Trial]:
+    rig: Rig,
+    loads: Mapping[str, Rig],
+    design: ControllerDesign,
+    swept: Robustness,
+    near: Following,
+    far: Following,
+    apart: Spread,
+    stiffest: float,
+) -> Iterator[TrialResult]:
     """Yield the trials of a clamped rig, its loads and the whole set.
 
     near, far: how torque follows on the rig, and on the hardest bench of the set. apart: what the set makes
     of the first. stiffest: largest impedance of the set over that of the spring.
     """
-    nominal, worst, demand = design.margins, swept.margins, Demand()
+    nominal, worst, demand = design.margins, swept.margins, DesignLimits()
     each = list(nominal.values())
-    yield Trial("benches of the set that are unstable", 0.0, "1", None, worst=swept.unstable, allowed=0.0)
+    yield TrialResult(
+        "benches of the set that are unstable", 0.0, "1", None, worst=swept.unstable, allowed=0.0
+    )
     largest_peak = max(m.sensitivity for m in each)
-    yield Trial("largest sensitivity", largest_peak, "1", demand.sensitivity, worst=swept.sensitivity,
-                allowed=1.05 * demand.robust)  # fmt: skip
-    yield Trial("phase margin", min(m.phase for m in each), "deg", 29.0, True, worst.phase)
-    yield Trial("gain margin", min(m.gain for m in each), "dB", 6.0, True, worst.gain)
-    yield Trial("delay margin", min(m.delay for m in each), "samples", 1.0, True, worst.delay)
-    yield Trial("crossover", nominal[LOCKED].crossover, "Hz", worst=worst.crossover)
-    yield Trial("output impedance, largest over the spring's", design.impedance, "1", 1.01 * demand.impedance,
-                worst=stiffest)  # fmt: skip
+    yield TrialResult("largest sensitivity", largest_peak, "1", demand.sensitivity, worst=swept.sensitivity,
+                      allowed=1.05 * demand.robust)  # fmt: skip
+    yield TrialResult("phase margin", min(m.phase for m in each), "deg", 29.0, True, worst.phase)
+    yield TrialResult("gain margin", min(m.gain for m in each), "dB", 6.0, True, worst.gain)
+    yield TrialResult("delay margin", min(m.delay for m in each), "samples", 1.0, True, worst.delay)
+    yield TrialResult("crossover", nominal[LOCKED].crossover, "Hz", worst=worst.crossover)
+    yield TrialResult("output impedance, largest over the spring's", design.impedance, "1",
+                      1.01 * demand.impedance, worst=stiffest)  # fmt: skip
     yield from _followed(rig, loads, design)
     yield from _bandwidth(near, far, apart)
     yield from _stepped(step_response(rig, rig, design), step_response(hard(loads), rig, design, late=1))
     rough = rig.with_effects(EFFECTS[0])
-    yield Trial("3 N m friction, not in the model", 100.0 * sine(rough, rig, design), "%", 6.0)
-    yield Trial("3 N m friction, in the model", 100.0 * sine(rough, rough, design), "%", 2.5)
-    yield Trial(
+    yield TrialResult("3 N m friction, not in the model", 100.0 * sine(rough, rig, design), "%", 6.0)
+    yield TrialResult("3 N m friction, in the model", 100.0 * sine(rough, rough, design), "%", 2.5)
+    yield TrialResult(
         "held with 5 arcmin of backlash: torque RMS over that without", restlessness(rig, design), "1", 1.1
     )
 
 
-def _followed(rig: Rig, loads: Mapping[str, Rig], design: Design) -> Iterator[Trial]:
+def _followed(rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign) -> Iterator[TrialResult]:
     near = list(loads)[1:4]
     cases = dict.fromkeys([*hardest(loads), *(case for name in near for case in lagging_corners(name))])
     errors = {case: 100.0 * tracked(rig, loads, case, design) for case in cases}
-    yield Trial(
+    yield TrialResult(
         "5 Hz, 10 N m, locked", 100.0 * sine(rig, rig, design), "%", 2.0,
         worst=max(errors.values()), allowed=8.0,
     )  # fmt: skip
     for name in near:
-        error, amplitude = 100.0 * tracked(rig, loads, Case(name), design), amplitude_of(loads[name])
+        error, amplitude = 100.0 * tracked(rig, loads, BenchVariant(name), design), amplitude_of(loads[name])
         worst = max(errors[case] for case in lagging_corners(name))
-        yield Trial(f"5 Hz, {amplitude:.1f} N m, {name}, load unknown", error, "%", 5.0, worst=worst)
+        yield TrialResult(f"5 Hz, {amplitude:.1f} N m, {name}, load unknown", error, "%", 5.0, worst=worst)
 
 
-def _bandwidth(near: Following, far: Following, apart: Spread) -> Iterator[Trial]:
+def _bandwidth(near: Following, far: Following, apart: Spread) -> Iterator[TrialResult]:
     least, most = (near.gain_at(apart.hz) + edge for edge in apart.gain)
-    yield Trial("torque bandwidth, -3 dB", near.bandwidth, "Hz", 19.1, True,
+    yield TrialResult("torque bandwidth, -3 dB", near.bandwidth, "Hz", 19.1, True,
                 min(far.bandwidth, fall(apart.hz, least)))  # fmt: skip
-    yield Trial("T_d / desired, largest", near.peak, "dB", 3.0, worst=max(far.peak, float(most.max())))
+    yield TrialResult("T_d / desired, largest", near.peak, "dB", 3.0, worst=max(far.peak, float(most.max())))
     at = min(near.bandwidth, float(near.hz[-1]))
-    yield Trial("motor torque per N m at that bandwidth", near.motor_at(at), "1", worst=far.motor_at(at))
-    yield Trial("motor torque per N m at 20 Hz", near.motor_at(20.0), "1", worst=far.motor_at(20.0))
+    yield TrialResult(
+        "motor torque per N m at that bandwidth", near.motor_at(at), "1", worst=far.motor_at(at)
+    )
+    yield TrialResult("motor torque per N m at 20 Hz", near.motor_at(20.0), "1", worst=far.motor_at(20.0))
 
 
-def _stepped(near: Step, far: Step) -> Iterator[Trial]:
-    yield Trial("step of 5 N m: 10 to 90 %", 1e3 * near.rise, "ms", worst=1e3 * far.rise)
-    yield Trial("its overshoot", 100.0 * near.overshoot, "%", worst=100.0 * far.overshoot)
-    yield Trial("within 5 % after", 1e3 * near.settling, "ms", worst=1e3 * far.settling)
+def _stepped(near: Step, far: Step) -> Iterator[TrialResult]:
+    yield TrialResult("step of 5 N m: 10 to 90 %", 1e3 * near.rise, "ms", worst=1e3 * far.rise)
+    yield TrialResult("its overshoot", 100.0 * near.overshoot, "%", worst=100.0 * far.overshoot)
+    yield TrialResult("within 5 % after", 1e3 * near.settling, "ms", worst=1e3 * far.settling)
 
 
-def hardest(loads: Mapping[str, Rig], *, every: bool = False) -> list[Case]:
+def hardest(loads: Mapping[str, Rig], *, every: bool = False) -> list[BenchVariant]:
     """Return the cases that are simulated: corners of K_s and b_m, all of the lag, with the mode.
 
     Three loads and two corners; every: all loads that differ, and all four corners.
@@ -153,11 +163,11 @@ def hardest(loads: Mapping[str, Rig], *, every: bool = False) -> list[Case]:
     return [case for name in names for case in lagging_corners(name, every=every)]
 
 
-def lagging_corners(name: str, *, every: bool = False) -> list[Case]:
+def lagging_corners(name: str, *, every: bool = False) -> list[BenchVariant]:
     """Return the corners of K_s and b_m of a load with all of the lag and the mode: two, or all four."""
     u, sides = Uncertainty(), ((1, 1), (-1, -1)) + (((1, -1), (-1, 1)) if every else ())
     return [
-        Case(name, 1.0 + k * u.stiffness, 1.0 + b * u.damping, u.samples, u.delay, u.mode[2])
+        BenchVariant(name, 1.0 + k * u.stiffness, 1.0 + b * u.damping, u.samples, u.delay, u.mode[2])
         for k, b in sides
     ]
 
@@ -165,10 +175,10 @@ def lagging_corners(name: str, *, every: bool = False) -> list[Case]:
 def hard(loads: Mapping[str, Rig]) -> Rig:
     """Return the locked bench that is stiffer, drags less, lags, and has the mode."""
     u = Uncertainty()
-    return disturbed(loads, Case(LOCKED, 1.0 + u.stiffness, 1.0 - u.damping, 0, u.delay, u.mode[2]))
+    return disturbed(loads, BenchVariant(LOCKED, 1.0 + u.stiffness, 1.0 - u.damping, 0, u.delay, u.mode[2]))
 
 
-def disturbed(loads: Mapping[str, Rig], case: Case) -> Rig:
+def disturbed(loads: Mapping[str, Rig], case: BenchVariant) -> Rig:
     """Return the bench of a case as a rig with effects; samples that are late are for the harness."""
     u, effects = Uncertainty(), []
     if case.delay:
@@ -182,16 +192,16 @@ def disturbed(loads: Mapping[str, Rig], case: Case) -> Rig:
 
 def amplitude_of(load: Rig) -> float:
     """Return the sine, N m, that a load lets a motor of 68 N m make at 5 Hz, a fifth of it to spare."""
-    return min(AMPLITUDE, 0.8 * largest(load.with_effects(), HZ, Limits().torque, math.inf))
+    return min(AMPLITUDE, 0.8 * largest(load.with_effects(), HZ, TorqueLimits().torque, math.inf))
 
 
-def tracked(rig: Rig, loads: Mapping[str, Rig], case: Case, design: Design) -> float:
+def tracked(rig: Rig, loads: Mapping[str, Rig], case: BenchVariant, design: ControllerDesign) -> float:
     """Return the error of the sine on a bench of the set, once it has been learned."""
     true, amplitude = disturbed(loads, case), amplitude_of(bench(loads[case.load], case))
     return sine(true, locked(rig), design, amplitude, seconds=LONG, settle=LEARNED, late=case.samples)
 
 
-def compensations(rig: Rig, design: Design) -> Iterator[Compensated]:
+def compensations(rig: Rig, design: ControllerDesign) -> Iterator[Compensated]:
     """Yield what each compensated effect costs without and with its compensation."""
     for effect in EFFECTS:
         hz = RIPPLE_HZ if effect.name == "torque_ripple" else HZ
@@ -203,10 +213,10 @@ def compensations(rig: Rig, design: Design) -> Iterator[Compensated]:
 def sine(
     true: Rig,
     model: Rig,
-    design: Design,
+    design: ControllerDesign,
     amplitude: float = AMPLITUDE,
     hz: float = HZ,
-    limits: Limits | None = None,
+    limits: TorqueLimits | None = None,
     *,
     seconds: float = SECONDS,
     settle: float = SETTLE,
@@ -221,7 +231,7 @@ def sine(
     return closed_loop(true, design.rate, controller, wanted, late=late).error(settle)
 
 
-def restlessness(rig: Rig, design: Design, gap: float = 5.0 * ARCMIN) -> float:
+def restlessness(rig: Rig, design: ControllerDesign, gap: float = 5.0 * ARCMIN) -> float:
     """Return the torque's RMS about its mean with backlash, over that without, worst of a few torques held.
 
     Each is held after a sine has shaken the gap. 1 is the noise of the sensor alone; NaN for a rig whose F/T
@@ -237,7 +247,7 @@ def restlessness(rig: Rig, design: Design, gap: float = 5.0 * ARCMIN) -> float:
     return max(ratios)
 
 
-def _held(true: Rig, model: Rig, design: Design, torque: float) -> float:
+def _held(true: Rig, model: Rig, design: ControllerDesign, torque: float) -> float:
     t = np.arange(round(LONG * design.rate)) / design.rate
     wanted = np.where(t < SETTLE, AMPLITUDE * np.sin(2.0 * np.pi * HZ * t), torque)
     controller = TorqueController(model, design.rate, design.gains, compensate=())

@@ -39,7 +39,7 @@ class Uncertainty:
 
 
 @dataclass(frozen=True)
-class Case:
+class BenchVariant:
     """One bench of the set: its load, K_s and b_m over the nominal ones, samples, delay (s), mode."""
 
     load: str
@@ -52,7 +52,7 @@ class Case:
     @property
     def nominal(self) -> bool:
         """Whether it is the rig itself with one of the loads."""
-        return self == Case(self.load)
+        return self == BenchVariant(self.load)
 
     def __str__(self) -> str:
         parts = [self.load, f"K_s x {self.stiffness:g}", f"b_m x {self.damping:g}"]
@@ -65,7 +65,7 @@ class Family:
     """Cases with their responses at hz (n,): plant (4, m, n) as `responses` has it, the path from a command
     to the torque and that to the current as it is measured, at the end of a sample: both (m, n)."""
 
-    cases: tuple[Case, ...]
+    cases: tuple[BenchVariant, ...]
     hz: FloatArray
     plant: ComplexArray
     path: ComplexArray
@@ -77,32 +77,32 @@ class Family:
         return np.array([case.nominal for case in self.cases])
 
 
-def corners(loads: Sequence[str], u: Uncertainty) -> list[Case]:
+def corners(loads: Sequence[str], u: Uncertainty) -> list[BenchVariant]:
     """Return the rig with each load, and the corners of the set: for the synthesis."""
     sides = list(product((1 - u.stiffness, 1 + u.stiffness), (1 - u.damping, 1 + u.damping)))
     wire = ((0, 0.0), (u.samples, u.delay))
-    return [Case(load) for load in loads] + [
-        Case(load, k, b, samples, delay, part)
+    return [BenchVariant(load) for load in loads] + [
+        BenchVariant(load, k, b, samples, delay, part)
         for load, (k, b), (samples, delay), part in product(loads, sides, wire, (0.0, u.mode[2]))
     ]
 
 
-def dense(loads: Sequence[str], u: Uncertainty, steps: int = 5) -> list[Case]:
+def dense(loads: Sequence[str], u: Uncertainty, steps: int = 5) -> list[BenchVariant]:
     """Return the set on a grid, for what is stated of a design."""
     stiff, damp = (1.0 + part * np.linspace(-1.0, 1.0, steps) for part in (u.stiffness, u.damping))
     wire = product((0, u.samples), (0.0, 0.5 * u.delay, u.delay))
     grid = product(loads, stiff, damp, wire, (0.0, 0.5 * u.mode[2], u.mode[2]))
-    return [Case(load, float(k), float(b), *path, part) for load, k, b, path, part in grid]
+    return [BenchVariant(load, float(k), float(b), *path, part) for load, k, b, path, part in grid]
 
 
-def bench(load: Rig, case: Case) -> Rig:
+def bench(load: Rig, case: BenchVariant) -> Rig:
     """Return a rig with the stiffness and damping of a case."""
     k, b = "spring.stiffness", "rotor.reflected_damping"
     return load.with_values({k: load[k] * case.stiffness, b: load[b] * case.damping})
 
 
 def family(
-    loads: Mapping[str, Rig], cases: Sequence[Case], u: Uncertainty, rate: float, hz: FloatArray
+    loads: Mapping[str, Rig], cases: Sequence[BenchVariant], u: Uncertainty, rate: float, hz: FloatArray
 ) -> Family:
     """Return the responses of cases at frequencies, Hz, below half the rate."""
     made: dict[tuple[str, float, float], tuple[ComplexArray, ComplexArray]] = {}
@@ -122,7 +122,7 @@ def family(
     return Family(tuple(cases), hz, np.stack(plants, axis=1), np.array(paths), np.array(currents))
 
 
-def lags_of(case: Case, rate: float, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+def lags_of(case: BenchVariant, rate: float, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """Return what a case adds to the path from a command to the torque, and to the measured current."""
     back = 1.0 / z_of(1.0 / rate, hz)
     path: ComplexArray = back**case.samples * np.exp(-2j * np.pi * hz * case.delay)

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.control.controller import CORNER, Reading
+from rsea_ros.control.controller import CORNER, Measurement
 from rsea_ros.control.impedance import moved
 from rsea_ros.control.law import law_of
 from rsea_ros.control.prediction import prediction_response, smoothed_response
-from rsea_ros.control.synthesis import Design
+from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
 
@@ -38,12 +38,14 @@ class Virtual:
     stiffness: float
     damping: float
 
-    def torque(self, reading: Reading, velocity: float, k_s: float) -> float:
+    def torque(self, reading: Measurement, velocity: float, k_s: float) -> float:
         """Return the desired torque, N m. velocity: of the distal side, rad/s."""
         return -self.stiffness * (reading.position - reading.ft / k_s) - self.damping * velocity
 
 
-def felt(rig: Rig, design: Design, virtual: Virtual, hz: FloatArray, *, trust: bool = True) -> ComplexArray:
+def felt(
+    rig: Rig, design: ControllerDesign, virtual: Virtual, hz: FloatArray, *, trust: bool = True
+) -> ComplexArray:
     """Return Z, N m s/rad, of the locked rig moved at its distal side, linear, at hz below half the rate.
 
     trust: whether the desired torque is predicted; else it comes through the low pass, two samples late.
@@ -56,7 +58,7 @@ def felt(rig: Rig, design: Design, virtual: Virtual, hz: FloatArray, *, trust: b
     return whole
 
 
-def passive_to(rig: Rig, design: Design, virtual: Virtual) -> float:
+def passive_to(rig: Rig, design: ControllerDesign, virtual: Virtual) -> float:
     """Return the frequency from which on Re Z < 0, Hz, with the desired torque predicted or not, whichever is
     lower; inf where it never is, to 0.45 of the rate."""
     hz = np.geomspace(SMALLEST, 0.45 * design.rate, 400)
@@ -65,7 +67,7 @@ def passive_to(rig: Rig, design: Design, virtual: Virtual) -> float:
     return float(hz[np.argmax(negative)]) if negative.any() else math.inf
 
 
-def stiffest(rig: Rig, design: Design, damping: float, to: float) -> float:
+def stiffest(rig: Rig, design: ControllerDesign, damping: float, to: float) -> float:
     """Return the largest K_v, N m/rad, that keeps Re Z > 0 up to a frequency, Hz."""
     low, high = 0.0, 4.0 * rig["spring.stiffness"]
     for _ in range(30):

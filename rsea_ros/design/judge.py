@@ -35,7 +35,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Design:
+class SpringDesign:
     """A spring for a requirement.
 
     stiffness: N m/rad. rate: N/m of each linear spring. deflection: rad, by Eq. (8) at the required torque,
@@ -63,7 +63,7 @@ class Design:
         return all(check.met for check in self.checks)
 
 
-def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design:
+def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> SpringDesign:
     """Return the design of a stiffness (N m/rad). Raises ParameterError unless it is above 0."""
     if not (math.isfinite(stiffness) and stiffness > 0.0):
         raise ParameterError(f"stiffness = {stiffness:g} N m/rad, expected a finite value > 0 N m/rad")
@@ -72,7 +72,7 @@ def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design
     exact = flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
     band = pure_torque_bandwidth(stiffness, requirement.inertia)
     theta = float(mechanism.deflection(stiffness, requirement.torque))
-    return Design(
+    return SpringDesign(
         requirement=requirement,
         unit=unit,
         stiffness=stiffness,

@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.design import mechanism
 from rsea_ros.design.catalogue import MotorGear
-from rsea_ros.design.judge import Design, judge, least_stiffness
+from rsea_ros.design.judge import SpringDesign, judge, least_stiffness
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.signals import FloatArray
@@ -39,7 +39,9 @@ def spreads_of(unit: MotorGear) -> dict[str, float]:
     return {**SPREADS, "rotor": unit.rotor_spread}
 
 
-def margins(design: Design, spreads: Mapping[str, float] | None = None, seed: int = 0) -> tuple[Margin, ...]:
+def margins(
+    design: SpringDesign, spreads: Mapping[str, float] | None = None, seed: int = 0
+) -> tuple[Margin, ...]:
     """Return the margins of a design, and last the share in which every demand is met at once.
 
     spreads: by part, relative, one sigma; those of the design's unit where left out.

@@ -118,7 +118,8 @@ def break_tie(
     """Return the model to accept and those that do as well with no more parameters.
 
     The best is the likeliest, the cost of leaving known values included. Of all that are not surely and
-    materially worse the simplest; of equals, the one that leaves the known values least.
+    materially worse the simplest; of equals, the likeliest, each unknown paid for (an optional one, as the
+    time in which a drift settles, does not count in `size`).
     """
     if not models:
         return None, ()
@@ -131,7 +132,11 @@ def break_tie(
         return not over.better or is_nearly_as_good(m, best, settings)
 
     contenders = [m for m in models if m is best or contends(m)]
-    chosen = min(contenders, key=lambda m: (m.size, -likelier_by(m, best, far)))
+
+    def worth(m: M) -> float:
+        return likelier_by(m, best, far) - settings.acceptance.price * m.parameters
+
+    chosen = min(contenders, key=lambda m: (m.size, -worth(m)))
     return chosen, tuple(m for m in contenders if m is not chosen and m.size <= chosen.size)
 
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from rsea_ros.diagnosis.result import Experiment
 from rsea_ros.diagnosis.settings import DEFAULT, NextRunSettings
-from rsea_ros.identification.allowed_run import Run, allowed_run, playable_rate
-from rsea_ros.identification.excitation import JOINT, PERIODIC, Settings
+from rsea_ros.identification.allowed_run import AllowedRun, allowed_run, playable_rate
+from rsea_ros.identification.excitation import JOINT, PERIODIC, ExcitationSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian
 from rsea_ros.identification.unknowns import apply, start_vector
@@ -84,16 +84,16 @@ def unit_of_commands(rig: Rig) -> str:
 
 def _settings(
     option: ExcitationOption, rate: float, rule: NextRunSettings = DEFAULT.next_run
-) -> Settings:
+) -> ExcitationSettings:
     """Return the settings of an option, of any amplitude."""
     rate = playable_rate(rate)
-    return Settings(
+    return ExcitationSettings(
         rate=rate, duration=rule.duration, amplitude=0.5, noise=0.2 if option.kind == "chirp" else 0.0,
         low=option.low, high=min(option.high, 0.45 * rate), period=4.0, seed=7,
     )  # fmt: skip
 
 
-def _as_excited(run: Run, rig: Rig) -> dict[str, float | str]:
+def _as_excited(run: AllowedRun, rig: Rig) -> dict[str, float | str]:
     """Return a run as parameters of the node excite, with its peak and the unit."""
     s = run.settings
     given: dict[str, float | str] = {
@@ -153,6 +153,8 @@ def amplitude_series(
     return None
 
 
-def _series(rig: Rig, rate: float, rule: NextRunSettings = DEFAULT.next_run) -> Settings:
+def _series(rig: Rig, rate: float, rule: NextRunSettings = DEFAULT.next_run) -> ExcitationSettings:
     high = min(rule.series_top if rig.loop is None else JOINT.high, 0.45 * rate)
-    return Settings(rate=rate, duration=rule.series_duration, amplitude=0.5, noise=0.0, low=0.1, high=high)
+    return ExcitationSettings(
+        rate=rate, duration=rule.series_duration, amplitude=0.5, noise=0.0, low=0.1, high=high
+    )

@@ -59,7 +59,7 @@ class Misfit:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class CauseParameter:
     """A parameter of a cause with its 95 % interval.
 
     ci95: of all that is unknown, the simulation's own error included. statistical_ci95: of the data's noise
@@ -82,7 +82,7 @@ class Cause:
     """
 
     name: str
-    parameters: Mapping[str, Estimate]
+    parameters: Mapping[str, CauseParameter]
     gain_train: float
     gain_holdout: float
     gain_holdout_ci95: tuple[float, float]
@@ -100,7 +100,7 @@ class Alternative:
 
     name: str
     instead_of: str
-    parameters: Mapping[str, Estimate]
+    parameters: Mapping[str, CauseParameter]
     gain_holdout: float
     gain_holdout_ci95: tuple[float, float]
     channel: str

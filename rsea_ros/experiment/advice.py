@@ -9,7 +9,7 @@ from rsea_ros.experiment.apart import Apart, measurements_apart
 from rsea_ros.experiment.bound import Bound, bound
 from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.hypothesis import Hypothesis
-from rsea_ros.experiment.proposal import Asked, Proposal
+from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.shape_rater import noise_by_channel
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.progress import Progress
@@ -34,7 +34,7 @@ class Advice:
     """
 
     hypotheses: tuple[Hypothesis, ...]
-    asked: Asked
+    asked: DesignRequest
     proposal: Proposal | None
     proofs: tuple[Proof, ...]
     excluded: Mapping[str, float] = field(default_factory=dict)
@@ -46,7 +46,7 @@ _WORTH = 0.02
 
 def advise(
     hypotheses: Sequence[Hypothesis],
-    asked: Asked,
+    asked: DesignRequest,
     measured: Mapping[str, float] | None = None,
     run: Map = serial,
     tell: Progress | None = None,
@@ -64,7 +64,7 @@ def advise(
 def proofs_of(
     hypotheses: Sequence[Hypothesis],
     pairs: Sequence[tuple[str, str]],
-    asked: Asked,
+    asked: DesignRequest,
     measured: Mapping[str, float],
     run: Map = serial,
 ) -> tuple[Proof, ...]:
@@ -74,7 +74,9 @@ def proofs_of(
     return tuple(p for p in proofs if p is not None)
 
 
-def _proved(a: Hypothesis, b: Hypothesis, asked: Asked, noise: Mapping[str, float], run: Map) -> Proof | None:
+def _proved(
+    a: Hypothesis, b: Hypothesis, asked: DesignRequest, noise: Mapping[str, float], run: Map
+) -> Proof | None:
     """Return the proof that no run separates two, None where the bound leaves room for one."""
     both = [
         (i, j, bound(i, j, asked.limits, LONGEST_OF_ALL, noise, asked.rate, run)) for i, j in ((a, b), (b, a))

@@ -15,7 +15,7 @@ from rsea_ros.experiment.advice import Proof, proofs_of
 from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.limits import used
-from rsea_ros.experiment.proposal import Asked, Proposal
+from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.weighing import RunWeighing, weigh
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
@@ -123,7 +123,7 @@ class Campaign:
 
     rig: Rig
     causes: Sequence[str]
-    asked: Asked
+    asked: DesignRequest
     play: Play
     budget: Budget = field(default_factory=Budget)
     rules: Rules = field(default_factory=Rules)

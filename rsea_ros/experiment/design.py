@@ -16,7 +16,7 @@ import numpy as np
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.margins import Group, Peaks, ends_of, peaks, share_used
-from rsea_ros.experiment.proposal import Asked, Proposal
+from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.refine import refined
 from rsea_ros.experiment.separation import decided, refitted, separations, sharpened
 from rsea_ros.experiment.shape import Shape
@@ -63,7 +63,7 @@ def check_commanded_by_torque(rig: Rig) -> None:
 
 def propose(
     hypotheses: Sequence[Hypothesis],
-    asked: Asked,
+    asked: DesignRequest,
     measured: Mapping[str, float] | None = None,
     run: Map = serial,
     tell: Progress | None = None,
@@ -114,7 +114,7 @@ def _hopeless(judge: ShapeRater, shapes: Sequence[Shape], tables: Sequence[Float
 
 
 def _per_second(
-    judge: ShapeRater, table: FloatArray, apart: BoolArray, asked: Asked
+    judge: ShapeRater, table: FloatArray, apart: BoolArray, asked: DesignRequest
 ) -> list[tuple[float, float]]:
     """Return the share that a shape decides per second, and the length, for several lengths of the run."""
     lengths = np.geomspace(asked.shortest, asked.longest, 7)
@@ -140,7 +140,7 @@ def _final(judge: ShapeRater, shape: Shape, length: float, apart: BoolArray, tri
     )  # fmt: skip
 
 
-def held(command: FloatArray, asked: Asked, groups: Sequence[Group]) -> tuple[FloatArray, Peaks]:
+def held(command: FloatArray, asked: DesignRequest, groups: Sequence[Group]) -> tuple[FloatArray, Peaks]:
     """Return a command as large as the limits allow for every possible bench, and its peaks.
 
     By bisection, because the worst response is not linear in the command. Raises

@@ -14,7 +14,7 @@ from rsea_ros.signals import FloatArray
 
 
 @dataclass(frozen=True)
-class Asked:
+class DesignRequest:
     """The freedom of a design. rate: Hz. shortest, longest: s. refine: evaluations of the refinement."""
 
     limits: RunLimits

@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from rsea_ros.experiment.proposal import Asked
+from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.shape import Shape
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray
 
 
-def refined(start: Shape, value: Callable[[Shape], float], asked: Asked, say: Progress) -> tuple[Shape, int]:
+def refined(
+    start: Shape, value: Callable[[Shape], float], asked: DesignRequest, say: Progress
+) -> tuple[Shape, int]:
     """Return the shape near `start` of the largest value, and how many were judged."""
     names = {
         "multisine": ("bias", "amplitude", "low", "high", "tilt"),
@@ -49,7 +51,7 @@ def _inner(name: str, value: float) -> float:
     return math.log(value) if name in _LOGARITHMIC else value
 
 
-def _outer(name: str, x: float, asked: Asked) -> float:
+def _outer(name: str, x: float, asked: DesignRequest) -> float:
     """Return the value of a shape's number within its sensible range."""
     value = math.exp(min(x, 50.0)) if name in _LOGARITHMIC else x
     low, high = {

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from rsea_ros.identification.excitation import NYQUIST_SHARE, Settings, chirp, ramped
+from rsea_ros.identification.excitation import NYQUIST_SHARE, ExcitationSettings, chirp, ramped
 from rsea_ros.signals import FloatArray
 
 Kind = Literal["multisine", "chirp", "steps", "holds"]
@@ -104,7 +104,7 @@ def _flat_multisine(n: int, rate: float, low: float, top: float, tilt: float) ->
 
 
 def _chirp(shape: Shape, n: int, rate: float) -> FloatArray:
-    settings = Settings(
+    settings = ExcitationSettings(
         rate=rate, duration=n / rate, amplitude=1.0, noise=0.0, low=shape.low, high=_top(shape, rate)
     )
     return chirp(settings)[:n]

@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
 from rsea_ros.experiment.limits import of_command, of_response, used
-from rsea_ros.experiment.proposal import Asked
+from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.shape import Shape, command_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map
@@ -25,7 +25,7 @@ class ShapeRater:
     """Judges shapes for hypotheses. noise: by channel."""
 
     hypotheses: Sequence[Hypothesis]
-    asked: Asked
+    asked: DesignRequest
     noise: Mapping[str, float]
     run: Map
 

@@ -18,8 +18,8 @@ from rsea_ros.checks.faults import check
 from rsea_ros.checks.signal_findings import band
 from rsea_ros.checks.usable import check_diagnosable, require_motion
 from rsea_ros.errors import RseaError
-from rsea_ros.fleet.joints import Joint
-from rsea_ros.fleet.reading import Run, read_run
+from rsea_ros.fleet.joints import MappedJoint
+from rsea_ros.fleet.reading import JointRecording, read_run
 from rsea_ros.fleet.row import Row
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification, ParameterEstimate
@@ -36,7 +36,7 @@ _MAIN = ("ft", "deflection", "position", "velocity")
 """Channels that judge a fit, the first one there speaks for the row."""
 
 
-def analyse(row: Row, path: Path, url: str, joint: Joint) -> dict[str, str]:
+def analyse(row: Row, path: Path, url: str, joint: MappedJoint) -> dict[str, str]:
     """Fill a row from a recording, and return the artefacts by file name.
 
     The row keeps the results before an error. Raises RseaError for a recording that cannot be used.
@@ -60,7 +60,7 @@ def analyse(row: Row, path: Path, url: str, joint: Joint) -> dict[str, str]:
     return files
 
 
-def _fit_for_fit(run: Run, rig: Rig) -> Record:
+def _fit_for_fit(run: JointRecording, rig: Rig) -> Record:
     """Return the run without the samples that the checks mask."""
     checked = check(bounded(run.lenient), rig)
     measured = [n for n in checked.record.channels if n not in ("command", "reference")]

@@ -16,7 +16,7 @@ import pyarrow.compute as pc
 
 from rsea_ros.fleet.keys import metadata, read
 from rsea_ros.fleet.row import write_table
-from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.new_files import Destination, NewFiles
 
 _PART = "part-"
 _REPLACES = b"rsea.replaces"
@@ -42,7 +42,7 @@ def take_out(rows: Path, outcomes: Collection[str]) -> None:
             plain = kept.replace_schema_metadata(
                 {key: value for key, value in (kept.schema.metadata or {}).items() if key != _REPLACES}
             )  # the row that comes in a removed one's place may have the name of a file that is replaced
-            with NewFiles(Place(file.parent, force=True)) as new:
+            with NewFiles(Destination(file.parent, force=True)) as new:
                 write_table(plain, new.staged(file.name))
 
 

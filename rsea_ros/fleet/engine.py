@@ -19,7 +19,7 @@ from rsea_ros.fleet.plan import Held
 from rsea_ros.fleet.rate import Rate
 from rsea_ros.fleet.sources import Bag
 from rsea_ros.fleet.store import Store, TaskOutcome
-from rsea_ros.fleet.summary import Summary
+from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.task import Changed, Task, read_fingerprint, reason
 from rsea_ros.progress import Progress
 from rsea_ros.version import version
@@ -60,9 +60,9 @@ class Engine:
         self._ready: deque[Job] = deque()
         self._later: list[tuple[float, int, Job]] = []
         self._order, self._in_flight = count(), 0
-        self._summary = Summary()
+        self._summary = RunSummary()
 
-    def run(self, held: Sequence[Held]) -> Summary:
+    def run(self, held: Sequence[Held]) -> RunSummary:
         """Process recordings with the joints that they hold; return a summary.
 
         Raises FleetError where the scheduler is lost, OSError where the store cannot be written.

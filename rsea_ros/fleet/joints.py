@@ -28,7 +28,7 @@ _DIGITS = 16
 
 
 @dataclass(frozen=True)
-class Joint:
+class MappedJoint:
     """A joint of the map, with everything that a worker on another machine needs.
 
     rig: the text of the rig's file. bags: patterns of paths, none for every bag. temperature: a topic, or
@@ -58,7 +58,7 @@ class Joint:
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:_DIGITS]
 
 
-def load_joints(path: str | Path) -> tuple[Joint, ...]:
+def load_joints(path: str | Path) -> tuple[MappedJoint, ...]:
     """Read a joint map. Raises JointMapError with file, line, field, value and the expected value."""
     path = Path(path)
     try:
@@ -73,7 +73,7 @@ def load_joints(path: str | Path) -> tuple[Joint, ...]:
         raise JointMapError(f"{path}: {document.where(error.field)}{error}", error.field) from None
 
 
-def _joints(content: Any, folder: Path) -> tuple[Joint, ...]:
+def _joints(content: Any, folder: Path) -> tuple[MappedJoint, ...]:
     body = mapping(content, "map", "a mapping with the key joints")
     only_keys(body, names(MAP), "map")
     defaults = mapping(body.get("defaults") or {}, "defaults")
@@ -84,7 +84,7 @@ def _joints(content: Any, folder: Path) -> tuple[Joint, ...]:
     return tuple(_joint(name, joints[name], defaults, folder) for name in joints)
 
 
-def _joint(name: Any, given: Any, defaults: Mapping[str, Any], folder: Path) -> Joint:
+def _joint(name: Any, given: Any, defaults: Mapping[str, Any], folder: Path) -> MappedJoint:
     where = f"joints.{name}"
     if not (isinstance(name, str) and _NAME.fullmatch(name)):
         expected = "a name of up to 64 letters, digits and _ - . that begins with a letter, a digit or _"
@@ -96,7 +96,7 @@ def _joint(name: Any, given: Any, defaults: Mapping[str, Any], folder: Path) -> 
     if "rig" not in body:
         raise FieldError(f"{where}: no rig, expected the name or the file of one", where)
     texts = {key: text(body[key], at[key]) for key in ("temperature", "date") if key in body}
-    return Joint(
+    return MappedJoint(
         name,
         _rig(text(body["rig"], at["rig"]), at["rig"], folder),
         _topics(body, at),

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rsea_ros.fleet.joints import Joint
+from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.sources import Bag
 from rsea_ros.fleet.store import Store
 from rsea_ros.fleet.task import Task
 from rsea_ros.version import version
 
-Held = tuple[Bag, tuple[Joint, ...]]
+Held = tuple[Bag, tuple[MappedJoint, ...]]
 
 
 def is_anything_new(store: Store, held: Sequence[Held]) -> bool:

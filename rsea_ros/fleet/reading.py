@@ -15,7 +15,7 @@ from msg_adapters.tables import import_record
 from msg_adapters.temperature import mean_temperature
 from msg_adapters.topics import ROLES
 from rsea_ros.errors import RseaError
-from rsea_ros.fleet.joints import Joint
+from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.signals import Record
 
 _DATED_NS = 10**17
@@ -25,7 +25,7 @@ _LETTERS = {"Y": r"\d{4}", "m": r"\d{2}", "d": r"\d{2}", "H": r"\d{2}", "M": r"\
 
 
 @dataclass(frozen=True)
-class Run:
+class JointRecording:
     """A recording of one joint. lenient: with gaps, repeats and NaN as they were recorded.
 
     strict: as a fit takes it; raises the error of a recording that it cannot take.
@@ -37,16 +37,16 @@ class Run:
     time: datetime | None
 
 
-def read_run(path: Path, url: str, joint: Joint) -> Run:
+def read_run(path: Path, url: str, joint: MappedJoint) -> JointRecording:
     """Read a recording. path: on this machine. Raises RseaError for one that cannot be read."""
     if joint.table is not None:
         record = import_record(path, joint.table, joint.index)
-        return Run(record, lambda: record, None, time_of(record, url, joint.date))
+        return JointRecording(record, lambda: record, None, time_of(record, url, joint.date))
     topics = joint.topics
     wanted = {DIAGNOSTICS, *(topics.topic(role) for role in ROLES), joint.temperature}
     contents = read_contents(path, wanted)
     record = record_from(contents, url, topics, strict=False)
-    return Run(
+    return JointRecording(
         record,
         lambda: record_from(contents, url, topics),
         mean_temperature(contents, joint.temperature),
@@ -75,7 +75,7 @@ def date_in(path: str, pattern: str) -> datetime | None:
     return None
 
 
-def is_refused(run: Run) -> RseaError | None:
+def is_refused(run: JointRecording) -> RseaError | None:
     """Return why a run cannot be read strictly, None where it can."""
     try:
         run.strict()

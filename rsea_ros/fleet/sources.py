@@ -13,7 +13,7 @@ from typing import Any
 from fsspec.core import url_to_fs
 
 from rsea_ros.fleet.errors import FleetError
-from rsea_ros.fleet.joints import Joint
+from rsea_ros.fleet.joints import MappedJoint
 
 METADATA = "metadata.yaml"
 """The file that makes a folder one bag."""
@@ -34,7 +34,9 @@ class Bag:
     stamp: str
 
 
-def bags_of(sources: Iterable[str], joints: Sequence[Joint]) -> list[tuple[Bag, tuple[Joint, ...]]]:
+def bags_of(
+    sources: Iterable[str], joints: Sequence[MappedJoint]
+) -> list[tuple[Bag, tuple[MappedJoint, ...]]]:
     """Return every recording under some sources with the joints that it holds, by path, each once.
 
     sources: folders, files, patterns with `*`, URLs, or `@FILE`, a list with a source a line. Recordings that

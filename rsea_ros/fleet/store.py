@@ -25,7 +25,7 @@ from rsea_ros.fleet.compaction import compact, finish, take_out
 from rsea_ros.fleet.errors import FleetError
 from rsea_ros.fleet.keys import known_rows
 from rsea_ros.fleet.row import SCHEMA, Row, analysis_of, month_of, write
-from rsea_ros.new_files import NewFiles, Place, write_text
+from rsea_ros.new_files import Destination, NewFiles, write_text
 
 MARK = "store.json"
 LOCK = ".lock"
@@ -67,7 +67,7 @@ class Store:
         name = f"{row['recording']}-{analysis}"
         if outcome.files:
             row["artefacts"] = f"artefacts/{row['joint']}/{name}"
-            with NewFiles(Place(self.path / row["artefacts"], force=True)) as new:
+            with NewFiles(Destination(self.path / row["artefacts"], force=True)) as new:
                 for file, content in outcome.files.items():
                     new.write(file, content)
         folder = self.rows / f"joint={row['joint']}" / f"month={month_of(row['time'])}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 
 @dataclass
-class Summary:
+class RunSummary:
     """The summary of a run.
 
     outcomes: rows written, by outcome. before: rows that the store had. unmapped: recordings that hold no

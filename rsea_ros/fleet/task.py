@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rsea_ros.errors import RseaError
-from rsea_ros.fleet.joints import Joint
+from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.row import Row, analysis_of, empty
 from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relisted
 from rsea_ros.fleet.store import TaskOutcome
@@ -34,7 +34,7 @@ class Task:
     """A recording of one joint. recording: the hash of its content. model_version: of this software."""
 
     bag: Bag
-    joint: Joint
+    joint: MappedJoint
     recording: str
     model_version: str
 

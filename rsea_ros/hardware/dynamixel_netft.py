@@ -9,8 +9,7 @@ from rsea_ros.hardware.device import State, Wrench
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
 from rsea_ros.hardware.limits import Limits, check_limits
-from rsea_ros.hardware.netft.sensor import Sensor
-from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.netft.sensor import ForceTorqueSensor, SensorConnection
 from rsea_ros.hardware.protection import Protection
 
 
@@ -26,14 +25,14 @@ class DynamixelNetft:
     def __init__(
         self,
         motor: Motor,
-        sensor: SensorSettings | None,
+        sensor: SensorConnection | None,
         limits: Limits,
         stiffness: float,
         *,
         absolute: bool = False,
     ) -> None:
         self._motor = motor
-        self._sensor = Sensor(sensor) if sensor is not None else None
+        self._sensor = ForceTorqueSensor(sensor) if sensor is not None else None
         self._limits, self._stiffness, self._absolute = limits, stiffness, absolute
         self._epoch = 0
         self.origin = 0.0

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
-from rsea_ros.hardware.limits import Fault, Guard, Limits, complaint
+from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, complaint
 from rsea_ros.hardware.losses import Losses
 from rsea_ros.hardware.protection import NONE
 from rsea_ros.hardware.spring import Spring
@@ -20,7 +20,7 @@ from rsea_ros.hardware.together import cycle
 BUSY = "clear_fault or reboot is under way, expected it to be over"
 
 
-class Guarded:
+class GuardedDevice:
     """Reads and writes once a cycle; errors become latched faults, never exceptions.
 
     enabled: whether commands pass. cycles: `failed_reads`, `failed_writes` of the cycles so far.
@@ -39,7 +39,7 @@ class Guarded:
         self._losses = {what: Losses(limits.lost_cycles) for what in ("read", "write")}
 
     @property
-    def fault(self) -> Fault | None:
+    def fault(self) -> DeviceFault | None:
         """The latched fault."""
         return self.guard.fault
 
@@ -202,6 +202,6 @@ class Guarded:
         """Count a failure. One lost answer costs a cycle; many of them, and any other failure, trip."""
         self.cycles[f"failed_{what}s"] += 1
         if not isinstance(error, NoReply):
-            self.guard.trip(Fault(type(error).__name__.lower(), detail=str(error)))
+            self.guard.trip(DeviceFault(type(error).__name__.lower(), detail=str(error)))
         elif fault := self._losses[what].take(lost=True):
             self.guard.trip(replace(fault, detail=fault.detail + str(error)))

@@ -47,7 +47,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Fault:
+class DeviceFault:
     """Why there is no torque: cause, value, limit, unit; detail: in words."""
 
     cause: str
@@ -61,18 +61,18 @@ class Fault:
         return f"{self.cause}:" + ("" if math.isnan(self.value) else measured) + f" {self.detail}".rstrip()
 
 
-def complaint(limits: Limits, state: State) -> Fault | None:
+def complaint(limits: Limits, state: State) -> DeviceFault | None:
     """Return the first fault in a reading."""
     if not math.isfinite(state.position + state.velocity + state.motor_torque):
         reading = f"{state.position} rad, {state.velocity} rad/s, {state.motor_torque} N m"
-        return Fault("reading", detail=f"{reading}, expected finite values")
+        return DeviceFault("reading", detail=f"{reading}, expected finite values")
     for cause, words in (
         ("hardware_error", state.hardware_error),
         ("motor_state", state.motor_trouble),
         ("ft", state.ft_trouble),
     ):
         if words:
-            return Fault(cause, detail=words)
+            return DeviceFault(cause, detail=words)
     ft = abs(state.wrench[limits.ft_axis]) if state.wrench is not None else math.nan
     deflection = state.position if math.isnan(state.deflection) else state.deflection
     for cause, value, limit, unit in (
@@ -85,9 +85,9 @@ def complaint(limits: Limits, state: State) -> Fault | None:
         ("power", abs(state.motor_torque * state.velocity), limits.power, "W"),
     ):
         if value > limit:
-            return Fault(cause, value, limit, unit)
+            return DeviceFault(cause, value, limit, unit)
     if state.voltage < limits.voltage:
-        return Fault("voltage", state.voltage, limits.voltage, "V", "too low")
+        return DeviceFault("voltage", state.voltage, limits.voltage, "V", "too low")
     return None
 
 
@@ -100,7 +100,7 @@ class Guard:
 
     def __init__(self, limits: Limits, period: float) -> None:
         self.limits, self._period = limits, period
-        self.fault: Fault | None = None
+        self.fault: DeviceFault | None = None
         self.limited = 0
         self.torque = 0.0
         self.halted = False
@@ -108,7 +108,7 @@ class Guard:
         self._written: deque[float] = deque(maxlen=HEARD_LATE)
         self._missed = 0
 
-    def trip(self, fault: Fault) -> None:
+    def trip(self, fault: DeviceFault) -> None:
         """Latch a fault, unless there is one."""
         if self.fault is None:
             self.fault = fault
@@ -130,7 +130,7 @@ class Guard:
         """Return the torque to write now (N m). age: of the command, s; None without a command."""
         limits = self.limits
         if self.fault is None and age is not None and age > limits.command_timeout and self.torque != 0.0:
-            self.trip(Fault(COMMAND_TIMEOUT, 1e3 * age, 1e3 * limits.command_timeout, "ms"))
+            self.trip(DeviceFault(COMMAND_TIMEOUT, 1e3 * age, 1e3 * limits.command_timeout, "ms"))
         if self.halted:
             self.torque = 0.0
         elif self.fault is None:
@@ -166,7 +166,7 @@ class Guard:
         self.limited += torque != wanted
         return torque
 
-    def _missing(self, measured: float) -> Fault | None:
+    def _missing(self, measured: float) -> DeviceFault | None:
         """Return a fault when the motor has not made the written torque for too long."""
         if not self._written or self.fault is not None:
             return None
@@ -175,7 +175,7 @@ class Guard:
         self._missed = self._missed + 1 if off > self.limits.effort else 0
         if self._missed * self._period <= self.limits.effort_time:
             return None
-        return Fault("effort", off, self.limits.effort, "N m", "between commanded and measured torque")
+        return DeviceFault("effort", off, self.limits.effort, "N m", "between commanded and measured torque")
 
 
 def check_limits(limits: Limits, motor_limit: float, stiffness: float) -> None:

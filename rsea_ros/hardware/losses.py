@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from rsea_ros.hardware.limits import Fault
+from rsea_ros.hardware.limits import DeviceFault
 
 WINDOW, SHARE = 10, 0.5
 """Answers that are looked at, as a multiple of those that are a fault in a row, and the part of them."""
@@ -31,7 +31,7 @@ class Losses:
             self._count -= 1
         self._in_a_row = 0
 
-    def take(self, *, lost: bool) -> Fault | None:
+    def take(self, *, lost: bool) -> DeviceFault | None:
         """Take in whether the answer of a cycle was lost; return the fault that it is."""
         if len(self._recent) == self._recent.maxlen:
             self._count -= self._recent[0]
@@ -39,8 +39,8 @@ class Losses:
         self._count += lost
         self._in_a_row = self._in_a_row + 1 if lost else 0
         if self._in_a_row >= self._limit:
-            return Fault("no_reply", self._in_a_row, self._limit, "cycles")
+            return DeviceFault("no_reply", self._in_a_row, self._limit, "cycles")
         most = math.ceil(SHARE * WINDOW * self._limit)
         if lost and self._count >= most:
-            return Fault("no_reply", self._count, most, "cycles", f"of the last {len(self._recent)}: ")
+            return DeviceFault("no_reply", self._count, most, "cycles", f"of the last {len(self._recent)}: ")
         return None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from rsea_ros.hardware.device import State
 
 if TYPE_CHECKING:
-    from rsea_ros.hardware.guarded import Guarded
+    from rsea_ros.hardware.guarded import GuardedDevice
 
 
 class Shared(Protocol):
@@ -23,14 +23,16 @@ class Shared(Protocol):
 
 
 def cycle(
-    joints: Sequence[Guarded], wanted: Sequence[tuple[float, float | None]], buses: Sequence[Shared] = ()
+    joints: Sequence[GuardedDevice],
+    wanted: Sequence[tuple[float, float | None]],
+    buses: Sequence[Shared] = (),
 ) -> list[State | None]:
     """Write the torques of all joints, then read all; return the reading of each, None of one without.
 
-    wanted: torque (N m) and age of its command (s) of each, see Guarded. A reading that trips a fault zeroes
-    that joint's torque at once. The write comes first, so that a command takes effect as near to the start of
-    its cycle as can be. A joint whose device is being switched, cleared or rebooted is left out, and
-    holds up no other.
+    wanted: torque (N m) and age of its command (s) of each, see GuardedDevice. A reading that trips a fault
+    zeroes that joint's torque at once. The write comes first, so that a command takes effect as near to the
+    start of its cycle as can be. A joint whose device is being switched, cleared or rebooted is left out,
+    and holds up no other.
     """
     with ExitStack() as kept:
         here = [joint.taken(kept) for joint in joints]

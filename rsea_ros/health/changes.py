@@ -50,7 +50,7 @@ class _Base:
 
 
 @dataclass(frozen=True)
-class Answer:
+class CandidateCauses:
     """Causes beside the present model, and in place of the last adopted one.
 
     The second are also fitted to the looks right after its adoption; first is the model's cost on these.
@@ -61,7 +61,7 @@ class Answer:
     first: float
 
 
-Job = Callable[[], Answer]
+Job = Callable[[], CandidateCauses]
 
 
 class Changes:
@@ -119,19 +119,19 @@ class Changes:
         first = [look for look in self._looks if self._base.since <= look.t[0] < recent[0].t[0]][:2]
         base, before = self._base, self._before
 
-        def fit() -> Answer:
+        def fit() -> CandidateCauses:
             beside = self._fitter(base, looks).causes(base.hypotheses, starts)
             if before is None:
-                return Answer(beside, (), 0.0)
+                return CandidateCauses(beside, (), 0.0)
             instead = self._fitter(before, (*first, *looks)).causes(before.hypotheses, starts)
-            return Answer(beside, instead, self._fitter(base, first).now())
+            return CandidateCauses(beside, instead, self._fitter(base, first).now())
 
         self.job = fit
 
     def _fitter(self, base: _Base, looks: Sequence[Look]) -> Fitter:
         return Fitter(base.rig, self._noise, self._settings.hold, looks, self._scatter.scale)
 
-    def conclude(self, answer: Answer) -> HealthFinding | None:
+    def conclude(self, answer: CandidateCauses) -> HealthFinding | None:
         """Take the result of the job; return the finding that is new, if one is."""
         self.job = None
         both = answer.beside[0].cost + answer.first

@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.errors import RigError
 from rsea_ros.health.bank import Bank
-from rsea_ros.health.changes import Answer, Changes
+from rsea_ros.health.changes import CandidateCauses, Changes
 from rsea_ros.health.estimates import ChangeEstimate
 from rsea_ros.health.finding import HealthFinding, sensor_findings
 from rsea_ros.health.hypotheses import FACTOR, GAINS, ChangeHypothesis, hypotheses_of, nuisances_of
@@ -81,11 +81,11 @@ class Monitor:
         return self.changes is None
 
     @property
-    def job(self) -> Callable[[], Answer] | None:
+    def job(self) -> Callable[[], CandidateCauses] | None:
         """The computation that the next finding needs."""
         return None if self.changes is None else self.changes.job
 
-    def conclude(self, answer: Answer) -> HealthFinding | None:
+    def conclude(self, answer: CandidateCauses) -> HealthFinding | None:
         """Take the result of the job; return the finding that is new, if one is."""
         assert self.changes is not None
         return self.changes.conclude(answer)

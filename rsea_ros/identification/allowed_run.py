@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import drive_from
 from rsea_ros.model.rig import Rig
@@ -25,7 +25,7 @@ _SHOWN = ("position", "velocity", "ft")
 
 
 @dataclass(frozen=True)
-class RunLimits:
+class DriverLimits:
     """The defaults of the driver (config/nodes/driver.yaml), which excite has too: torque N m, slew N m/s.
 
     deflection: rad, of the spring. velocity: rad/s. ft: N m. power: W.
@@ -40,14 +40,14 @@ class RunLimits:
 
 
 @dataclass(frozen=True)
-class Run:
+class AllowedRun:
     """An excitation by its settings, which excite has too, and the noise-free case of a rig under it.
 
     peak: the largest command, N m, or rad where positions command the rig.
     """
 
     kind: str
-    settings: Settings
+    settings: ExcitationSettings
     peak: float
     case: Case
 
@@ -58,14 +58,19 @@ def playable_rate(rate: float) -> float:
 
 
 def allowed_run(
-    rig: Rig, like: Case, kind: str, settings: Settings, peak: float, limits: RunLimits | None = None
-) -> Run | None:
+    rig: Rig,
+    like: Case,
+    kind: str,
+    settings: ExcitationSettings,
+    peak: float,
+    limits: DriverLimits | None = None,
+) -> AllowedRun | None:
     """Return a run of at most a peak that stays within the limits in simulation; None where none does.
 
     like: the case of the present run, whose travel is the largest where nothing else bounds it. settings:
     amplitude and noise count by their ratio.
     """
-    limits = limits or RunLimits()
+    limits = limits or DriverLimits()
     bounds = _bounds(rig, like, limits)
     for _ in range(_TRIES):
         try:
@@ -75,14 +80,14 @@ def allowed_run(
             return None
         share = _share(command, outputs, bounds, settings.rate)
         if share <= 1.0:
-            return Run(kind, scaled, float(np.max(np.abs(command))), case)
+            return AllowedRun(kind, scaled, float(np.max(np.abs(command))), case)
         if not math.isfinite(share):
             return None
         peak *= _CLOSER / share
     return None
 
 
-def _bounds(rig: Rig, like: Case, limits: RunLimits) -> Mapping[str, float]:
+def _bounds(rig: Rig, like: Case, limits: DriverLimits) -> Mapping[str, float]:
     """Return the limits by simulated quantity; a rig commanded by positions bounds its own torque."""
     present: dict[str, float] = {
         n: float(np.nanmax(np.abs(y))) for n, y in like.measured.items() if n in ("position", "velocity")
@@ -99,7 +104,7 @@ def _bounds(rig: Rig, like: Case, limits: RunLimits) -> Mapping[str, float]:
     return {**bounds, "ft": min(limits.ft, limits.deflection * rig["spring.stiffness"])}
 
 
-def _scaled(kind: str, settings: Settings, peak: float) -> tuple[Settings, FloatArray]:
+def _scaled(kind: str, settings: ExcitationSettings, peak: float) -> tuple[ExcitationSettings, FloatArray]:
     """Return settings and command whose largest value is the peak: both grow with amplitude and noise."""
     largest = float(np.max(np.abs(excitation(kind, settings))))
     factor = peak / largest

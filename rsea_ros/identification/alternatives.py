@@ -36,7 +36,7 @@ _ITERATIONS = 10
 
 
 @dataclass(frozen=True)
-class Alternative:
+class ExtendedFit:
     """A law that the rig does not list, and the fit with it."""
 
     name: str
@@ -61,7 +61,7 @@ def extended(
     return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])
 
 
-def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[Alternative, ...]:
+def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[ExtendedFit, ...]:
     """Return the laws that would explain a part of a solution's residual, the best first.
 
     cases: with the noise of their sensors, not with weights from the misfit.
@@ -75,7 +75,7 @@ def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[A
     best = min((s.cost for _, s in fitted), default=0.0)
     credible = sorted(((n, s) for n, s in fitted if s.cost <= NEAR * best), key=lambda item: item[1].cost)
     settled = ((n, _settled(s, cases, run)) for n, s in credible)
-    return tuple(Alternative(n, s, confidence_of(s)) for n, s in settled)
+    return tuple(ExtendedFit(n, s, confidence_of(s)) for n, s in settled)
 
 
 def _fitted(solution: Solution, effect: Effect, run: Map) -> Solution | None:
@@ -101,7 +101,7 @@ def _settled(solution: Solution, cases: Sequence[Case], run: Map) -> Solution:
     return solve(replace(known, cases=weighted), solution.theta, iterations=_ITERATIONS, run=run)
 
 
-def spanned(ci95: tuple[float, float], name: str, others: Sequence[Alternative]) -> tuple[float, float]:
+def spanned(ci95: tuple[float, float], name: str, others: Sequence[ExtendedFit]) -> tuple[float, float]:
     """Return an interval of a parameter widened to hold its intervals under the alternatives, SI."""
     every = [ci95, *(other.interval(name) for other in others)]
     return min(low for low, _ in every), max(high for _, high in every)

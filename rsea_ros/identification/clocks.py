@@ -37,7 +37,7 @@ WORTH = 2.0
 
 
 @dataclass(frozen=True)
-class Asked:
+class RequiredClocks:
     """Clocks that the data require, and by unknown the widening of its interval with the others free."""
 
     clocks: tuple[Unknown, ...] = ()
@@ -50,11 +50,11 @@ class Asked:
         return (Remark("clocks_taken_as_right", (name,), (times,)),) if times >= WORTH else ()
 
 
-def asked_of(solution: Solution, run: Map = serial) -> Asked:
+def asked_of(solution: Solution, run: Map = serial) -> RequiredClocks:
     """Return the clocks that a fit without any must move, offsets and rates."""
     problem = solution.problem
     if is_inverse(problem.rig):
-        return Asked()
+        return RequiredClocks()
     channels = sorted({n for case in problem.cases for n in problem.present(case)})
     left = [*clocks(channels, problem.rig), *clock_rates(channels)]
     columns, blocks = clock_columns(problem, solution.theta, left, run), sample_blocks(problem, BLOCK)
@@ -68,12 +68,12 @@ def asked_of(solution: Solution, run: Map = serial) -> Asked:
     if _left_over(solution, columns[:, taken], [left[i] for i in taken]) > MISFIT:
         taken = [i for i in taken if not left[i].is_rate]
     others = [i for i, c in enumerate(left) if not c.is_rate and i not in taken]
-    return Asked(
+    return RequiredClocks(
         tuple(left[i] for i in taken), _cost(solution, columns[:, others], [left[i] for i in others])
     )
 
 
-def freed(solution: Solution, asked: Asked) -> tuple[Problem, FloatArray]:
+def freed(solution: Solution, asked: RequiredClocks) -> tuple[Problem, FloatArray]:
     """Return the problem of a fit with the required clocks among its unknowns, and its start."""
     problem = replace(solution.problem, unknowns=(*solution.problem.unknowns, *asked.clocks))
     return problem, np.concatenate([solution.theta, np.zeros(len(asked.clocks))])

@@ -83,7 +83,7 @@ def even_clock(t: FloatArray, shared: float = 0.0) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class _Line:
+class _StampFit:
     """Stamps over the number of their sample, by least squares: period and its one sigma, s.
 
     place: the number of each sample. farthest, scatter: largest and RMS distance of a stamp from it, s.
@@ -96,14 +96,14 @@ class _Line:
     scatter: float
 
 
-def _line(t: FloatArray) -> _Line:
+def _line(t: FloatArray) -> _StampFit:
     usual = float(np.median(np.diff(t)))
     place = np.concatenate([[0.0], np.cumsum(np.round(np.diff(t) / usual))])
     period, first = np.polyfit(place, t, 1)
     off = np.abs(t - (first + period * place))
     scatter = float(np.sqrt(np.mean(off**2)))
     doubt = scatter / (float(np.std(place)) * float(np.sqrt(len(place))))
-    return _Line(place, float(period), doubt, float(off.max()), scatter)
+    return _StampFit(place, float(period), doubt, float(off.max()), scatter)
 
 
 def _shared_period(record: Record) -> float:

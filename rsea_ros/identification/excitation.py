@@ -1,6 +1,6 @@
 """Excitations: torque commands on a uniform grid, N m.
 
-Every kind is a function of one `Settings`, in KINDS under the name by which the excite node and the
+Every kind is a function of one `ExcitationSettings`, in KINDS under the name by which the excite node and the
 command line choose it. `excitation()` adds the ramps.
 """
 
@@ -26,7 +26,7 @@ _DETECTION_GROUP = 4
 
 
 @dataclass(frozen=True)
-class Settings:
+class ExcitationSettings:
     """The settings of an excitation.
 
     rate: Hz. duration: s, without the ramps of periodic kinds. amplitude: N m, peak of chirp and steps, rms
@@ -67,11 +67,11 @@ class Settings:
         return round(self.duration * self.rate)
 
 
-JOINT = Settings(rate=100.0, amplitude=0.4, noise=0.03, low=0.05, high=3.0)
+JOINT = ExcitationSettings(rate=100.0, amplitude=0.4, noise=0.03, low=0.05, high=3.0)
 """What suits a joint that positions command: amplitude and noise in rad."""
 
 
-def chirp(settings: Settings) -> FloatArray:
+def chirp(settings: ExcitationSettings) -> FloatArray:
     """Return the paper's excitation: a logarithmic sweep with white noise on top (section 3.2.1).
 
         u(t) = A sin(2 pi low T / ln r ((r)^(t/T) - 1)) + w(t),   r = top / low
@@ -85,12 +85,12 @@ def chirp(settings: Settings) -> FloatArray:
     return sweep + _band_noise(settings, settings.noise)
 
 
-def white_noise(settings: Settings) -> FloatArray:
+def white_noise(settings: ExcitationSettings) -> FloatArray:
     """Return Gaussian white noise between low and top, `amplitude` N m rms."""
     return _band_noise(settings, settings.amplitude)
 
 
-def steps(settings: Settings) -> FloatArray:
+def steps(settings: ExcitationSettings) -> FloatArray:
     """Return steps 0, A, 0, -A, each held for a quarter of `period`."""
     quarter = np.floor(np.arange(settings.samples) / settings.rate * 4.0 / settings.period + 1e-9)
     levels = np.array([0.0, settings.amplitude, 0.0, -settings.amplitude])
@@ -98,7 +98,7 @@ def steps(settings: Settings) -> FloatArray:
     return held
 
 
-def multisine(settings: Settings) -> FloatArray:
+def multisine(settings: ExcitationSettings) -> FloatArray:
     """Return whole periods of a random-phase multisine on odd harmonics, `amplitude` N m rms.
 
         u(t) = sqrt(2 / K) A sum_k cos(2 pi k t / period + phi_k),   k in odd_lines(settings)
@@ -117,7 +117,7 @@ def multisine(settings: Settings) -> FloatArray:
     return whole
 
 
-def odd_lines(settings: Settings) -> IntArray:
+def odd_lines(settings: ExcitationSettings) -> IntArray:
     """Return the excited harmonics of 1/period: odd ones in the band, one of each four left out at random."""
     first, last = math.ceil(settings.low * settings.period), math.floor(settings.top * settings.period)
     odd = np.arange(first + (first + 1) % 2, last + 1, 2)
@@ -132,7 +132,7 @@ def odd_lines(settings: Settings) -> IntArray:
     return np.delete(odd, left_out)
 
 
-def _period_samples(settings: Settings) -> int:
+def _period_samples(settings: ExcitationSettings) -> int:
     size = round(settings.period * settings.rate)
     where = f"multisine: period = {settings.period:g} s"
     if abs(size - settings.period * settings.rate) > 1e-6 * size:
@@ -142,7 +142,7 @@ def _period_samples(settings: Settings) -> int:
     return size
 
 
-def _band_noise(settings: Settings, deviation: float) -> FloatArray:
+def _band_noise(settings: ExcitationSettings, deviation: float) -> FloatArray:
     """Return Gaussian noise that is white from low to top and nothing elsewhere. deviation: N m.
 
     Raises ParameterError where the band has no line: it is narrower than 1 / duration.
@@ -164,13 +164,13 @@ def _band_noise(settings: Settings, deviation: float) -> FloatArray:
     return noise
 
 
-KINDS: Mapping[str, Callable[[Settings], FloatArray]] = MappingProxyType(
+KINDS: Mapping[str, Callable[[ExcitationSettings], FloatArray]] = MappingProxyType(
     {"chirp": chirp, "multisine": multisine, "white_noise": white_noise, "steps": steps}
 )
 PERIODIC = frozenset({"multisine"})
 
 
-def excitation(kind: str, settings: Settings, ramp: float = 0.0) -> FloatArray:
+def excitation(kind: str, settings: ExcitationSettings, ramp: float = 0.0) -> FloatArray:
     """Return a command that begins and ends at rest, N m, shape (n,).
 
     ramp: s, raised cosine in and out. Periodic kinds get it before and after, as their own continuation, so

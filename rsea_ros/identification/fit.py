@@ -8,7 +8,7 @@ from dataclasses import replace
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.scale import Scale
-from rsea_ros.identification.clocks import Asked, asked_of, freed, without_needless
+from rsea_ros.identification.clocks import RequiredClocks, asked_of, freed, without_needless
 from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
@@ -34,7 +34,7 @@ _OTHER_NOISE = 1.1
 
 def fit(
     cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = None
-) -> tuple[Solution, tuple[Case, ...], Asked]:
+) -> tuple[Solution, tuple[Case, ...], RequiredClocks]:
     """Fit the rig's free values, its effects and the clocks that the data require.
 
     Returns also the cases with their noise, and the result of the clock tests.

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
+from rsea_ros.identification.alternatives import ExtendedFit, alternatives, spanned
 from rsea_ros.identification.clock_doubt import with_even_clocks
 from rsea_ros.identification.confidence import (
     Confidence,
@@ -105,7 +105,7 @@ def _result(
     records: Sequence[Record],
     cases: Sequence[Case],
     responses: tuple[FrequencyResponse, ...],
-    others: Sequence[Alternative],
+    others: Sequence[ExtendedFit],
     confidence: Confidence,
 ) -> Identification:
     """Gather the result. cases: with their noise, before any weight followed a misfit."""

@@ -11,9 +11,9 @@ from rsea_ros.laws.candidates import SPLINES, TermCandidate, basis_of, spline_kn
 from rsea_ros.laws.columns import LawBench
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import SELECTION, Gram
-from rsea_ros.laws.law import Curve, Law, Part, joined
+from rsea_ros.laws.law import FittedTerm, Law, LearntCurve, joined
 from rsea_ros.laws.reading import ranges_of
-from rsea_ros.laws.selection import Model
+from rsea_ros.laws.selection import SparseLaw
 
 _POINTS = 41
 """Of a learnt curve, evenly apart."""
@@ -21,7 +21,7 @@ _RIDGE = 1e-4
 
 
 def law_of(
-    gram: Gram, candidates: Sequence[TermCandidate], benches: Sequence[LawBench], models: Sequence[Model]
+    gram: Gram, candidates: Sequence[TermCandidate], benches: Sequence[LawBench], models: Sequence[SparseLaw]
 ) -> list[Law]:
     """Return the laws of some models fitted together, those of one place as one."""
     first = len(gram.prior)
@@ -29,12 +29,12 @@ def law_of(
     if not columns:
         return []
     beta = gram.fit(np.array(columns, np.int64), SELECTION)[first:]
-    parts: dict[str, list[Part]] = {}
+    parts: dict[str, list[FittedTerm]] = {}
     for k, b in zip(columns, beta, strict=True):
         candidate = candidates[k - first]
         assert candidate.term is not None
         parts.setdefault(candidate.place, []).append(
-            Part(candidate.term, float(b / gram.scale[k]), candidate.shape)
+            FittedTerm(candidate.term, float(b / gram.scale[k]), candidate.shape)
         )
     laws = []
     for place, items in parts.items():
@@ -58,7 +58,7 @@ def curve_of(
     knots = spline_knots(benches, spline)
     x = np.linspace(knots[0], knots[-1], _POINTS)
     used = [c.part[2] for k in columns if (c := candidates[k - first]).part]
-    curve = Curve(spline.over, spline.factor, x, beta @ basis_of(x, knots)[used])
+    curve = LearntCurve(spline.over, spline.factor, x, beta @ basis_of(x, knots)[used])
     law = Law(
         _placed(f"learnt_law_of_{_slug(dependence.regressor)}", place),
         place,

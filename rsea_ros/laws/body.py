@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from rsea_ros.laws.law import Law, Part
+from rsea_ros.laws.law import FittedTerm, Law
 from rsea_ros.laws.memory import RING
 from rsea_ros.laws.reading import READS, letters_of, time_letters
 
@@ -114,7 +114,7 @@ def _with_letter(expression: str, letter: str, replaced: str) -> str:
     return re.sub(rf"\b{letter}\b", replaced, expression)
 
 
-def _memory(part: Part, name: str, shape: str, state: int) -> tuple[list[str], int]:
+def _memory(part: FittedTerm, name: str, shape: str, state: int) -> tuple[list[str], int]:
     """Return the lines that keep a memory in the states from `state` on, and the next free one."""
     of, kind = part.term.remembers, part.term.memory
     if kind in ("lag", "heat"):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from rsea_ros.laws.columns import LawBench, Rows
+from rsea_ros.laws.columns import LawBench, ResidualRows
 from rsea_ros.laws.repeats import lines, modes, periods
 from rsea_ros.laws.terms import (
     COMMAND_TERMS,
@@ -187,7 +187,7 @@ def _of_splines(benches: Sequence[LawBench]) -> Iterator[tuple[TermCandidate, li
 
 
 def columns_of(
-    rows: Rows, benches: Sequence[LawBench], made: Sequence[tuple[TermCandidate, list[FloatArray]]]
+    rows: ResidualRows, benches: Sequence[LawBench], made: Sequence[tuple[TermCandidate, list[FloatArray]]]
 ) -> list[FloatArray]:
     """Return the column of every candidate; the simulations run on two threads."""
 

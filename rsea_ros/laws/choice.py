@@ -13,7 +13,7 @@ from rsea_ros.laws.columns import LawBench, bench_of, rows_of
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
 from rsea_ros.laws.result import Tried
-from rsea_ros.laws.selection import MOST_TERMS, Model, paths, simplest, standard_error
+from rsea_ros.laws.selection import MOST_TERMS, SparseLaw, paths, simplest, standard_error
 from rsea_ros.signals import FloatArray
 
 MATTERS = 0.02
@@ -50,8 +50,8 @@ def searched(base: Base) -> Search:
 class Choice:
     """The models that were compared, those that make the law, and the dependence that a curve shall show."""
 
-    compared: tuple[Model, ...]
-    taken: tuple[Model, ...] = ()
+    compared: tuple[SparseLaw, ...]
+    taken: tuple[SparseLaw, ...] = ()
     curve: Dependence | None = None
 
 
@@ -70,14 +70,14 @@ def chosen_models(search: Search, depends: Sequence[Dependence]) -> Choice:
         for m in paths(gram, search.candidates, best.columns, most=3)
         if m.place != best.place or len(best.columns) + len(m.columns) <= MOST_TERMS
     ]
-    second = simplest([Model(best.place, (), best.left), *more], gram)
+    second = simplest([SparseLaw(best.place, (), best.left), *more], gram)
     helps = second.columns and surely_helps(gram, best.left, second.left, second.columns, best.columns)
     taken = (best, second) if helps else (best,)
     return Choice((*models, *more), taken, _curve(search, depends, none, taken[-1]))
 
 
 def _curve(
-    search: Search, depends: Sequence[Dependence], none: FloatArray, short: Model
+    search: Search, depends: Sequence[Dependence], none: FloatArray, short: SparseLaw
 ) -> Dependence | None:
     """Return the dependence for a learnt curve, where short laws leave much of it."""
     weight = search.gram.weights(none, SELECTION)
@@ -117,7 +117,7 @@ def _is_sure(gain: FloatArray, errors: float, worse: float) -> bool:
     return gain.sum() > 0.0 and bool(gain.sum() > errors * standard_error(gain) or lost < worse * won)
 
 
-def tried_of(search: Search, choice: Choice, taken: Sequence[Model]) -> tuple[Tried, ...]:
+def tried_of(search: Search, choice: Choice, taken: Sequence[SparseLaw]) -> tuple[Tried, ...]:
     """Return the compared models with their held-out residuals over that of the base."""
     gram, first = search.gram, len(search.gram.prior)
     none = gram.held_out(np.array([], np.int64))

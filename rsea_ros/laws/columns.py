@@ -97,7 +97,7 @@ def bench_of(
 
 
 @dataclass(frozen=True)
-class Rows:
+class ResidualRows:
     """All residuals of a base model, measured less simulated over the noise, shape (m,), and how they group.
 
     group: set of the block times GROUPS plus a number. channel: number of the channel in `channels`.
@@ -127,7 +127,7 @@ class Rows:
         return {(int(self.group[p[0]]), int(self.channel[p[0]])): p for p in pieces}
 
 
-def rows_of(problem: Problem, theta: FloatArray) -> Rows:
+def rows_of(problem: Problem, theta: FloatArray) -> ResidualRows:
     """Return the rows of a base model. problem: on all samples of its cases."""
     residual = problem.residual(theta)
     masks = tuple((i, n) for i, case in enumerate(problem.cases) for n in problem.present(case))
@@ -140,7 +140,7 @@ def rows_of(problem: Problem, theta: FloatArray) -> Rows:
     sizes = [int(np.count_nonzero(problem.cases[i].mask[n])) for i, n in masks]
     names = tuple(dict.fromkeys(n for _, n in masks))
     which = np.concatenate([np.full(k, names.index(n)) for k, (_, n) in zip(sizes, masks, strict=True)])
-    return Rows(
+    return ResidualRows(
         residual=-residual,
         nominal=jacobian(problem, theta, residual),
         prior=np.array([1.0 / u.reach for u in problem.unknowns]),

@@ -16,7 +16,7 @@ from rsea_ros.laws.columns import bench_of
 from rsea_ros.laws.law import Law
 from rsea_ros.laws.reading import letters_of
 from rsea_ros.laws.refinement import Refined, effect_from
-from rsea_ros.laws.result import Shown, WrittenLaw
+from rsea_ros.laws.result import FigurePoints, WrittenLaw
 from rsea_ros.laws.writing import LawProvenance, source_of
 from rsea_ros.model.rig import EffectSetting
 
@@ -72,7 +72,7 @@ def finished(
     return written
 
 
-def shown_of(problem: Problem, refined: Refined, law: Law, values: dict[str, float]) -> Shown:
+def shown_of(problem: Problem, refined: Refined, law: Law, values: dict[str, float]) -> FigurePoints:
     """Return the missing torque of the fitted model without a law, over the law's variable."""
     off = {n: 0.0 if n in _sizes(law) else v for n, v in values.items()}
     rig = problem.rig
@@ -90,7 +90,7 @@ def shown_of(problem: Problem, refined: Refined, law: Law, values: dict[str, flo
     course = law.values(bench.variables) * (values.get("size", 1.0))
     if law.parts and law.parts[0].term.memory:
         over, letters = LAW, {**letters, LAW: course}
-    return Shown(
+    return FigurePoints(
         t=t[k], x=np.interp(t[k], at, letters[over]), values=bench.missing.torque[k],
         law=np.interp(t[k], at, course), over=over, sd=bench.missing.sd,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from rsea_ros.diagnosis.data_split import TEST
-from rsea_ros.laws.columns import GROUPS, Rows
+from rsea_ros.laws.columns import GROUPS, ResidualRows
 from rsea_ros.signals import FloatArray, IntArray
 
 _RIDGE = 1e-6
@@ -106,7 +106,7 @@ def groups_of(sets: Sequence[int]) -> IntArray:
 SELECTION, HELD_BACK = groups_of([s for f in FOLDS for s in f]), groups_of(TEST)
 
 
-def gram_of(rows: Rows, columns: Sequence[FloatArray]) -> Gram:
+def gram_of(rows: ResidualRows, columns: Sequence[FloatArray]) -> Gram:
     """Return the sums of products of the rig's derivatives, some columns and the residual."""
     nominal = rows.nominal
     x = np.empty((len(rows.residual), nominal.shape[1] + len(columns)), np.float32)

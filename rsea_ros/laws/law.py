@@ -13,7 +13,7 @@ from rsea_ros.signals import FloatArray
 
 
 @dataclass(frozen=True)
-class Part:
+class FittedTerm:
     """One term of a law with its coefficient and shape, SI, and their 95 % intervals where they are known."""
 
     term: Term
@@ -24,7 +24,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Curve:
+class LearntCurve:
     """A learnt curve: values (N m, rad at the encoder) over a variable, times a factor, held at its ends."""
 
     over: str
@@ -43,9 +43,9 @@ class Law:
     name: str
     place: Place
     regressor: str
-    parts: tuple[Part, ...]
+    parts: tuple[FittedTerm, ...]
     ranges: Mapping[str, float]
-    curve: Curve | None = None
+    curve: LearntCurve | None = None
 
     @property
     def is_learnt(self) -> bool:

@@ -24,7 +24,7 @@ class Tried:
 
 
 @dataclass(frozen=True)
-class Shown:
+class FigurePoints:
     """The missing torque beside a law, point by point, for the page.
 
     t: s. values, law: N m, rad at the encoder. over: the letter of the variable that the law
@@ -47,7 +47,7 @@ class WrittenLaw:
     effect: Effect
     source: str
     claims: Claims
-    shown: Shown
+    shown: FigurePoints
 
 
 @dataclass(frozen=True)

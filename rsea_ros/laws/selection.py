@@ -24,7 +24,7 @@ _SAME = 0.05
 
 
 @dataclass(frozen=True)
-class Model:
+class SparseLaw:
     """A law of some columns at one place. left: squares left of each group by fits without it."""
 
     place: Place
@@ -73,7 +73,7 @@ def folded(gram: Gram, weight: FloatArray) -> Folded:
 
 def paths(
     gram: Gram, candidates: Sequence[TermCandidate], given: Sequence[int] = (), most: int = MOST_TERMS
-) -> list[Model]:
+) -> list[SparseLaw]:
     """Return the models of one, two, … terms of every place. given: columns that are part of all."""
     models = []
     for place in dict.fromkeys(c.place for c in candidates):
@@ -83,11 +83,11 @@ def paths(
 
 def _path(
     gram: Gram, candidates: Sequence[TermCandidate], place: Place, given: Sequence[int], most: int
-) -> list[Model]:
+) -> list[SparseLaw]:
     first = len(gram.prior)
     free = [first + k for k, c in enumerate(candidates) if c.term is not None and c.place == place]
     chosen: list[int] = []
-    models: list[Model] = []
+    models: list[SparseLaw] = []
     left = gram.held_out(np.array([*given], np.int64))
     for _ in range(most):
         sums = folded(gram, gram.weights(left, SELECTION))
@@ -99,7 +99,7 @@ def _path(
         chosen.append(taken)
         free = [k for k in free if not _same_form(candidates[k - first], candidates[taken - first])]
         left = gram.held_out(np.array([*given, *chosen], np.int64))
-        models.append(Model(place, tuple(chosen), left))
+        models.append(SparseLaw(place, tuple(chosen), left))
     return models
 
 
@@ -118,12 +118,12 @@ def _acts_right(gram: Gram, candidates: Sequence[TermCandidate], columns: Sequen
     return all(b > 0.0 for b, t in zip(beta, terms, strict=True) if t is not None and t.is_drag)
 
 
-def simplest(models: Sequence[Model], gram: Gram) -> Model:
+def simplest(models: Sequence[SparseLaw], gram: Gram) -> SparseLaw:
     """Return the shortest model within one standard error of the one with the largest likelihood."""
     best = min(models, key=lambda m: m.minus_log_likelihood(gram))
     weight = gram.weights(best.left, SELECTION)
 
-    def is_near(model: Model) -> bool:
+    def is_near(model: SparseLaw) -> bool:
         more = (model.left - best.left)[SELECTION] @ weight
         return bool(
             more.sum() <= max(standard_error(more), _SAME * float((best.left[SELECTION] @ weight).sum()))

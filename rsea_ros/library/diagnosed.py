@@ -80,10 +80,10 @@ class Diagnosed:
         force: replace existing results; without it they raise OutputError.
         """
         from msg_adapters.overlay import write_overlay
-        from rsea_ros.new_files import Place
+        from rsea_ros.new_files import Destination
         from rsea_ros.report.diagnosis.files import write_diagnosis
 
-        return write_diagnosis(self.result, self.record, Place(Path(directory), force), write_overlay)
+        return write_diagnosis(self.result, self.record, Destination(Path(directory), force), write_overlay)
 
     def __repr__(self) -> str:
         """Return the verdict and the causes in one line."""

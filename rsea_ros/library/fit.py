@@ -69,10 +69,10 @@ class Fit:
 
         force: replace existing results; without it they raise OutputError.
         """
-        from rsea_ros.new_files import Place
+        from rsea_ros.new_files import Destination
         from rsea_ros.report.identification.files import write_results
 
-        return write_results(self.result, Place(Path(directory), force))
+        return write_results(self.result, Destination(Path(directory), force))
 
     def __repr__(self) -> str:
         """Return rig, fit and parameters in one line."""

@@ -24,6 +24,10 @@ LONGEST_STEP = 4.5e-4
 MOST_STEPS = 5e7
 """Of a record, six hours: a longer one needs more memory than most computers have."""
 
+SLOW, MOST_SLOW_STEPS = 4.0, 2e6
+"""Hz of the fastest channel below which a record is slow, and the steps of a slow one, 15 minutes: stamps in
+ms make of 10 s at 280 Hz such a record of three hours, of which every simulation would last for minutes."""
+
 LONGEST_OF_JOINTS = 1e-3
 """s, where targets at tens of Hz command a position loop, whose firmware samples about as often."""
 
@@ -33,6 +37,9 @@ ON_GRID = 1e-3
 
 AT_REST = 0.5
 """Of the whole record's standard deviation: a first sample below it is of a bench that started from rest."""
+
+LATE = 1.6
+"""Sample periods: a first sample later than this after the first command is of a channel that starts late."""
 
 
 @dataclass(frozen=True)
@@ -118,10 +125,11 @@ def drive_from(
     stop = max(record.stop, float(command.t[-1]) + period)
     check_extent(record, start, stop)
     count = math.ceil((stop - start) / step - 1e-6)
-    if count > MOST_STEPS:
+    most = MOST_STEPS if _is_fast(record) else refine * MOST_SLOW_STEPS
+    if count > most:
         raise IdentificationError(
-            f"{record.source}: lasts {stop - start:.4g} s, expected up to {MOST_STEPS * step:.4g} s: "
-            f"are the stamps in s, not in ms or µs ({1.0 / period:.3g} Hz)? If so, cut the record"
+            f"{record.source}: lasts {stop - start:.4g} s, expected up to {most * step:.4g} s at "
+            f"{1.0 / period:.3g} Hz: are the stamps in s, not in ms or µs? If so, cut the record"
         )
     knots, torque = _in_steps(command.t, start, step), command.y
     if closed_loop:
@@ -145,6 +153,11 @@ def drive_from(
         hold=steps,
         jumps=jumps,
     )
+
+
+def _is_fast(record: Record) -> bool:
+    """Return whether any channel has the rate of a control loop, rather than stamps in another unit."""
+    return any(channel.rate > SLOW for channel in record.channels.values() if len(channel) > 1)
 
 
 def coarser(drive: Drive) -> Drive:
@@ -212,11 +225,15 @@ def _initial(record: Record) -> tuple[float, float]:
     """Return position and velocity at the start: rest, unless the first samples say otherwise.
 
     The first sample comes a period after the first command; a motion that the command may have caused until
-    then, the largest change from sample to sample, is not an initial motion.
+    then, the largest change from sample to sample, is not an initial motion. A channel that was not measured
+    says nothing. The position at the start is the first one less what the first velocity brought until then.
     """
-    position, velocity = (_finite(record, n)[1] for n in ("position", "velocity"))
-    moved = _moved(position) or _moved(velocity)
-    return (float(position[0]), float(velocity[0])) if moved else (0.0, 0.0)
+    (t, position), (_, velocity) = (_finite(record, n) for n in ("position", "velocity"))
+    if not (_moved(position) or _moved(velocity)):
+        return 0.0, 0.0
+    late = float(t[0] - record["command"].t[0])
+    passed = late if "position" in record and 0.0 < late < LATE * float(t[1] - t[0]) else 0.0
+    return float(position[0] - passed * velocity[0]), float(velocity[0])
 
 
 def _angle(record: Record, ends: FloatArray) -> FloatArray:
@@ -261,7 +278,8 @@ def _mean_of_curve(finer: int, knots: FloatArray, y: FloatArray, count: int) -> 
 
 
 def _moved(y: FloatArray) -> bool:
-    return bool(abs(y[0]) >= max(AT_REST * np.std(y), np.max(np.abs(np.diff(y)))))
+    least = max(AT_REST * np.std(y), np.max(np.abs(np.diff(y))))
+    return bool(y[0] != 0.0 and abs(y[0]) >= least)
 
 
 def _in_steps(t: FloatArray, start: float, step: float) -> FloatArray:

@@ -6,14 +6,14 @@ import math
 
 from rsea_ros.errors import ChannelError
 from rsea_ros.model import loop
-from rsea_ros.model.rig import Controller, Rig
+from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.signals import ComplexArray, Record
 
 
 def loop_parameters(rig: Rig) -> tuple[float, ...]:
     """Return the parameters of loop.control, in its order, of a rig that has a loop."""
     if rig.loop is None:
-        c = rig.controller or Controller(0.0, 0.0)
+        c = rig.controller or PositionLoop(0.0, 0.0)
         return loop.CASCADE, c.k_p, 0.0, c.k_v, 0.0, c.limit, math.inf, 0.0
     limits = tuple(rig[f"controller.{name}"] for name in ("torque_limit", "velocity_limit", "sample_time"))
     if rig.loop == "pd":

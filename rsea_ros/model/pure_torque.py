@@ -17,7 +17,7 @@ from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end, flat_band
-from rsea_ros.model.observer import ErrorModel, Estimate
+from rsea_ros.model.observer import ErrorModel, TorqueEstimate
 from rsea_ros.model.pure_torque_filter import (
     CORNER,
     FELL,
@@ -81,7 +81,7 @@ class FlagSettings:
             raise ParameterError(f"limit = {self.limit:g}, expected a share from 0.05 to 0.5")
 
 
-class Reading(NamedTuple):
+class PureTorqueVerdict(NamedTuple):
     """Verdict, share of the power above the edge, and the frequency of a sine with that share, Hz.
 
     Share and frequency are nan when there is no torque.
@@ -132,7 +132,7 @@ class PureTorque:
         self._limits[[NOISE_HIGH, NOISE_LOW, SIGMA]] = heard if np.isfinite(heard).all() else DEAF
         self._period = dt
 
-    def take(self, t: float, estimate: Estimate) -> Verdict:
+    def take(self, t: float, estimate: TorqueEstimate) -> Verdict:
         """Process an estimate and return the verdict. A stamp far before the last one starts another run."""
         if self._memory[LAST] - t > AGAIN:
             self._memory[:] = 0.0
@@ -141,16 +141,16 @@ class PureTorque:
         judge(self._pair, self._limits, self._memory, t, estimate.distal, estimate.sigma_distal)
         return self.verdict
 
-    def reading(self) -> Reading:
+    def reading(self) -> PureTorqueVerdict:
         """Return the present reading of the powers."""
         if self.verdict == "no torque":
-            return Reading(self.verdict, math.nan, math.nan)
+            return PureTorqueVerdict(self.verdict, math.nan, math.nan)
         above = max(self._memory[HIGH] - self._limits[NOISE_HIGH], 0.0)
         below = max(self._memory[LOW] - self._limits[NOISE_LOW], 1e-12)
         turn, corner = math.pi * self._period, self._limits[CORNER]
         g = math.tan(turn * corner) if self._period * corner < SEEN else 0.0
         occupied = math.atan((above / below) ** 0.25 * g) / turn
-        return Reading(self.verdict, float(above / (above + below)), occupied)
+        return PureTorqueVerdict(self.verdict, float(above / (above + below)), occupied)
 
     def error_at(self, hz: float) -> tuple[float, float]:
         """Return |T_d / T_p|, dB, and its phase, degrees: the error of who takes them for the same."""

@@ -24,7 +24,7 @@ from numpy.polynomial import polynomial
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end
-from rsea_ros.model.observer import Estimate
+from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.pure_torque_window import (
     BEYOND,
     HEARD,
@@ -98,9 +98,9 @@ class ErrorFlag:
         self._state, self._ring = np.zeros(STATE), empty_ring()
         self._state[[TOLERANCE, WINDOW, HYSTERESIS, QUIET]] = s.tolerance, s.window, s.hysteresis, s.quiet
         self._state[[HEARD, SHARE, LAST]] = -math.inf, math.nan, -math.inf
-        self.take(-math.inf, Estimate(*[0.0] * 6))  # compiles, and is too early to count
+        self.take(-math.inf, TorqueEstimate(*[0.0] * 6))  # compiles, and is too early to count
 
-    def take(self, t: float, estimate: Estimate, *, heard: bool = False) -> int:
+    def take(self, t: float, estimate: TorqueEstimate, *, heard: bool = False) -> int:
         """Process an estimate and return the verdict: NOTHING, PURE or BEYOND.
 
         heard: a finer detector (pure_torque.py) sees a torque that may be too small to be judged here.

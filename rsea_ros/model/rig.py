@@ -69,7 +69,7 @@ class EffectSetting:
 
 
 @dataclass(frozen=True)
-class Controller:
+class PositionLoop:
     """Position loop that was active during the record: command = k_v (k_p (reference - q) - dq/dt).
 
     k_p: 1/s; k_v: N m s/rad; limit: N m on the command.
@@ -107,7 +107,7 @@ class Rig:
     ft_end: str = "spring_end"
     encoder_end: str = "gear_output"
     loop: str | None = None
-    controller: Controller | None = None
+    controller: PositionLoop | None = None
     hold: Hold = "zero"
     effects: tuple[EffectSetting, ...] = ()
     about: str = ""

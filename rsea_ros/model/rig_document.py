@@ -14,7 +14,7 @@ from rsea_ros.checked import mapping, number, only_keys, switch, text, unit
 from rsea_ros.errors import FieldError, RigError
 from rsea_ros.keys import names
 from rsea_ros.model.effect_settings import check_effects
-from rsea_ros.model.rig import HOLDS, Controller, EffectSetting, Hold, Quantity, Rig
+from rsea_ros.model.rig import HOLDS, EffectSetting, Hold, PositionLoop, Quantity, Rig
 from rsea_ros.model.rig_fields import END_NAMES, FIELDS, LOOP_FIELDS, LOOP_LIMITS, Field, check_value
 from rsea_ros.model.rig_keys import (
     CONTROLLER,
@@ -142,7 +142,7 @@ def _hold(item: Any) -> Hold:
     raise RigError(f"hold = {shown(item)}, expected {', '.join(HOLDS)}", "hold")
 
 
-def _controller(item: Any) -> Controller | None:
+def _controller(item: Any) -> PositionLoop | None:
     if item is None:
         return None
     body = mapping(item, "controller")
@@ -155,7 +155,7 @@ def _controller(item: Any) -> Controller | None:
             raise RigError(f"{name} = {value:g} {symbol}, expected a finite value >= 0 {symbol}", name)
     if limit <= 0.0:
         raise RigError(f"controller.limit = {limit:g} N m, expected a value > 0 N m", "controller.limit")
-    return Controller(k_p, k_v, limit)
+    return PositionLoop(k_p, k_v, limit)
 
 
 def _effects(items: Any) -> tuple[EffectSetting, ...]:

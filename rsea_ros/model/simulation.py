@@ -252,7 +252,7 @@ def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator)
 
 
 @dataclass(frozen=True)
-class Sample:
+class PlantSample:
     """One measurement of the plant: rad, rad/s, N m, N m (nan without a spring to measure), rad."""
 
     position: float
@@ -281,7 +281,7 @@ class Plant:
         self._machine = build(self._rig, self._step, self._duration)
         self._time = 0.0
 
-    def step(self, command: float) -> Sample:
+    def step(self, command: float) -> PlantSample:
         """Hold a command (N m) for one sample period and return the measurement at its end."""
         run(self._machine, np.full(self._count, command), self._out, start=self._time)
         self._time += self._count * self._step
@@ -290,4 +290,4 @@ class Plant:
             values = {n: float(measure(self._rig, n, v, self._rng)) for n, v in values.items()}
         ft = math.nan if self._rig.rigid_spring else float(values["ft"])
         position, velocity, torque = (float(values[n]) for n in ("position", "velocity", "motor_torque"))
-        return Sample(position, velocity, torque, ft, float(values["deflection"]))
+        return PlantSample(position, velocity, torque, ft, float(values["deflection"]))

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from rsea_ros.interrupts import STOPPING
 
 
-class Alarm:
+class SignalListener:
     """Call `react()`, in a thread, at the first signal that ends the process, beside the handlers it has."""
 
     def __init__(self, react: Callable[[], None]) -> None:

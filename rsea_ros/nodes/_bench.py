@@ -23,19 +23,19 @@ from rsea_ros.hardware.device import State
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import HORIZON, CommandQueue
 from rsea_ros.nodes._cycle import Cycle
-from rsea_ros.nodes._health import OK, WARN, Report
+from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox
-from rsea_ros.nodes._parameters import JOINT, Parameter
+from rsea_ros.nodes._parameters import JOINT, NodeParameter
 from rsea_ros.nodes._publishers import Obeyed
 from rsea_ros.nodes._qos import COMMAND, MEASURED, OVERRIDES
 
 NAMES = (
     JOINT,
-    Parameter("frame", "", "frame_id of joint_states"),
-    Parameter("ft_frame", "ft_sensor", "frame_id of ft"),
+    NodeParameter("frame", "", "frame_id of joint_states"),
+    NodeParameter("ft_frame", "ft_sensor", "frame_id of ft"),
 )
 """Parameters of every bench."""
-SPRING_FRAME = Parameter(
+SPRING_FRAME = NodeParameter(
     "spring_frame", "spring_deflection", "frame_id of deflection, and of ft where it is stiffness times that"
 )
 """Of a bench whose device may measure the spring by a second encoder."""
@@ -119,7 +119,7 @@ class Bench:
         elif state.wrench is not None:
             self._ft.publish(writer.write(state.ft_stamp + shift, state.wrench))
 
-    def report(self, cycle: Cycle, more: Mapping[str, int] | None = None) -> Report:
+    def report(self, cycle: Cycle, more: Mapping[str, int] | None = None) -> NodeHealth:
         """Return the health of a bench that runs in a cycle; warnings are of events since the last report.
 
         more: further counts by their name in words.
@@ -145,7 +145,7 @@ class Bench:
             "furthest_stamp_s": f"{commands.furthest:+.3f}",
             **cycle.anchor.values(),
         }
-        return Report(WARN if troubles else OK, ", ".join(troubles) or "running", values)
+        return NodeHealth(WARN if troubles else OK, ", ".join(troubles) or "running", values)
 
     def close(self) -> None:
         """Take the topics away."""

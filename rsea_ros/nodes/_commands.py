@@ -13,7 +13,7 @@ HORIZON = 300 * MILLISECOND
 WATCHDOG = 50 * MILLISECOND
 
 
-class Waiting(NamedTuple):
+class PendingCommand(NamedTuple):
     """A command until it is due: when it takes effect and when it came, ns; torque N m."""
 
     when: int
@@ -36,7 +36,7 @@ class CommandQueue:
     def __init__(self, *, strict: bool = False) -> None:
         self._strict = strict
         self._lock = threading.Lock()
-        self._waiting: list[Waiting] = []
+        self._waiting: list[PendingCommand] = []
         self._taken_until = self._from = 0
         self._newest: int | None = None
         self.torque, self.furthest = 0.0, 0.0
@@ -61,7 +61,7 @@ class CommandQueue:
                 self.late += 1
             if stamp <= now:
                 self._waiting = [w for w in self._waiting if w.when <= now]
-            self._waiting.append(Waiting(max(stamp, self._taken_until), torque, now))
+            self._waiting.append(PendingCommand(max(stamp, self._taken_until), torque, now))
             self._waiting.sort(key=lambda waiting: waiting.when)  # of one instant, the last that came counts
 
     def refuse(self) -> None:

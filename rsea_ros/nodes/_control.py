@@ -5,53 +5,63 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.control.controller import CORNER, Limits, TorqueController
+from rsea_ros.control.controller import CORNER, TorqueController, TorqueLimits
 from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LIGHTEST, lightest, load_range
-from rsea_ros.control.synthesis import Demand, Design, check, design
+from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, design
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._parameters import AXIS, JOINT, Parameter
+from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._realtime import REALTIME
 
 Values = Mapping[str, Any]
 
 GAINS = ("k_p", "k_d", "k_i", "q_frequency", "k_w")
 TABLE = (
-    Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
-    Parameter("free", "", f"rig whose ends are the lightest load; empty: rig's, {LIGHTEST} if clamped"),
-    Parameter("rate", 280.0, "measurements a second", "Hz", 50.0, 1000.0),
+    NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
+    NodeParameter("free", "", f"rig whose ends are the lightest load; empty: rig's, {LIGHTEST} if clamped"),
+    NodeParameter("rate", 280.0, "measurements a second", "Hz", 50.0, 1000.0),
     AXIS,
-    Parameter("k_p", -1.0, "gain on the torque error; -1: all five gains by synthesis", "", -1.0, 1e4),
-    Parameter("k_d", -1.0, "gain on the rate of the torque error; -1: see k_p", "s", -1.0, 1e3),
-    Parameter("k_i", -1.0, "gain on the slow torque error; -1: see k_p", "", -1.0, 1e3),
-    Parameter("q_frequency", -1.0, "of the disturbance observer's filter; -1: see k_p", "Hz", -1.0, 500.0),
-    Parameter("k_w", -1.0, "damping of the gear about the model; -1: see k_p", "N m s/rad", -1.0, 1e4),
-    Parameter("sensitivity", 2.0, "largest of the rig itself, with every load", "", 1.1, 5.0),
-    Parameter("robust", 3.0, "largest sensitivity of the whole set of benches", "", 1.1, 20.0),
-    Parameter("impedance", 1.2, "largest output impedance over that of the bare spring", "", 1.0, 20.0),
-    Parameter("compensate", True, "whether friction, ripple and backlash of the rig are compensated"),
-    Parameter("learn", True, "whether load and drive are learned; not inside an outer impedance loop"),
-    Parameter("link", True, "whether the link's motion is fed forward where the rig has a sensor deflection"),
-    Parameter("preview", False, "desired torques are stamped two samples ahead or more: no prediction"),
-    Parameter("prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0),
-    Parameter("torque_limit", 68.0, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0),
-    Parameter("slew_limit", 10_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
-    Parameter("ramp", 0.25, "in which the limit grows after a start", "s", 0.0, 10.0),
-    Parameter("stale", 0.05, "time without a measurement that ends the torque", "s", 0.005, 1.0),
-    Parameter("release", 0.02, "from there to zero torque", "s", 0.0, 1.0),
-    Parameter("error_limit", 15.0, "of the torque against the desired one, for error_time", "N m", 0.1, 1e3),
-    Parameter("error_time", 0.5, "for which the error may be larger", "s", 0.0, 60.0),
-    Parameter("ft_limit", 110.0, "largest torque that ft may measure", "N m", 0.1, 1e3),
-    Parameter("late_share", 0.5, "of the commands of late_time that may be late", "", 0.01, 1.0),
-    Parameter("late_time", 1.0, "over which late commands are counted", "s", 0.05, 60.0),
+    NodeParameter("k_p", -1.0, "gain on the torque error; -1: all five gains by synthesis", "", -1.0, 1e4),
+    NodeParameter("k_d", -1.0, "gain on the rate of the torque error; -1: see k_p", "s", -1.0, 1e3),
+    NodeParameter("k_i", -1.0, "gain on the slow torque error; -1: see k_p", "", -1.0, 1e3),
+    NodeParameter(
+        "q_frequency", -1.0, "of the disturbance observer's filter; -1: see k_p", "Hz", -1.0, 500.0
+    ),
+    NodeParameter("k_w", -1.0, "damping of the gear about the model; -1: see k_p", "N m s/rad", -1.0, 1e4),
+    NodeParameter("sensitivity", 2.0, "largest of the rig itself, with every load", "", 1.1, 5.0),
+    NodeParameter("robust", 3.0, "largest sensitivity of the whole set of benches", "", 1.1, 20.0),
+    NodeParameter("impedance", 1.2, "largest output impedance over that of the bare spring", "", 1.0, 20.0),
+    NodeParameter("compensate", True, "whether friction, ripple and backlash of the rig are compensated"),
+    NodeParameter("learn", True, "whether load and drive are learned; not inside an outer impedance loop"),
+    NodeParameter(
+        "link", True, "whether the link's motion is fed forward where the rig has a sensor deflection"
+    ),
+    NodeParameter("preview", False, "desired torques are stamped two samples ahead or more: no prediction"),
+    NodeParameter(
+        "prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0
+    ),
+    NodeParameter(
+        "torque_limit", 68.0, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0
+    ),
+    NodeParameter("slew_limit", 10_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
+    NodeParameter("ramp", 0.25, "in which the limit grows after a start", "s", 0.0, 10.0),
+    NodeParameter("stale", 0.05, "time without a measurement that ends the torque", "s", 0.005, 1.0),
+    NodeParameter("release", 0.02, "from there to zero torque", "s", 0.0, 1.0),
+    NodeParameter(
+        "error_limit", 15.0, "of the torque against the desired one, for error_time", "N m", 0.1, 1e3
+    ),
+    NodeParameter("error_time", 0.5, "for which the error may be larger", "s", 0.0, 60.0),
+    NodeParameter("ft_limit", 110.0, "largest torque that ft may measure", "N m", 0.1, 1e3),
+    NodeParameter("late_share", 0.5, "of the commands of late_time that may be late", "", 0.01, 1.0),
+    NodeParameter("late_time", 1.0, "over which late commands are counted", "s", 0.05, 60.0),
     JOINT,
     REALTIME,
 )
 
 
-def design_of(values: Values) -> Design:
+def design_of(values: Values) -> ControllerDesign:
     """Return the requested design. Raises ParameterError where it is unstable with a load."""
     rig = load_rig(values["rig"])
     loads = load_range(rig, lightest(rig, values["free"]))
@@ -62,12 +72,12 @@ def design_of(values: Values) -> Design:
         given = ", ".join(f"{value:g}" for value in stated)
         raise ParameterError(f"parameters {', '.join(GAINS)} = {given}, expected all five, or -1 for all")
     names = ("sensitivity", "robust", "impedance")
-    return design(rig, loads, values["rate"], Demand(*(values[name] for name in names)))
+    return design(rig, loads, values["rate"], DesignLimits(*(values[name] for name in names)))
 
 
-def controller_of(values: Values, found: Design, link: LinkShare) -> TorqueController:
+def controller_of(values: Values, found: ControllerDesign, link: LinkShare) -> TorqueController:
     """Return the controller for the parameters. link: what of the link's motion it feeds forward."""
-    limits = Limits(values["torque_limit"], values["slew_limit"], values["ramp"])
+    limits = TorqueLimits(values["torque_limit"], values["slew_limit"], values["ramp"])
     options: dict[str, Any] = {} if values["compensate"] else {"compensate": ()}
     return TorqueController(
         load_rig(values["rig"]),
@@ -82,7 +92,7 @@ def controller_of(values: Values, found: Design, link: LinkShare) -> TorqueContr
     )
 
 
-def summary(found: Design) -> list[str]:
+def summary(found: ControllerDesign) -> list[str]:
     """Return gains and margins as lines for the log."""
     g = found.gains
     head = (

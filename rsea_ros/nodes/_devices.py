@@ -13,11 +13,10 @@ from rsea_ros.hardware.dynamixel.line import Line
 from rsea_ros.hardware.dynamixel.line_motor import LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
-from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
-from rsea_ros.hardware.dynamixel.settings import usual_latency
+from rsea_ros.hardware.dynamixel.settings import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.limits import Limits
-from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.spring import Spring
 from rsea_ros.model.rig import Rig
@@ -120,7 +119,7 @@ def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
     if values["baud"] not in BAUD_RATES:
         known = ", ".join(map(str, BAUD_RATES))
         raise ParameterError(f"parameter baud = {values['baud']} bit/s, expected one of {known}")
-    motor = MotorSettings(
+    motor = MotorConnection(
         path=values["port"],
         baud=values["baud"],
         identity=values["id"],
@@ -130,7 +129,7 @@ def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
         watchdog=values["watchdog"],
         supervisor=values["supervisor"],
     )
-    sensor = SensorSettings(*(values[f"ft_{name}"] for name in ("host", "port", "page_port", "timeout")))
+    sensor = SensorConnection(*(values[f"ft_{name}"] for name in ("host", "port", "page_port", "timeout")))
     stiffness = math.inf if rig.rigid_spring else rig["spring.stiffness"]
     return DynamixelNetft(
         Motor(motor) if line is None else LineMotor(motor, line),

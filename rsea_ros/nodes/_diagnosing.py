@@ -11,8 +11,8 @@ from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.errors import RseaError
 from rsea_ros.model.rig import Rig
-from rsea_ros.new_files import Place
-from rsea_ros.nodes._health import OK, WARN, Report
+from rsea_ros.new_files import Destination
+from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.file_names import REPORT
@@ -37,7 +37,7 @@ class Diagnosing:
         """Whether a diagnosis is under way."""
         return self._work is not None and not self._work.done()
 
-    def begin(self, record: Record) -> Waiting:
+    def begin(self, record: Record) -> AwaitableResult:
         """Start on a record and return an awaitable.
 
         Raises RseaError for a record that cannot be diagnosed, and while a diagnosis is under way.
@@ -46,16 +46,16 @@ class Diagnosing:
             raise RseaError(f"a diagnosis is under way ({self._step}), expected its end first")
         check_diagnosable(record)
         self._work = self._pool.submit(self._diagnose, record)
-        return Waiting(self._work)
+        return AwaitableResult(self._work)
 
-    def report(self) -> Report | None:
+    def report(self) -> NodeHealth | None:
         """Return the status for /diagnostics: the step, then the verdict; None before the first diagnosis."""
         if self._work is None:
             return None
         if not self._work.done():
-            return Report(OK, f"diagnosing: {self._step}", {})
+            return NodeHealth(OK, f"diagnosing: {self._step}", {})
         if error := self._work.exception():
-            return Report(WARN, f"diagnosis failed: {error}", {})
+            return NodeHealth(WARN, f"diagnosis failed: {error}", {})
         return report_of(self._work.result(), self._report)
 
     def close(self) -> None:
@@ -69,7 +69,7 @@ class Diagnosing:
         from rsea_ros.report.diagnosis.files import write_diagnosis
 
         result = diagnose([held_against(record, self._rig, masks=True)], self._rig, progress=self._tell)
-        self._report = write_diagnosis(result, record, Place(self._out, fresh=True), write_overlay)
+        self._report = write_diagnosis(result, record, Destination(self._out, fresh=True), write_overlay)
         return result
 
     def _tell(self, step: str, share: float) -> None:
@@ -78,7 +78,7 @@ class Diagnosing:
         self._step = step
 
 
-class Waiting:
+class AwaitableResult:
     """Await a thread's result in a coroutine of rclpy's executor, which resumes it over and over."""
 
     def __init__(self, work: Future[Diagnosis]) -> None:
@@ -92,7 +92,7 @@ class Waiting:
         return self._work.result()
 
 
-def report_of(diagnosis: Diagnosis, report: Path) -> Report:
+def report_of(diagnosis: Diagnosis, report: Path) -> NodeHealth:
     """Return verdict, causes with sizes and gains, and faults of the data as the values of a diagnostic."""
     values: dict[str, object] = {
         "verdict": diagnosis.verdict,
@@ -105,4 +105,4 @@ def report_of(diagnosis: Diagnosis, report: Path) -> Report:
         values[f"{cause.name}.probability"] = f"{cause.probability:.2f}"
     values["faults"] = "; ".join(fault_lines(diagnosis.faults))
     level = OK if diagnosis.verdict == "nothing_wrong" and not diagnosis.faults else WARN
-    return Report(level, diagnosis_sentence(diagnosis), {**values, "report": report})
+    return NodeHealth(level, diagnosis_sentence(diagnosis), {**values, "report": report})

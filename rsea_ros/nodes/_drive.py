@@ -8,8 +8,8 @@ from contextlib import ExitStack, contextmanager
 from typing import Protocol
 
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.guarded import Guarded
-from rsea_ros.hardware.limits import Fault
+from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.limits import DeviceFault
 from rsea_ros.hardware.together import Shared, cycle
 from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
@@ -17,7 +17,7 @@ from rsea_ros.nodes._commands import CommandQueue
 CLOCK_STEP, STOPPED = "clock_step", "stopped"
 
 
-class Source(Protocol):
+class CommandSource(Protocol):
     """The source of commands. commands: the polled ones."""
 
     commands: CommandQueue
@@ -26,13 +26,13 @@ class Source(Protocol):
         """Put all commands that have arrived into the queue."""
 
 
-class Drive:
+class DriverCycle:
     """A guarded device, driven by a source's commands. rate: Hz. anchor: the clock of stamps and ages.
 
     lock: held while a cycle takes a command and the device gets it.
     """
 
-    def __init__(self, guarded: Guarded, source: Source, anchor: Anchor, rate: float) -> None:
+    def __init__(self, guarded: GuardedDevice, source: CommandSource, anchor: Anchor, rate: float) -> None:
         self.guarded, self._source, self.anchor = guarded, source, anchor
         self._period = round(SECOND / rate)
         self.lock = threading.Lock()
@@ -66,7 +66,7 @@ class Drive:
     def stop(self) -> None:
         """End the torque with the next cycle, until the fault is cleared; commands so far are forgotten."""
         with self.deaf():
-            self.guarded.guard.trip(Fault(STOPPED, detail="the service stop was called"))
+            self.guarded.guard.trip(DeviceFault(STOPPED, detail="the service stop was called"))
 
     def _see_to_the_clock(self, by: int) -> None:
         """Move the commands with a system clock that was set.
@@ -77,10 +77,10 @@ class Drive:
             self._source.commands.shift(by)
             if self.guarded.guard.torque != 0.0:
                 detail = f"the system clock was set by {by / SECOND:+.3f} s"
-                self.guarded.guard.trip(Fault(CLOCK_STEP, detail=detail))
+                self.guarded.guard.trip(DeviceFault(CLOCK_STEP, detail=detail))
 
 
-def step(drives: Sequence[Drive], stamp: int, buses: Sequence[Shared] = ()) -> list[State | None]:
+def step(drives: Sequence[DriverCycle], stamp: int, buses: Sequence[Shared] = ()) -> list[State | None]:
     """Do a cycle of joints that share an anchor; return the reading of each, None where it has none.
 
     stamp: the cycle's, ns since the epoch. buses: through which several joints are written and read.

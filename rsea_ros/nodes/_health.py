@@ -13,13 +13,13 @@ from rclpy.node import Node
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, diagnostics_message
 from rsea_ros.nodes._qos import COMMAND
 
-__all__ = ["ERROR", "OK", "STEADY", "WARN", "Health", "Report"]
+__all__ = ["ERROR", "OK", "STEADY", "WARN", "Health", "NodeHealth"]
 
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 """Of timers: rclpy's own stand still for as long as the system clock is set back."""
 
 
-class Report(NamedTuple):
+class NodeHealth(NamedTuple):
     """Level (OK, WARN, ERROR), one line, and values by name."""
 
     level: bytes
@@ -31,7 +31,7 @@ class Health:
     """Publishes the status from `assess`. hardware: its subject. part: of a node that has several."""
 
     def __init__(
-        self, node: Node, assess: Callable[[], Report], hardware: str = "", part: str = ""
+        self, node: Node, assess: Callable[[], NodeHealth], hardware: str = "", part: str = ""
     ) -> None:
         self._node, self._assess, self.hardware = node, assess, hardware
         self._part = f"/{part}" if part else ""
@@ -46,5 +46,5 @@ class Health:
         except Exception as error:
             text = f"no assessment: {type(error).__name__}: {error}"
             self._node.get_logger().error(text, throttle_duration_sec=10.0)
-            report = Report(ERROR, text, {})
+            report = NodeHealth(ERROR, text, {})
         self._publisher.publish(diagnostics_message(time.time_ns(), name, *report, self.hardware))

@@ -22,7 +22,7 @@ Events = tuple[FloatArray, IntArray, FloatArray]
 Keep = Callable[[str, str, int, bytes], None]
 
 
-class Inputs:
+class HealthInputs:
     """Best-effort subscriptions; nothing waits for them. keep: gets topic, type, arrival (ns), bytes."""
 
     def __init__(self, node: Node, axis: str, joint: str, keep: Keep) -> None:

@@ -10,21 +10,21 @@ from rclpy.node import Node
 from msg_adapters.ros import Trigger
 from rsea_ros.errors import RseaError
 from rsea_ros.hardware.device import Device, State
-from rsea_ros.hardware.guarded import Guarded
-from rsea_ros.hardware.limits import Fault
+from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.limits import DeviceFault
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench import Bench
 from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._devices import limits_of, spring_of
-from rsea_ros.nodes._drive import Drive
-from rsea_ros.nodes._health import ERROR, OK, Health, Report
+from rsea_ros.nodes._drive import DriverCycle
+from rsea_ros.nodes._health import ERROR, OK, Health, NodeHealth
 from rsea_ros.nodes._jobs import Jobs
 
 LOST = {"failed_reads": "reads lost", "failed_writes": "writes lost"}
 Work = Callable[[], str]
 
 
-class Joint:
+class DrivenJoint:
     """values: parameters of this joint.
 
     part: its name among others, the namespace of its topics and services.
@@ -35,12 +35,12 @@ class Joint:
         self, node: Node, jobs: Jobs, part: str, values: Mapping[str, Any], device: Device
     ) -> None:
         self._node, self._jobs, self.part, self._values = node, jobs, part, values
-        self.guarded = Guarded(device, limits_of(values), values["rate"], spring_of(values))
-        self.drive: Drive | None = None
+        self.guarded = GuardedDevice(device, limits_of(values), values["rate"], spring_of(values))
+        self.drive: DriverCycle | None = None
         self.bench: Bench | None = None
         self._cycle: Cycle | None = None
         self._ended = ""
-        self._told: tuple[Fault | None, int] = (None, 0)
+        self._told: tuple[DeviceFault | None, int] = (None, 0)
         self._health = Health(node, self.report, part=part)
         for name, work in (
             ("zero_ft", self._zero_ft), ("clear_fault", self.clear_fault), ("reboot", self._reboot),
@@ -58,7 +58,7 @@ class Joint:
             self._node, values, strict=True, every_record=values["ft_all"], part=self.part,
             deflects=self.guarded.measures_deflection(),
         )  # fmt: skip
-        self.drive = Drive(self.guarded, self.bench, anchor, values["rate"])
+        self.drive = DriverCycle(self.guarded, self.bench, anchor, values["rate"])
 
     def runs_in(self, cycle: Cycle) -> None:
         """Note the cycle, whose times are reported with this joint's health."""
@@ -138,10 +138,10 @@ class Joint:
 
         return done
 
-    def report(self) -> Report:
+    def report(self) -> NodeHealth:
         """Return its health."""
         if self._cycle is None or self.bench is None:
-            return Report(ERROR if self._ended else OK, self._ended or "not configured", {})
+            return NodeHealth(ERROR if self._ended else OK, self._ended or "not configured", {})
         self._cycle.rest()
         fault, cycles = self.guarded.fault, self.guarded.cycles
         lost = {words: cycles[name] for name, words in LOST.items()} if fault is None else {}
@@ -157,9 +157,9 @@ class Joint:
             **self.guarded.device.health(),
         }
         if fault is None:
-            return Report(report.level, report.summary, values)
+            return NodeHealth(report.level, report.summary, values)
         besides = "" if report.level == OK else f"; {report.summary}"
-        return Report(ERROR, f"fault {fault}{besides}", values)
+        return NodeHealth(ERROR, f"fault {fault}{besides}", values)
 
 
 def offer(node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[], None]) -> None:

@@ -8,16 +8,16 @@ from dataclasses import replace
 from typing import Any
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._parameters import NodeParameter
 
-JOINTS = Parameter(
+JOINTS = NodeParameter(
     "joints", [""], "names of several joints, each with topics and services under its name; [\"\"]: one",
     whole=True,
 )  # fmt: skip
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
-def joint_table(table: Sequence[Parameter], given: Mapping[str, Any]) -> list[Parameter]:
+def joint_table(table: Sequence[NodeParameter], given: Mapping[str, Any]) -> list[NodeParameter]:
     """Return the parameters JOINT.NAME of each joint; one not given for a joint is that of the node.
 
     given: parameters of the node by name. Raises ParameterError for impossible joints.

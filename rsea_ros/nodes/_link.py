@@ -13,7 +13,7 @@ from rsea_ros.control.law import law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
 from rsea_ros.control.loads import lightest, load_range
 from rsea_ros.control.spring_encoder import SpringEncoder, spread
-from rsea_ros.control.synthesis import Demand, Design
+from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 
@@ -23,7 +23,7 @@ HEARD = 2000
 """Samples of noise that show it."""
 
 
-class Link(NamedTuple):
+class LinkFeedforward(NamedTuple):
     """share: what is fed forward. encoder: None where nothing is, and `reason` says why."""
 
     share: LinkShare
@@ -31,23 +31,23 @@ class Link(NamedTuple):
     reason: str
 
 
-def link_of(values: Mapping[str, Any], found: Design) -> Link:
+def link_of(values: Mapping[str, Any], found: ControllerDesign) -> LinkFeedforward:
     """Return what the link's motion is used for."""
     rig = load_rig(values["rig"])
     if reason := _unusable(values, rig):
-        return Link(LinkShare(), None, reason)
-    demand = Demand(*(values[name] for name in ("sensitivity", "robust", "impedance")))
+        return LinkFeedforward(LinkShare(), None, reason)
+    demand = DesignLimits(*(values[name] for name in ("sensitivity", "robust", "impedance")))
     share = link_share(rig, load_range(rig, lightest(rig, values["free"])), found, demand)
     if share == LinkShare():
-        return Link(share, None, "no part of it keeps the demands")
+        return LinkFeedforward(share, None, "no part of it keeps the demands")
     loud, most = _noise(rig, found, share), LOUD * values["torque_limit"]
     if loud > most:
         reason = f"noise of {loud:.2g} N m of motor torque, expected at most {most:.2g}"
-        return Link(LinkShare(), None, reason)
-    return Link(share, SpringEncoder(rig, found.rate), "")
+        return LinkFeedforward(LinkShare(), None, reason)
+    return LinkFeedforward(share, SpringEncoder(rig, found.rate), "")
 
 
-def link_words(link: Link) -> str:
+def link_words(link: LinkFeedforward) -> str:
     """Return it as a line for the log."""
     if link.encoder is None:
         return f"motion of the link is not fed forward: {link.reason}"
@@ -58,7 +58,7 @@ def link_words(link: Link) -> str:
     )
 
 
-def link_values(link: Link) -> dict[str, object]:
+def link_values(link: LinkFeedforward) -> dict[str, object]:
     """Return it as diagnostics show it."""
     encoder = link.encoder
     if encoder is None:
@@ -81,7 +81,7 @@ def _unusable(values: Mapping[str, Any], rig: Rig) -> str:
     return ""
 
 
-def _noise(rig: Rig, found: Design, share: LinkShare) -> float:
+def _noise(rig: Rig, found: ControllerDesign, share: LinkShare) -> float:
     """Return the RMS of the torque of a link that stands still, N m."""
     angle = math.hypot(spread(rig, "deflection"), spread(rig, "position"))
     motion = LinkMotion(law_of(rig, found.rate, found.gains), share)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from rclpy.node import Node
 
 from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
-from rsea_ros.control.controller import Reading
+from rsea_ros.control.controller import Measurement
 from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import CommandQueue
@@ -58,7 +58,7 @@ class Measurements:
         )
         self.subscriptions = [self._states.subscription, self._fts.subscription]
 
-    def take(self) -> Iterator[tuple[int, Reading]]:
+    def take(self) -> Iterator[tuple[int, Measurement]]:
         """Yield stamp (ns) and reading of each state that has a torque of its instant, or of a later one.
 
         Of its instant: to half a period. All that has arrived is taken first, so that a process that was held
@@ -78,7 +78,7 @@ class Measurements:
             if math.isfinite(torque + velocity + position):
                 ft_age = (stamp - at) / self._period
                 link = self._link(stamp, torque, position, ft_age) if self._encoder else math.nan
-                yield stamp, Reading(torque, velocity, position, effort, ft_age, link)
+                yield stamp, Measurement(torque, velocity, position, effort, ft_age, link)
             else:
                 self._refuse()
 

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping
 
 from rsea_ros.model.bandwidth import pure_torque_bandwidth
-from rsea_ros.model.observer import Estimate, Observer
+from rsea_ros.model.observer import Observer, TorqueEstimate
 from rsea_ros.model.observer.consistency import Consistency
 from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
-from rsea_ros.nodes._health import OK, WARN, Report
-from rsea_ros.nodes._model_inputs import Inputs
+from rsea_ros.nodes._health import OK, WARN, NodeHealth
+from rsea_ros.nodes._model_inputs import ModelInputs
 
 EVERY = 64
 """Estimates between two looks at their noise."""
@@ -25,27 +25,27 @@ class ModelHealth:
     """Assesses the node once a second, and passes the noise of the estimates to the flag."""
 
     def __init__(
-        self, rig: Rig, observer: Observer, flag: PureTorque, error: ErrorFlag, inputs: Inputs
+        self, rig: Rig, observer: Observer, flag: PureTorque, error: ErrorFlag, inputs: ModelInputs
     ) -> None:
         self._observer, self._flag, self._error, self._inputs = observer, flag, error, inputs
         j_sc = rig["chassis.inertia"]
         sprung = j_sc > 0.0 and not rig.rigid_spring
         self._eq_7 = pure_torque_bandwidth(rig["spring.stiffness"], j_sc) if sprung else math.inf
         self._calibrated = (math.nan, math.nan)
-        self.estimate: Estimate | None = None
+        self.estimate: TorqueEstimate | None = None
         self.count = 0
 
-    def tell(self, estimate: Estimate) -> None:
+    def tell(self, estimate: TorqueEstimate) -> None:
         """Process the newest estimate; the flag learns the noise once that has settled or changed."""
         self.estimate = estimate
         self.count += 1
         if self.count % EVERY == 0:
             self._calibrate()
 
-    def report(self) -> Report:
+    def report(self) -> NodeHealth:
         """Return the report."""
         if self.estimate is None:
-            return Report(
+            return NodeHealth(
                 WARN, "no measurement yet, expected joint_states and ft", {"bandwidth_hz": self._edge()}
             )
         tests = self._observer.consistency()
@@ -53,7 +53,9 @@ class ModelHealth:
         doubts = (_told(name, test) for name, test in tests.items() if test.broken)
         troubles = [*stopped, *self._silence(), *doubts]
         summary = "; ".join(troubles) or self._error.verdict
-        return Report(WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)})
+        return NodeHealth(
+            WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)}
+        )
 
     def _calibrate(self) -> None:
         if self.estimate is None or math.isnan(self._inputs.period):

@@ -11,7 +11,7 @@ from statistics import median
 from rclpy.node import Node
 
 from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
-from rsea_ros.model.observer import Estimate, Observer
+from rsea_ros.model.observer import Observer, TorqueEstimate
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._frozen import Frozen
@@ -26,7 +26,7 @@ have stopped: more than noise does in a second, less than what matters."""
 _STATE, _FT = range(2)
 
 
-class Inputs:
+class ModelInputs:
     """Feeds the observer. Stamps are ns; the observer's seconds count from the first one."""
 
     def __init__(
@@ -54,7 +54,7 @@ class Inputs:
             )
         )
 
-    def take(self) -> Iterator[tuple[int, Estimate]]:
+    def take(self) -> Iterator[tuple[int, TorqueEstimate]]:
         """Process new messages; yield the estimate at each wrench, or at each state while ft is silent."""
         for stamp, (torque,), _ in self._commands.take():
             self._command(stamp, torque)
@@ -94,7 +94,7 @@ class Inputs:
         topics = (("joint_states", self._still), ("ft", self._numb))
         return [topic for topic, sensor in topics if sensor.frozen]
 
-    def _measured(self, stamp: int, a: float, b: float, kind: int) -> Estimate | None:
+    def _measured(self, stamp: int, a: float, b: float, kind: int) -> TorqueEstimate | None:
         """Give a sample to the observer, unless its sensor has stopped."""
         if kind == _FT:
             self._ft_stamp = stamp

@@ -19,7 +19,7 @@ _ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 
 @dataclass(frozen=True)
-class Parameter:
+class NodeParameter:
     """One parameter. Its type is the default's; an integer is accepted for a float.
 
     low, high: inclusive range of a number. choices: allowed texts. whole: of the node, where the others
@@ -65,11 +65,11 @@ class Parameter:
         )
 
 
-AXIS = Parameter(
+AXIS = NodeParameter(
     "axis", "torque.z", "actuator axis of the wrench on ft", choices=(*AXES, *(f"-{a}" for a in AXES))
 )
 """Of every node that listens to ft."""
-JOINT = Parameter(
+JOINT = NodeParameter(
     "joint", "joint", "name of the joint in commands and states; another one is refused", whole=True
 )
 """Of every node that commands or measures it."""
@@ -77,8 +77,8 @@ JOINT = Parameter(
 
 def declare(
     node: Node,
-    table: Sequence[Parameter],
-    more: Callable[[Mapping[str, Any]], Sequence[Parameter]] = lambda given: (),
+    table: Sequence[NodeParameter],
+    more: Callable[[Mapping[str, Any]], Sequence[NodeParameter]] = lambda given: (),
 ) -> dict[str, Any]:
     """Declare a table on a node and return the values. more: further parameters, from the given ones.
 
@@ -98,7 +98,7 @@ def declare(
     return values
 
 
-def _refuse_unknown(given: Mapping[str, Any], table: Sequence[Parameter]) -> None:
+def _refuse_unknown(given: Mapping[str, Any], table: Sequence[NodeParameter]) -> None:
     names = [p.name for p in table]
     for name in given:
         if name not in names and name not in _ROS_OWN and not name.startswith("qos_overrides."):
@@ -106,18 +106,18 @@ def _refuse_unknown(given: Mapping[str, Any], table: Sequence[Parameter]) -> Non
             raise ParameterError(f"parameter {name}: no such parameter, expected one of {known}")
 
 
-def _descriptor(parameter: Parameter) -> Any:
+def _descriptor(parameter: NodeParameter) -> Any:
     low, high, bounds = parameter.low, parameter.high, None
     if low is not None and high is not None:
         bounds = (int(low), int(high)) if isinstance(parameter.default, int) else (float(low), float(high))
     return parameter_descriptor(_described(parameter), f"expected {parameter.expected()}", bounds)
 
 
-def _described(parameter: Parameter) -> str:
+def _described(parameter: NodeParameter) -> str:
     return f"{parameter.description}, {parameter.unit}" if parameter.unit else parameter.description
 
 
-def usage(name: str, table: Sequence[Parameter]) -> str:
+def usage(name: str, table: Sequence[NodeParameter]) -> str:
     """Return the help text of a node."""
     rows = [f"  {p.name:<11} {p.description}; {p.expected()} (default {p.default!r})" for p in table]
     return "\n".join([f"usage: ros2 run rsea_ros {name} --ros-args -p NAME:=VALUE …", "", *rows, ""])

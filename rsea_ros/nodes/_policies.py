@@ -37,6 +37,7 @@ ENCODERS = "two_encoders.yaml"
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "controller": {"rig": ENCODERS},
     "driver": {"autostart": True, "rig": "sea_two_encoders"},
+    "plant": {"rig": ENCODERS},
     "record": {"out": "bag"},
     "replay": {"bag": "every topic"},
     "watch": {"port": 0},

@@ -13,13 +13,13 @@ from typing import Protocol
 from rclpy.node import Node
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._parameters import NodeParameter
 
 SET_TIMER_SLACK = 29
 """Of Linux' prctl."""
 SWITCH_INTERVAL = 1e-5
 """s after which a thread of Python must let another one in."""
-REALTIME = Parameter(
+REALTIME = NodeParameter(
     "realtime_priority", 0, "of the thread that keeps time, SCHED_FIFO; 0: as any process", "", 0,
     os.sched_get_priority_max(os.SCHED_FIFO), whole=True,
 )  # fmt: skip

@@ -19,7 +19,7 @@ from rclpy.utilities import remove_ros_args
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.interrupts import STOPPING, Stopped
 from rsea_ros.nodes._idle import anything_to_do
-from rsea_ros.nodes._parameters import Parameter, declare, usage
+from rsea_ros.nodes._parameters import NodeParameter, declare, usage
 from rsea_ros.nodes._sockets import publish_by_sockets
 from rsea_ros.wording import printable
 
@@ -46,12 +46,12 @@ class Program(Protocol):
 
 def run_node(
     name: str,
-    table: Sequence[Parameter],
+    table: Sequence[NodeParameter],
     make: Callable[[Any, dict[str, Any]], Program],
     *,
     kind: type[Node] = Node,
     endless: bool = True,
-    more: Callable[[Mapping[str, Any]], Sequence[Parameter]] = lambda given: (),
+    more: Callable[[Mapping[str, Any]], Sequence[NodeParameter]] = lambda given: (),
     waits_for_nobody: bool = False,
 ) -> int:
     """Run one node in this process and return the exit status.

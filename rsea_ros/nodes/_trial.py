@@ -75,7 +75,7 @@ class Ears:
                 self._alarm(f"{status.name}: {status.message}")
 
 
-class Trial:
+class LiveRun:
     """Plays a proposal while its bench is recorded; a run that broke off is discarded."""
 
     def __init__(self, ears: Ears, player: Player) -> None:

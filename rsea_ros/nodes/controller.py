@@ -14,12 +14,12 @@ from rclpy.serialization import serialize_message
 from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, Trigger, torque_command_message
 from msg_adapters.topics import TYPES
-from rsea_ros.control.controller import Reading
+from rsea_ros.control.controller import Measurement
 from rsea_ros.control.grid import Grid
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._control import TABLE, controller_of, design_of, summary
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._health import ERROR, OK, WARN, Health, Report
+from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._judge import Judge
 from rsea_ros.nodes._link import link_of, link_values, link_words
 from rsea_ros.nodes._measurements import Measurements
@@ -34,7 +34,7 @@ WATCH = 0.005
 CLOSING_ZEROS = 3
 
 
-class Controller:
+class ControllerNode:
     """One command for each measurement, stamped with the place of the next: one sample of delay, always.
 
     Not with the measurement's own stamp and a period: one that is late would act in the cycle after.
@@ -80,7 +80,7 @@ class Controller:
                 self._watched = time.monotonic_ns()
                 self._watch()
 
-    def _measured(self, stamp: int, reading: Reading, together: int) -> None:
+    def _measured(self, stamp: int, reading: Measurement, together: int) -> None:
         """Command for a measurement, one for each period of the grid that they lie on.
 
         together: how many came at once, for the newest of them; 0 for the others, which it replaces.
@@ -100,7 +100,7 @@ class Controller:
         self._grid.forget()
         self._last, self._restarts = 0, self._restarts + 1
 
-    def _command(self, stamp: int, reading: Reading, missed: int, together: int) -> None:
+    def _command(self, stamp: int, reading: Measurement, missed: int, together: int) -> None:
         self._inputs.hear_desired(self._anchor)
         off = self._take_desired()
         if not self._last or self._judge.idle(self._torque, reading.motor_torque):
@@ -186,7 +186,7 @@ class Controller:
         await_arrival(self._commands)
         self._node.get_logger().info(f"torque zero after {self._steps} commands")
 
-    def _report(self) -> Report:
+    def _report(self) -> NodeHealth:
         squares, self._squares = self._squares, []
         worst = min(self._design.margins.values(), key=lambda m: m.phase)
         share = self._controller.share
@@ -213,15 +213,15 @@ class Controller:
             "refused_desired": self._desired.refused,
         }
         if self._fault:
-            return Report(ERROR, self._fault, values)
+            return NodeHealth(ERROR, self._fault, values)
         if not self._last:
-            return Report(WARN, "waiting for joint_states and ft", values)
+            return NodeHealth(WARN, "waiting for joint_states and ft", values)
         new, self._told = self._late - self._told, self._late
         if new:
-            return Report(WARN, f"{new} commands more than a sample late, with less feedback", values)
+            return NodeHealth(WARN, f"{new} commands more than a sample late, with less feedback", values)
         if words := self._new_loss():
-            return Report(WARN, words, values)
-        return Report(OK, "running", values)
+            return NodeHealth(WARN, words, values)
+        return NodeHealth(OK, "running", values)
 
     def _new_loss(self) -> str:
         """Return in words that the encoder on the link has ceased to count; empty where it has not."""
@@ -234,7 +234,7 @@ class Controller:
 
 def main() -> int:
     """Run the node."""
-    return run_node("controller", TABLE, Controller, waits_for_nobody=True)
+    return run_node("controller", TABLE, ControllerNode, waits_for_nobody=True)
 
 
 if __name__ == "__main__":

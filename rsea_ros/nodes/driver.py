@@ -18,7 +18,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, ManagedEntity, Transi
 
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
-from rsea_ros.nodes._alarm import Alarm
+from rsea_ros.nodes._alarm import SignalListener
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench import NAMES, SPRING_FRAME
 from rsea_ros.nodes._buses import devices_of
@@ -28,19 +28,19 @@ from rsea_ros.nodes._device_parameters import LIMITS, MOTOR, SAFETY, SENSOR
 from rsea_ros.nodes._devices import DEVICES
 from rsea_ros.nodes._drive import step
 from rsea_ros.nodes._jobs import Jobs
-from rsea_ros.nodes._joint import Joint, offer
+from rsea_ros.nodes._joint import DrivenJoint, offer
 from rsea_ros.nodes._joints import JOINTS, joint_table, joint_values
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._realtime import REALTIME, keep_time, usual_priority
 from rsea_ros.nodes._run import run_node
 from rsea_ros.wording import printable
 
 TABLE = (
-    Parameter("device", "simulated", f"what to drive: {', '.join(DEVICES)}, or one of RSEA_DEVICES"),
-    Parameter("rate", 280.0, "cycles a second", "Hz", 10.0, 1000.0, whole=True),
-    Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
-    Parameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 1_000_000_000),
-    Parameter("autostart", False, "whether to configure and activate at once", whole=True),
+    NodeParameter("device", "simulated", f"what to drive: {', '.join(DEVICES)}, or one of RSEA_DEVICES"),
+    NodeParameter("rate", 280.0, "cycles a second", "Hz", 10.0, 1000.0, whole=True),
+    NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
+    NodeParameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 1_000_000_000),
+    NodeParameter("autostart", False, "whether to configure and activate at once", whole=True),
     REALTIME,
     JOINTS,
     *SAFETY,
@@ -54,7 +54,7 @@ PATIENCE = 10.0
 """s that a reboot may take which is under way when the program ends."""
 
 
-class Driver(ManagedEntity):
+class DriverNode(ManagedEntity):
     """The joints and their cycle, from configure to cleanup. joints: one, or those of the parameter."""
 
     def __init__(self, node: LifecycleNode, values: dict[str, Any]) -> None:
@@ -69,9 +69,9 @@ class Driver(ManagedEntity):
             text = f"{EXTRA_PATH}={printable(files)}: code from there runs in this node"
             node.get_logger().warning(text)
         devices, self._buses = devices_of([own for _, own in named], DEVICES)
-        self._jobs, self._alarm = Jobs(node), Alarm(self._halt)
+        self._jobs, self._alarm = Jobs(node), SignalListener(self._halt)
         self.joints = [
-            Joint(node, self._jobs, name, own, device)
+            DrivenJoint(node, self._jobs, name, own, device)
             for (name, own), device in zip(named, devices, strict=True)
         ]
         if named[0][0]:
@@ -184,7 +184,7 @@ class Driver(ManagedEntity):
         for bus in self._buses:
             bus.send()
 
-    def _disable(self, joints: Sequence[Joint]) -> None:
+    def _disable(self, joints: Sequence[DrivenJoint]) -> None:
         """Zero torque and switch off, whatever one of them answers."""
         for joint in joints:
             try:
@@ -238,7 +238,7 @@ class Driver(ManagedEntity):
 def main() -> int:
     """Run the node."""
     return run_node(
-        "driver", TABLE, Driver, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given),
+        "driver", TABLE, DriverNode, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given),
         waits_for_nobody=True,
     )  # fmt: skip
 

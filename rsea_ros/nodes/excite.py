@@ -8,37 +8,37 @@ from typing import Any
 from rclpy.node import Node
 
 from rsea_ros.experiment.run_file import read_run
-from rsea_ros.identification.excitation import KINDS, Settings, check_limits, excitation
-from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
-from rsea_ros.nodes._parameters import JOINT, Parameter
+from rsea_ros.identification.excitation import KINDS, ExcitationSettings, check_limits, excitation
+from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
+from rsea_ros.nodes._parameters import JOINT, NodeParameter
 from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._run import run_node
 from rsea_ros.signals import FloatArray
 
 TABLE = (
-    Parameter("file", "", "run.csv of rsea experiment to play instead; empty: what follows"),
-    Parameter("kind", "chirp", "excitation", choices=tuple(KINDS)),
-    Parameter(
+    NodeParameter("file", "", "run.csv of rsea experiment to play instead; empty: what follows"),
+    NodeParameter("kind", "chirp", "excitation", choices=tuple(KINDS)),
+    NodeParameter(
         "amplitude", 20.0, "peak of chirp and steps, rms of multisine and white noise", "N m", 0.0, 1e4
     ),
-    Parameter("noise", 10.0, "standard deviation of the noise on top of the chirp", "N m", 0.0, 1e4),
-    Parameter("duration", 160.0, "length without the ramps of a multisine", "s", 0.1, 1e5),
-    Parameter("rate", 280.0, "commands a second", "Hz", 50.0, 1000.0),
-    Parameter("low", 0.01, "lowest frequency", "Hz", 1e-4, 500.0),
-    Parameter("high", 140.0, "highest frequency, kept below 0.475 of the rate", "Hz", 1e-3, 500.0),
-    Parameter("period", 10.0, "period of multisine and steps", "s", 0.01, 1e4),
-    Parameter("seed", 0, "seed of noise and phases", "", 0, 1_000_000_000),
-    Parameter(
+    NodeParameter("noise", 10.0, "standard deviation of the noise on top of the chirp", "N m", 0.0, 1e4),
+    NodeParameter("duration", 160.0, "length without the ramps of a multisine", "s", 0.1, 1e5),
+    NodeParameter("rate", 280.0, "commands a second", "Hz", 50.0, 1000.0),
+    NodeParameter("low", 0.01, "lowest frequency", "Hz", 1e-4, 500.0),
+    NodeParameter("high", 140.0, "highest frequency, kept below 0.475 of the rate", "Hz", 1e-3, 500.0),
+    NodeParameter("period", 10.0, "period of multisine and steps", "s", 0.01, 1e4),
+    NodeParameter("seed", 0, "seed of noise and phases", "", 0, 1_000_000_000),
+    NodeParameter(
         "limit", 68.0, "largest torque; the whole excitation is checked before it starts", "N m", 0.0, 1e4
     ),
-    Parameter("ramp", 0.5, "raised cosine at either end", "s", 0.0, 100.0),
-    Parameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
-    Parameter("subscribers", 1, "subscriptions of torque_command to wait for", "", 1, 100),
+    NodeParameter("ramp", 0.5, "raised cosine at either end", "s", 0.0, 100.0),
+    NodeParameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
+    NodeParameter("subscribers", 1, "subscriptions of torque_command to wait for", "", 1, 100),
     JOINT,
 )
 
 
-class Excite:
+class ExciteNode:
     """Plays one excitation, or the file of one, and ends."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -76,13 +76,13 @@ class Excite:
             )
             self._node.get_logger().info(f"waiting: {wanted}", throttle_duration_sec=5.0)
 
-    def _report(self) -> Report:
+    def _report(self) -> NodeHealth:
         p = self._player
         values = {"commands": p.next, "left_out": p.left_out}
         if p.started:
             values |= p.cycle.timing().values()  # type: ignore[arg-type]
         level = WARN if p.left_out else OK
-        return Report(level, "running" if p.started else "waiting for a measurement", values)
+        return NodeHealth(level, "running" if p.started else "waiting for a measurement", values)
 
 
 def planned(values: dict[str, Any]) -> tuple[FloatArray, float]:
@@ -90,13 +90,13 @@ def planned(values: dict[str, Any]) -> tuple[FloatArray, float]:
     if values["file"]:
         return read_run(values["file"])
     names = ("rate", "duration", "amplitude", "noise", "low", "high", "period", "seed")
-    command = excitation(values["kind"], Settings(**{n: values[n] for n in names}), values["ramp"])
+    command = excitation(values["kind"], ExcitationSettings(**{n: values[n] for n in names}), values["ramp"])
     return command, values["rate"]
 
 
 def main() -> int:
     """Run the node."""
-    return run_node("excite", TABLE, Excite, endless=False)
+    return run_node("excite", TABLE, ExciteNode, endless=False)
 
 
 if __name__ == "__main__":

@@ -22,15 +22,15 @@ from rsea_ros.experiment.campaign import Budget, Campaign, CampaignOutcome, Roun
 from rsea_ros.experiment.causes import USUAL, causes_from
 from rsea_ros.experiment.limits import limits_from
 from rsea_ros.experiment.opinion import diagnosed
-from rsea_ros.experiment.proposal import Asked, Proposal
+from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.new_files import Place, unused
-from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
-from rsea_ros.nodes._parameters import AXIS, JOINT, Parameter
+from rsea_ros.new_files import Destination, unused
+from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
+from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
-from rsea_ros.nodes._trial import Ears, Trial
+from rsea_ros.nodes._trial import Ears, LiveRun
 from rsea_ros.report.campaign.files import write_campaign
 from rsea_ros.report.campaign.words import end_sentence, known
 from rsea_ros.report.diagnosis.files import write_diagnosis
@@ -40,23 +40,25 @@ from rsea_ros.signals import Record
 
 DEFAULT = "out/experiment"
 TABLE = (
-    Parameter("rig", "paper_high_impedance", "what the bench is: a name of config/rigs, or a file"),
-    Parameter("bag", "", "what was recorded so far, commas between several bags"),
-    Parameter("causes", ",".join(USUAL), "effects of the catalogue that it may be, commas between them"),
-    Parameter("limits", "torque=10", "of every run, as in rsea experiment --limits"),
-    Parameter("seconds", 60.0, "budget of excitation", "s", 0.5, 1e5),
-    Parameter("energy", 1e6, "budget of the integral of the squared torque", "N^2 m^2 s", 1.0, 1e12),
-    Parameter("longest", 10.0, "length of a run at most", "s", 0.5, 600.0),
-    Parameter("rate", 280.0, "commands a second", "Hz", 50.0, 1000.0),
-    Parameter("ask", True, "wait for ~/approve before each run; false: play at once"),
-    Parameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
-    Parameter("out", DEFAULT, "directory of the results; the default: the first of -2, -3, … that is new"),
+    NodeParameter("rig", "paper_high_impedance", "what the bench is: a name of config/rigs, or a file"),
+    NodeParameter("bag", "", "what was recorded so far, commas between several bags"),
+    NodeParameter("causes", ",".join(USUAL), "effects of the catalogue that it may be, commas between them"),
+    NodeParameter("limits", "torque=10", "of every run, as in rsea experiment --limits"),
+    NodeParameter("seconds", 60.0, "budget of excitation", "s", 0.5, 1e5),
+    NodeParameter("energy", 1e6, "budget of the integral of the squared torque", "N^2 m^2 s", 1.0, 1e12),
+    NodeParameter("longest", 10.0, "length of a run at most", "s", 0.5, 600.0),
+    NodeParameter("rate", 280.0, "commands a second", "Hz", 50.0, 1000.0),
+    NodeParameter("ask", True, "wait for ~/approve before each run; false: play at once"),
+    NodeParameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
+    NodeParameter(
+        "out", DEFAULT, "directory of the results; the default: the first of -2, -3, … that is new"
+    ),
     AXIS,
     JOINT,
 )
 
 
-class Experiment:
+class ExperimentNode:
     """The loop in a separate thread; the executor's thread plays and records."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -64,7 +66,7 @@ class Experiment:
         self._out = unused(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
         self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
         self._ears = Ears(node, values["axis"])
-        self._trial: Trial | None = None
+        self._trial: LiveRun | None = None
         self._proposal: Proposal | None = None
         self._round: Round | None = None
         self._answer: bool | None = None
@@ -84,7 +86,7 @@ class Experiment:
         self._work: Future[CampaignOutcome] = self._pool.submit(self._go)
 
     def _made(self, values: dict[str, Any]) -> Campaign:
-        asked = Asked(limits_from(values["limits"]), values["rate"], longest=values["longest"])
+        asked = DesignRequest(limits_from(values["limits"]), values["rate"], longest=values["longest"])
         budget = Budget(values["seconds"], values["energy"])
         causes = causes_from(values["causes"])
         return Campaign(load_rig(values["rig"]), causes, asked, self._play, budget, hear=self._hear)
@@ -127,7 +129,7 @@ class Experiment:
             if self._proposal is None or not self._answer:
                 return
             if self._trial is None:
-                self._trial = Trial(self._ears, self._player(self._proposal))
+                self._trial = LiveRun(self._ears, self._player(self._proposal))
             elif self._trial.over():
                 self._trial.close()
                 self._proposal = None
@@ -191,7 +193,7 @@ class Experiment:
         try:
             verdict = diagnosed(outcome.records, self._campaign.rig, self._campaign.causes)
             write_diagnosis(
-                verdict, outcome.records[-1], Place(self._out / "diagnosis", fresh=True), write_overlay
+                verdict, outcome.records[-1], Destination(self._out / "diagnosis", fresh=True), write_overlay
             )
         except RseaError as error:
             return f"none: {' '.join(str(error).split())}"
@@ -209,11 +211,11 @@ class Experiment:
         self._campaign.tell = _end
         self._pool.shutdown(cancel_futures=True)
 
-    def _report(self) -> Report:
+    def _report(self) -> NodeHealth:
         if self._work.done() and not self._work.cancelled() and self._work.exception() is None:
             outcome = self._work.result()
             level = OK if outcome.end in ("confirmed", "nothing_wrong") else WARN
-            return Report(level, end_sentence(outcome), outcome.weighing.probability)
+            return NodeHealth(level, end_sentence(outcome), outcome.weighing.probability)
         waits = self._proposal is not None and self._answer is None
         state = "waits for ~/approve" if waits else "plays" if self._trial is not None else "designs"
         values: dict[str, object] = {"runs": self._runs}
@@ -221,7 +223,7 @@ class Experiment:
             values["run"] = shape_words(self._proposal)
         if self._round is not None:
             values |= {n: f"{p:.3f}" for n, p in self._round.weighing.probability.items()}
-        return Report(OK, state, values)
+        return NodeHealth(OK, state, values)
 
 
 def _end(step: str, share: float) -> None:
@@ -230,7 +232,7 @@ def _end(step: str, share: float) -> None:
 
 def main() -> int:
     """Run the node."""
-    return run_node("experiment", TABLE, Experiment, endless=False)
+    return run_node("experiment", TABLE, ExperimentNode, endless=False)
 
 
 if __name__ == "__main__":

@@ -19,30 +19,32 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._findings import FindingsPublisher, instant, sentence
-from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
-from rsea_ros.nodes._health_inputs import Events, Inputs
+from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
+from rsea_ros.nodes._health_inputs import Events, HealthInputs
 from rsea_ros.nodes._kept import Keeper, Ring
 from rsea_ros.nodes._model_noise import noise_from
-from rsea_ros.nodes._parameters import AXIS, JOINT, Parameter
+from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._run import NAMESPACE, run_node
 
 TABLE = (
-    Parameter(
+    NodeParameter(
         "rig", "paper_high_impedance", "the joint as it was: a name of config/rigs, or the last model.yaml"
     ),
-    Parameter(
+    NodeParameter(
         "identification", "", "identification.json whose measured noise counts; empty: that of the rig"
     ),
     AXIS,
     JOINT,
-    Parameter("false_alarms", 1e-3, "of changes, at most so many an hour", "1/h", 1e-6, 10.0),
-    Parameter("every", 3.0, "from one look of a second to the next, while nothing changes", "s", 1.0, 60.0),
-    Parameter("learn", 20, "looks that show how the signals scatter when all is right", "", 5, 1000),
-    Parameter("out", "out/health", "folder of the bags that are kept"),
-    Parameter("keep", 120.0, "that is in memory, and in a bag", "s", 10.0, 3600.0),
-    Parameter("memory", 200.0, "that this may take at most", "MB", 1.0, 4000.0),
-    Parameter("after", 30.0, "from an alarm to the end of its bag", "s", 0.0, 600.0),
-    Parameter("bags", 10, "that the folder may hold; beyond it none is written", "", 0, 10000),
+    NodeParameter("false_alarms", 1e-3, "of changes, at most so many an hour", "1/h", 1e-6, 10.0),
+    NodeParameter(
+        "every", 3.0, "from one look of a second to the next, while nothing changes", "s", 1.0, 60.0
+    ),
+    NodeParameter("learn", 20, "looks that show how the signals scatter when all is right", "", 5, 1000),
+    NodeParameter("out", "out/health", "folder of the bags that are kept"),
+    NodeParameter("keep", 120.0, "that is in memory, and in a bag", "s", 10.0, 3600.0),
+    NodeParameter("memory", 200.0, "that this may take at most", "MB", 1.0, 4000.0),
+    NodeParameter("after", 30.0, "from an alarm to the end of its bag", "s", 0.0, 600.0),
+    NodeParameter("bags", 10, "that the folder may hold; beyond it none is written", "", 0, 10000),
 )
 TICK = 0.25
 """s between two looks at what has come: a wake-up for each sample would cost more than the work."""
@@ -64,7 +66,7 @@ class HealthNode:
         self._monitor = Monitor(rig, noise_from(rig, values["identification"]), settings)
         ring = Ring(min(values["keep"], 3600.0), values["memory"])
         self._keeper = Keeper(ring, Path(values["out"]), values["bags"], values["after"])
-        self._inputs = Inputs(node, values["axis"], values["joint"], ring.add)
+        self._inputs = HealthInputs(node, values["axis"], values["joint"], ring.add)
         self._pool = ThreadPoolExecutor(1, "causes")
         self._fit: Future[Any] | None = None
         self._heard = time.monotonic()
@@ -114,7 +116,7 @@ class HealthNode:
         axis = f" --axis={self._axis}" if self._axis != AXIS.default else ""
         return f"rsea diagnose {path / 'after'} --rig {self._rig_name}{elsewhere}{axis}"
 
-    def _report(self) -> Report:
+    def _report(self) -> NodeHealth:
         monitor, inputs = self._monitor, self._inputs
         findings = monitor.findings()
         troubles = [f"{f.code}: {sentence(f)}" for f in findings]
@@ -124,7 +126,7 @@ class HealthNode:
         if self._keeper.trouble:
             troubles.append(self._keeper.trouble)
         usual = "learning how the signals scatter" if monitor.learning else "as the model says"
-        return Report(WARN if troubles else OK, "; ".join(troubles) or usual, self._values())
+        return NodeHealth(WARN if troubles else OK, "; ".join(troubles) or usual, self._values())
 
     def _values(self) -> dict[str, object]:
         monitor, inputs = self._monitor, self._inputs

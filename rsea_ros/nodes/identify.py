@@ -22,8 +22,8 @@ from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free, unused
 from rsea_ros.nodes._diagnosing import Diagnosing
-from rsea_ros.nodes._health import OK, WARN, Health, Report
-from rsea_ros.nodes._parameters import AXIS, Parameter
+from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
+from rsea_ros.nodes._parameters import AXIS, NodeParameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
@@ -35,20 +35,22 @@ from rsea_ros.signals import Record
 
 DEFAULT = "out/identify"
 TABLE = (
-    Parameter("rig", "paper_high_impedance", "where the fit starts: a name of config/rigs, or a file"),
-    Parameter("out", DEFAULT, "directory of the results; the default: the first of -2, -3, … that is new"),
+    NodeParameter("rig", "paper_high_impedance", "where the fit starts: a name of config/rigs, or a file"),
+    NodeParameter(
+        "out", DEFAULT, "directory of the results; the default: the first of -2, -3, … that is new"
+    ),
     AXIS,
-    Parameter(
+    NodeParameter(
         "quiet", 1.0, "finish so long after the last command, once nobody publishes any", "s", 0.1, 1e3
     ),
-    Parameter(
+    NodeParameter(
         "stay", False, "wait for ~/finish also when the commands are over, so that ~/diagnose can be asked"
     ),
-    Parameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
+    NodeParameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
 )
 
 
-class Identify:
+class IdentifyNode:
     """Records the contract's topics; the identification begins when the commands are over.
 
     They are over when some have come, none has for `quiet` seconds, and torque_command has no publisher any
@@ -68,7 +70,7 @@ class Identify:
         check_free(self._out / name for name in IDENTIFICATION)
         self._diagnosing = Diagnosing(self._rig, self._out / "diagnosis")
         self._answering = 0
-        self._identified: Report | None = None
+        self._identified: NodeHealth | None = None
         group = ReentrantCallbackGroup()
         self._diagnose = node.create_service(Trigger, "~/diagnose", self._on_diagnose, callback_group=group)
         self._health = Health(node, self._report)
@@ -158,27 +160,27 @@ class Identify:
     def _tell(self) -> None:
         self._node.get_logger().info(self._gathered() if self._commanded else "waiting for torque_command")
 
-    def _report(self) -> Report:
+    def _report(self) -> NodeHealth:
         if self._identified is not None:
             return self._identified
         lost = sum(tap.lost for tap in self._taps.values())
         counts = {role: tap.count for role, tap in self._taps.items()}
         if (told := self._diagnosing.report()) is not None:
-            return Report(told.level, told.summary, {**counts, **told.values})
-        return Report(WARN if lost else OK, f"{lost} messages lost" if lost else "gathering", counts)
+            return NodeHealth(told.level, told.summary, {**counts, **told.values})
+        return NodeHealth(WARN if lost else OK, f"{lost} messages lost" if lost else "gathering", counts)
 
 
-def report_of(result: Identification, report: Path) -> Report:
+def report_of(result: Identification, report: Path) -> NodeHealth:
     """Return verdict, parameters and faults of the data as the values of a diagnostic."""
     values: dict[str, object] = {"verdict": result.verdict, "faults": "; ".join(fault_lines(result.faults))}
     values |= {p.name: f"{p.value:.6g} {p.unit}" for p in result.parameters}
     level = OK if result.verdict == "adequate" and not result.faults else WARN
-    return Report(level, verdict_sentence(result), {**values, "report": report})
+    return NodeHealth(level, verdict_sentence(result), {**values, "report": report})
 
 
 def main() -> int:
     """Run the node."""
-    return run_node("identify", TABLE, Identify, endless=False)
+    return run_node("identify", TABLE, IdentifyNode, endless=False)
 
 
 if __name__ == "__main__":

@@ -19,40 +19,44 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._flags import Flags
-from rsea_ros.nodes._health import Health, Report
+from rsea_ros.nodes._health import Health, NodeHealth
 from rsea_ros.nodes._model_health import ModelHealth
-from rsea_ros.nodes._model_inputs import Inputs
+from rsea_ros.nodes._model_inputs import ModelInputs
 from rsea_ros.nodes._model_noise import noise_from
-from rsea_ros.nodes._parameters import AXIS, JOINT, Parameter
+from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._realtime import REALTIME, keep_time
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._waiter import Waiter
 
 TABLE = (
-    Parameter(
+    NodeParameter(
         "rig", "paper_high_impedance", "the model: a name of config/rigs, or a file such as model.yaml"
     ),
-    Parameter(
+    NodeParameter(
         "identification", "", "identification.json whose measured noise counts; empty: that of the rig"
     ),
     AXIS,
-    Parameter("duration", 60.0, "time over which drifts of the model come to their full size", "s", 1.0, 1e6),
-    Parameter(
+    NodeParameter(
+        "duration", 60.0, "time over which drifts of the model come to their full size", "s", 1.0, 1e6
+    ),
+    NodeParameter(
         "ft_timeout", 0.02, "time without ft after which joint_states make the estimates", "s", 1e-3, 1.0
     ),
-    Parameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
-    Parameter("tolerance", 0.3, "of |T_p - T_d| over |T_d|: up to it the torque is pure", "", 0.01, 1.0),
-    Parameter("error_window", 0.5, "over which that is measured, RMS", "s", 0.01, 2.0),
-    Parameter("error_hysteresis", 0.15, "part of that tolerance, either way", "", 0.0, 0.5),
-    Parameter("tolerance_db", 3.0, "of |T_d/T_p| in the band of pure torque", "dB", 0.01, 40.0),
-    Parameter("tolerance_deg", 30.0, "of its phase; 90 leaves that out of account", "deg", 0.1, 90.0),
-    Parameter("share", 0.5, "of the torque's power above the edge, of a sine exactly at it", "", 0.05, 0.5),
-    Parameter("hysteresis", 0.025, "part of the edge's frequency, either way", "", 0.0, 0.2),
-    Parameter("window", 0.02, "over which power is measured", "s", 0.001, 0.25),
-    Parameter("hold_on", 0.005, "how long the powers must say so before the flag rises", "s", 0.0, 10.0),
-    Parameter("hold_off", 0.005, "how long before it falls", "s", 0.0, 10.0),
-    Parameter("quiet", 0.2, "time below the noise floor that is no torque", "s", 0.0, 100.0),
+    NodeParameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
+    NodeParameter("tolerance", 0.3, "of |T_p - T_d| over |T_d|: up to it the torque is pure", "", 0.01, 1.0),
+    NodeParameter("error_window", 0.5, "over which that is measured, RMS", "s", 0.01, 2.0),
+    NodeParameter("error_hysteresis", 0.15, "part of that tolerance, either way", "", 0.0, 0.5),
+    NodeParameter("tolerance_db", 3.0, "of |T_d/T_p| in the band of pure torque", "dB", 0.01, 40.0),
+    NodeParameter("tolerance_deg", 30.0, "of its phase; 90 leaves that out of account", "deg", 0.1, 90.0),
+    NodeParameter(
+        "share", 0.5, "of the torque's power above the edge, of a sine exactly at it", "", 0.05, 0.5
+    ),
+    NodeParameter("hysteresis", 0.025, "part of the edge's frequency, either way", "", 0.0, 0.2),
+    NodeParameter("window", 0.02, "over which power is measured", "s", 0.001, 0.25),
+    NodeParameter("hold_on", 0.005, "how long the powers must say so before the flag rises", "s", 0.0, 10.0),
+    NodeParameter("hold_off", 0.005, "how long before it falls", "s", 0.0, 10.0),
+    NodeParameter("quiet", 0.2, "time below the noise floor that is no torque", "s", 0.0, 100.0),
     JOINT,
     REALTIME,
 )
@@ -61,7 +65,7 @@ TICK = 0.02
 """s between looks at what has come without ft."""
 
 
-class Model:
+class ModelNode:
     """Wakes at each ft and processes the messages that came with it; while ft is silent, every 20 ms."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -76,7 +80,7 @@ class Model:
         template = serialize_message(efforts_message(0, dict.fromkeys(NAMES, 0.0)))
         self._writer = RawWriter(template, TYPES["joint_states"], "effort")
         self._flags = Flags(node)
-        self._inputs = Inputs(
+        self._inputs = ModelInputs(
             node, observer, values["ft_timeout"], values["axis"], values["reliable"], joint=values["joint"],
             ft_noise=noise.ft,
         )  # fmt: skip
@@ -98,7 +102,7 @@ class Model:
                 self._flags.show(stamp, pure and not self._inputs.frozen)
                 self._assess.tell(estimate)
 
-    def _report(self) -> Report:
+    def _report(self) -> NodeHealth:
         with self._lock:
             return self._assess.report()
 
@@ -117,7 +121,7 @@ class Model:
 
 def main() -> int:
     """Run the node."""
-    return run_node("model", TABLE, Model)
+    return run_node("model", TABLE, ModelNode)
 
 
 if __name__ == "__main__":

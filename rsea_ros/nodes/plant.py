@@ -10,25 +10,26 @@ from rclpy.node import Node
 
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._bench import NAMES, Bench
+from rsea_ros.nodes._bench import NAMES, SPRING_FRAME, Bench
 from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import Health
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
-    Parameter("rig", "paper_high_impedance", "rig to simulate: a name of config/rigs, or a file"),
-    Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0),
-    Parameter("seed", 0, "seed of the sensors' noise", "", 0, 1_000_000_000),
-    Parameter("noise", True, "whether the sensors have their noise and quantum"),
-    Parameter("duration", 60.0, "time over which drifts come to their full size", "s", 1.0, 1e6),
+    NodeParameter("rig", "paper_high_impedance", "rig to simulate: a name of config/rigs, or a file"),
+    NodeParameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0),
+    NodeParameter("seed", 0, "seed of the sensors' noise", "", 0, 1_000_000_000),
+    NodeParameter("noise", True, "whether the sensors have their noise and quantum"),
+    NodeParameter("duration", 60.0, "time over which drifts come to their full size", "s", 1.0, 1e6),
     *NAMES,
+    SPRING_FRAME,
 )
 STALL, PAUSE = SECOND // 50, 0.005
 """After a stall of so many ns, the pause (s) in which commands arrive that were held up with this process."""
 
 
-class Plant:
+class PlantNode:
     """Simulates up to each deadline with the commands that took effect until then, and publishes.
 
     The simulation ends at the instant of the stamp; a command with a stamp in between acts from that
@@ -47,7 +48,7 @@ class Plant:
             duration=values["duration"],
             clock=lambda: self._now,
         )
-        self._bench = Bench(node, values)
+        self._bench = Bench(node, values, deflects="deflection" in rig.sensors)
         self._cycle = Cycle(values["rate"], self._step, catch_up=True)
         self._health = Health(node, lambda: self._bench.report(self._cycle), f"simulated {values['rig']}")
         self._log.info(f"rig {rig.name} at {values['rate']:g} Hz")
@@ -90,7 +91,7 @@ class Plant:
 
 def main() -> int:
     """Run the node."""
-    return run_node("plant", TABLE, Plant)
+    return run_node("plant", TABLE, PlantNode)
 
 
 if __name__ == "__main__":

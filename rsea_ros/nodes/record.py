@@ -14,8 +14,8 @@ from msg_adapters import BagWriter
 from msg_adapters.ros import message_type
 from msg_adapters.topics import JOINT_STATE, WRENCH
 from rsea_ros.new_files import unused
-from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
+from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
@@ -34,17 +34,21 @@ TOPICS = {
 RELIABLE = {"torque_command", "desired_torque"}
 
 TABLE = (
-    Parameter("out", "", "bag to write; empty: runs/ and the time"),
-    Parameter("storage", "mcap", "format of the bag", choices=("mcap", "sqlite3")),
-    Parameter(
+    NodeParameter("out", "", "bag to write; empty: runs/ and the time"),
+    NodeParameter("storage", "mcap", "format of the bag", choices=("mcap", "sqlite3")),
+    NodeParameter(
         "duration", 0.0, "length of the recording from the first message on; 0: until stopped", "s", 0.0, 1e6
     ),
-    Parameter("sync", 1.0, "what a power cut or a kill may cost: put on the disk so often", "s", 0.1, 60.0),
-    Parameter("quiet", 0.0, "stop when torque_command has been silent for so long; 0: never", "s", 0.0, 1e4),
+    NodeParameter(
+        "sync", 1.0, "what a power cut or a kill may cost: put on the disk so often", "s", 0.1, 60.0
+    ),
+    NodeParameter(
+        "quiet", 0.0, "stop when torque_command has been silent for so long; 0: never", "s", 0.0, 1e4
+    ),
 )
 
 
-class Record:
+class RecordNode:
     """Subscriptions to every topic, one bag. Log times are those of reception."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -96,15 +100,15 @@ class Record:
         counts = ", ".join(f"{count} {name}" for name, count in self._counts().items())
         self._node.get_logger().info(f"{counts or 'nothing yet'}; {self._lost()} lost")
 
-    def _report(self) -> Report:
+    def _report(self) -> NodeHealth:
         lost = self._lost()
         summary = f"{lost} messages lost" if lost else "recording"
-        return Report(WARN if lost else OK, summary, {**self._counts(), "lost_messages": lost})
+        return NodeHealth(WARN if lost else OK, summary, {**self._counts(), "lost_messages": lost})
 
 
 def main() -> int:
     """Run the node."""
-    return run_node("record", TABLE, Record)
+    return run_node("record", TABLE, RecordNode)
 
 
 if __name__ == "__main__":

@@ -16,16 +16,16 @@ from msg_adapters import iterate
 from msg_adapters.ros import Clock, clock_message, message_type
 from rsea_ros.errors import BagError, ParameterError
 from rsea_ros.nodes._cycle import SECOND, wait_until
-from rsea_ros.nodes._health import OK, STEADY, Health, Report
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._health import OK, STEADY, Health, NodeHealth
+from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
-    Parameter("bag", "", "bag to play, a directory or a file"),
-    Parameter("rate", 1.0, "pace: 2 is twice as fast as recorded", "", 0.01, 1000.0),
-    Parameter("start", 0.0, "begin so far into the bag", "s", 0.0, 1e6),
-    Parameter(
+    NodeParameter("bag", "", "bag to play, a directory or a file"),
+    NodeParameter("rate", 1.0, "pace: 2 is twice as fast as recorded", "", 0.01, 1000.0),
+    NodeParameter("start", 0.0, "begin so far into the bag", "s", 0.0, 1e6),
+    NodeParameter(
         "subscribers",
         1,
         "subscriptions of each of the three topics to wait for; 0: begin at once",
@@ -33,7 +33,7 @@ TABLE = (
         0,
         100,
     ),
-    Parameter("clock", True, "whether to publish /clock"),
+    NodeParameter("clock", True, "whether to publish /clock"),
 )
 WAIT_FOR = ("torque_command", "joint_states", "ft")
 NEVER = {"/diagnostics", "/clock", "/rosout", "/parameter_events"}
@@ -44,7 +44,7 @@ HEARTBEAT = Duration(seconds=4)
 """Longer than the middleware takes to learn that a reliable subscriber has everything."""
 
 
-class Replay:
+class ReplayNode:
     """A thread that publishes serialised messages when they are due. It ends when all have arrived."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -125,13 +125,13 @@ class Replay:
             wanted = f"{self._wanted} subscription(s) of {', '.join(WAIT_FOR)}; subscribers:=0 begins at once"
             self._node.get_logger().info(f"waiting for {wanted}", throttle_duration_sec=5.0)
 
-    def _report(self) -> Report:
-        return Report(OK, "playing", {"played": self._played, "messages": len(self._rows)})
+    def _report(self) -> NodeHealth:
+        return NodeHealth(OK, "playing", {"played": self._played, "messages": len(self._rows)})
 
 
 def main() -> int:
     """Run the node."""
-    return run_node("replay", TABLE, Replay, endless=False)
+    return run_node("replay", TABLE, ReplayNode, endless=False)
 
 
 if __name__ == "__main__":

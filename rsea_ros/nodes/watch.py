@@ -9,8 +9,8 @@ from typing import Any
 from rclpy.node import Node
 
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._health import OK, Health, Report
-from rsea_ros.nodes._parameters import AXIS, JOINT, Parameter
+from rsea_ros.nodes._health import OK, Health, NodeHealth
+from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._watch_command import WatchCommand
 from rsea_ros.nodes._watch_source import WatchSource
@@ -18,25 +18,25 @@ from rsea_ros.watch.runs import Runs
 from rsea_ros.watch.server import Server
 
 TABLE = (
-    Parameter("host", "localhost", "where the page is served; 0.0.0.0: in the network too"),
-    Parameter("port", 8270, "of the page; 0: any", "", 0, 65535),
-    Parameter("command", False, "whether a page may command torque"),
-    Parameter(
+    NodeParameter("host", "localhost", "where the page is served; 0.0.0.0: in the network too"),
+    NodeParameter("port", 8270, "of the page; 0: any", "", 0, 65535),
+    NodeParameter("command", False, "whether a page may command torque"),
+    NodeParameter(
         "limit", 10.0, "largest torque of the page; the driver's counts where it is less", "N m", 0.0, 1e3
     ),
-    Parameter(
+    NodeParameter(
         "growth", 20.0, "of a page's torque; the driver's soft_start counts where it is less", "N m/s",
         0.1, 1e4,
     ),
-    Parameter("rate", 280.0, "of the page's commands, as the bench runs", "Hz", 50.0, 1000.0),
-    Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
-    Parameter("out", "runs", "folder of the recordings"),
+    NodeParameter("rate", 280.0, "of the page's commands, as the bench runs", "Hz", 50.0, 1000.0),
+    NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
+    NodeParameter("out", "runs", "folder of the recordings"),
     AXIS,
     JOINT,
 )
 
 
-class Watch:
+class WatchNode:
     """The subscriptions, the server, and the commands where they are permitted."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -67,11 +67,11 @@ class Watch:
             self._command.close()
         self._server.stop()
 
-    def _report(self) -> Report:
+    def _report(self) -> NodeHealth:
         held = self._command is not None and self._command.commander.holder is not None
         pages = self._server.desk.count
         summary = f"{pages} pages open" if pages != 1 else "1 page open"
-        return Report(OK, summary, {"pages": pages, "commanding": held})
+        return NodeHealth(OK, summary, {"pages": pages, "commanding": held})
 
 
 def _runs(node: Node, values: dict[str, Any]) -> Runs:
@@ -84,7 +84,7 @@ def _runs(node: Node, values: dict[str, Any]) -> Runs:
 
 def main() -> int:
     """Run the node."""
-    return run_node("watch", TABLE, Watch)
+    return run_node("watch", TABLE, WatchNode)
 
 
 if __name__ == "__main__":

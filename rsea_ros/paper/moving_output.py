@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.lumped import lumped
@@ -51,7 +51,9 @@ def moving_output(
     channels: used by the fit beside the command; the paper had the F/T sensor alone.
     """
     bench = drawn(rig, seed)
-    values = excitation("white_noise", Settings(rate=RATE, duration=duration, amplitude=NOISE, seed=seed))
+    values = excitation(
+        "white_noise", ExcitationSettings(rate=RATE, duration=duration, amplitude=NOISE, seed=seed)
+    )
     command = Channel(np.arange(len(values)) / RATE, values)
     ends = ["spring_end", *(["housing_end"] if "proximal_spring.stiffness" in rig.quantities else [])]
     records = {end: bag(f"{rig.name}_{end}", _record(bench, end, command, seed)) for end in ends}

@@ -13,7 +13,7 @@ from rsea_ros.trends.regression import Kind, Regression, scan, term
 
 
 @dataclass(frozen=True)
-class Term:
+class StepOrRamp:
     """A step or a ramp from the day with this index on."""
 
     kind: Kind
@@ -34,7 +34,7 @@ class Course:
     day_variance: float
     warm: float = 0.0
     slope: bool = False
-    terms: tuple[Term, ...] = ()
+    terms: tuple[StepOrRamp, ...] = ()
 
     @property
     def t(self) -> FloatArray:
@@ -124,7 +124,7 @@ def _neighbours(course: Course) -> Iterator[Course]:
     for i in range(len(course.terms)):
         yield replace(course, terms=course.terms[:i] + course.terms[i + 1 :])
     for i, old in enumerate(course.terms):
-        other = Term("ramp" if old.kind == "step" else "step", old.index)
+        other = StepOrRamp("ramp" if old.kind == "step" else "step", old.index)
         if other not in course.terms:
             yield replace(course, terms=(*course.terms[:i], other, *course.terms[i + 1 :]))
 

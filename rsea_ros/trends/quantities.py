@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
-from rsea_ros.trends.course import Course, Term, date_range
+from rsea_ros.trends.course import Course, StepOrRamp, date_range
 from rsea_ros.trends.regression import Regression, term
 from rsea_ros.trends.result import Interval
 
@@ -45,7 +45,7 @@ def dated(course: Course, doubt: float) -> Dated:
 
 
 def _moved(course: Course, i: int, index: int) -> Course:
-    terms: Sequence[Term] = course.terms
+    terms: Sequence[StepOrRamp] = course.terms
     return replace(course, terms=(*terms[:i], replace(terms[i], index=index), *terms[i + 1 :]))
 
 
@@ -113,7 +113,7 @@ def last_slope(whole: Dated) -> Interval:
     start = max((k.index for k in course.terms), default=0)
     if len(course.t) - start < 3 or course.t[-1] <= course.t[start]:
         return Interval(0.0, -np.inf, np.inf)
-    longer = replace(course, terms=(*course.terms, Term("ramp", start)))
+    longer = replace(course, terms=(*course.terms, StepOrRamp("ramp", start)))
     return step_size(len(course.terms))(longer)
 
 

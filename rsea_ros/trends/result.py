@@ -52,7 +52,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Curve:
+class ParameterCourse:
     """The course of the parameter without temperature and day effects: POSIX s, its unit; each shape (n,)."""
 
     time_s: FloatArray
@@ -84,8 +84,8 @@ class Trend:
     day_sd: float = 0.0
     detectable: float = float("nan")
     changes: tuple[Change, ...] = ()
-    curve: Curve | None = None
-    by_day: Curve | None = None
+    curve: ParameterCourse | None = None
+    by_day: ParameterCourse | None = None
     limit: float = float("nan")
     to_limit_s: Interval | None = None
     reason: str = ""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.trends.course import Course, Term, cost, course_of, improved
+from rsea_ros.trends.course import Course, StepOrRamp, cost, course_of, improved
 from rsea_ros.trends.day_effect import DayEffect, day_effect
 from rsea_ros.trends.days import Days
 from rsea_ros.trends.regression import Kind, scan
@@ -72,8 +72,8 @@ def _candidates(course: Course, price: float, settings: TrendSettings) -> Iterat
     yield _completed(course, price, settings)
 
 
-def _terms(places: Sequence[int], kinds: tuple[Kind, ...]) -> tuple[Term, ...]:
-    return tuple(Term(kind, i) for i in places[: _MOST_TERMS // len(kinds)] for kind in kinds)
+def _terms(places: Sequence[int], kinds: tuple[Kind, ...]) -> tuple[StepOrRamp, ...]:
+    return tuple(StepOrRamp(kind, i) for i in places[: _MOST_TERMS // len(kinds)] for kind in kinds)
 
 
 def _completed(course: Course, price: float, settings: TrendSettings) -> Course:
@@ -91,7 +91,7 @@ def _completed(course: Course, price: float, settings: TrendSettings) -> Course:
     return course
 
 
-def _best(course: Course, fewest: int) -> tuple[Term, float]:
+def _best(course: Course, fewest: int) -> tuple[StepOrRamp, float]:
     """Return the term that gains most, and its |z|."""
     regression, scores = course.regression(), {}
     for kind in _KINDS:
@@ -100,7 +100,7 @@ def _best(course: Course, fewest: int) -> tuple[Term, float]:
         scores[kind] = z
     kind = max(_KINDS, key=lambda k: float(np.max(scores[k])))
     index = int(np.argmax(scores[kind]))
-    return Term(kind, index), float(scores[kind][index])
+    return StepOrRamp(kind, index), float(scores[kind][index])
 
 
 def _share(days: Days, settings: TrendSettings) -> float:

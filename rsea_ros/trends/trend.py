@@ -22,7 +22,7 @@ from rsea_ros.trends.quantities import (
     step_size,
 )
 from rsea_ros.trends.regression import term
-from rsea_ros.trends.result import Change, Curve, Interval, Trend
+from rsea_ros.trends.result import Change, Interval, ParameterCourse, Trend
 from rsea_ros.trends.search import Tested
 from rsea_ros.trends.series import Series
 from rsea_ros.trends.settings import DAY, YEAR, TrendSettings
@@ -103,19 +103,19 @@ def _change(series: Series, whole: Dated, i: int, size: Interval) -> Change:
     return Change(k.kind, since, earliest, latest, size, False, min(row, len(series.time_s) - 1))
 
 
-def _curve(course: Course) -> Curve:
+def _curve(course: Course) -> ParameterCourse:
     """Return the course at few places: an even grid and both sides of each term's beginning."""
     t, r = course.t, course.regression()
     edges = [v for k in course.terms for v in (t[k.index] - 1e-6, t[k.index])]
     grid = np.unique(np.concatenate([np.linspace(t[0], t[-1], _POINTS), edges]))
     values = np.array([combined(r, level_row(course, float(at))) for at in grid]) * course.days.scale
-    return Curve((course.days.t[0] + grid) * DAY, values[:, 0], values[:, 1], values[:, 2])
+    return ParameterCourse((course.days.t[0] + grid) * DAY, values[:, 0], values[:, 1], values[:, 2])
 
 
-def _by_day(course: Course) -> Curve:
+def _by_day(course: Course) -> ParameterCourse:
     days, value = course.days, course.at_mean_temperature() * course.days.scale
     half = Z95 * np.sqrt(days.variance) * days.scale
-    return Curve(days.t * DAY, value, value - half, value + half)
+    return ParameterCourse(days.t * DAY, value, value - half, value + half)
 
 
 def _with_limit(trend: Trend, whole: Dated, settings: TrendSettings) -> Trend:

@@ -12,7 +12,7 @@ CHANNELS = ("command", "motor", "ft", "proximal", "distal", "disturbance", "defl
 """Torques N m, deflection rad."""
 
 
-class Source(Protocol):
+class FrameSource(Protocol):
     """The source of the page's numbers; called by one thread, and never blocks.
 
     flag: whether the actuator is a pure torque source, None: unknown.

@@ -22,13 +22,13 @@ def routes(access: Access, desk: Desk, runs: Runs) -> Sequence[Any]:
     """Return the routes of the Application."""
     return [
         (r"/", Front, {"access": access}),
-        (r"/(watch\.css|watch\.js|plot\.js)", Part, {"access": access}),
+        (r"/(watch\.css|watch\.js|plot\.js)", PageFileHandler, {"access": access}),
         (r"/socket", Socket, {"access": access, "desk": desk}),
-        (r"/report/([\w.-]+)/(\w+)", Report, {"access": access, "runs": runs}),
+        (r"/report/([\w.-]+)/(\w+)", ReportHandler, {"access": access, "runs": runs}),
     ]
 
 
-class Guarded(RequestHandler):
+class TokenHandler(RequestHandler):
     """Answers only who has the token, by cookie."""
 
     def initialize(self, access: Access, **more: Any) -> None:
@@ -54,7 +54,7 @@ class Guarded(RequestHandler):
         self.finish(f"{status_code}: {message if status_code == 403 else self._reason}\n")
 
 
-class Front(Guarded):
+class Front(TokenHandler):
     """The page; the first visit brings the token in its address, which becomes a cookie.
 
     No redirection: a browser that came from another site would not send a strict cookie along.
@@ -75,7 +75,7 @@ class Front(Guarded):
         self.finish((PARTS / "index.html").read_bytes())
 
 
-class Part(Guarded):
+class PageFileHandler(TokenHandler):
     """Style and scripts of the page."""
 
     def get(self, name: str) -> None:
@@ -84,7 +84,7 @@ class Part(Guarded):
         self.finish((PARTS / name).read_bytes())
 
 
-class Report(Guarded):
+class ReportHandler(TokenHandler):
     """A report that was made of a recording."""
 
     runs: Runs
@@ -98,7 +98,7 @@ class Report(Guarded):
         self.finish(page.read_bytes())
 
 
-class Socket(Guarded, WebSocketHandler):
+class Socket(TokenHandler, WebSocketHandler):
     """The socket of a page: frames and state out, requests in. Closing it releases the page's command."""
 
     desk: Desk

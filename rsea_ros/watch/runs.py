@@ -23,7 +23,7 @@ _TAIL = 4000
 
 
 @dataclass
-class Job:
+class Evaluation:
     """A verb on a recording. state: running, done or failed; words: the last line that it said."""
 
     verb: str
@@ -54,7 +54,7 @@ class Recording:
     began: float
     seconds: float = 0.0
     words: str = ""
-    jobs: dict[str, Job] = field(default_factory=dict)
+    jobs: dict[str, Evaluation] = field(default_factory=dict)
 
 
 class Runs:
@@ -95,7 +95,7 @@ class Runs:
             raise ParameterError("another recording is being evaluated, expected one at a time")
         folder = unused(each.bag.with_name(f"{each.bag.name}-{verb}"))
         words = ["-m", "rsea_ros", verb, str(each.bag), "--out", str(folder), *self._verb_options]
-        each.jobs[verb] = Job(verb, folder, *_python(words))
+        each.jobs[verb] = Evaluation(verb, folder, *_python(words))
 
     def report(self, name: str, verb: str) -> Path | None:
         """Return the report of a recording, or None."""

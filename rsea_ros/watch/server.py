@@ -17,7 +17,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.watch.access import Access, addresses
 from rsea_ros.watch.command import Commander
 from rsea_ros.watch.desk import Desk
-from rsea_ros.watch.frames import Source, frame
+from rsea_ros.watch.frames import FrameSource, frame
 from rsea_ros.watch.handlers import routes
 from rsea_ros.watch.runs import Runs
 
@@ -39,7 +39,12 @@ class Server:
     """
 
     def __init__(
-        self, source: Source, runs: Runs, commander: Commander | None, host: str = "localhost", port: int = 0
+        self,
+        source: FrameSource,
+        runs: Runs,
+        commander: Commander | None,
+        host: str = "localhost",
+        port: int = 0,
     ) -> None:
         self._source, self._runs = source, runs
         self.desk = Desk(commander, runs)

@@ -9,10 +9,12 @@ import pytest
 from independent.bench import drawn_bench, record_command, record_run
 from independent.excitations import chirp_noise
 from independent.hidden import hide
+from scipy.signal import lfilter
 
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side
+from rsea_ros.checks.faults import clipping
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig_file import load_rig
@@ -109,3 +111,15 @@ def test_a_record_in_which_nothing_moves_is_refused_in_one_line():
     record = record_command(BENCH, np.zeros(N), np.random.default_rng(5))
     with pytest.raises(IdentificationError, match="the command stays at 0 N m and nothing moves"):
         check_diagnosable(record)
+
+
+@pytest.mark.parametrize("repeats", [1, 15])
+def test_a_servo_that_stands_still_is_not_clipped(repeats):
+    """It stands most of the time at one of two angles, which are its largest and its smallest."""
+    t = np.arange(12_000) / 1000.0
+    targets = np.sign(np.sin(2.0 * np.pi * t / 4.0))
+    followed = lfilter([0.01], [1.0, -0.99], 0.5 * targets)
+    angle = 0.0015 * np.round(np.repeat(followed[::repeats], repeats) / 0.0015)
+    assert not clipping(Channel(t, angle), "position").any()
+    swing = np.repeat(np.clip(0.8 * np.sin(3.0 * t) + 0.3 * np.sin(7.1 * t), -0.8, 0.8)[::repeats], repeats)
+    assert clipping(Channel(t, swing), "position").sum() == np.count_nonzero(np.abs(swing) == 0.8)

@@ -58,6 +58,16 @@ def test_the_right_rig_is_not_questioned(name, amplitude):
     assert asked(check_record(run_of(name, amplitude), load_rig(name))) == {}
 
 
+@pytest.mark.parametrize(("factor", "light"), [(0.144, {}), (0.02, {"motor_torque": "red"})])
+def test_a_drive_within_the_coarse_spread_of_its_rig_is_not_questioned(factor, light):
+    """A rig that states its inertia to 100 % was the wrong one in red at a seventh of it."""
+    rig = load_rig("emps")
+    values = {n: factor * rig[n] for n in ("rotor.reflected_inertia", "rotor.reflected_damping")}
+    command = 50.0 * np.random.default_rng(4).standard_normal(2800)
+    run = rsea.simulate(rig.with_values(values), command, RATE, seed=4)
+    assert asked(check_record(run, rig)) == light
+
+
 def test_a_value_that_identify_leaves_to_the_prior_is_undetermined():
     """Without encoder three values have no unique size: the check called them determined."""
     run = run_of("paper_high_impedance", 15.0)

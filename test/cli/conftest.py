@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel, Record
@@ -17,7 +17,7 @@ sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1] / "msg_ad
 
 @pytest.fixture(scope="module")
 def record() -> Record:
-    u = excitation("white_noise", Settings(duration=4.0))
+    u = excitation("white_noise", ExcitationSettings(duration=4.0))
     return synthesize(load_rig("paper_high_impedance"), Channel(np.arange(len(u)) / 280.0, u))
 
 

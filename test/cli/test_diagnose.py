@@ -17,7 +17,7 @@ from msg_adapters import write_record
 from rsea_ros.cli.main import main
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -30,7 +30,7 @@ NAMES = ["diagnosis.json", "model.yaml", "overlay.mcap", "report.html"]
 @pytest.fixture(scope="module")
 def record():
     """A run of a bench with Coulomb friction."""
-    command = excitation("chirp", Settings(rate=RATE, duration=DURATION, seed=3))
+    command = excitation("chirp", ExcitationSettings(rate=RATE, duration=DURATION, seed=3))
     bench = load_rig("paper_high_impedance").with_effects(
         EffectSetting("coulomb_friction", {"torque": FRICTION})
     )

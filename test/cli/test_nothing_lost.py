@@ -26,7 +26,7 @@ from rsea_ros.errors import OutputError
 from rsea_ros.experiment import advice, run_file
 from rsea_ros.fleet import columns
 from rsea_ros.identification import identify
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.laws import learn
 from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.model.rig_file import load_rig
@@ -108,7 +108,7 @@ class Found:
 
 @pytest.fixture(scope="module")
 def record() -> Record:
-    u = excitation("white_noise", Settings(duration=2.0))
+    u = excitation("white_noise", ExcitationSettings(duration=2.0))
     return synthesize(load_rig(RIG), Channel(np.arange(len(u)) / 280.0, u))
 
 

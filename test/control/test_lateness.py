@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.control.controller import Reading, TorqueController
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.harness import Arrivals, irregular
 from rsea_ros.control.lateness import Lateness, Tolerance
 from rsea_ros.control.law import Gains
@@ -34,7 +34,7 @@ def largest(rate, seed):
         if left <= 0:
             left, late = dice.geometric(0.2), dice.choice((0, dice.integers(2, 9)))
         left -= 1
-        reading = Reading(sample.ft, sample.velocity, sample.position, sample.motor_torque)
+        reading = Measurement(sample.ft, sample.velocity, sample.position, sample.motor_torque)
         wanted = 10.0 * math.sin(2.0 * math.pi * 5.0 * k / rate)
         torque = controller.step(reading, wanted, trust=lateness.take(late))
         queue.append((max(k + 1 + late, queue[-1][0] if queue else 0), torque))

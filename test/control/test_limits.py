@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.control.controller import Limits
+from rsea_ros.control.controller import TorqueLimits
 from rsea_ros.control.impedance import impedance
 from rsea_ros.control.large_signal import largest, reach
 from rsea_ros.control.law import Gains
-from rsea_ros.control.synthesis import Design
+from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.trials import sine
 from rsea_ros.model.rig_file import load_rig
 
@@ -47,8 +47,8 @@ def test_the_reach_ends_at_the_torque_limit_of_the_motor():
 
 
 def test_the_simulated_actuator_stops_following_at_its_reach():
-    design = Design(GAINS, 280.0, {}, math.nan)
+    design = ControllerDesign(GAINS, 280.0, {}, math.nan)
     edge = reach(RIG, 40.0, 50.0, math.inf).torque
-    limits = Limits(torque=50.0)
+    limits = TorqueLimits(torque=50.0)
     below, above = (sine(RIG, RIG, design, 40.0, share * edge, limits) for share in (0.85, 1.3))
     assert below < 0.06 and above > 4.0 * below

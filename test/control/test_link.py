@@ -13,7 +13,7 @@ from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
 from rsea_ros.control.loads import load_range
 from rsea_ros.control.loop import linked
-from rsea_ros.control.synthesis import Design
+from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.trials import disturbed, lagging_corners
 from rsea_ros.control.virtual import Virtual
 from rsea_ros.model.rig_file import load_rig
@@ -21,7 +21,7 @@ from rsea_ros.model.rig_file import load_rig
 RATE = 280.0
 RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
 GAINS = Gains(0.2575, 0.003029, 1.195, 6.99, 42.9)
-DESIGN = Design(GAINS, RATE, {}, math.nan)
+DESIGN = ControllerDesign(GAINS, RATE, {}, math.nan)
 LAW, SHARE = law_of(RIG, RATE, GAINS), LinkShare(0.25, 0.4, 20.0)
 HZ = np.array([1.0, 5.0, 20.0])
 

@@ -4,9 +4,9 @@ import control
 import numpy as np
 import pytest
 
-from rsea_ros.control.controller import Limits, TorqueController
+from rsea_ros.control.controller import TorqueController, TorqueLimits
 from rsea_ros.control.harness import closed_loop
-from rsea_ros.control.law import Gains, State, feedback, hold, law_of
+from rsea_ros.control.law import FeedbackState, Gains, feedback, hold, law_of
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.loop import largest_pole, open_loop
 from rsea_ros.control.margins import margins
@@ -47,7 +47,7 @@ def test_the_controller_answers_a_sine_as_the_formula_says(hz):
     at = np.array([hz])
     response = responses(model, at)
     turn = np.exp(2j * np.pi * hz / RATE * np.arange(4000))
-    state, answers = State(), []
+    state, answers = FeedbackState(), []
     for ft, velocity in zip((response[FT, 0] * turn).real, (response[VELOCITY, 0] * turn).real, strict=True):
         torque, state = feedback(law, state, -ft, -velocity, ft, velocity)
         state = hold(state, torque)
@@ -77,7 +77,7 @@ def test_the_bench_is_stable_below_the_gain_margin_and_unstable_above(rig, found
     rms = {}
     for share in (0.95, 1.05):
         true = rig.with_effects(EffectSetting("torque_constant_error", {"gain": share * gain}))
-        controller = TorqueController(rig, RATE, GAINS, limits=Limits(1e9, 1e12, 0.0))
+        controller = TorqueController(rig, RATE, GAINS, limits=TorqueLimits(1e9, 1e12, 0.0))
         ft = closed_loop(true, RATE, controller, np.zeros(600)).ft
         rms[share] = np.std(ft[400:]) / np.std(ft[100:300])
     assert rms[0.95] < 2.0 and rms[1.05] > 5.0

@@ -9,13 +9,13 @@ from rsea_ros.control.following import fall, following
 from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.spread import NEAR, softness, spread
-from rsea_ros.control.synthesis import Design
+from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.trials import hard
 from rsea_ros.control.uncertainty import Uncertainty, mode_of
 from rsea_ros.model.rig_file import load_rig
 
 RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
-DESIGN = Design(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), 280.0, {}, math.nan)
+DESIGN = ControllerDesign(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), 280.0, {}, math.nan)
 LOADS = load_range(RIG, FREE)
 
 

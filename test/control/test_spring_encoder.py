@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rsea_ros.control.controller import Reading, TorqueController
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare
@@ -182,5 +182,5 @@ def test_without_an_angle_the_controller_is_the_one_without_encoder():
     with_share = TorqueController(RIG, RATE, GAINS, link=SHARE)
     plain = TorqueController(RIG, RATE, GAINS)
     for k in range(50):
-        reading = Reading(math.sin(0.1 * k), 0.01, 0.001 * k, 0.5)
+        reading = Measurement(math.sin(0.1 * k), 0.01, 0.001 * k, 0.5)
         assert with_share.step(reading, 1.0) == plain.step(reading, 1.0)

@@ -8,12 +8,12 @@ import pytest
 from rsea_ros.control.human import measured
 from rsea_ros.control.impedance import moved
 from rsea_ros.control.law import Gains
-from rsea_ros.control.synthesis import Design
+from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.virtual import Virtual, felt, passive_to, stiffest
 from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")
-DESIGN = Design(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), 280.0, {}, math.nan)
+DESIGN = ControllerDesign(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), 280.0, {}, math.nan)
 HZ = np.array([1.0, 5.0, 10.0, 20.0])
 
 

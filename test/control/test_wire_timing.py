@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.acted import Acted
-from rsea_ros.control.controller import Reading, TorqueController
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.grid import Grid
 from rsea_ros.control.law import Gains
 from rsea_ros.control.prediction import Prediction
-from rsea_ros.hardware.peer.motor import Motor
+from rsea_ros.hardware.peer.motor import EmulatedMotor
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
 
@@ -34,7 +34,7 @@ class Wire:
         self.clock, self._due = BEGIN, BEGIN
         self._plant = SimulatedDevice(load_rig("paper_high_impedance"), 10_000.0, clock=lambda: self.clock)
         self._plant.open()
-        self._motor = Motor(54024, self._plant)
+        self._motor = EmulatedMotor(54024, self._plant)
         for name, value in (("mode", 0), ("torque_enable", 1)):
             self._motor.put(name, value)
         self._unit = self._motor.model.ampere * self._motor.model.constant
@@ -78,7 +78,7 @@ def errors(rate, shift, **options):
         number = round((grid.at - start) / period)
         wanted = AMPLITUDE * math.sin(2.0 * math.pi * HZ * number / rate)
         stamp, ft = wire.ft
-        reading = Reading(ft, *wire.read(), (wire.clock - stamp) / period)
+        reading = Measurement(ft, *wire.read(), (wire.clock - stamp) / period)
         off = (start + number * period - grid.at) / period
         command = controller.step(reading, wanted, missed, offset=grid.offset, desired_offset=off)
         rows.append(((stamp - start) / 1e9, ft))

@@ -115,6 +115,14 @@ def test_of_equal_models_the_simplest_is_accepted_and_those_as_simple_are_its_ri
     assert break_tie([], present) == (None, ())
 
 
+@pytest.mark.parametrize(("prior_cost", "accepted"), [(1.0, "ft_bias"), (1.9, "ft_bias"), (2.1, "ft_drift")])
+def test_of_models_as_simple_an_optional_unknown_is_paid_for(prior_cost, accepted):
+    present = score(ft=20.0)
+    bias = model("ft_bias", parameters=7, prior_cost=prior_cost, ft=1.0)
+    settling = model("ft_drift", parameters=8, ft=1.0)
+    assert break_tie([settling, bias], present)[0].causes == (accepted,)
+
+
 def test_far_from_the_floor_a_simpler_model_may_leave_a_tenth_more_for_each_number_it_saves():
     best = model("stribeck_friction", size=3, ft=20.0)
     assert is_nearly_as_good(model(FRICTION, ft=23.9), best)

@@ -9,7 +9,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.evaluation import HeldOut
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -21,7 +21,7 @@ RIG = load_rig("paper_high_impedance")
 def checked(stiffer=1.0, seed=1):
     """Return a short record of the rig with its stiffness times a factor."""
     bench = RIG.with_values({"spring.stiffness": stiffer * RIG["spring.stiffness"]})
-    u = excitation("chirp", Settings(rate=280.0, duration=8.0))
+    u = excitation("chirp", ExcitationSettings(rate=280.0, duration=8.0))
     return check(synthesize(bench, Channel(np.arange(len(u)) / 280.0, u), seed=seed), RIG)
 
 

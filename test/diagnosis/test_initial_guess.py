@@ -7,7 +7,7 @@ import pytest
 
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.effects.catalogue import catalogue, effect_named
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -18,7 +18,7 @@ from rsea_ros.signals import MEASURED, Channel
 def view():
     """A record beside a model whose values are 10 % off."""
     rig = load_rig("paper_high_impedance")
-    command = excitation("multisine", Settings(rate=280.0, duration=4.0, period=4.0))
+    command = excitation("multisine", ExcitationSettings(rate=280.0, duration=4.0, period=4.0))
     record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=3)
     case, wrong = case_from(record, rig), rig.with_values({n: 1.1 * rig[n] for n in rig.free()})
     (outputs,) = Problem((case,), wrong, (), MEASURED).outputs(np.zeros(0))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.diagnosis.next_experiment import EXCITATIONS, _as_excited, _series, _settings, amplitude_series
-from rsea_ros.identification.allowed_run import RunLimits, allowed_run
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.allowed_run import DriverLimits, allowed_run
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import Solution
 from rsea_ros.model.rig_file import load_rig
@@ -15,14 +15,14 @@ from rsea_ros.nodes.excite import TABLE
 from rsea_ros.signals import Channel, Record
 
 RATE = 280.0
-DRIVER = RunLimits()
+DRIVER = DriverLimits()
 EVERY = {f"{o.kind} {o.low:g}-{o.high:g} Hz": (o.kind, _settings(o, RATE)) for o in EXCITATIONS}
 EVERY["series"] = ("multisine", _series(load_rig("paper_high_impedance"), RATE))
 
 
 def like(rig, amplitude=20.0):
     """A case of a run as the bench has it."""
-    slow = Settings(rate=RATE, duration=10.0, amplitude=amplitude, noise=0.0, low=0.1, high=5.0)
+    slow = ExcitationSettings(rate=RATE, duration=10.0, amplitude=amplitude, noise=0.0, low=0.1, high=5.0)
     command = excitation("chirp", slow)
     return case_from(synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=1), rig)
 
@@ -32,7 +32,9 @@ def played(run, rig):
     given = {k: v for k, v in _as_excited(run, rig).items() if k not in ("kind", "unit", "peak")}
     values = {p.name: p.default for p in TABLE}
     names = ("rate", "duration", "amplitude", "noise", "low", "high", "period", "seed")
-    return excitation(run.kind, Settings(**{n: given.get(n, values[n]) for n in names}), values["ramp"])
+    return excitation(
+        run.kind, ExcitationSettings(**{n: given.get(n, values[n]) for n in names}), values["ramp"]
+    )
 
 
 def moved(rig, command):
@@ -79,7 +81,7 @@ def test_a_command_within_the_limits_is_played_as_requested():
 
 def test_an_impossible_run_is_not_recommended():
     rig = load_rig("paper_high_impedance")
-    uneven = Settings(rate=280.03, duration=12.0, noise=0.0)
+    uneven = ExcitationSettings(rate=280.03, duration=12.0, noise=0.0)
     assert allowed_run(rig, like(rig), "multisine", uneven, 20.0) is None
 
 

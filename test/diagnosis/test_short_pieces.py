@@ -10,7 +10,7 @@ import pytest
 
 from rsea_ros.diagnosis.data_split import short_pieces_of
 from rsea_ros.diagnosis.problem_variants import with_doubled_step
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate, synthesize
@@ -29,7 +29,7 @@ def with_stated_noise(case, rig):
 def test_the_right_model_leaves_only_noise_in_every_piece(kind):
     """A piece begins at the measured state, and its run-up is not compared."""
     rig = load_rig("paper_high_impedance")
-    command = excitation(kind, Settings(rate=RATE, duration=60.0, seed=3, amplitude=40.0))
+    command = excitation(kind, ExcitationSettings(rate=RATE, duration=60.0, seed=3, amplitude=40.0))
     record = synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=3)
     case = case_from(record, rig)
     problem = Problem((case,), rig, (), MEASURED)
@@ -49,7 +49,7 @@ def test_the_right_model_leaves_only_noise_in_every_piece(kind):
 def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_too(rate, jitter):
     """Pieces that began within a hold had a motor torque off by a change of the command: 2.5e7 for 2.5e4."""
     rig = load_rig("paper_high_impedance")
-    command = excitation("white_noise", Settings(rate=rate, duration=32.0, seed=5))
+    command = excitation("white_noise", ExcitationSettings(rate=rate, duration=32.0, seed=5))
     stamps = np.arange(len(command)) / rate
     stamps += jitter / rate * np.random.default_rng(5).uniform(-0.5, 0.5, len(stamps))
     record = synthesize(rig, Channel(stamps, command), seed=5)
@@ -70,7 +70,7 @@ def test_pieces_sample_a_channel_about_as_often_as_commands_at_most(times, kept,
     """Joint states at four times the rate of the commands took twice as long and added no information."""
     rig = load_rig("paper_high_impedance")
     t = np.arange(round(40.0 * RATE)) / RATE
-    command = Channel(t, excitation("white_noise", Settings(rate=RATE, duration=40.0, seed=5)))
+    command = Channel(t, excitation("white_noise", ExcitationSettings(rate=RATE, duration=40.0, seed=5)))
     stamps = (np.arange(round(40.0 * RATE * times)) + 1.0) / (RATE * times)
     stamps += jitter / (RATE * times) * np.random.default_rng(5).uniform(-0.5, 0.5, len(stamps))
     blank = Channel(stamps, np.zeros(len(stamps)))

@@ -12,7 +12,7 @@ from rsea_ros.diagnosis.naming import outcome
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -27,7 +27,7 @@ FEW = DiagnosisSettings(max_causes=1, without=tuple(set(catalogue()) - {"coulomb
 
 
 def recorded(*effects):
-    command = excitation("multisine", Settings(rate=RATE, duration=DURATION, period=4.0))
+    command = excitation("multisine", ExcitationSettings(rate=RATE, duration=DURATION, period=4.0))
     bench = RIG.with_effects(*effects)
     return synthesize(bench, Channel(np.arange(len(command)) / RATE, command), seed=3)
 

@@ -12,14 +12,14 @@ from rsea_ros.experiment.campaign import Budget, Campaign
 from rsea_ros.experiment.causes import causes_from
 from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.limits import RunLimits
-from rsea_ros.experiment.proposal import Asked
+from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.weighing import middles_of_runs, weigh
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.campaign.files import write_campaign
 
 RIG = load_rig("paper_high_impedance")
 CAUSES = ("current_loop_lag", "hard_stop")
-ASKED = Asked(RunLimits(torque=20.0, velocity=2.0), refine=0, kinds=("multisine",), longest=2.0)
+ASKED = DesignRequest(RunLimits(torque=20.0, velocity=2.0), refine=0, kinds=("multisine",), longest=2.0)
 BENCH = hide(Bench(), "current_loop_lag", {"time_constant": 3e-3})
 
 

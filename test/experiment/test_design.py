@@ -15,17 +15,17 @@ from rsea_ros.experiment.files import hypotheses_from, model_of
 from rsea_ros.experiment.hypothesis import motion, run_case
 from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used
 from rsea_ros.experiment.margins import at_ends
-from rsea_ros.experiment.proposal import Asked
+from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.separation import Refit, refitted
 from rsea_ros.experiment.shape import Shape, at_rest_around, command_of
 from rsea_ros.experiment.weighing import cases_of
-from rsea_ros.identification.excitation import Settings, chirp
+from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.identification.solver import power, solve
 from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")
 LIMITS = RunLimits(torque=15.0, velocity=1.5, deflection=0.03)
-ASKED = Asked(LIMITS, refine=3, probe=1.0, kinds=("multisine", "chirp"))
+ASKED = DesignRequest(LIMITS, refine=3, probe=1.0, kinds=("multisine", "chirp"))
 NOISE = {"ft": 0.03, "position": 6e-6}
 
 
@@ -54,7 +54,7 @@ def test_the_designed_run_separates_more_a_second_than_the_chirp_on_a_bench_of_o
     (friction, _), run = friction_or_play
     seconds = 8.0
     size = LIMITS.torque * 0.98
-    sweep = chirp(Settings(duration=seconds, amplitude=size, noise=0.0, low=0.05, high=100.0))
+    sweep = chirp(ExcitationSettings(duration=seconds, amplitude=size, noise=0.0, low=0.05, high=100.0))
     ours = left_of_rival(run.command, friction, 1) / run.duration
     fixed = left_of_rival(at_rest_around(sweep, 280.0), friction, 1) / seconds
     assert ours > 1.5 * fixed > 0.0
@@ -74,7 +74,7 @@ def test_more_doubt_makes_a_smaller_run():
         [replace(h, information=h.information * weight) for h in possible(nonlinear_spring={"cubic": 100.0})]
         for weight in (100.0, 1.0)
     )
-    tight = Asked(RunLimits(torque=30.0, deflection=0.012), refine=0, kinds=("chirp",), longest=1.0)
+    tight = DesignRequest(RunLimits(torque=30.0, deflection=0.012), refine=0, kinds=("chirp",), longest=1.0)
     assert propose(unsure, tight).peaks.expected["torque"] < propose(sure, tight).peaks.expected["torque"]
 
 
@@ -85,7 +85,7 @@ def test_a_peak_at_the_quantile_adds_the_axes_as_squares():
 
 def test_one_cause_gets_the_run_that_narrows_its_parameters():
     (alone,) = possible(current_loop_lag={"time_constant": 3e-3})
-    asked = Asked(LIMITS, refine=0, longest=1.0, probe=1.0, kinds=("chirp",))
+    asked = DesignRequest(LIMITS, refine=0, longest=1.0, probe=1.0, kinds=("chirp",))
     fast = propose([alone], asked)
     slow = propose([alone], replace(asked, limits=replace(LIMITS, slew=60.0)))
     assert fast.sharpened > slow.sharpened + 0.5 > 0.5

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from datetime import datetime, timezone
 
-from rsea_ros.fleet.joints import Joint
+from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.store import TaskOutcome
 from rsea_ros.fleet.task import Task
 
 MARCH = datetime(2026, 3, 5, tzinfo=timezone.utc)
-KNEE = Joint("knee", "name: stub")
-HIP = Joint("hip", "name: stub")
+KNEE = MappedJoint("knee", "name: stub")
+HIP = MappedJoint("hip", "name: stub")
 
 
 def stub_work(task: Task) -> TaskOutcome:

@@ -12,7 +12,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.fleet.analysis import _diagnosed
 from rsea_ros.fleet.row import empty
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -21,7 +21,7 @@ from rsea_ros.signals import Channel
 
 def test_a_row_has_the_parameters_of_the_fit_with_causes(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = load_rig("paper_high_impedance")
-    u = excitation("chirp", Settings(duration=6.0, seed=2))
+    u = excitation("chirp", ExcitationSettings(duration=6.0, seed=2))
     gap = EffectSetting("backlash", {"gap": 3e-3})
     record = synthesize(rig.with_effects(gap), Channel(np.arange(len(u)) / 280.0, u), seed=2)
     others = tuple(name for name in catalogue() if name != "backlash")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rsea_ros.fleet.errors import JointMapError
-from rsea_ros.fleet.joints import Joint, load_joints
+from rsea_ros.fleet.joints import MappedJoint, load_joints
 
 GOOD = """
 defaults:
@@ -29,13 +29,13 @@ joints:
 """
 
 
-def joints(folder: Path, text: str) -> tuple[Joint, ...]:
+def joints(folder: Path, text: str) -> tuple[MappedJoint, ...]:
     (folder / "joints.yaml").write_text(text, encoding="utf-8")
     return load_joints(folder / "joints.yaml")
 
 
 @pytest.fixture
-def mapped(tmp_path: Path) -> tuple[Joint, ...]:
+def mapped(tmp_path: Path) -> tuple[MappedJoint, ...]:
     rig = Path(__file__).parents[2] / "config/rigs/prototype_knee.yaml"
     (tmp_path / "my_rig.yaml").write_text(rig.read_text(encoding="utf-8"), encoding="utf-8")
     return joints(tmp_path, GOOD)

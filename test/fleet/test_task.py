@@ -20,7 +20,7 @@ from rsea_ros.fleet.keys import read
 from rsea_ros.fleet.reading import date_in
 from rsea_ros.fleet.row import VARYING
 from rsea_ros.fleet.task import Changed, Task, read_fingerprint, work
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig, rig_text
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
@@ -39,7 +39,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Give a folder with a map, two good recordings, one where nothing moves and one that is not a bag."""
     folder = tmp_path_factory.mktemp("lab")
     (folder / "joints.yaml").write_text(MAP, encoding="utf-8")
-    u = excitation("chirp", Settings(duration=5.0))
+    u = excitation("chirp", ExcitationSettings(duration=5.0))
     command = Channel(np.arange(len(u)) / 280.0, u)
     for seed in (1, 2):
         record = synthesize(load_rig(RIG), command, seed=seed)
@@ -121,11 +121,11 @@ def test_sql_answers_and_changes_nothing(serial, capsys):
 
 
 def test_a_recording_that_grows_while_it_is_read_makes_no_row(lab, tmp_path):
-    from rsea_ros.fleet.joints import Joint
+    from rsea_ros.fleet.joints import MappedJoint
     from rsea_ros.fleet.sources import bags_of
 
     (tmp_path / "run.mcap").write_bytes((lab / "knee1.mcap").read_bytes())
-    joint = Joint("knee", rig_text(load_rig(RIG)), diagnose="never")
+    joint = MappedJoint("knee", rig_text(load_rig(RIG)), diagnose="never")
     ((bag, _),) = bags_of([str(tmp_path)], [joint])
     bag, recording = read_fingerprint(bag)
     with (tmp_path / "run.mcap").open("ab") as file:

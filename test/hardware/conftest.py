@@ -8,11 +8,11 @@ from functools import partial
 import pytest
 
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel.settings import MotorConnection
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
-from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 PERIOD = 1.0 / 280.0
@@ -23,8 +23,8 @@ LATENCY, FT_TIMEOUT, WATCHDOG = 0.03, 0.2, 0.5
 
 def device_on(bench, limits=None, *, absolute=False, **motor):
     """Return the driver's device on a bench."""
-    settings = MotorSettings(bench.port, 4_000_000, **{"latency": LATENCY, "watchdog": WATCHDOG, **motor})
-    sensor = SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
+    settings = MotorConnection(bench.port, 4_000_000, **{"latency": LATENCY, "watchdog": WATCHDOG, **motor})
+    sensor = SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
     return DynamixelNetft(Motor(settings), sensor, limits or Limits(68.0), STIFFNESS, absolute=absolute)
 
 
@@ -34,7 +34,7 @@ class Loop:
     def __init__(self, bench, limits=None, **motor):
         self.bench = bench
         self.device = device_on(bench, limits, **motor)
-        self.guarded = Guarded(self.device, limits or Limits(68.0), 1.0 / PERIOD)
+        self.guarded = GuardedDevice(self.device, limits or Limits(68.0), 1.0 / PERIOD)
         self.guarded.open()
         self.states = []
 

@@ -7,7 +7,7 @@ import pytest
 
 from rsea_ros.hardware.dynamixel.frames import crc16, frame, stuffed, unstuffed
 from rsea_ros.hardware.dynamixel.handler import PacketHandler
-from rsea_ros.hardware.dynamixel.receiver import Receiver
+from rsea_ros.hardware.dynamixel.receiver import StatusFrameParser
 from rsea_ros.hardware.peer import protocol2
 
 ALPHABET = (0xFF, 0xFD, 0x00, 0x55)
@@ -60,7 +60,7 @@ def test_the_sdks_methods_invert_each_other_where_its_own_lose_a_byte():
 
 
 def test_every_short_payload_comes_through_the_receiver_byte_by_byte_and_at_once():
-    receiver = Receiver()
+    receiver = StatusFrameParser()
     for payload in itertools.islice(short_payloads(), 0, None, 7):
         packet = protocol2.status(1, 0, payload)
         (whole,) = receiver.feed(packet)
@@ -71,7 +71,7 @@ def test_every_short_payload_comes_through_the_receiver_byte_by_byte_and_at_once
 
 
 def test_unstuffed_bytes_with_a_right_crc_are_refused_and_counted():
-    receiver = Receiver()
+    receiver = StatusFrameParser()
     assert receiver.feed(protocol2.status(1, 0, b"\xff\xff\xfd\x07", escaped=False)) == []
     assert receiver.rejected["stuffing"] == 1
 
@@ -80,7 +80,7 @@ def test_the_frame_behind_a_damaged_one_is_found():
     good = protocol2.status(1, 0, b"\x01\x02")
     endless = b"\xff\xff\xfd\x00\x01\xff\xff"
     for damage in (b"\xff\xff\xfd", good[:5], b"\xff" * 5, good[:-1] + b"\x00", endless):
-        assert Receiver().feed(damage + good)[-1:] == [good], damage.hex(" ")
+        assert StatusFrameParser().feed(damage + good)[-1:] == [good], damage.hex(" ")
 
 
 def mutations(rng, packet):
@@ -101,7 +101,7 @@ def test_damaged_and_random_bytes_give_no_frame_that_was_not_sent():
     while strings < 50_000:
         packet = protocol2.status(rng.randrange(253), rng.randrange(8), rng.randbytes(rng.randrange(20)))
         for damaged in mutations(rng, packet):
-            assert Receiver().feed(damaged) in ([], [packet]), damaged.hex(" ")
+            assert StatusFrameParser().feed(damaged) in ([], [packet]), damaged.hex(" ")
             strings += 1
 
 

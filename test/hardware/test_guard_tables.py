@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.limits import Fault, Guard, Limits
+from rsea_ros.hardware.limits import DeviceFault, Guard, Limits
 
 PERIOD = 1.0 / 64.0
 """s; a power of two, so that sums of it are exact."""
@@ -64,7 +64,7 @@ def test_the_fault_of_late_commands_says_how_late_in_ms():
     it = guard(command_timeout=0.125)
     it.allowed(9.0, 0.0)
     it.allowed(9.0, 0.25)
-    assert it.fault == Fault("command_timeout", 250.0, 125.0, "ms")
+    assert it.fault == DeviceFault("command_timeout", 250.0, 125.0, "ms")
 
 
 def test_at_the_end_of_the_program_the_torque_is_zero_without_a_fault():
@@ -78,7 +78,7 @@ def test_at_the_end_of_the_program_the_torque_is_zero_without_a_fault():
 def test_any_other_fault_makes_the_torque_zero_at_once():
     it = guard()
     it.allowed(9.0, 0.0)
-    it.trip(Fault("ft"))
+    it.trip(DeviceFault("ft"))
     assert torques(it, (9.0, 0.0), (9.0, 9.0), (9.0, None)) == [0.0, 0.0, 0.0]
     assert it.fault.cause == "ft"
 
@@ -86,9 +86,9 @@ def test_any_other_fault_makes_the_torque_zero_at_once():
 def test_the_first_fault_stays_and_so_does_its_ramp():
     it = guard(ramp=4 * PERIOD)
     it.allowed(8.0, 0.0)
-    it.trip(Fault("command_timeout"))
+    it.trip(DeviceFault("command_timeout"))
     it.allowed(8.0, 0.0)
-    it.trip(Fault("ft"))
+    it.trip(DeviceFault("ft"))
     assert it.fault.cause == "command_timeout"
     assert torques(it, (8.0, 0.0), (8.0, 0.0)) == [4.0, 2.0]
 
@@ -102,14 +102,14 @@ def test_the_first_fault_stays_and_so_does_its_ramp():
 def test_the_ramp_takes_its_duration_and_one_cycle_at_least(age, ramp, expected):
     it = guard(ramp=ramp)
     it.allowed(-8.0, 0.0)
-    it.trip(Fault("command_timeout"))
+    it.trip(DeviceFault("command_timeout"))
     assert [abs(it.allowed(-8.0, age)) for _ in range(5)] == expected
 
 
 def test_the_ramp_takes_20_ms_by_default():
     it = guard(period=0.005)
     it.allowed(8.0, 0.0)
-    it.trip(Fault("command_timeout"))
+    it.trip(DeviceFault("command_timeout"))
     assert [it.allowed(8.0, 0.0) for _ in range(5)] == pytest.approx([6, 4, 2, 0, 0], abs=1e-12)
 
 
@@ -120,7 +120,7 @@ def test_the_rest_of_the_ramp_follows_the_age_of_the_command(late, expected):
     """late: cycles since the command ceased to count, of a ramp of four."""
     it = guard(command_timeout=2 * PERIOD, ramp=4 * PERIOD)
     it.allowed(8.0, 0.0)
-    it.trip(Fault("command_timeout"))
+    it.trip(DeviceFault("command_timeout"))
     assert it.allowed(8.0, (2.0 + late) * PERIOD) == expected
 
 
@@ -164,7 +164,7 @@ def test_there_is_no_soft_start_by_default():
 def test_a_guard_begins_anew_after_it_was_cleared():
     it = guard(slew=128.0, **SOFT)
     torques(it, *[(9.0, 0.0)] * 4)
-    it.trip(Fault("ft"))
+    it.trip(DeviceFault("ft"))
     it.clear()
     assert (it.fault, it.torque) == (None, 0.0)
     assert torques(it, *[(9.0, 0.0)] * 2) == [2.0, 4.0]
@@ -200,7 +200,7 @@ def test_a_torque_that_is_missed_for_longer_than_allowed_is_a_fault(measured, tr
 def test_the_fault_of_a_missed_torque_says_by_how_much():
     it = guard(**EFFORT)
     misses(it, *[5.0] * 4)
-    assert it.fault == Fault("effort", 5.0, 4.0, "N m", "between commanded and measured torque")
+    assert it.fault == DeviceFault("effort", 5.0, 4.0, "N m", "between commanded and measured torque")
 
 
 def test_a_torque_must_be_measured_within_three_cycles():
@@ -223,7 +223,7 @@ def test_a_torque_between_the_last_ones_written_is_not_missed(measured):
 def test_a_missed_torque_is_forgotten_when_a_fault_is_cleared():
     it = guard(**EFFORT)
     misses(it, 0.0, 0.0, 0.0)
-    it.trip(Fault("ft"))
+    it.trip(DeviceFault("ft"))
     it.clear()
     it.look(reading(-9.0))  # nothing was written yet
     assert it.fault is None
@@ -233,7 +233,7 @@ def test_a_missed_torque_is_forgotten_when_a_fault_is_cleared():
 def test_a_ramp_is_not_taken_for_a_missed_torque():
     it = guard(**EFFORT)
     it.allowed(10.0, 0.0)
-    it.trip(Fault("ft"))
+    it.trip(DeviceFault("ft"))
     for _ in range(5):
         it.look(reading(10.0))
     it.fault = None

@@ -9,8 +9,8 @@ import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply, State
-from rsea_ros.hardware.guarded import Guarded
-from rsea_ros.hardware.limits import Fault, Limits
+from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.limits import DeviceFault, Limits
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, Protection
 from rsea_ros.hardware.spring import Spring
 
@@ -65,7 +65,7 @@ def device():
 @pytest.fixture
 def joint(device):
     """A guarded device, open and enabled, with nothing in its log; 4 N m a cycle of soft start."""
-    made = Guarded(device, Limits(64.0, slew=1e9, soft_start=256.0), 64.0)
+    made = GuardedDevice(device, Limits(64.0, slew=1e9, soft_start=256.0), 64.0)
     made.open()
     made.enable()
     device.log.clear()
@@ -73,20 +73,20 @@ def joint(device):
 
 
 def test_nothing_is_enabled_counted_or_read_before_it_is_asked_for(device):
-    new = Guarded(device, Limits(64.0), 64.0)
+    new = GuardedDevice(device, Limits(64.0), 64.0)
     assert (new.enabled, new.away, new.state, new.fault, new.cycles) == (False, False, None, None, {})
     assert device.log == []
 
 
 def test_the_rate_is_that_of_the_cycles(device):
-    joint = Guarded(device, Limits(64.0, slew=128.0), 64.0)
+    joint = GuardedDevice(device, Limits(64.0, slew=128.0), 64.0)
     joint.enable()
     assert joint.write(9.0, 0.0) == 2.0
 
 
 def test_opening_begins_softly_and_without_a_fault(device):
-    joint = Guarded(device, Limits(64.0), 64.0)
-    joint.guard.trip(Fault("ft"))
+    joint = GuardedDevice(device, Limits(64.0), 64.0)
+    joint.guard.trip(DeviceFault("ft"))
     joint.open()
     assert device.log == ["open"] and joint.fault is None
 
@@ -95,7 +95,7 @@ def test_opening_begins_softly_and_without_a_fault(device):
 @pytest.mark.parametrize("unprotected", [False, True])
 def test_a_device_that_nothing_protects_is_closed_again_unless_that_is_allowed(kind, unprotected):
     device = Device(kind)
-    joint = Guarded(device, Limits(64.0), 64.0)
+    joint = GuardedDevice(device, Limits(64.0), 64.0)
     if kind == NONE and not unprotected:
         with pytest.raises(ParameterError, match="expected a bus watchdog or a supervisor"):
             joint.open(unprotected=unprotected)
@@ -107,7 +107,7 @@ def test_a_device_that_nothing_protects_is_closed_again_unless_that_is_allowed(k
 
 def test_protection_is_required_by_default():
     with pytest.raises(ParameterError):
-        Guarded(Device(NONE), Limits(64.0), 64.0).open()
+        GuardedDevice(Device(NONE), Limits(64.0), 64.0).open()
 
 
 def test_a_cycle_writes_then_reads_and_beats_before_each(joint, device):
@@ -126,7 +126,7 @@ def test_a_deflection_is_measured_where_a_reading_has_one(joint, device, value):
 
 
 def test_no_torque_gets_through_before_it_is_enabled(device):
-    joint = Guarded(device, Limits(64.0), 64.0)
+    joint = GuardedDevice(device, Limits(64.0), 64.0)
     assert joint.write(9.0, 0.0) == 0.0
     assert device.log == ["beat False", "write 0"]
 
@@ -148,8 +148,8 @@ LOST = NoReply("no reply")
     ("answers", "fault"),
     [
         ([LOST, LOST, None, LOST, LOST], None),
-        ([LOST, LOST, LOST], Fault("no_reply", 3, 3, "cycles", "no reply")),
-        ([DeviceError("access denied")], Fault("deviceerror", detail="access denied")),
+        ([LOST, LOST, LOST], DeviceFault("no_reply", 3, 3, "cycles", "no reply")),
+        ([DeviceError("access denied")], DeviceFault("deviceerror", detail="access denied")),
     ],
 )
 def test_lost_answers_in_a_row_are_a_fault_and_other_errors_at_once(
@@ -172,7 +172,7 @@ def test_every_second_answer_lost_is_a_fault_though_never_two_in_a_row(joint, de
     assert joint.fault is None
     device.broken = {method: [LOST]}
     joint.cycle(1.0, 0.0)
-    assert joint.fault == Fault("no_reply", 15, 15, "cycles", "of the last 29: no reply")
+    assert joint.fault == DeviceFault("no_reply", 15, 15, "cycles", "of the last 29: no reply")
     joint.clear()
     device.broken = {method: [LOST] * 2}
     joint.cycle(1.0, 0.0)
@@ -189,7 +189,7 @@ def test_a_write_that_is_acknowledged_during_the_reading_is_not_lost(joint, devi
     device.broken, device.reading = {"write": [LOST] * 3}, {}
     for _ in range(3):
         joint.cycle(1.0, 0.0)
-    assert joint.fault == Fault("no_reply", 3, 3, "cycles", "no reply")
+    assert joint.fault == DeviceFault("no_reply", 3, 3, "cycles", "no reply")
 
 
 def test_a_third_of_the_answers_lost_is_none(joint, device):
@@ -210,14 +210,14 @@ def test_enabling_needs_no_fault_and_begins_softly(joint, device):
     joint.write(9.0, 0.0)
     joint.enable()
     assert joint.write(9.0, 0.0) == 4.0 and device.log.count("enable") == 1
-    joint.guard.trip(Fault("ft", detail="saturation"))
+    joint.guard.trip(DeviceFault("ft", detail="saturation"))
     with pytest.raises(DeviceError, match="fault ft: saturation, expected clear_fault first"):
         joint.enable()
     assert device.log.count("enable") == 1
 
 
 def test_a_device_that_does_not_enable_gets_no_torque(device):
-    joint = Guarded(device, Limits(64.0), 64.0)
+    joint = GuardedDevice(device, Limits(64.0), 64.0)
     device.broken = {"enable": [NoReply("no reply")]}
     with pytest.raises(NoReply):
         joint.enable()
@@ -278,7 +278,7 @@ def test_without_a_fault_there_is_nothing_to_clear(joint, device):
 
 def test_a_fault_is_cleared_by_a_reading_without_it(joint, device):
     joint.write(9.0, 0.0)
-    joint.guard.trip(Fault("ft"))
+    joint.guard.trip(DeviceFault("ft"))
     device.log.clear()
     assert joint.clear() is True
     assert device.log == ["recover", "read", "enable"]
@@ -286,7 +286,7 @@ def test_a_fault_is_cleared_by_a_reading_without_it(joint, device):
 
 
 def test_a_fault_is_not_cleared_while_a_reading_has_it(joint, device):
-    joint.guard.trip(Fault("temperature"))
+    joint.guard.trip(DeviceFault("temperature"))
     device.reading = {"temperature": 99.0}
     with pytest.raises(DeviceError, match="temperature: 99 °C, limit 70 °C is still there"):
         joint.clear()
@@ -313,7 +313,7 @@ def test_a_reboot_ends_the_torque_first_and_restores_it_afterwards(joint, device
     device.log.clear()
     seen = []
     device.during = {"disable": lambda: seen.append((joint.guard.torque, joint.away))}
-    joint.guard.trip(Fault("ft"))
+    joint.guard.trip(DeviceFault("ft"))
     joint.reboot()
     assert device.log == ["disable", "beat False", "reboot", "enable"]
     assert seen == [(0.0, True)]
@@ -334,7 +334,7 @@ def test_a_disabled_device_stays_disabled_over_a_reboot(joint, device, refusal):
 
 def test_a_failed_reboot_lets_go_of_the_device(joint, device):
     device.broken = {"reboot": [NoReply("no reply")]}
-    joint.guard.trip(Fault("ft"))
+    joint.guard.trip(DeviceFault("ft"))
     with pytest.raises(NoReply):
         joint.reboot()
     assert not joint.away and joint.fault.cause == "ft"
@@ -356,7 +356,7 @@ SPRING = Spring(1500.0)
     ],
 )
 def test_a_wrench_comes_from_sensor_or_deflection(device, spring, reading, source):
-    joint = Guarded(device, Limits(64.0), 64.0, spring)
+    joint = GuardedDevice(device, Limits(64.0), 64.0, spring)
     assert joint.ft_source == "none"
     device.reading = reading
     joint.read()
@@ -374,7 +374,7 @@ def test_a_wrench_comes_from_sensor_or_deflection(device, spring, reading, sourc
     ],
 )
 def test_a_deflection_that_was_measured_must_go_on(device, before, now, fault):
-    joint = Guarded(device, Limits(64.0), 64.0, SPRING)
+    joint = GuardedDevice(device, Limits(64.0), 64.0, SPRING)
     device.reading = before
     joint.read()
     device.reading = now

@@ -9,7 +9,7 @@ from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.bus import Bus
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import Turns
-from rsea_ros.hardware.dynamixel.settings import Settings
+from rsea_ros.hardware.dynamixel.settings import MotorConnection
 from rsea_ros.hardware.dynamixel.tables import TABLES, TorqueConstant
 from rsea_ros.hardware.peer.protocol2 import status
 
@@ -51,7 +51,7 @@ class Line:
 
 def motor_on(line):
     """An open 54024 there."""
-    motor = Motor(Settings("line"))
+    motor = Motor(MotorConnection("line"))
     motor.port, motor.bus, motor.table = line, Bus(line, 1), TABLES[54024]
     motor.torque_constant = TorqueConstant(6.8, 6.8, 6.8, "")
     return motor

@@ -8,7 +8,7 @@ import pytest
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.limits import Fault, Limits, check_limits, complaint
+from rsea_ros.hardware.limits import DeviceFault, Limits, check_limits, complaint
 
 ALL = Limits(68.0, deflection=0.25, temperature=60.0, current=12.0, voltage=20.0, velocity=2.0, position=0.5,
              ft=50.0, power=100.0)  # fmt: skip
@@ -47,15 +47,15 @@ def test_a_reading_at_its_limit_is_fine_and_one_beyond_it_is_not(name):
     limits = only(**{field: limit})
     assert complaint(limits, make(limit)) is None
     beyond = math.nextafter(limit, math.inf)
-    assert complaint(limits, make(beyond)) == Fault(cause, beyond, limit, unit)
+    assert complaint(limits, make(beyond)) == DeviceFault(cause, beyond, limit, unit)
     if cause != "temperature":
-        assert complaint(limits, make(-beyond)) == Fault(cause, beyond, limit, unit), "either way"
+        assert complaint(limits, make(-beyond)) == DeviceFault(cause, beyond, limit, unit), "either way"
 
 
 def test_a_voltage_at_its_limit_is_fine_and_one_below_it_is_not():
     limits = only(voltage=20.0)
     assert complaint(limits, reading(voltage=20.0)) is None
-    assert complaint(limits, reading(voltage=19.9)) == Fault("voltage", 19.9, 20.0, "V", "too low")
+    assert complaint(limits, reading(voltage=19.9)) == DeviceFault("voltage", 19.9, 20.0, "V", "too low")
 
 
 DEFAULTS = [
@@ -123,10 +123,10 @@ def test_a_fault_of_the_device_comes_before_a_measured_one(more, cause):
 @pytest.mark.parametrize(
     ("fault", "text"),
     [
-        (Fault("heldup"), "heldup:"),
-        (Fault("ft", detail="saturation"), "ft: saturation"),
-        (Fault("power", 120.0, 100.0, "W"), "power: 120 W, limit 100 W"),
-        (Fault("voltage", 19.0, 20.0, "V", "too low"), "voltage: 19 V, limit 20 V too low"),
+        (DeviceFault("heldup"), "heldup:"),
+        (DeviceFault("ft", detail="saturation"), "ft: saturation"),
+        (DeviceFault("power", 120.0, 100.0, "W"), "power: 120 W, limit 100 W"),
+        (DeviceFault("voltage", 19.0, 20.0, "V", "too low"), "voltage: 19 V, limit 20 V too low"),
     ],
 )
 def test_a_fault_is_described_with_value_limit_and_unit(fault, text):
@@ -134,7 +134,7 @@ def test_a_fault_is_described_with_value_limit_and_unit(fault, text):
 
 
 def test_a_fault_without_a_measured_value_has_no_unit():
-    bare = Fault("heldup")
+    bare = DeviceFault("heldup")
     assert math.isnan(bare.value) and math.isnan(bare.limit) and (bare.unit, bare.detail) == ("", "")
 
 

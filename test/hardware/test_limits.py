@@ -8,8 +8,8 @@ import yaml
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, Refused, State
-from rsea_ros.hardware.guarded import Guarded
-from rsea_ros.hardware.limits import Fault, Guard, Limits
+from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.limits import DeviceFault, Guard, Limits
 from rsea_ros.hardware.protection import NONE, Protection
 
 PERIOD = 0.01
@@ -110,7 +110,7 @@ def cycles(answers, count):
     """The fault after each of some cycles on a flaky device."""
     device = Flaky()
     device.answers = answers
-    guarded = Guarded(device, Limits(68.0), 100.0)
+    guarded = GuardedDevice(device, Limits(68.0), 100.0)
     guarded.enable()
     faults = []
     for _ in range(count):
@@ -138,7 +138,7 @@ def test_the_first_command_does_not_act_in_full_after_start_fault_and_pause():
     soft = guard(slew=1e6, soft_start=300.0)
     begin = [3.0, 6.0, 9.0, 10.0]
     assert [soft.allowed(10.0, 0.0) for _ in range(4)] == begin
-    soft.trip(Fault("any"))
+    soft.trip(DeviceFault("any"))
     assert soft.allowed(10.0, 0.0) == 0.0
     soft.clear()
     assert [soft.allowed(10.0, 0.0) for _ in range(4)] == begin

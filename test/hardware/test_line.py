@@ -9,11 +9,11 @@ import pytest
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.dynamixel.line import Line
 from rsea_ros.hardware.dynamixel.line_motor import LineMotor
-from rsea_ros.hardware.dynamixel.settings import Settings
+from rsea_ros.hardware.dynamixel.settings import MotorConnection
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
-from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.hardware.together import cycle
 from test.hardware.conftest import FT_TIMEOUT, LATENCY, PERIOD, WATCHDOG
@@ -28,9 +28,9 @@ class Three:
     def __init__(self, bench, fast):
         self.bench = bench
         self.line = Line(bench.port, 4_000_000, LATENCY, fast=fast)
-        sensor = SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
+        sensor = SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
         self.members = [
-            Guarded(_device(bench, self.line, k + 1, None if k else sensor), SMALL, 1.0 / PERIOD)
+            GuardedDevice(_device(bench, self.line, k + 1, None if k else sensor), SMALL, 1.0 / PERIOD)
             for k in range(3)
         ]
         for member in self.members:
@@ -65,7 +65,7 @@ class Three:
 
 
 def _device(bench, line, identity, sensor=None):
-    settings = Settings(bench.port, 4_000_000, identity, latency=LATENCY, watchdog=WATCHDOG)
+    settings = MotorConnection(bench.port, 4_000_000, identity, latency=LATENCY, watchdog=WATCHDOG)
     return DynamixelNetft(LineMotor(settings, line), sensor, SMALL, math.inf)
 
 

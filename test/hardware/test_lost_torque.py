@@ -15,7 +15,7 @@ import pytest
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware import supervisor
 from rsea_ros.hardware.device import PortLost
-from rsea_ros.hardware.dynamixel.port import Port
+from rsea_ros.hardware.dynamixel.port import SerialPort
 from rsea_ros.hardware.supervised import SupervisorLost
 from test.hardware.conftest import Loop, well_behaved
 
@@ -152,7 +152,7 @@ def test_a_supervisor_service_that_does_not_run_is_refused(benches, tmp_path):
 
 
 def _is_free(path):
-    port = Port(path, 4_000_000, 0.01)
+    port = SerialPort(path, 4_000_000, 0.01)
     try:
         port.open()
     except PortLost:

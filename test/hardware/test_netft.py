@@ -11,7 +11,7 @@ import pytest
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.netft.calibration import parse
-from rsea_ros.hardware.netft.receiver import Receiver
+from rsea_ros.hardware.netft.receiver import DatagramReceiver
 from rsea_ros.hardware.netft.records import RESYNCHRONISE, RdtRecord, Sequence, decode, request, trouble
 
 
@@ -133,7 +133,7 @@ def streamed():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sensor:
         sensor.bind(("127.0.0.1", 0))
         sensor.settimeout(10.0)
-        receiver = Receiver(*sensor.getsockname())
+        receiver = DatagramReceiver(*sensor.getsockname())
         receiver.open()
         asked, client = sensor.recvfrom(64)
         assert asked == request(2)

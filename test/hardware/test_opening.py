@@ -4,7 +4,7 @@ import pytest
 
 from rsea_ros.errors import RseaError
 from rsea_ros.hardware.device import PortLost
-from rsea_ros.hardware.dynamixel.port import Port
+from rsea_ros.hardware.dynamixel.port import SerialPort
 from rsea_ros.hardware.limits import Limits
 
 WRONG = {
@@ -24,7 +24,7 @@ def test_settings_that_do_not_fit_the_machine_are_refused(benches, device, name)
 
 
 def test_a_port_that_does_not_exist_is_named(tmp_path):
-    port = Port(str(tmp_path / "nothing"), 4_000_000, 1e-3)
+    port = SerialPort(str(tmp_path / "nothing"), 4_000_000, 1e-3)
     with pytest.raises(PortLost, match=r"port .*nothing: .*expected a serial port that is free"):
         port.open()
 

@@ -5,7 +5,7 @@ import argparse
 import pytest
 
 from rsea_ros.cli.bench import _motors
-from rsea_ros.hardware.peer.bus import Bus
+from rsea_ros.hardware.peer.bus import EmulatedBus
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
 from rsea_ros.hardware.peer.protocol2 import instruction
 
@@ -19,7 +19,7 @@ def test_a_bench_keeps_no_more_than_it_is_asked_to(tmp_path, kept, left):
         rig="paper_high_impedance", model=[54024], seed=0, torque_constant=0.0, return_delay=0
     )
     _, motors = _motors(args, kept)
-    bus = Bus(tmp_path / "tty", motors, Misbehaviour(), kept)
+    bus = EmulatedBus(tmp_path / "tty", motors, Misbehaviour(), kept)
     for now in range(9):
         motors[0].write(now, 604, bytes(2))
         for request in bus._listener.hear(instruction(1, 2, READ)):

@@ -8,7 +8,7 @@ from contextlib import suppress
 import pytest
 
 from rsea_ros.hardware.device import PortLost
-from rsea_ros.hardware.dynamixel.port import Port
+from rsea_ros.hardware.dynamixel.port import SerialPort
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def wire():
     """An open port and the descriptor of its other end."""
     near, far = os.openpty()
     tty.setraw(far)
-    port = Port(os.ttyname(far), 1_000_000, 1e-3)
+    port = SerialPort(os.ttyname(far), 1_000_000, 1e-3)
     port.open()
     os.close(far)
     yield port, near

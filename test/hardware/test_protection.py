@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits, complaint
 from rsea_ros.hardware.outside import options_of, outside_device
 from rsea_ros.hardware.protection import NONE, PROCESS
@@ -36,7 +36,7 @@ def toy(monkeypatch):
 
 
 def guarded(device, spring=None, **limits):
-    return Guarded(device, Limits(68.0, **limits), 280.0, spring)
+    return GuardedDevice(device, Limits(68.0, **limits), 280.0, spring)
 
 
 def test_a_device_without_protection_is_refused_unless_that_is_allowed(toy):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -22,7 +22,9 @@ def bench(name: str, seed: int) -> tuple[Rig, Rig]:
 
 def recorded(true: Rig, seed: int, duration: float = 10.0, kind: str = "white_noise", **settings) -> Record:
     """Return what the sensors of a bench log."""
-    u = excitation(kind, Settings(rate=RATE, duration=duration, seed=seed, amplitude=15.0, **settings))
+    u = excitation(
+        kind, ExcitationSettings(rate=RATE, duration=duration, seed=seed, amplitude=15.0, **settings)
+    )
     return synthesize(true, Channel(np.arange(len(u)) / RATE, u), seed=seed)
 
 

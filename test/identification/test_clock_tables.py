@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification import clocks
-from rsea_ros.identification.clocks import Asked, asked_of, freed, without_needless
+from rsea_ros.identification.clocks import RequiredClocks, asked_of, freed, without_needless
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown
 
@@ -214,12 +214,12 @@ def test_the_cost_is_that_of_the_offsets_that_are_taken_as_right(world, z, cost)
 
 def test_a_rig_that_is_judged_by_torque_has_no_clocks_to_ask_for(world):
     world.z, world.inverse = {("clock.ft",): 9.0}, True
-    assert world.asked() == Asked((), None)
+    assert world.asked() == RequiredClocks((), None)
 
 
 def test_requested_clocks_start_at_zero_offset():
     fit = solution((0, 0), (1, 0), theta=[0.5])
-    problem, theta = freed(fit, Asked((FT, FT_RATE)))
+    problem, theta = freed(fit, RequiredClocks((FT, FT_RATE)))
     assert [u.name for u in problem.unknowns] == ["value.0", "clock.ft", "clock_rate.ft"]
     assert theta.tolist() == [0.5, 0.0, 0.0]
 
@@ -251,6 +251,6 @@ def test_a_clock_within_two_standard_deviations_of_right_is_taken_as_right(
      ({"a": 2.0, "b": 3.0, "c": 1.0}, ("b", 3.0))],
 )  # fmt: skip
 def test_the_largest_cost_is_reported_from_a_factor_of_two(cost, said):
-    assert [(r.code, r.names, r.values) for r in Asked((), cost).remarks] == [
+    assert [(r.code, r.names, r.values) for r in RequiredClocks((), cost).remarks] == [
         ("clocks_taken_as_right", said[:1], said[1:])
     ] * bool(said)

@@ -7,7 +7,7 @@ from scipy import signal
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.excitation import (
     KINDS,
-    Settings,
+    ExcitationSettings,
     check_limits,
     chirp,
     excitation,
@@ -17,7 +17,7 @@ from rsea_ros.identification.excitation import (
     white_noise,
 )
 
-PAPER = Settings()
+PAPER = ExcitationSettings()
 
 
 def _power(command, rate):
@@ -29,7 +29,7 @@ def _power(command, rate):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_is_finite_reproducible_and_begins_and_ends_at_rest(kind):
-    settings = Settings(duration=20.0, seed=3)
+    settings = ExcitationSettings(duration=20.0, seed=3)
     command = excitation(kind, settings, ramp=0.5)
     assert np.all(np.isfinite(command))
     assert command[0] == 0.0 and command[-1] == 0.0
@@ -38,7 +38,7 @@ def test_every_kind_is_finite_reproducible_and_begins_and_ends_at_rest(kind):
 
 
 def test_chirp_without_noise_is_scipys_logarithmic_chirp():
-    settings = Settings(noise=0.0)
+    settings = ExcitationSettings(noise=0.0)
     t = np.arange(44_800) / 280.0
     expected = 20.0 * signal.chirp(t, 0.01, 160.0, settings.top, "logarithmic", phi=-90.0)
     assert chirp(settings) == pytest.approx(expected, abs=1e-6)
@@ -51,7 +51,7 @@ def test_the_papers_excitation_stays_below_nyquist():
 
 
 def test_noise_has_its_deviation_and_is_white_in_its_band_only():
-    settings = Settings(amplitude=10.0, low=1.0, high=100.0, seed=5)
+    settings = ExcitationSettings(amplitude=10.0, low=1.0, high=100.0, seed=5)
     noise = white_noise(settings)
     assert np.std(noise) == pytest.approx(10.0, rel=0.02)
     frequency, power = _power(noise, settings.rate)
@@ -61,13 +61,13 @@ def test_noise_has_its_deviation_and_is_white_in_its_band_only():
 
 
 def test_chirps_noise_adds_to_the_sweep():
-    noise = chirp(PAPER) - chirp(Settings(noise=0.0))
+    noise = chirp(PAPER) - chirp(ExcitationSettings(noise=0.0))
     assert np.std(noise) == pytest.approx(10.0, rel=0.02)
-    assert not np.array_equal(chirp(PAPER), chirp(Settings(seed=1)))
+    assert not np.array_equal(chirp(PAPER), chirp(ExcitationSettings(seed=1)))
 
 
 def test_multisine_has_power_on_its_odd_lines_alone_and_equal():
-    settings = Settings(duration=30.0, amplitude=8.0, low=0.2, high=60.0, seed=2)
+    settings = ExcitationSettings(duration=30.0, amplitude=8.0, low=0.2, high=60.0, seed=2)
     command = multisine(settings)
     assert np.sqrt(np.mean(command**2)) == pytest.approx(8.0)
     one = command[:2800]
@@ -80,26 +80,26 @@ def test_multisine_has_power_on_its_odd_lines_alone_and_equal():
 
 
 def test_multisine_leaves_out_a_quarter_of_the_odd_lines_for_detection():
-    settings = Settings(low=0.2, high=60.0)
+    settings = ExcitationSettings(low=0.2, high=60.0)
     missing = set(range(3, 600, 2)) - set(odd_lines(settings))
     assert len(missing) == 299 // 4
-    assert missing != set(range(3, 600, 2)) - set(odd_lines(Settings(low=0.2, high=60.0, seed=1)))
+    assert missing != set(range(3, 600, 2)) - set(odd_lines(ExcitationSettings(low=0.2, high=60.0, seed=1)))
 
 
 def test_multisines_periods_stay_whole_between_its_ramps():
-    settings = Settings(duration=20.0, seed=4)
+    settings = ExcitationSettings(duration=20.0, seed=4)
     command = excitation("multisine", settings, ramp=1.0)
     assert np.array_equal(command[280:-280], multisine(settings))
 
 
 def test_steps_hold_their_levels():
-    command = steps(Settings(duration=8.0, amplitude=5.0, period=4.0, rate=100.0))
+    command = steps(ExcitationSettings(duration=8.0, amplitude=5.0, period=4.0, rate=100.0))
     assert np.array_equal(command[::100], [0.0, 5.0, 0.0, -5.0, 0.0, 5.0, 0.0, -5.0])
     assert np.count_nonzero(np.diff(command)) == 7
 
 
 def test_ramp_is_a_raised_cosine():
-    settings = Settings(duration=4.0, period=1e6, rate=100.0, amplitude=2.0)
+    settings = ExcitationSettings(duration=4.0, period=1e6, rate=100.0, amplitude=2.0)
     command = excitation("white_noise", settings, ramp=1.0) / excitation("white_noise", settings)
     rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(100) / 100.0))
     assert command[:100] == pytest.approx(rise)
@@ -122,14 +122,17 @@ def test_limit_names_value_unit_limit_and_time():
     ("call", "message"),
     [
         (lambda: excitation("sweep", PAPER), "expected one of chirp"),
-        (lambda: Settings(rate=0.0), "rate = 0 Hz"),
-        (lambda: Settings(duration=float("nan")), "duration = nan s"),
-        (lambda: Settings(low=133.0), "low = 133 Hz"),
-        (lambda: excitation("steps", Settings(duration=1.0), ramp=0.6), "ramp = 0.6 s, expected 0 to 0.5 s"),
-        (lambda: multisine(Settings(period=0.0101)), "whole number of samples"),
-        (lambda: multisine(Settings(duration=5.0)), "at most the duration of 5 s"),
+        (lambda: ExcitationSettings(rate=0.0), "rate = 0 Hz"),
+        (lambda: ExcitationSettings(duration=float("nan")), "duration = nan s"),
+        (lambda: ExcitationSettings(low=133.0), "low = 133 Hz"),
         (
-            lambda: multisine(Settings(period=1.0, low=1.1, high=1.9)),
+            lambda: excitation("steps", ExcitationSettings(duration=1.0), ramp=0.6),
+            "ramp = 0.6 s, expected 0 to 0.5 s",
+        ),
+        (lambda: multisine(ExcitationSettings(period=0.0101)), "whole number of samples"),
+        (lambda: multisine(ExcitationSettings(duration=5.0)), "at most the duration of 5 s"),
+        (
+            lambda: multisine(ExcitationSettings(period=1.0, low=1.1, high=1.9)),
             "expected one with odd lines in 1.1 to 1.9 Hz",
         ),
     ],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import ChannelError, IdentificationError
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.result import ComplexArray, FrequencyResponse
 from rsea_ros.model import outputs
@@ -26,7 +26,7 @@ KINDS = {
 
 
 def command_of(kind: str, duration: float, seed: int = 0) -> Channel:
-    u = excitation(kind, Settings(rate=RATE, duration=duration, seed=seed))
+    u = excitation(kind, ExcitationSettings(rate=RATE, duration=duration, seed=seed))
     return Channel(np.arange(len(u)) / RATE, u)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -19,7 +19,7 @@ SEEDS = range(6)
 
 def noisy(kind: str, duration: float, seed: int, level: float) -> tuple[Record, Record]:
     """Return a record without noise, and with white noise of `level` N m on its F/T sensor."""
-    u = excitation(kind, Settings(rate=RATE, duration=duration, seed=seed))
+    u = excitation(kind, ExcitationSettings(rate=RATE, duration=duration, seed=seed))
     clean = synthesize(load_rig("paper_high_impedance"), Channel(np.arange(len(u)) / RATE, u), noise=False)
     noise = level * np.random.default_rng([seed, 99]).standard_normal(len(u))
     return clean, clean.with_channels(ft=Channel(clean["ft"].t, clean["ft"].y + noise))
@@ -60,7 +60,7 @@ def test_distortion_is_distinguished_from_noise(effect: str | None, distorts: bo
     rig = load_rig("paper_high_impedance")
     if effect:
         rig = rig.with_effects(EffectSetting(effect, {"cubic": 2000.0}))
-    u = excitation("multisine", Settings(rate=RATE, duration=60.0, amplitude=20.0, high=60.0))
+    u = excitation("multisine", ExcitationSettings(rate=RATE, duration=60.0, amplitude=20.0, high=60.0))
     record = synthesize(rig, Channel(np.arange(len(u)) / RATE, u), seed=5)
     measured = estimate_response(record, "ft")
     low = measured.frequency < 12.0

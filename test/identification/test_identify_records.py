@@ -11,7 +11,7 @@ from benches import RATE, bench, recorded
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.even_stamps import even_clock
 from rsea_ros.identification.identify import identify
-from rsea_ros.model.rig import Controller, Rig
+from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate
 from rsea_ros.report.remark_words import remark_sentences
@@ -103,7 +103,7 @@ def test_several_bags_narrow_the_intervals(case):
 def test_values_are_recovered_with_a_controller_in_the_loop():
     """The bag's command comes from the loop; the rig states the controller and the bag has the reference."""
     nominal, true = bench("paper_high_impedance", 14)
-    loop = Controller(k_p=30.0, k_v=20.0)
+    loop = PositionLoop(k_p=30.0, k_v=20.0)
     nominal, true = (replace(rig, controller=loop) for rig in (nominal, true))
     record = closed_loop(true, 14)
     result = identify([record], nominal)

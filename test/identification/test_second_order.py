@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.second_order import SecondOrder, effective_values, fit_second_order
 from rsea_ros.model.rig_file import load_rig
@@ -23,7 +23,7 @@ def bench_of_eq_10(noise: float) -> Record:
     j_eff = K_S / A0
     values = {"rotor.reflected_inertia": j_eff - rig["chassis.inertia"], "spring.damping": 0.0}
     rig = rig.with_values({**values, "rotor.reflected_damping": A1 * j_eff, "spring.stiffness": K_S})
-    u = excitation("chirp", Settings())
+    u = excitation("chirp", ExcitationSettings())
     t = np.arange(len(u)) / 280.0
     asked = synthesize(rig, Channel(t, u), noise=False)
     weak = simulate(rig, asked.with_channels(command=Channel(t, u * C / A0)))["ft"]

@@ -9,7 +9,7 @@ import pytest
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification import confidence
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
 from rsea_ros.identification.remark import Remark
@@ -22,7 +22,7 @@ from rsea_ros.signals import Channel
 def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_reported(monkeypatch):
     """A bound of 2e4 beside priors of 0.01 was cut off as a singular direction: its doubt came out as 0."""
     rig = load_rig("paper_high_impedance")
-    command = excitation("multisine", Settings(rate=280.0, duration=4.0, period=4.0))
+    command = excitation("multisine", ExcitationSettings(rate=280.0, duration=4.0, period=4.0))
     record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=3)
     spring = EffectSetting("nonlinear_spring", effect_named("nonlinear_spring").typical)
     solution = fit((case_from(record, rig),), rig.with_effects(spring))[0]

@@ -16,7 +16,7 @@ from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.effects.catalogue import catalogue, effect_named, lent
 from rsea_ros.effects.effect import Claims
 from rsea_ros.laws.claims import claims_of
-from rsea_ros.laws.law import Curve, Law, Part
+from rsea_ros.laws.law import FittedTerm, Law, LearntCurve
 from rsea_ros.laws.memory import remembered
 from rsea_ros.laws.refinement import effect_from
 from rsea_ros.laws.terms import COMMAND_TERMS, GEAR_TERMS, SENSOR_TERMS, SPRING_TERMS, Term, wave_terms
@@ -35,7 +35,7 @@ def term(name: str) -> Term:
 
 
 def law(name: str, *parts: tuple[str, float, float]) -> Law:
-    made = tuple(Part(term(n), size, shape) for n, size, shape in parts)
+    made = tuple(FittedTerm(term(n), size, shape) for n, size, shape in parts)
     return Law(name, made[0].term.place, made[0].term.regressor, made, RANGES)
 
 
@@ -87,7 +87,9 @@ def test_it_loads_from_a_folder_of_effects(tmp_path, monkeypatch):
 
 def test_a_learnt_curve_acts_as_its_points_say():
     x = np.linspace(-0.6, 0.6, 41)
-    made = Law("learnt_law_of_speed", "gear", "speed", (), RANGES, Curve("w", "", x, -12.0 * x * np.abs(x)))
+    made = Law(
+        "learnt_law_of_speed", "gear", "speed", (), RANGES, LearntCurve("w", "", x, -12.0 * x * np.abs(x))
+    )
     short = law("law_of_drag", ("quadratic_drag", 12.0, 0.0))
     effects = [effect_from(source_of(each, NOTHING, WHERE), each.name) for each in (made, short)]
     with lent(*effects):

@@ -200,3 +200,39 @@ def test_stamps_in_another_unit_than_seconds_are_refused(unit):
     record = record_of(t, white(16800), t)
     with pytest.raises(IdentificationError, match="are the stamps in s, not in ms or µs"):
         simulate(load_rig("paper_high_impedance"), record)
+
+
+@pytest.mark.parametrize("name", ["position", "velocity"])
+def test_a_run_from_rest_starts_at_rest_whichever_channel_is_measured(name):
+    """The other channel, zero because nobody measured it, made the first sample the state at time zero."""
+    rig = load_rig("two_moving_outputs")
+    stamps = np.arange(150) / 5.0
+    blank = Channel(stamps + 0.2, np.zeros(150))
+    record = Record({"command": Channel(stamps, white(150)), name: blank})
+    moving = record.with_channels(**{name: Channel(blank.t, simulate(rig, record)[name])})
+    assert drive_from(moving).initial == (0.0, 0.0)
+    np.testing.assert_array_equal(simulate(rig, moving)[name], moving[name].y)
+
+
+def test_a_motion_that_goes_on_is_dated_back_to_the_first_command():
+    """The first sample comes a period after the first command: at 2 rad/s the joint was 7 mrad behind it."""
+    stamps = np.arange(50) / RATE
+    measured = stamps + 1 / RATE
+    motion = {
+        "position": Channel(measured, 0.5 + 2.0 * measured),
+        "velocity": Channel(measured.copy(), np.full(50, 2.0)),
+    }
+    drive = drive_from(Record({"command": Channel(stamps, np.zeros(50)), **motion}))
+    assert drive.initial == pytest.approx((0.5, 2.0))
+    late = {n: Channel(c.t + 5.0, c.y) for n, c in motion.items()}
+    drive = drive_from(Record({"command": Channel(np.arange(2000) / RATE, np.zeros(2000)), **late}))
+    assert drive.initial == (motion["position"].y[0], 2.0), "what starts 5 s late is not extrapolated"
+
+
+def test_ten_seconds_in_ms_are_refused_and_slow_commands_to_fast_sensors_are_not():
+    """10 s at 280 Hz given in ms were simulated as 10 000 s at 0.28 Hz, for more than a minute."""
+    t = 1e3 * np.arange(2800) / RATE
+    with pytest.raises(IdentificationError, match="are the stamps in s, not in ms or µs"):
+        drive_from(record_of(t, white(2800), t))
+    steps = np.arange(0.0, 1000.0, 5.0)
+    drive_from(record_of(steps, white(200), np.arange(0.0, 1000.0, 0.1)))

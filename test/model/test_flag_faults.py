@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rsea_ros.model.observer import ErrorModel, Estimate, Observer
+from rsea_ros.model.observer import ErrorModel, Observer, TorqueEstimate
 from rsea_ros.model.observer.consistency import consistency
 from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.rig_file import load_rig
@@ -28,7 +28,7 @@ def run(made, torque, seconds, start=0.0, sigma=SIGMA):
     noise = SIGMA * np.random.default_rng(1).normal(size=len(times))
     read = [torque(t) for t in times] + noise
     return [
-        made.take(t, Estimate(y, 0.0, 0.0, sigma, 0.0, 0.0)) for t, y in zip(times, read, strict=True)
+        made.take(t, TorqueEstimate(y, 0.0, 0.0, sigma, 0.0, 0.0)) for t, y in zip(times, read, strict=True)
     ]
 
 

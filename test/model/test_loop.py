@@ -9,7 +9,7 @@ import pytest
 import slow
 from scipy.linalg import expm
 
-from rsea_ros.model.rig import Controller
+from rsea_ros.model.rig import PositionLoop
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.signals import Channel, Record
@@ -56,9 +56,9 @@ def by_scipy(rig, controller, outside):
 @pytest.mark.parametrize(
     ("controller", "outside"),
     [
-        (Controller(k_p=8.0, k_v=20.0), np.zeros(len(T))),
-        (Controller(k_p=8.0, k_v=20.0), np.where(T > 0.5, 3.0, 0.0)),
-        (Controller(k_p=30.0, k_v=40.0, limit=12.0), np.zeros(len(T))),
+        (PositionLoop(k_p=8.0, k_v=20.0), np.zeros(len(T))),
+        (PositionLoop(k_p=8.0, k_v=20.0), np.where(T > 0.5, 3.0, 0.0)),
+        (PositionLoop(k_p=30.0, k_v=40.0, limit=12.0), np.zeros(len(T))),
     ],
     ids=["tracking", "disturbed", "limited"],
 )
@@ -83,7 +83,7 @@ def test_without_a_measured_motor_torque_nothing_but_the_loop_acts():
     record = record_of(np.sin(T))
     same = record.with_channels(motor_torque=record["command"])
     without = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
-    rig = replace(load_rig("bare_drive"), controller=Controller(8.0, 20.0))
+    rig = replace(load_rig("bare_drive"), controller=PositionLoop(8.0, 20.0))
     expected = simulate(rig, same)
     for name, values in simulate(rig, without).items():
         np.testing.assert_array_equal(values, expected[name])

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from rsea_ros.errors import ChannelError, RigError
 from rsea_ros.identification.responses import model_response
 from rsea_ros.model.position_loop import commanded
-from rsea_ros.model.rig import Controller, Quantity, Rig
+from rsea_ros.model.rig import PositionLoop, Quantity, Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_to_document import rig_to_document
@@ -82,7 +82,7 @@ def test_the_loop_is_that_of_its_equation(kind):
 def test_a_cascade_without_integral_is_the_controller_of_a_logged_torque():
     looped = joint("cascade")
     bare = {n: q for n, q in looped.quantities.items() if not n.startswith("controller.")}
-    drive = replace(looped, loop=None, quantities=bare, controller=Controller(8.0, 6.0))
+    drive = replace(looped, loop=None, quantities=bare, controller=PositionLoop(8.0, 6.0))
     steady = np.full(len(T), 0.2)
     blank = Channel(T + 1 / RATE, np.zeros(len(T)))
     record = Record(

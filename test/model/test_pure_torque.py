@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import ParameterError, RigError
-from rsea_ros.model.observer import Estimate, Observer
+from rsea_ros.model.observer import Observer, TorqueEstimate
 from rsea_ros.model.pure_torque import FlagSettings, PureTorque
 from rsea_ros.model.pure_torque_filter import empty_pair, powers
 from rsea_ros.model.pure_torque_noise import split
@@ -41,7 +41,9 @@ def flag_at(rate, rig="paper_high_impedance", **settings):
 
 def feed(flag, t, torque):
     """Give the flag a torque at stamps and return its verdicts."""
-    return [flag.take(s, Estimate(y, y, 0.0, SIGMA, SIGMA, 0.0)) for s, y in zip(t, torque, strict=True)]
+    return [
+        flag.take(s, TorqueEstimate(y, y, 0.0, SIGMA, SIGMA, 0.0)) for s, y in zip(t, torque, strict=True)
+    ]
 
 
 def sine(f, seconds, rate, phase, start=0.0):

@@ -10,7 +10,7 @@ import pytest
 
 from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.bandwidth import end_over_end
-from rsea_ros.model.observer import Estimate
+from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.pure_torque_error import BEYOND, NOTHING, PURE, ErrorFlag, ErrorSettings, edge_of
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
@@ -49,7 +49,7 @@ def said(flag, distal, proximal, sigma=0.007):
     """Verdicts and shares by sample."""
     rows = []
     for k, (d, p) in enumerate(zip(distal.tolist(), proximal.tolist(), strict=True)):
-        verdict = flag.take(k / RATE, Estimate(d, p, 0.0, sigma, sigma, sigma))
+        verdict = flag.take(k / RATE, TorqueEstimate(d, p, 0.0, sigma, sigma, sigma))
         rows.append((verdict, flag.share))
     return np.array(rows).T
 
@@ -151,7 +151,7 @@ def test_a_torque_too_small_to_judge_keeps_the_verdict():
     for k in range(3000):
         size = 5.0 if k < 1000 else 0.01
         d = size * math.sin(2.0 * math.pi * 2.0 * k / RATE)
-        verdict = flag.take(k / RATE, Estimate(d, d, 0.0, 0.007, 0.007, 0.007), heard=k < 2000)
+        verdict = flag.take(k / RATE, TorqueEstimate(d, d, 0.0, 0.007, 0.007, 0.007), heard=k < 2000)
         assert verdict == (PURE if 100 < k < 2200 else verdict)
     assert verdict == NOTHING
     assert math.isnan(flag.share)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from random_rigs import RIG_NAMES, rigs
 
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.model.rig import Controller, EffectSetting, Quantity
+from rsea_ros.model.rig import EffectSetting, PositionLoop, Quantity
 from rsea_ros.model.rig_file import (
     load_rig,
     rig_folders,
@@ -41,7 +41,7 @@ def test_every_shipped_rig_is_tested():
 def test_everything_that_a_rig_can_hold_survives(tmp_path):
     rig = replace(
         load_rig("bare_drive"),
-        controller=Controller(k_p=8.0, k_v=20.0, limit=40.0),
+        controller=PositionLoop(k_p=8.0, k_v=20.0, limit=40.0),
         effects=(EffectSetting("coulomb_friction", {"torque": 2.5}),),
         train="star",
         other_trains=("spur", "planetary"),

@@ -154,7 +154,7 @@ def make_driver(listener):
 
     def make(name, values, overrides=()):
         node = LifecycleNode(name, namespace=name, parameter_overrides=list(overrides))
-        made.append((driver.Driver(node, values), node))
+        made.append((driver.DriverNode(node, values), node))
         listener.serve(node)
         return made[-1]
 

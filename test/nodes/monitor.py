@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, State
-from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection
 from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
-from rsea_ros.nodes._drive import Drive, step
+from rsea_ros.nodes._drive import DriverCycle, step
 
 LONGEST = WATCHDOG = 0.1
 """s after which a command no longer excuses a torque; of the motor's own watchdog."""
@@ -106,8 +106,8 @@ class World:
         self.motor, self.commands, self.inbox = FakeMotor(), CommandQueue(strict=True), []
         self.anchor = Anchor(lambda: self.steady + self.off, lambda: self.steady)
         defaults = {"soft_start": 500.0, "slew": 10_000.0, "effort": 6.0}
-        self.guarded = Guarded(self.motor, Limits(68.0, **(defaults | limits)), self.RATE)
-        self.drive = Drive(self.guarded, self, self.anchor, self.RATE)
+        self.guarded = GuardedDevice(self.motor, Limits(68.0, **(defaults | limits)), self.RATE)
+        self.drive = DriverCycle(self.guarded, self, self.anchor, self.RATE)
         self.monitor, self.polled = Monitor(), 0
         self.torques = []
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rsea_ros.control.controller import Reading, Share
+from rsea_ros.control.controller import Measurement, Share
 from rsea_ros.nodes import controller
 from rsea_ros.nodes._commands import CommandQueue
 
@@ -24,7 +24,7 @@ def program(listener, monkeypatch):
     monkeypatch.setattr(controller, "controller_of", lambda values, design, link: stub)
     monkeypatch.setattr(controller, "keep_time", lambda *worker: None)
     values = {parameter.name: parameter.default for parameter in controller.TABLE} | {"rate": 1000.0}
-    made = controller.Controller(listener.node, values | {"ft_limit": 1e3, "error_limit": 1e3})
+    made = controller.ControllerNode(listener.node, values | {"ft_limit": 1e3, "error_limit": 1e3})
     made.sent = []
     made._writer = SimpleNamespace(write=lambda stamp, torques: (stamp, *torques))
     made._commands = SimpleNamespace(publish=made.sent.append)
@@ -39,7 +39,7 @@ def test_a_command_for_a_late_measurement_acts_in_the_next_cycle_all_the_same(pr
         queue.take(cycle + PERIOD // 2)
         acted.append(queue.torque)
         stamp = cycle + (700_000 if k % 10 == 9 else 300_000)
-        program._measured(stamp, Reading(0.0, 0.0, 0.0), 1)
+        program._measured(stamp, Measurement(0.0, 0.0, 0.0), 1)
         at, torque = program.sent[-1]
         queue.add(at, torque, stamp)
     assert acted == [float(k) for k in range(60)]

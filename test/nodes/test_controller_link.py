@@ -9,7 +9,7 @@ import pytest
 from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.spring_encoder import SpringEncoder
-from rsea_ros.control.synthesis import Design
+from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import Plant
@@ -19,7 +19,7 @@ from rsea_ros.nodes._link import link_of, link_values, link_words
 
 RATE = 280.0
 EPOCH, PERIOD = 1_700_000_000_000_000_000, 1e9 / RATE
-DESIGN = Design(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), RATE, {}, math.nan)
+DESIGN = ControllerDesign(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), RATE, {}, math.nan)
 ENCODER = {"deflection": Sensor(noise=5e-6)}
 
 

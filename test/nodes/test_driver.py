@@ -210,7 +210,7 @@ def test_two_actuators_each_follow_only_their_own_commands(listener, monkeypatch
     made, topic = [], {}
     for name in spies:
         node = LifecycleNode("driver", namespace=name)
-        made.append((driver.Driver(node, values | {"joint": f"{name}_knee"}), node))
+        made.append((driver.DriverNode(node, values | {"joint": f"{name}_knee"}), node))
         topic[name] = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
 
     def pushed():

@@ -13,7 +13,7 @@ from rclpy.qos import QoSProfile
 
 from msg_adapters.ros import DiagnosticArray, JointState, Trigger, torque_command_message
 from rsea_ros.hardware.peer.remote import RemoteBench
-from rsea_ros.nodes._alarm import Alarm
+from rsea_ros.nodes._alarm import SignalListener
 from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._publishers import Obeyed
 from rsea_ros.nodes._qos import COMMAND
@@ -171,7 +171,7 @@ def test_a_signal_acts_while_the_main_thread_waits(listener):
     """The handler ran only after the wait, 95 ms later."""
     reacted = threading.Event()
     before = signal.signal(signal.SIGHUP, lambda number, frame: None)
-    alarm = Alarm(reacted.set)
+    alarm = SignalListener(reacted.set)
     sender = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGHUP))
     late = threading.Timer(0.1, lambda: order.append(reacted.wait(20.0)))
     order = []

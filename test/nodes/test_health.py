@@ -10,7 +10,7 @@ from msg_adapters.ros import ERROR, OK, WARN, JointState, WrenchStamped, joint_s
 from rsea_ros.health.codes import NAMES
 from rsea_ros.health.finding import HealthFinding
 from rsea_ros.nodes._findings import FindingsPublisher
-from rsea_ros.nodes._health_inputs import Inputs
+from rsea_ros.nodes._health_inputs import HealthInputs
 from rsea_ros.nodes._kept import Keeper, Ring
 from rsea_ros.nodes._qos import COMMAND
 
@@ -23,7 +23,7 @@ STATE = "sensor_msgs/msg/JointState"
 def heard(listener):
     """Inputs on topics of this process with a ring, and publishers of them."""
     ring = Ring(60.0, 1.0)
-    inputs = Inputs(listener.node, "torque.z", "joint", ring.add)
+    inputs = HealthInputs(listener.node, "torque.z", "joint", ring.add)
     state, command, ft = (
         listener.node.create_publisher(kind, topic, COMMAND)
         for topic, kind in zip(TOPICS, (JointState, JointState, WrenchStamped), strict=True)

@@ -8,7 +8,7 @@ import pytest
 
 from msg_adapters import write_record
 from msg_adapters.ros import DiagnosticArray, Trigger
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -24,7 +24,7 @@ FRICTION = 3.0
 def bag(tmp_path_factory):
     """A run of a bench with Coulomb friction."""
     path = tmp_path_factory.mktemp("run") / "run.mcap"
-    command = excitation("chirp", Settings(rate=RATE, duration=DURATION, seed=4))
+    command = excitation("chirp", ExcitationSettings(rate=RATE, duration=DURATION, seed=4))
     bench = load_rig(RIG).with_effects(EffectSetting("coulomb_friction", {"torque": FRICTION}))
     record = synthesize(bench, Channel(np.arange(len(command)) / RATE, command), seed=5)
     write_record(replace(record, epoch_ns=1_700_000_000_000_000_000), path)

@@ -7,7 +7,7 @@ import pytest
 
 from msg_adapters import iterate, read_record
 from msg_adapters.ros import Clock, JointState, WrenchStamped, stamp_of
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.nodes._qos import COMMAND, RECORD_RELIABLE
@@ -50,7 +50,7 @@ def recorded(bag):
 
 
 def test_the_bag_has_every_command_that_was_planned(recorded):
-    planned = excitation("chirp", Settings(duration=DURATION, seed=7), 0.5)
+    planned = excitation("chirp", ExcitationSettings(duration=DURATION, seed=7), 0.5)
     command = recorded["command"]
     assert np.array_equal(command.y[: len(planned)], planned)
     assert np.all(command.y[len(planned) :] == 0.0) and len(command) > len(planned)

@@ -7,7 +7,7 @@ import pytest
 from msg_adapters.ros import JointState, WrenchStamped, joint_state_message, wrench_message
 from rsea_ros.model.observer import Observer, noise_of
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._model_inputs import Inputs
+from rsea_ros.nodes._model_inputs import ModelInputs
 from rsea_ros.nodes._qos import COMMAND
 
 RIG = load_rig("paper_high_impedance")
@@ -18,7 +18,9 @@ EPOCH, PERIOD = 1_700_000_000_000_000_000, 1e9 / 280.0
 def heard(listener):
     """Inputs on topics of this process, and publishers of them."""
     node = listener.node
-    inputs = Inputs(node, Observer(RIG), 0.02, "torque.z", True, joint="joint", ft_noise=noise_of(RIG).ft)
+    inputs = ModelInputs(
+        node, Observer(RIG), 0.02, "torque.z", True, joint="joint", ft_noise=noise_of(RIG).ft
+    )
     state, ft = (
         node.create_publisher(kind, topic, COMMAND)
         for kind, topic in ((JointState, "joint_states"), (WrenchStamped, "ft"))

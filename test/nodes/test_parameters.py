@@ -12,7 +12,7 @@ import yaml
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.interrupts import STOPPING
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._parameters import NodeParameter
 from test.nodes.conftest import written
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
@@ -20,10 +20,10 @@ NODES = (
     "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
     "replay", "watch",
 )  # fmt: skip
-RATE = Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
-COUNT = Parameter("count", 3, "how many", "", 0, 10)
-KIND = Parameter("kind", "a", "which", choices=("a", "b"))
-FLAG = Parameter("flag", False, "whether")
+RATE = NodeParameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
+COUNT = NodeParameter("count", 3, "how many", "", 0, 10)
+KIND = NodeParameter("kind", "a", "which", choices=("a", "b"))
+FLAG = NodeParameter("flag", False, "whether")
 
 
 @pytest.mark.parametrize(

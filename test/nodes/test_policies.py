@@ -26,6 +26,7 @@ def test_the_committed_policies_are_those_of_the_nodes():
         ("topics", "publish", "/rsea/torque_command", {"controller", "excite", "experiment", "replay"}),
         ("topics", "publish", "/rsea/desired_torque", {"replay"}),
         ("topics", "publish", "/rsea/joint_states", {"driver", "plant", "replay"}),
+        ("topics", "publish", "/rsea/deflection", {"driver", "plant", "replay"}),
         ("services", "request", "/rsea/driver/change_state", {"operator"}),
     ],
 )

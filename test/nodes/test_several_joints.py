@@ -59,7 +59,7 @@ BUS = {"device": "dynamixel_netft", "ft_host": "", "deflection_limit": 0.0, "ft_
 def test_impossible_joints_are_refused(listener, given, told):
     node = LifecycleNode("refused", namespace="refused")
     with pytest.raises(ParameterError, match=told):
-        driver.Driver(node, values_of(**given))
+        driver.DriverNode(node, values_of(**given))
     node.destroy_node()
 
 
@@ -180,7 +180,7 @@ def test_all_torques_are_zero_before_the_first_motor_is_closed(listener, monkeyp
         monkeypatch.setattr(spy, "close", lambda name=name: order.append((name, "closed")))
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"]]})
     node = LifecycleNode("ended", namespace="ended")
-    program = driver.Driver(node, values_of(joints=["hip", "knee"], autostart=True))
+    program = driver.DriverNode(node, values_of(joints=["hip", "knee"], autostart=True))
     program._cycle.stop()
     order.clear()
     program.close()

@@ -14,7 +14,7 @@ import pytest
 from msg_adapters.overlay import write_overlay
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate
@@ -56,7 +56,7 @@ def opened() -> Callable[[str, Path], tuple[str, str]]:
 @pytest.fixture(scope="session")
 def identification() -> Identification:
     rig = load_rig("paper_high_impedance")
-    u = excitation("chirp", Settings(rate=RATE, duration=DURATION))
+    u = excitation("chirp", ExcitationSettings(rate=RATE, duration=DURATION))
     record = synthesize(rig, Channel(np.arange(len(u)) / RATE, u), seed=11)
     simulated, sensors = simulate(rig, record), ("ft", "position", "velocity")
     responses = tuple(estimate_response(record, n) for n in ("ft", "position"))
@@ -102,7 +102,7 @@ class Diagnosed:
 
 @pytest.fixture(scope="session")
 def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
-    command = excitation("chirp", Settings(rate=RATE, duration=SHORT, seed=3))
+    command = excitation("chirp", ExcitationSettings(rate=RATE, duration=SHORT, seed=3))
     bench = load_rig("paper_high_impedance").with_effects(
         EffectSetting("coulomb_friction", {"torque": FRICTION})
     )

@@ -9,7 +9,7 @@ import numpy as np
 from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut
 from rsea_ros.diagnosis.naming.status import Named
 from rsea_ros.diagnosis.naming.weighing import Weighed
-from rsea_ros.diagnosis.result import Alternative, Cause, Estimate, Reason, Rejected
+from rsea_ros.diagnosis.result import Alternative, Cause, CauseParameter, Reason, Rejected
 from rsea_ros.diagnosis.score import Score, gain
 from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import SizeSettings
@@ -74,13 +74,15 @@ def alternative_of(
     )
 
 
-def sizes(effect: str, estimates: Sequence[ParameterEstimate], rule: SizeSettings) -> dict[str, Estimate]:
+def sizes(
+    effect: str, estimates: Sequence[ParameterEstimate], rule: SizeSettings
+) -> dict[str, CauseParameter]:
     """Return the parameters of an effect among estimates, by their names without the effect's."""
     parameters = [p for p in estimates if p.name.startswith(effect + ".")]
     return {p.name.split(".")[1]: with_model_uncertainty(p, rule) for p in parameters}
 
 
-def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings) -> Estimate:
+def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings) -> CauseParameter:
     """Return an estimate whose interval includes errors that no residual shows.
 
     The fit's interval covers noise only. Two right simulations of one bench differ by about `model_error`
@@ -91,7 +93,7 @@ def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings) -> E
     if estimate.unit == "s":
         sd = float(np.hypot(sd, CLOCK_DOUBT))
     low, high = (float(np.hypot(end - value, Z95 * sd)) for end in estimate.ci95)
-    return Estimate(value, estimate.unit, (value - low, value + high), estimate.ci95, sd)
+    return CauseParameter(value, estimate.unit, (value - low, value + high), estimate.ci95, sd)
 
 
 def latest(trials: Sequence[Trial]) -> list[Trial]:

@@ -22,7 +22,7 @@ is named is 100 times as much."""
 
 
 @dataclass(frozen=True)
-class Rows:
+class ContributionRows:
     """The weighted residuals of a model and the contribution of one cause, row by row, shape (m,).
 
     others: derivatives by all unknowns but the cause's, shape (m, n). block: number of a row's block, tests:
@@ -45,7 +45,7 @@ def weighted_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Prob
 
 def rows_of(
     problem: Problem, theta: FloatArray, name: str, rule: BlockSettings, run: Map = serial
-) -> Rows | None:
+) -> ContributionRows | None:
     """Return a model's residuals and the contribution of one cause.
 
     None where a simulation diverges, and for a cause that changes nothing: what its model gains, a better fit
@@ -61,7 +61,7 @@ def rows_of(
         return None
     which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
     block, tests, runs = _blocks_of_rows(problem, rule)
-    return Rows(
+    return ContributionRows(
         contribution=contribution,
         residual=-error,
         others=jacobian_columns(problem, theta, error, which, run),
@@ -89,7 +89,7 @@ def _blocks_of_rows(
     return np.concatenate(blocks), np.concatenate(tests), tuple(runs)
 
 
-def projected(rows: Rows, values: FloatArray) -> FloatArray:
+def projected(rows: ContributionRows, values: FloatArray) -> FloatArray:
     """Return rows of values less their best fit by the other unknowns."""
     a = rows.others
     normal = a.T @ a + np.diag(rows.prior**2)

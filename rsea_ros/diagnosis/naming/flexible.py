@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.naming.contribution import Rows
+from rsea_ros.diagnosis.naming.contribution import ContributionRows
 from rsea_ros.diagnosis.score import gain_of
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
@@ -47,7 +47,7 @@ class Flexible:
     of_cause: float
 
 
-def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flexible | None:
+def flexible(problem: Problem, theta: FloatArray, name: str, rows: ContributionRows) -> Flexible | None:
     """Return the gain of a spline beside a cause; None for a cause without a suitable regressor."""
     responses = _responses(problem, theta, effect_named(name))
     if not responses:
@@ -68,7 +68,7 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flex
     )
 
 
-def _by_block(rows: Rows, values: FloatArray) -> FloatArray:
+def _by_block(rows: ContributionRows, values: FloatArray) -> FloatArray:
     """Return the power of values in each test block."""
     power = np.bincount(rows.block, values**2 * rows.tests)
     return np.asarray(power[np.bincount(rows.block, rows.tests) > 0], np.float64)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.diagnosis.naming.contribution import Rows, projected
+from rsea_ros.diagnosis.naming.contribution import ContributionRows, projected
 from rsea_ros.diagnosis.settings import DEFAULT, EvidenceSettings
 from rsea_ros.signals import FloatArray, IntArray
 
@@ -47,7 +47,7 @@ class Signature:
     kept: float
 
 
-def signature(rows: Rows, rule: EvidenceSettings = DEFAULT.evidence) -> Signature:
+def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence) -> Signature:
     """Return the signature of a cause."""
     c, r = (projected(rows, v) for v in (rows.contribution, rows.residual))
     cc, cr = c * c, c * r
@@ -90,7 +90,7 @@ def _parts_by(values: FloatArray, cc: FloatArray, parts: int) -> IntArray:
     return part
 
 
-def _by_chance(rows: Rows, c: FloatArray, r: FloatArray) -> float:
+def _by_chance(rows: ContributionRows, c: FloatArray, r: FloatArray) -> float:
     """Return the spread over blocks for a contribution that is shifted in time, RMS of several shifts."""
     spreads = []
     for k in range(1, _SHIFTS + 1):
@@ -99,7 +99,7 @@ def _by_chance(rows: Rows, c: FloatArray, r: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.square(spreads))))
 
 
-def _over_frequency(rows: Rows, c: FloatArray, r: FloatArray, bands: int) -> float:
+def _over_frequency(rows: ContributionRows, c: FloatArray, r: FloatArray, bands: int) -> float:
     """Return the spread of the complex lambda over frequency bands of equal ratio."""
     cc, cr = np.zeros(bands), np.zeros(bands, complex)
     for run in rows.runs:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
 from rsea_ros.diagnosis.naming.evidence import Evidence
 from rsea_ros.diagnosis.naming.probability import probability
-from rsea_ros.diagnosis.naming.weighing import Place, Weighed
+from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, Weighed
 from rsea_ros.diagnosis.result import Status
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, NamingSettings
 
@@ -30,7 +30,7 @@ class Named:
 
 
 def named(
-    places: Sequence[Place],
+    places: Sequence[CauseAndRivals],
     at_floor: bool,
     takes_most: bool,
     settings: DiagnosisSettings = DEFAULT,
@@ -42,7 +42,7 @@ def named(
     return [_named(p, at_floor, takes_most and not p.is_late, settings) for p in places]
 
 
-def _named(place: Place, at_floor: bool, takes_most: bool, settings: DiagnosisSettings) -> Named:
+def _named(place: CauseAndRivals, at_floor: bool, takes_most: bool, settings: DiagnosisSettings) -> Named:
     every = [place.cause, *place.rivals]
     likely, status = probabilities_and_status([w.evidence for w in every], at_floor, takes_most, settings)
     others = zip(every[1:], likely[1:], strict=True)

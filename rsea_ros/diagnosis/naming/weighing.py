@@ -31,7 +31,7 @@ class Weighed:
 
 
 @dataclass(frozen=True)
-class Place:
+class CauseAndRivals:
     """A cause and its rivals, each with its evidence. is_late: the steps of the search had left it out."""
 
     cause: Weighed
@@ -45,7 +45,7 @@ class Weighing:
 
     selection: Selection
     stages: list[Evaluated]
-    places: list[Place]
+    places: list[CauseAndRivals]
 
 
 def weigh(
@@ -68,7 +68,7 @@ def weigh(
         return tuple(Weighed(c, e) for c in group if (e := evidence_by_claim[id(c)]) is not None)
 
     places = [
-        Place(cause[0], with_evidence(contest.rivals), is_late=k >= accepted)
+        CauseAndRivals(cause[0], with_evidence(contest.rivals), is_late=k >= accepted)
         for k, contest in enumerate(contested, start=1)
         if (cause := with_evidence([contest.cause]))
     ]

@@ -11,7 +11,7 @@ from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS
 
 from rsea_ros.hardware.device import NoReply, Refused
 from rsea_ros.hardware.dynamixel.handler import PacketHandler
-from rsea_ros.hardware.dynamixel.port import Port
+from rsea_ros.hardware.dynamixel.port import SerialPort
 from rsea_ros.hardware.dynamixel.tables import Item
 
 T = TypeVar("T")
@@ -27,10 +27,10 @@ REFUSALS = {
 class Bus:
     """One motor on a port. alert: bit 7 of the last error byte. errors: failed transactions by kind.
 
-    latency, return_delay: see Port; of this motor's transactions, also where others use the port.
+    latency, return_delay: see SerialPort; of this motor's transactions, also where others use the port.
     """
 
-    def __init__(self, port: Port, identity: int) -> None:
+    def __init__(self, port: SerialPort, identity: int) -> None:
         self.port, self._id = port, identity
         self.latency, self.return_delay = port.latency, port.return_delay
         self.handler = PacketHandler()

@@ -17,8 +17,8 @@ from dynamixel_sdk import (
 )
 
 from rsea_ros.hardware.dynamixel.frames import LONGEST, OVERHEAD, crc16, frame, stuffed, unstuffed
-from rsea_ros.hardware.dynamixel.port import Port
-from rsea_ros.hardware.dynamixel.receiver import Receiver
+from rsea_ros.hardware.dynamixel.port import SerialPort
+from rsea_ros.hardware.dynamixel.receiver import StatusFrameParser
 
 EMPTY = 11
 """Bytes of a status packet without parameters."""
@@ -34,7 +34,7 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
     """
 
     def __init__(self) -> None:
-        self.receiver = Receiver()
+        self.receiver = StatusFrameParser()
         self.stale = self.acknowledged = 0
         self.expected: int | None = None
         self.meanwhile: Callable[[], None] | None = None
@@ -58,7 +58,7 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
             raise ValueError(f"packet {bytes(packet).hex(' ')}: FF FF FD inside, expected FF FF FD FD")
         return _with_payload(packet, plain)
 
-    def txPacket(self, port: Port, txpacket: Sequence[int]) -> int:
+    def txPacket(self, port: SerialPort, txpacket: Sequence[int]) -> int:
         """Stuff, sign and send a packet; earlier input is discarded. Raises PortLost."""
         data = frame(txpacket[4], _payload(txpacket))
         if len(data) > LONGEST:
@@ -69,7 +69,7 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
         sent = port.writePort(data)
         return int(COMM_SUCCESS if sent == len(data) else COMM_TX_FAIL)
 
-    def rxPacket(self, port: Port, fast_option: bool) -> tuple[bytes, int]:
+    def rxPacket(self, port: SerialPort, fast_option: bool) -> tuple[bytes, int]:
         """Wait for the next status packet until the port's time is over. Raises PortLost."""
         rejected = self.receiver.rejected.total()
         meanwhile, self.meanwhile = self.meanwhile, None

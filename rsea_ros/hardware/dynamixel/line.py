@@ -14,8 +14,8 @@ from typing import NamedTuple
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, PortLost
 from rsea_ros.hardware.dynamixel.frames import frame
-from rsea_ros.hardware.dynamixel.port import Port
-from rsea_ros.hardware.dynamixel.receiver import BROADCAST, Receiver
+from rsea_ros.hardware.dynamixel.port import SerialPort
+from rsea_ros.hardware.dynamixel.receiver import BROADCAST, StatusFrameParser
 from rsea_ros.hardware.dynamixel.tables import ControlTable
 
 SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
@@ -23,7 +23,7 @@ EMPTY = 11
 """Bytes of a status packet without parameters."""
 
 
-class Answer(NamedTuple):
+class StatusReply(NamedTuple):
     """Error byte, data of the table's sample, middle of the transaction (monotonic ns)."""
 
     error: int
@@ -39,13 +39,13 @@ class Line:
     """
 
     def __init__(self, path: str, baud: int, latency: float, *, fast: bool = False) -> None:
-        self.port = Port(path, baud, latency)
-        self._latency, self._fast, self._receiver = latency, fast, Receiver()
+        self.port = SerialPort(path, baud, latency)
+        self._latency, self._fast, self._receiver = latency, fast, StatusFrameParser()
         self._joined: dict[int, Callable[[], None]] = {}
         self._delays: dict[int, float] = {}
         self._table: ControlTable | None = None
         self._goals: dict[int, int] = {}
-        self._answers: dict[int, Answer | PortLost | None] = {}
+        self._answers: dict[int, StatusReply | PortLost | None] = {}
         self._silent, self._last = False, list[int]()
         self._longer = 0
 
@@ -100,7 +100,7 @@ class Line:
         """Whether the last exchange has read a motor and its answer has not been taken yet."""
         return identity in self._answers
 
-    def answer(self, identity: int) -> Answer:
+    def answer(self, identity: int) -> StatusReply:
         """Return the reply of a motor in the last exchange, once. Raises NoReply, PortLost."""
         answer = self._answers.pop(identity)
         if answer is None:
@@ -121,7 +121,7 @@ class Line:
             body += bytes((identity, *goal.data(counts)))
         self.port.writePort(frame(BROADCAST, body))
 
-    def _read(self, order: list[int]) -> dict[int, Answer | PortLost | None]:
+    def _read(self, order: list[int]) -> dict[int, StatusReply | PortLost | None]:
         """Return the answer of each motor, None of one that has none."""
         start, size = self._known.sample
         size += self._longer
@@ -141,7 +141,7 @@ class Line:
         if silent:
             self._last = [each for each in self._last if each != silent[0]] + silent[:1]
             self._longer ^= 1  # a reply that comes late has another size than the next one
-        return {each: Answer(*heard[each], instant) if each in heard else None for each in order}
+        return {each: StatusReply(*heard[each], instant) if each in heard else None for each in order}
 
     def _heard(self, order: list[int], size: int, *, fast: bool) -> dict[int, tuple[int, bytes]]:
         heard: dict[int, tuple[int, bytes]] = {}

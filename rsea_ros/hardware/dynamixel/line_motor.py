@@ -9,14 +9,14 @@ from rsea_ros.hardware.device import PortLost
 from rsea_ros.hardware.dynamixel.bus import ALERT
 from rsea_ros.hardware.dynamixel.line import Line
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.sample import Sample
-from rsea_ros.hardware.dynamixel.settings import Settings
+from rsea_ros.hardware.dynamixel.sample import MotorSample
+from rsea_ros.hardware.dynamixel.settings import MotorConnection
 
 
 class LineMotor(Motor):
     """As Motor. The exchange comes between `write` and `read`; without one `read` asks the motor alone."""
 
-    def __init__(self, settings: Settings, line: Line) -> None:
+    def __init__(self, settings: MotorConnection, line: Line) -> None:
         super().__init__(settings, line.port)
         self._line, self._id = line, settings.identity
 
@@ -26,7 +26,7 @@ class LineMotor(Motor):
         super().open()
         self._line.admit(self._id, self.known, self.bus.return_delay)
 
-    def read(self, meanwhile: Callable[[], None] | None = None) -> Sample:
+    def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
         """Return the reading of the exchange, or a separate one. Raises NoReply, PortLost, Refused."""
         if not self._line.asked(self._id):
             return super().read(meanwhile)

@@ -11,9 +11,9 @@ from rsea_ros.hardware.device import NoReply, PortLost
 from rsea_ros.hardware.dynamixel.bus import Bus
 from rsea_ros.hardware.dynamixel.frames import frame
 from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, own_limits
-from rsea_ros.hardware.dynamixel.port import Port
-from rsea_ros.hardware.dynamixel.sample import Sample, sample_of
-from rsea_ros.hardware.dynamixel.settings import Settings
+from rsea_ros.hardware.dynamixel.port import SerialPort
+from rsea_ros.hardware.dynamixel.sample import MotorSample, sample_of
+from rsea_ros.hardware.dynamixel.settings import MotorConnection
 from rsea_ros.hardware.dynamixel.tables import TABLES, ControlTable, TorqueConstant, error_names
 from rsea_ros.hardware.dynamixel.watchlist import Watchlist
 from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection, Supervised
@@ -33,9 +33,9 @@ class Motor:
     acknowledged_late: whether the reply to a write that raised NoReply arrived during the last reading.
     """
 
-    def __init__(self, settings: Settings, port: Port | None = None) -> None:
+    def __init__(self, settings: MotorConnection, port: SerialPort | None = None) -> None:
         self._settings, self._shared = settings, port is not None
-        self.port = port or Port(settings.path, settings.baud, settings.latency)
+        self.port = port or SerialPort(settings.path, settings.baud, settings.latency)
         self.bus = Bus(self.port, settings.identity)
         self.protection: Protection | Supervised = Supervised(settings.watchdog, settings.supervisor)
         self._watchlist = Watchlist(self.bus)
@@ -103,7 +103,7 @@ class Motor:
         if self.table is not None:
             self._stop()
 
-    def read(self, meanwhile: Callable[[], None] | None = None) -> Sample:
+    def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
         """Read all measurements once. Raises NoReply, PortLost, Refused.
 
         meanwhile: done while the reply is on its way.
@@ -127,7 +127,7 @@ class Motor:
         instant = (begin + time.monotonic_ns()) // 2
         return self.sample(data, instant)
 
-    def sample(self, data: bytes, instant: int) -> Sample:
+    def sample(self, data: bytes, instant: int) -> MotorSample:
         """Return the reading with the motor's errors; watched registers are checked here in turn."""
         table = self.known
         error = error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
@@ -218,7 +218,7 @@ def stop_frames(table: ControlTable, identity: int) -> list[bytes]:
     ]
 
 
-def _table(model: int, settings: Settings) -> ControlTable:
+def _table(model: int, settings: MotorConnection) -> ControlTable:
     """Return the control table of a model number. Raises DeviceError for one that is not expected."""
     where = f"motor ID {settings.identity} on {settings.path}"
     if model not in TABLES:
@@ -228,7 +228,7 @@ def _table(model: int, settings: Settings) -> ControlTable:
     return TABLES[model]
 
 
-def _constant(table: ControlTable, settings: Settings) -> TorqueConstant:
+def _constant(table: ControlTable, settings: MotorConnection) -> TorqueConstant:
     """Return the torque constant that is set, else the table's. Raises ParameterError without either."""
     if settings.torque_constant:
         given = settings.torque_constant

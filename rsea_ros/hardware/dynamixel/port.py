@@ -40,7 +40,7 @@ class Turns:
             self._used.release()
 
 
-class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
+class SerialPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     """PortHandler of the SDK with a blocking wait and a time-out from baud rate, size and return delay.
 
     latency: allowance for USB adapter and scheduler beside the time on the wire, s.

@@ -15,7 +15,7 @@ ERROR_CODES = frozenset(range(8))
 """Of the error byte, the bits below the alert."""
 
 
-class Receiver:
+class StatusFrameParser:
     """Take bytes as they come and give out each whole, intact status frame once, unstuffed.
 
     rejected: how many frames were not, by kind: `crc`, `stuffing`, `length`, `instruction`.

@@ -9,7 +9,7 @@ from rsea_ros.hardware.dynamixel.tables import ControlTable
 
 
 @dataclass(frozen=True)
-class Sample:
+class MotorSample:
     """instant: middle of the transaction, monotonic ns. counts: of the encoder. position rad, velocity rad/s,
     current A, voltage V, temperature °C.
 
@@ -29,11 +29,11 @@ class Sample:
 
 def sample_of(
     table: ControlTable, data: bytes, instant: int, hardware_error: str = "", trouble: str = ""
-) -> Sample:
+) -> MotorSample:
     """Return the measurements in the bytes of `table.sample`; further bytes are ignored."""
     start = table.sample[0]
     counts = table.position.value(data, start)
-    return Sample(
+    return MotorSample(
         instant=instant,
         counts=counts,
         position=counts * 2.0 * math.pi / table.pulses,

@@ -9,7 +9,7 @@ SHARE, REST = 0.4, 1e-4
 
 
 @dataclass(frozen=True)
-class Settings:
+class MotorConnection:
     """Connection and model of the motor.
 
     baud: bit/s. model: number that is expected, 0 for any known. torque_constant: N m at the gear output

@@ -36,7 +36,7 @@ class Arrival(NamedTuple):
     instant: int
 
 
-class Receiver:
+class DatagramReceiver:
     """Request the stream of a sensor and keep its records.
 
     sequence: counts of received and lost records. refused: datagrams that were not records.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import Wrench
 from rsea_ros.hardware.netft.calibration import Calibration, fetch
-from rsea_ros.hardware.netft.receiver import Arrival, Receiver
+from rsea_ros.hardware.netft.receiver import Arrival, DatagramReceiver
 from rsea_ros.hardware.netft.records import SET_BIAS, trouble
 
 SETTLE, FIRST = 0.1, 3.0
@@ -28,7 +28,7 @@ Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Settings:
+class SensorConnection:
     """host, UDP port of RDT, TCP port of the web page; timeout: s without a record that are a fault."""
 
     host: str
@@ -38,12 +38,12 @@ class Settings:
 JUMPS = {"restarted": "the sensor was restarted", "frozen": "ft_sequence stands still"}
 
 
-class Sensor:
+class ForceTorqueSensor:
     """One sensor. noise: standard deviation of each axis at rest, N and N m."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: SensorConnection) -> None:
         self._settings = settings
-        self._receiver = Receiver(settings.host, settings.port)
+        self._receiver = DatagramReceiver(settings.host, settings.port)
         self._calibration = Calibration(1.0, 1.0)
         self.noise: Wrench = (0.0,) * 6
         self._quiet = 0

@@ -11,8 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import KEPT, LENGTH, UNKNOWN, Motor
-from rsea_ros.hardware.peer.protocol2 import Listener, Request, checksum, status
+from rsea_ros.hardware.peer.motor import KEPT, LENGTH, UNKNOWN, EmulatedMotor
+from rsea_ros.hardware.peer.protocol2 import Request, RequestParser, checksum, status
 from rsea_ros.locked_folder import PREFIX
 
 EVERYONE = 254
@@ -24,7 +24,7 @@ BOOT_TIME = 300_000_000
 """ns without an answer after a reboot."""
 
 
-class Bus:
+class EmulatedBus:
     """A line with motors on it, at `path` (a link to the terminal).
 
     sent: data of every reply with measurements that was sent whole, as (clock in ns, address, bytes), the
@@ -32,10 +32,10 @@ class Bus:
     """
 
     def __init__(
-        self, path: Path, motors: Sequence[Motor], misbehaviour: Misbehaviour, kept: int = KEPT
+        self, path: Path, motors: Sequence[EmulatedMotor], misbehaviour: Misbehaviour, kept: int = KEPT
     ) -> None:
         self._path, self._motors, self._wrong = path, motors, misbehaviour
-        self._listener = Listener()
+        self._listener = RequestParser()
         self._waiting: list[tuple[int, bytes]] = []
         self._busy_until = [0] * len(motors)
         self.sent: deque[tuple[int, int, bytes]] = deque(maxlen=kept)
@@ -104,24 +104,24 @@ class Bus:
                 elif request.identity != EVERYONE:
                     self._reply(now, motor, UNKNOWN)
 
-    def _awake(self, now: int) -> list[Motor]:
+    def _awake(self, now: int) -> list[EmulatedMotor]:
         """Return the motors that are not booting."""
         return [motor for motor, end in zip(self._motors, self._busy_until, strict=True) if now >= end]
 
-    def _named(self, now: int, identity: int) -> Motor | None:
+    def _named(self, now: int, identity: int) -> EmulatedMotor | None:
         return next((motor for motor in self._awake(now) if motor.get("id") == identity), None)
 
-    def _ping(self, now: int, motor: Motor, request: Request) -> None:
+    def _ping(self, now: int, motor: EmulatedMotor, request: Request) -> None:
         self._reply(now, motor, 0, bytes(motor.memory[0:2] + motor.memory[6:7]))
 
-    def _read(self, now: int, motor: Motor, request: Request) -> None:
+    def _read(self, now: int, motor: EmulatedMotor, request: Request) -> None:
         if len(request.parameters) != 4:
             return self._reply(now, motor, LENGTH)
         address, length = _pair(request.parameters)
         error, data = motor.read(now, address, length)
         self._reply(now, motor, error, data, address)
 
-    def _write(self, now: int, motor: Motor, request: Request) -> None:
+    def _write(self, now: int, motor: EmulatedMotor, request: Request) -> None:
         if len(request.parameters) < 3:
             return self._reply(now, motor, LENGTH)
         address = int.from_bytes(request.parameters[:2], "little")
@@ -129,7 +129,7 @@ class Bus:
         if request.identity != EVERYONE and motor.get("status_level") == 2:
             self._reply(now, motor, error)
 
-    def _reboot(self, now: int, motor: Motor, request: Request) -> None:
+    def _reboot(self, now: int, motor: EmulatedMotor, request: Request) -> None:
         self._reply(now, motor, 0)
         self._busy_until[self._motors.index(motor)] = now + BOOT_TIME
         motor.reboot(now)
@@ -162,7 +162,7 @@ class Bus:
         if fast and len(parts) == len(wanted):
             self._joint(now, parts)
 
-    def _joint(self, now: int, parts: Sequence[tuple[Motor, int, bytes]]) -> None:
+    def _joint(self, now: int, parts: Sequence[tuple[EmulatedMotor, int, bytes]]) -> None:
         """Send the joint reply: error, ID, data and the CRC of all before it, of each motor."""
         size = 1 + sum(len(part) + 2 for _, _, part in parts)
         packet = bytes((0xFF, 0xFF, 0xFD, 0, EVERYONE, size & 255, size >> 8, 0x55))
@@ -181,12 +181,14 @@ class Bus:
             if motor is not None:
                 motor.write(now, address, items[at + 1 : at + 1 + length])
 
-    def _reply(self, now: int, motor: Motor, error: int, data: bytes = b"", address: int = -1) -> None:
+    def _reply(
+        self, now: int, motor: EmulatedMotor, error: int, data: bytes = b"", address: int = -1
+    ) -> None:
         escaped = not self._wrong.happens("unstuffed")
         packet = status(motor.get("id"), _error(motor, error), data, escaped=escaped)
         self._send(now, motor, packet, address, data)
 
-    def _send(self, now: int, motor: Motor, packet: bytes, address: int, data: bytes) -> None:
+    def _send(self, now: int, motor: EmulatedMotor, packet: bytes, address: int, data: bytes) -> None:
         packet = self._wrong.damaged(packet)
         when = now + motor.get("return_delay") * RETURN_DELAY_UNIT
         if self._wrong.happens("delay"):
@@ -197,7 +199,7 @@ class Bus:
             self.sent.append((now, address, data))
 
 
-def _error(motor: Motor, error: int) -> int:
+def _error(motor: EmulatedMotor, error: int) -> int:
     return error | (0x80 if motor.alert else 0)
 
 

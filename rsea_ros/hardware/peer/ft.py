@@ -8,7 +8,7 @@ from collections import deque
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import Plant
+from rsea_ros.hardware.peer.motor import Mechanism
 
 RECORDS = 500_000
 """Records of the log, where somebody watches: a minute at 7 kHz."""
@@ -25,7 +25,7 @@ PAGE = f"""<?xml version="1.0"?>
 class ForceSensor:
     """Streams records at `rate` (Hz) to the last client that asked. gone: records that were left out."""
 
-    def __init__(self, plant: Plant, rate: float, wrong: Misbehaviour, host: str = "127.0.0.1") -> None:
+    def __init__(self, plant: Mechanism, rate: float, wrong: Misbehaviour, host: str = "127.0.0.1") -> None:
         self._plant, self._wrong = plant, wrong
         self._period = round(1e9 / rate)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -111,7 +111,7 @@ class ForceSensor:
                 self._client = None
 
 
-def _counts(plant: Plant) -> list[int]:
+def _counts(plant: Mechanism) -> list[int]:
     wrench = plant.read().wrench or (0.0,) * 6
     force = [round(value * COUNTS_PER_NEWTON) for value in wrench[:3]]
     return force + [round(value * 1e3 * COUNTS_PER_NEWTON_MILLIMETRE) for value in wrench[3:]]

@@ -19,7 +19,7 @@ KEPT = 60_000
 """Entries of each log: a minute at 1 kHz. A bench that runs for days does not grow."""
 
 
-class Plant(Protocol):
+class Mechanism(Protocol):
     """The mechanics: advance to now and measure; hold a torque (N m) from now on."""
 
     def read(self) -> State:
@@ -29,14 +29,19 @@ class Plant(Protocol):
         """Hold a torque."""
 
 
-class Motor:
+class EmulatedMotor:
     """One motor. torque_constant: N m at the output per A, 0: its model's. origin: counts at 0 rad.
 
     history: every write to it, as (clock in ns, goal in counts, whether torque is on), the newest `kept`.
     """
 
     def __init__(
-        self, number: int, plant: Plant, torque_constant: float = 0.0, origin: int = 1234, kept: int = KEPT
+        self,
+        number: int,
+        plant: Mechanism,
+        torque_constant: float = 0.0,
+        origin: int = 1234,
+        kept: int = KEPT,
     ) -> None:
         self.model, self._plant = MODELS[number], plant
         self._constant, self._origin = torque_constant or self.model.constant, origin

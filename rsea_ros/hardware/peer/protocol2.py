@@ -75,7 +75,7 @@ def _packet(identity: int, payload: bytes) -> bytes:
     return packet + bytes((remainder & 255, remainder >> 8))
 
 
-class Listener:
+class RequestParser:
     """Collects bytes into requests."""
 
     def __init__(self) -> None:

@@ -22,7 +22,7 @@ class Register:
 
 
 @dataclass(frozen=True)
-class Model:
+class MotorModel:
     """A motor: its number, its items by name, and the value of a count in A, rad/s and rad.
 
     constant: N m at the output per A, as this motor has it.
@@ -121,16 +121,16 @@ _V12, _V24 = (95, 160, 120), (110, 300, 240)
 """Lowest, highest and present voltage, 0.1 V."""
 
 
-def _models() -> dict[int, Model]:
+def _models() -> dict[int, MotorModel]:
     """Return every motor of the X and P series and the Pro, with the constant that a count is worth."""
-    made = {54024: Model(54024, _PRO, 33.0 / 2048.0, 0.00199234 * _RPM, 501_923)}
+    made = {54024: MotorModel(54024, _PRO, 33.0 / 2048.0, 0.00199234 * _RPM, 501_923)}
     for number, turn, constant in (
         (2000, 607_500, 9.143), (2010, 1_003_846, 6.424), (2020, 1_003_846, 6.826), (2100, 526_374, 2.8),
         (2110, 502_834, 6.724), (2120, 502_834, 5.771), (43289, 526_374, 2.8), (46097, 502_834, 6.724),
         (46353, 502_834, 5.771), (51201, 607_500, 9.143), (53769, 1_003_846, 6.424),
         (54025, 1_003_846, 6.826),
     ):  # fmt: skip
-        made[number] = Model(number, _PRO_A, 1e-3, 0.01 * _RPM, turn, constant)
+        made[number] = MotorModel(number, _PRO_A, 1e-3, 0.01 * _RPM, turn, constant)
     for number, unit, current, voltage, constant in (
         (1000, 2.69e-3, 648, _V12, 2.615), (1010, 2.69e-3, 648, _V12, 1.923),
         (1020, 2.69e-3, 1193, _V12, 1.783), (1030, 2.69e-3, 1193, _V12, 1.304),
@@ -140,7 +140,7 @@ def _models() -> dict[int, Model]:
         (1140, 2.69e-3, 2047, _V24, 3.833), (1150, 2.69e-3, 2047, _V24, 2.667),
         (1170, 2.69e-3, 2047, _V12, 1.939), (1180, 2.69e-3, 2047, _V12, 1.408),
     ):  # fmt: skip
-        made[number] = Model(number, _x(current, voltage), unit, 0.229 * _RPM, 4096, constant)
+        made[number] = MotorModel(number, _x(current, voltage), unit, 0.229 * _RPM, 4096, constant)
     return made
 
 

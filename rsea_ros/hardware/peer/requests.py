@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
-from rsea_ros.hardware.peer.bus import Bus
+from rsea_ros.hardware.peer.bus import EmulatedBus
 from rsea_ros.hardware.peer.ft import SATURATED, ForceSensor
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import KEPT, Motor
+from rsea_ros.hardware.peer.motor import KEPT, EmulatedMotor
 
 Request = Mapping[str, Any]
 LOWEST_VOLTAGE, VOLTAGE_ERROR = 18.0, 1
@@ -31,8 +31,8 @@ class LineRequests:
 
     def __init__(
         self,
-        motors: Sequence[Motor],
-        bus: Bus,
+        motors: Sequence[EmulatedMotor],
+        bus: EmulatedBus,
         sensor: ForceSensor,
         wrong: Misbehaviour,
         inlet: int,

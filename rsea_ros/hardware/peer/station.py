@@ -8,9 +8,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from rsea_ros.hardware.peer.bus import Bus
+from rsea_ros.hardware.peer.bus import EmulatedBus
 from rsea_ros.hardware.peer.ft import ForceSensor
-from rsea_ros.hardware.peer.motor import Motor, Plant
+from rsea_ros.hardware.peer.motor import EmulatedMotor, Mechanism
 
 STILL = 10_000_000
 """ns between two turns from which on the bench itself was held up: it turns at least every TICK."""
@@ -37,9 +37,9 @@ class Station:
 
     def __init__(
         self,
-        plants: Sequence[Plant],
-        motors: Sequence[Motor],
-        bus: Bus,
+        plants: Sequence[Mechanism],
+        motors: Sequence[EmulatedMotor],
+        bus: EmulatedBus,
         sensor: ForceSensor,
         requests: Requests,
     ) -> None:

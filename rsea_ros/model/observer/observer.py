@@ -22,7 +22,7 @@ GAP = 1.0
 """s. A larger jump of the stamps, in either direction, restarts the observer."""
 
 
-class Estimate(NamedTuple):
+class TorqueEstimate(NamedTuple):
     """Torques on the two ends and the disturbance on the gear, N m, and one sigma of each."""
 
     distal: float
@@ -71,11 +71,11 @@ class Observer:
         """Add a command (N m) that takes effect at its stamp, which may be ahead of the measurements."""
         self._take(t, COMMAND, torque, 0.0)
 
-    def state(self, t: float, position: float, motor_torque: float = math.nan) -> Estimate | None:
+    def state(self, t: float, position: float, motor_torque: float = math.nan) -> TorqueEstimate | None:
         """Add position (rad) and motor torque (N m, nan if missing); return None for a sample too late."""
         return self._take(t, STATE, position, motor_torque)
 
-    def ft(self, t: float, torque: float) -> Estimate | None:
+    def ft(self, t: float, torque: float) -> TorqueEstimate | None:
         """Add a torque of the F/T sensor (N m); return None for a sample that is too late."""
         return self._take(t, FT, torque, 0.0)
 
@@ -114,7 +114,7 @@ class Observer:
         self._score, self._newest = np.zeros((3, 3)), math.nan
         self.restarts += 1
 
-    def _take(self, t: float, kind: int, a: float, b: float) -> Estimate | None:
+    def _take(self, t: float, kind: int, a: float, b: float) -> TorqueEstimate | None:
         if abs(t - self._newest) > GAP:
             self._begin()
         if kind == COMMAND:
@@ -124,7 +124,7 @@ class Observer:
         has_estimate = receive(
             self._handle, self._rest, self._reads_load, self._hold, t, kind, a, b, self._estimate
         )
-        return Estimate._make(self._estimate.tolist()) if has_estimate else None
+        return TorqueEstimate._make(self._estimate.tolist()) if has_estimate else None
 
 
 def observe(observer: Observer, record: Record) -> tuple[FloatArray, FloatArray]:

@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.control.large_signal import Reach
 from rsea_ros.control.margins import Margins
 from rsea_ros.control.study import AtRate, Study
-from rsea_ros.control.trials import Compensated, Trial
+from rsea_ros.control.trials import Compensated, TrialResult
 from rsea_ros.report.json_values import finite, numbers
 
 
@@ -70,7 +70,7 @@ def _margins(margins: Margins) -> dict[str, float | None]:
     return numbers(asdict(margins))
 
 
-def _trial(t: Trial) -> dict[str, Any]:
+def _trial(t: TrialResult) -> dict[str, Any]:
     return {
         "what": t.what,
         "value": finite(t.value),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from rsea_ros.control.large_signal import Reach
 from rsea_ros.control.study import Study
-from rsea_ros.control.trials import Trial
+from rsea_ros.control.trials import TrialResult
 from rsea_ros.report import words
 from rsea_ros.report.page.html import section
 from rsea_ros.report.page.table import table
@@ -30,7 +30,7 @@ def trial_head(study: Study) -> list[str]:
     return ["trial", "asked", *(f"{at.design.rate:g} Hz" for at in study.rates)]
 
 
-def asked(trial: Trial) -> str:
+def asked(trial: TrialResult) -> str:
     """Return the demand in words."""
     limits = [words.number(limit, 3) for limit in (trial.asked, trial.allowed) if limit is not None]
     if not limits:
@@ -39,7 +39,7 @@ def asked(trial: Trial) -> str:
     return f"{_SIGNS[trial.least]} {limits[0]}{worst} {_unit(trial.unit)}".strip()
 
 
-def value(trial: Trial) -> str:
+def value(trial: TrialResult) -> str:
     """Return the value with its unit and that of the worst case, and `missed` in front of one that
     misses its demand."""
     missed = "missed: " if trial.met is False else ""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from rsea_ros.design.by_train import WithTrain, by_train
-from rsea_ros.design.judge import Design, stiffness_bounds
+from rsea_ros.design.judge import SpringDesign, stiffness_bounds
 from rsea_ros.design.margins import margins
 from rsea_ros.report.json_values import finite
 
 
-def design_json(asked: Design, least: Design, robust: Design | None) -> dict[str, Any]:
+def design_json(asked: SpringDesign, least: SpringDesign, robust: SpringDesign | None) -> dict[str, Any]:
     """Return the result file. Angles in rad; null where a design cannot carry the torque."""
     r = asked.requirement
     return {
@@ -26,7 +26,7 @@ def design_json(asked: Design, least: Design, robust: Design | None) -> dict[str
     }
 
 
-def _design(d: Design) -> dict[str, Any]:
+def _design(d: SpringDesign) -> dict[str, Any]:
     return {
         "stiffness": d.stiffness,
         "spring_rate": d.rate,

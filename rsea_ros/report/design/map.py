@@ -16,7 +16,7 @@ _TOP = 2e4
 
 
 @dataclass(frozen=True)
-class Demand:
+class LeastStiffness:
     """The least K_s (N m/rad) for a demand, at each inertia of the chassis (kg m^2)."""
 
     name: str
@@ -25,7 +25,9 @@ class Demand:
     stiffness: FloatArray
 
 
-def feasible_map(title: str, points: Sequence[Point], demands: Sequence[Demand], caption: str = "") -> Figure:
+def feasible_map(
+    title: str, points: Sequence[Point], demands: Sequence[LeastStiffness], caption: str = ""
+) -> Figure:
     """Return the plane of inertia and stiffness: above every line a design meets that demand."""
     inertia = demands[0].inertia
     least = np.max([d.stiffness for d in demands], axis=0)

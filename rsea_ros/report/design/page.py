@@ -10,12 +10,12 @@ from html import escape
 import numpy as np
 
 from rsea_ros.design.by_train import by_train
-from rsea_ros.design.judge import Design, least_for_band, rig_of, stiffness_bounds
+from rsea_ros.design.judge import SpringDesign, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, undamped_stiffness
 from rsea_ros.model.response import frequency_response
 from rsea_ros.report import words
-from rsea_ros.report.design.map import Demand, feasible_map
+from rsea_ros.report.design.map import LeastStiffness, feasible_map
 from rsea_ros.report.design.surface import Point, bandwidth_surface
 from rsea_ros.report.design.tables import (
     checks_table,
@@ -33,7 +33,7 @@ from rsea_ros.signals import FloatArray
 _COLOURS = (BEFORE, AFTER, TRUTH)
 
 
-def design_report(asked: Design, least: Design, robust: Design | None) -> str:
+def design_report(asked: SpringDesign, least: SpringDesign, robust: SpringDesign | None) -> str:
     """Return the page. asked: the stiffness judged; least: meets all demands; robust: under tolerance too."""
     designs = [asked, least, *([robust] if robust else [])]
     blocks: list[Block] = [
@@ -50,7 +50,7 @@ def design_report(asked: Design, least: Design, robust: Design | None) -> str:
     return page(verdict(asked), _kicker(asked), blocks, _footer(asked))
 
 
-def verdict(d: Design) -> str:
+def verdict(d: SpringDesign) -> str:
     """Return in a sentence which demands the design meets."""
     unmet = [c for c in d.checks if not c.met]
     what = f"{d.stiffness:.0f} N·m/rad"
@@ -61,7 +61,7 @@ def verdict(d: Design) -> str:
     return f"{band}, but miss {len(unmet)} of {len(d.checks)} demands"
 
 
-def _kicker(d: Design) -> str:
+def _kicker(d: SpringDesign) -> str:
     r = d.requirement
     return (
         f"Design for {r.torque:g} N·m, {r.bandwidth:g} Hz, {math.degrees(r.deflection):g}° · "
@@ -69,7 +69,7 @@ def _kicker(d: Design) -> str:
     )
 
 
-def _keys(d: Design) -> list[tuple[str, str]]:
+def _keys(d: SpringDesign) -> list[tuple[str, str]]:
     turned = "none" if math.isnan(d.deflection) else f"{math.degrees(d.deflection):.1f}°"
     return [
         (f"{d.band_eq_7:.1f} Hz", "bandwidth by Eq. (7)"),
@@ -80,7 +80,7 @@ def _keys(d: Design) -> list[tuple[str, str]]:
     ]
 
 
-def _sentences(asked: Design, least: Design) -> str:
+def _sentences(asked: SpringDesign, least: SpringDesign) -> str:
     r = asked.requirement
     spin, turns = asked.unit.spin, words.signed(asked.unit.turns, 0)
     return section(
@@ -107,23 +107,25 @@ def _term(value: float) -> str:
     return f"{'−' if value < 0.0 else '+'} {abs(value):.3f}"
 
 
-def _why(least: Design) -> str:
+def _why(least: SpringDesign) -> str:
     bounds = stiffness_bounds(least.requirement, least.unit)
     parts = [f"{words.sentence(name)} asks for {value:.0f}" for name, value in bounds.items()]
     return "; ".join(parts)
 
 
-def _map(designs: Sequence[Design]) -> Figure:
+def _map(designs: Sequence[SpringDesign]) -> Figure:
     r, unit = designs[0].requirement, designs[0].unit
     j = np.geomspace(2e-4, 2e-2, 25)
     bounds = stiffness_bounds(r, unit)
     spin = np.array([least_for_band(replace(r, inertia=float(v)), unit) for v in j])
     flat = np.ones(len(j))
     demands = [
-        Demand(f"{r.bandwidth:g} Hz, with spin", BEFORE, j, spin),
-        Demand(f"{math.degrees(r.deflection):g}° at {r.torque:g} N·m", INK, j, bounds["Deflection"] * flat),
-        Demand(f"K_s/2 = {r.torque:g} N·m", QUIET, j, bounds["Torque, K_s/2"] * flat),
-        Demand(f"{r.bandwidth:g} Hz, Eq. (7)", AFTER, j, undamped_stiffness(r.bandwidth, j)),
+        LeastStiffness(f"{r.bandwidth:g} Hz, with spin", BEFORE, j, spin),
+        LeastStiffness(
+            f"{math.degrees(r.deflection):g}° at {r.torque:g} N·m", INK, j, bounds["Deflection"] * flat
+        ),
+        LeastStiffness(f"K_s/2 = {r.torque:g} N·m", QUIET, j, bounds["Torque, K_s/2"] * flat),
+        LeastStiffness(f"{r.bandwidth:g} Hz, Eq. (7)", AFTER, j, undamped_stiffness(r.bandwidth, j)),
     ]
     points = [
         Point(f"{d.stiffness:.0f}", d.stiffness, r.inertia, c)
@@ -133,7 +135,7 @@ def _map(designs: Sequence[Design]) -> Figure:
     return feasible_map(_map_title(designs[0]), points, demands, caption)
 
 
-def _map_title(d: Design) -> str:
+def _map_title(d: SpringDesign) -> str:
     r, spin = d.requirement, d.unit.spin
     alone = float(undamped_stiffness(r.bandwidth, spin))
     if spin > 0.0:
@@ -147,7 +149,7 @@ def _map_title(d: Design) -> str:
     )
 
 
-def _surface(designs: Sequence[Design]) -> tuple[str, list[Point], str]:
+def _surface(designs: Sequence[SpringDesign]) -> tuple[str, list[Point], str]:
     d = designs[0]
     points = [
         Point(f"{d.stiffness:.0f} N·m/rad, chassis", d.stiffness, d.requirement.inertia, AFTER),
@@ -157,7 +159,7 @@ def _surface(designs: Sequence[Design]) -> tuple[str, list[Point], str]:
     return title, points, "Both horizontal axes are logarithmic; lines of equal bandwidth every 20 Hz."
 
 
-def _open_loop(designs: Sequence[Design]) -> Figure:
+def _open_loop(designs: Sequence[SpringDesign]) -> Figure:
     hz: FloatArray = np.geomspace(0.5, 300.0, 500)
     curves = []
     for d, colour in zip(designs, _COLOURS, strict=False):
@@ -183,7 +185,7 @@ def _open_loop(designs: Sequence[Design]) -> Figure:
     return response_figure(title, curves, marks, caption, decibel=(-60.0, 40.0))
 
 
-def _footer(d: Design) -> list[str]:
+def _footer(d: SpringDesign) -> list[str]:
     sources = [f"train {words.train(d.unit.train)} ({d.unit.sources['train']})"]
     sources += [f"{k.replace('_', ' ')} {v:g} ({d.unit.sources[k]})" for k, v in d.unit.values.items()]
     return [

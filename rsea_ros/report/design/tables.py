@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rsea_ros.design.by_train import NINETY_PERCENT, WithTrain, sense_unknown
-from rsea_ros.design.judge import Check, Design, judge
+from rsea_ros.design.judge import Check, SpringDesign, judge
 from rsea_ros.design.margins import Margin, margins, spreads_of
 from rsea_ros.report import words
 from rsea_ros.report.page.html import section
 from rsea_ros.report.page.table import table
 
 
-def checks_table(designs: Sequence[Design]) -> str:
+def checks_table(designs: Sequence[SpringDesign]) -> str:
     head = ["Demand", "Limit", *(f"K_s = {d.stiffness:.0f} N·m/rad" for d in designs)]
     rows = []
     for i, check in enumerate(designs[0].checks):
@@ -36,7 +36,7 @@ def _cell(check: Check) -> str:
     return f"{'✓' if check.met else '✗'} {value}"
 
 
-def trains_table(rows: Sequence[WithTrain], d: Design) -> str:
+def trains_table(rows: Sequence[WithTrain], d: SpringDesign) -> str:
     """Return the design with every possible train of the unit, and the range left by J_m."""
     hz = d.requirement.bandwidth
     head = [
@@ -75,7 +75,7 @@ def trains_table(rows: Sequence[WithTrain], d: Design) -> str:
     return section(title, table(head, body, numbers=range(1, 7)), caption=caption)
 
 
-def springs_table(designs: Sequence[Design]) -> str:
+def springs_table(designs: Sequence[SpringDesign]) -> str:
     r = designs[0].requirement
     head = [
         "Separation, mm",
@@ -105,7 +105,7 @@ def springs_table(designs: Sequence[Design]) -> str:
     )
 
 
-def margins_table(d: Design) -> str:
+def margins_table(d: SpringDesign) -> str:
     rows = margins(d)
     head = ["Quantity", "5 %", "median", "95 %", "limit", "meets it"]
     body = [_margin_row(m) for m in rows]

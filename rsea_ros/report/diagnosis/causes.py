@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from html import escape
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Rejected
+from rsea_ros.diagnosis.result import Cause, CauseParameter, Diagnosis, Rejected
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
@@ -47,7 +47,7 @@ def _sizes(cause: Cause) -> str:
     return f'<div class="keys">{"".join(cells)}</div>'
 
 
-def _model_share(estimate: Estimate) -> str:
+def _model_share(estimate: CauseParameter) -> str:
     """Return how much of an interval the simulation itself adds, `, of which the simulation ± 0.0147 N·m`."""
     if not estimate.model_sd > 0.0:
         return ""

@@ -14,7 +14,7 @@ from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.figures.figure import Figure, band
 from rsea_ros.report.figures.overlay import Simulated, overlay_figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
-from rsea_ros.report.figures.spectrum import ABOVE_FLOOR, Curve, finding, in_bands, residual_figure
+from rsea_ros.report.figures.spectrum import ABOVE_FLOOR, SpectrumLine, finding, in_bands, residual_figure
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import listed
 
@@ -26,10 +26,10 @@ def spectrum_figure(diagnosis: Diagnosis, spectrum: Spectrum) -> Figure:
     """Return the residual's density before and after against the noise floor."""
     s, what = spectrum, words.channel(spectrum.channel)
     if not diagnosis.causes:
-        curves = [Curve("residual", AFTER if diagnosis.at_noise_floor else BEFORE, s.before)]
+        curves = [SpectrumLine("residual", AFTER if diagnosis.at_noise_floor else BEFORE, s.before)]
         title = finding(s.frequency, s.before, s.noise, what)
         return residual_figure(title, s.channel, s.frequency, curves, s.noise)
-    curves = [Curve("before", BEFORE, s.before), Curve("after", AFTER, s.after)]
+    curves = [SpectrumLine("before", BEFORE, s.before), SpectrumLine("after", AFTER, s.after)]
     title, caption = _before_and_after(diagnosis, s), f"Residual of the {what}: measured minus simulated."
     figure = residual_figure(title, s.channel, s.frequency, curves, s.noise, caption)
     return replace(figure, data=[_gained(s), *figure.data])

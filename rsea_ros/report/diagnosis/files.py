@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.new_files import Destination, NewFiles
 from rsea_ros.report.diagnosis.json import diagnosis_json
 from rsea_ros.report.diagnosis.overlay import overlay_records
 from rsea_ros.report.diagnosis.page import diagnosis_report
@@ -23,7 +23,7 @@ OverlayWriter = Callable[[Mapping[str, Record], Path], None]
 def write_diagnosis(
     diagnosis: Diagnosis,
     record: Record,
-    out: Place | str | Path,
+    out: Destination | str | Path,
     write: OverlayWriter,
     provenance: Provenance | None = None,
 ) -> Path:

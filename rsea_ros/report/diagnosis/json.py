@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Estimate, Experiment, Misfit, Rejected
+from rsea_ros.diagnosis.result import (
+    Alternative,
+    Cause,
+    CauseParameter,
+    Diagnosis,
+    Experiment,
+    Misfit,
+    Rejected,
+)
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.noise_numbers import NOISE_NUMBERS
@@ -103,11 +111,11 @@ def _alternative(a: Alternative) -> dict[str, Any]:
     }
 
 
-def _sizes(parameters: Mapping[str, Estimate]) -> dict[str, Any]:
+def _sizes(parameters: Mapping[str, CauseParameter]) -> dict[str, Any]:
     return {name: _estimate(p) for name, p in parameters.items()}
 
 
-def _estimate(p: Estimate) -> dict[str, Any]:
+def _estimate(p: CauseParameter) -> dict[str, Any]:
     statistical = None if p.statistical_ci95 is None else _pair(p.statistical_ci95)
     return {
         "value": finite(p.value),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.diagnosis.result import Diagnosis, Estimate
+from rsea_ros.diagnosis.result import CauseParameter, Diagnosis
 from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.signals import UNITS
@@ -49,7 +49,7 @@ def rms_change(diagnosis: Diagnosis, channel: str) -> str:
     return f"{before} → {after}, noise {noise}" if diagnosis.causes else f"{before}, noise {noise}"
 
 
-def estimate(estimate: Estimate) -> tuple[str, str, str]:
+def estimate(estimate: CauseParameter) -> tuple[str, str, str]:
     """Return value, doubt and unit: ("4.0045", " ± 0.0029", "mrad"), or lopsided " −0.1/+1.4"."""
     factor, prefix = _prefix(estimate)
     low, high = estimate.ci95
@@ -57,13 +57,13 @@ def estimate(estimate: Estimate) -> tuple[str, str, str]:
     return value, doubt, prefix + words.unit(estimate.unit)
 
 
-def model_half_width(estimate: Estimate) -> tuple[str, str]:
+def model_half_width(estimate: CauseParameter) -> tuple[str, str]:
     """Return the half-width of the simulation's own error at 95 % and its unit: ("0.0147", "N·m")."""
     factor, prefix = _prefix(estimate)
     return words.number(Z95 * estimate.model_sd * factor, 2), prefix + words.unit(estimate.unit)
 
 
-def _prefix(estimate: Estimate) -> tuple[float, str]:
+def _prefix(estimate: CauseParameter) -> tuple[float, str]:
     """Return the factor and prefix that make a small angle or time readable."""
     if estimate.unit not in ("rad", "s") or not 0.0 < abs(estimate.value) < 0.1:
         return 1.0, ""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rich.text import Text
 
-from rsea_ros.diagnosis.result import Diagnosis, Estimate, Experiment, Misfit
+from rsea_ros.diagnosis.result import CauseParameter, Diagnosis, Experiment, Misfit
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
@@ -69,7 +69,7 @@ def _next(experiment: Experiment) -> str:
     return f"{say.prose(next_run(experiment))}{f': {settings}' if settings else ''}"
 
 
-def _size(name: str, parameter: Estimate) -> str:
+def _size(name: str, parameter: CauseParameter) -> str:
     value, doubt, unit = num.estimate(parameter)
     return f"{name.replace('_', ' ')} {value}{doubt} {unit}".rstrip()
 

@@ -22,7 +22,7 @@ _LABEL = 0.06
 
 
 @dataclass(frozen=True)
-class Curve:
+class SpectrumLine:
     """A density: its name on the page, its colour, unit/√Hz."""
 
     name: str
@@ -31,7 +31,12 @@ class Curve:
 
 
 def residual_figure(
-    title: str, channel: str, frequency: FloatArray, curves: Sequence[Curve], noise: float, caption: str = ""
+    title: str,
+    channel: str,
+    frequency: FloatArray,
+    curves: Sequence[SpectrumLine],
+    noise: float,
+    caption: str = "",
 ) -> Figure:
     """Return the densities of residuals over frequency, Hz. noise: density of the noise floor."""
     unit = words.unit(UNITS[channel])
@@ -104,7 +109,7 @@ def _range(values: Sequence[FloatArray]) -> list[float]:
     return [low - lacking - 0.1, high + lacking + 0.3]
 
 
-def _at_peak(curve: Curve, frequency: FloatArray, values: FloatArray) -> Json:
+def _at_peak(curve: SpectrumLine, frequency: FloatArray, values: FloatArray) -> Json:
     """Return the label of the highest curve, above its peak; lower ones have theirs at their right end."""
     k = int(np.argmax(values))
     x, y = float(np.log10(frequency[k])), _exponent(values[k])

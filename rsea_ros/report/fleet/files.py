@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.new_files import Destination, NewFiles
 from rsea_ros.report.fleet.joint_page import joint_page
 from rsea_ros.report.fleet.links import Links, page_names
 from rsea_ros.report.fleet.page import fleet_page
@@ -23,7 +23,7 @@ INDEX = "index.html"
 def write_fleet_report(
     history: Table,
     recordings: Table,
-    out: Place | Path | str,
+    out: Destination | Path | str,
     *,
     store: Path | str | None = None,
     settings: TrendSettings = DEFAULT,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.new_files import Destination, NewFiles
 from rsea_ros.report.file_names import IDENTIFICATION_JSON, MODEL, REPORT
 from rsea_ros.report.identification.json import identification_json
 from rsea_ros.report.identification.page import identification_report
@@ -15,7 +15,7 @@ from rsea_ros.report.provenance import Provenance
 
 
 def write_results(
-    identification: Identification, out: Place | str | Path, provenance: Provenance | None = None
+    identification: Identification, out: Destination | str | Path, provenance: Provenance | None = None
 ) -> Path:
     """Write identification.json, model.yaml and report.html, and return the report's path.
 

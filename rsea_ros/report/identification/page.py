@@ -11,7 +11,7 @@ from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.overlay import Simulated, overlay_figure
 from rsea_ros.report.figures.palette import AFTER, MEASURED
-from rsea_ros.report.figures.spectrum import Curve, density, finding, residual_figure
+from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
 from rsea_ros.report.identification.correlation import correlation_section
 from rsea_ros.report.identification.parameters import clock_sentence, parameter_table
 from rsea_ros.report.identification.statics import statics_sentences
@@ -125,7 +125,7 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
     noise = identification.noise_rms[n] / float(np.sqrt(rate / 2.0))
     title = finding(frequency, values, noise, words.channel(n))
     _, measured = density(overlay.measured, rate)
-    curves = [Curve("measured", MEASURED, measured), Curve("residual", AFTER, values)]
+    curves = [SpectrumLine("measured", MEASURED, measured), SpectrumLine("residual", AFTER, values)]
     return residual_figure(title, n, frequency, curves, noise)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from rsea_ros.effects.catalogue import lent
 from rsea_ros.laws.result import LawResult
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.new_files import Destination, NewFiles
 from rsea_ros.report.file_names import BASE, LAW_JSON, MODEL, REPORT
 from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.law.json import law_json
@@ -15,7 +15,7 @@ from rsea_ros.report.law.page import law_report
 from rsea_ros.report.provenance import Provenance
 
 
-def write_law(result: LawResult, out: Place | str | Path, provenance: Provenance | None = None) -> Path:
+def write_law(result: LawResult, out: Destination | str | Path, provenance: Provenance | None = None) -> Path:
     """Write law.json, the effect files, base.yaml, model.yaml and report.html; return the report's path."""
     with NewFiles(out) as new, lent(*(w.effect for w in result.laws)):
         new.write(LAW_JSON, json_text(with_provenance(law_json(result), provenance)))

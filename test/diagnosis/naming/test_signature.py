@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.naming.contribution import Rows, projected
+from rsea_ros.diagnosis.naming.contribution import ContributionRows, projected
 from rsea_ros.diagnosis.naming.signature import signature
 
 BLOCKS, LENGTH = 48, 100
@@ -19,7 +19,7 @@ CONTRIBUTION = 5.0 * np.sin(2.0 * np.pi * 0.21 * TIME**1.4)
 
 def rows(residual):
     """Return rows of one channel whose nominal model has one derivative, a ramp."""
-    return Rows(
+    return ContributionRows(
         contribution=CONTRIBUTION,
         residual=residual + RNG.normal(size=len(TIME)),
         others=TIME[:, None] - TIME.mean(),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.result import Estimate, Experiment
+from rsea_ros.diagnosis.result import CauseParameter, Experiment
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.normal import Z95
@@ -78,7 +78,7 @@ def test_json_separates_the_noise_from_the_error_of_the_simulation(diagnosed) ->
 def test_not_a_number_is_written_as_null(diagnosed) -> None:
     unbounded = replace(
         diagnosed.diagnosis.causes[0],
-        parameters={"torque": Estimate(3.0, "N m", (-np.inf, np.inf))},
+        parameters={"torque": CauseParameter(3.0, "N m", (-np.inf, np.inf))},
         gain_holdout=np.nan,
     )
     odd = replace(

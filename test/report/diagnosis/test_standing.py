@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rsea_ros.diagnosis.result import Alternative, Cause, Estimate
+from rsea_ros.diagnosis.result import Alternative, Cause, CauseParameter
 from rsea_ros.report.diagnosis.json import diagnosis_json
 from rsea_ros.report.diagnosis.page import diagnosis_report
 from rsea_ros.report.diagnosis.standing import standing
 
 DELAY = Cause(
     "command_delay",
-    {"delay": Estimate(9.1e-3, "s", (8.4e-3, 9.8e-3))},
+    {"delay": CauseParameter(9.1e-3, "s", (8.4e-3, 9.8e-3))},
     0.4,
     0.4,
     (0.3, 0.5),
@@ -22,14 +22,14 @@ DELAY = Cause(
 GAIN = replace(
     DELAY,
     name="ft_gain_error",
-    parameters={"gain": Estimate(0.891, "1", (0.886, 0.896))},
+    parameters={"gain": CauseParameter(0.891, "1", (0.886, 0.896))},
     status="one_of",
     probability=0.55,
 )
 CONSTANT = Alternative(
     "torque_constant_error",
     "ft_gain_error",
-    {"gain": Estimate(1.12, "1", (1.11, 1.13))},
+    {"gain": CauseParameter(1.12, "1", (1.11, 1.13))},
     0.39,
     (0.3, 0.5),
     "ft",

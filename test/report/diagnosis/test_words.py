@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from rsea_ros.diagnosis.result import Estimate, Misfit, Reason, Rejected
+from rsea_ros.diagnosis.result import CauseParameter, Misfit, Reason, Rejected
 from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
 from rsea_ros.identification import coloured, noise_level
 from rsea_ros.identification.result import Overlay
@@ -93,11 +93,11 @@ def test_json_sentence_and_page_name_the_same_channel(diagnosed):
 @pytest.mark.parametrize(
     ("estimate", "text"),
     [
-        (Estimate(0.0040045, "rad", (0.0040015, 0.0040075)), ("4.0045", " ± 0.0030", "mrad")),
-        (Estimate(2.5e-4, "s", (2.3e-4, 2.7e-4)), ("250", " ± 20", "µs")),
-        (Estimate(3.0, "N m", (2.5, 3.5)), ("3.00", " ± 0.50", "N·m")),
-        (Estimate(0.95, "1", (0.94, 0.96)), ("0.950", " ± 0.010", "")),
-        (Estimate(3.0, "N m", (2.9, 4.4)), ("3.00", " −0.10/+1.4", "N·m")),
+        (CauseParameter(0.0040045, "rad", (0.0040015, 0.0040075)), ("4.0045", " ± 0.0030", "mrad")),
+        (CauseParameter(2.5e-4, "s", (2.3e-4, 2.7e-4)), ("250", " ± 20", "µs")),
+        (CauseParameter(3.0, "N m", (2.5, 3.5)), ("3.00", " ± 0.50", "N·m")),
+        (CauseParameter(0.95, "1", (0.94, 0.96)), ("0.950", " ± 0.010", "")),
+        (CauseParameter(3.0, "N m", (2.9, 4.4)), ("3.00", " −0.10/+1.4", "N·m")),
     ],
 )
 def test_small_angles_and_times_have_a_prefix(estimate, text):
@@ -113,7 +113,7 @@ def test_an_experiment_is_described_with_its_units():
 
 def test_a_number_without_unit_is_named(diagnosed):
     cause = replace(diagnosed.diagnosis.causes[0], name="ft_gain_error",
-                    parameters={"gain": Estimate(1.05, "1", (1.04, 1.06))})  # fmt: skip
+                    parameters={"gain": CauseParameter(1.05, "1", (1.04, 1.06))})  # fmt: skip
     assert say.named([cause]) == "F/T gain error (gain 1.05)"
 
 

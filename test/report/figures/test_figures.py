@@ -13,7 +13,7 @@ from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.overlay import MOST_SAMPLES, Simulated, overlay_figure, sampled
 from rsea_ros.report.figures.palette import AFTER, BEFORE
-from rsea_ros.report.figures.spectrum import Curve, density, finding, residual_figure
+from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
 from rsea_ros.report.figures.thinned import thinned
 
 
@@ -71,7 +71,10 @@ def test_long_traces_keep_their_extremes() -> None:
 
 def test_before_after_and_noise_are_in_one_figure() -> None:
     frequency = np.linspace(0.1, 139.0, 500)
-    curves = [Curve("before", BEFORE, 1.0 / frequency), Curve("after", AFTER, np.full(500, 2e-3))]
+    curves = [
+        SpectrumLine("before", BEFORE, 1.0 / frequency),
+        SpectrumLine("after", AFTER, np.full(500, 2e-3)),
+    ]
     figure = residual_figure("The cause takes it to the noise", "ft", frequency, curves, noise=2e-3)
     assert [d["name"] for d in figure.data] == ["noise floor", "before", "after"]
     assert figure.layout["yaxis"]["title"]["text"] == "density, N·m/√Hz"

@@ -1,0 +1,106 @@
+"""What every peer's script shares: it reads a case, and writes what it predicts.
+
+    python with_NAME.py CASE.npz RESULT.json BUDGET
+
+A case has t (s), u (input), y (output to be predicted), position, velocity (empty where not measured), each
+of shape (n,), `split` (index of the first held-out sample) and `meta` (JSON: physics and stated values). A
+script fits to the samples before `split` and predicts y from there on by a free run: u is known, no y is.
+BUDGET: processor seconds. Only numpy is needed, so that every peer's environment has it.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+Array = Any
+
+
+@dataclass(frozen=True)
+class PeerCase:
+    """A case as a peer sees it; values after `split` of y, position and velocity are not a number."""
+
+    t: Array
+    u: Array
+    y: Array
+    position: Array
+    velocity: Array
+    split: int
+    meta: dict[str, Any]
+    budget: float
+    started: float = field(default_factory=time.process_time)
+
+    @property
+    def period(self) -> float:
+        """Sample period, s."""
+        return float(np.median(np.diff(self.t)))
+
+    @property
+    def seconds_left(self) -> float:
+        """Processor seconds of the budget that are left."""
+        return self.budget - (time.process_time() - self.started)
+
+
+@dataclass(frozen=True)
+class PeerResult:
+    """What a peer returns: y from `split` on, values where they are physical, the cause if it names one."""
+
+    prediction: Array
+    parameters: dict[str, float] = field(default_factory=dict)
+    cause: str = ""
+    note: str = ""
+
+
+class NotApplicable(Exception):
+    """A case that a peer has no model for; its text is the reason."""
+
+
+def main(fit: Callable[[PeerCase], PeerResult]) -> None:
+    """Run a peer on the case of the command line."""
+    source, target, budget = sys.argv[1:4]
+    data = np.load(source)
+    arrays = (np.array(data[n]) for n in ("t", "u", "y", "position", "velocity"))
+    case = PeerCase(*arrays, int(data["split"]), json.loads(str(data["meta"])), float(budget))
+    try:
+        result = fit(case)
+    except NotApplicable as reason:
+        contents: dict[str, Any] = {"not_run": str(reason)}
+    else:
+        contents = {
+            "prediction": [float(v) for v in np.ravel(result.prediction)],
+            "parameters": result.parameters,
+            "cause": result.cause,
+            "note": result.note,
+        }
+    contents["seconds"] = time.process_time() - case.started
+    with open(target, "w", encoding="utf-8") as file:
+        json.dump(contents, file)
+
+
+def scaled(case: PeerCase) -> tuple[Array, Array, float, float]:
+    """Return u and the known y, both scaled by the training samples; and mean and deviation of y."""
+    u, y = case.u, case.y[: case.split]
+    return (u - u[: case.split].mean()) / u[: case.split].std(), (y - y.mean()) / y.std(), y.mean(), y.std()
+
+
+def free_run(step: Callable[[Array], float], u: Array, y: Array, lags: int) -> Array:
+    """Return y continued by a one-step predictor of `lags` past outputs and inputs."""
+    longest = 10.0 * float(np.max(np.abs(y)))
+    out = np.concatenate([y, np.zeros(len(u) - len(y))])
+    for k in range(len(y), len(u)):
+        row = np.concatenate([out[k - lags : k][::-1], u[k - lags : k + 1][::-1]])
+        out[k] = np.clip(step(row), -longest, longest)
+    return out[len(y) :]
+
+
+def narx_rows(u: Array, y: Array, lags: int) -> tuple[Array, Array]:
+    """Return regressors, shape (n, 2 lags + 1), and the outputs that belong to them, shape (n,)."""
+    columns = [y[lags - k : len(y) - k] for k in range(1, lags + 1)]
+    columns += [u[lags - k : len(y) - k] for k in range(lags + 1)]
+    return np.column_stack(columns), y[lags:]

@@ -1,0 +1,1 @@
+"""The cause-naming benchmark: the format of its data sets, of the truth and of answers, and their scores."""

@@ -1,0 +1,128 @@
+"""A data set of the benchmark: a folder with a manifest, and a table and a rig for each record."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rsea_ros.benchmark.documents import read_json, read_text, text_of
+from rsea_ros.errors import BenchmarkError
+from rsea_ros.signals import UNITS, Channel, Record
+
+VERSION = "1"
+"""Of the rules and of the way records are drawn; scores of different versions are not comparable."""
+MANIFEST = "manifest.json"
+LIMIT = 120.0
+"""s for a record on two cores; an answer that took longer counts as none."""
+COLUMNS = ("t_command", "command", "t", "ft", "position", "velocity", "motor_torque")
+"""Of a record's table: stamps of the command, s, the command, stamps of the measurements, s, and these."""
+RULES = (
+    "Use anything in this folder, any software and any knowledge of physics; not the truth file, its seed, "
+    "or records made with that seed.",
+    "Tune on data sets of other seeds, never on the one that is scored; no hand work on single records.",
+    "Name effects of `effects` with the probability that the record hides each; an effect that is not named "
+    "has the probability 0. An effect counts as named from a probability of 0.5.",
+    "Every hidden effect changes some channel by at least its noise, RMS. A record may hide none, or a law "
+    "that is not in `effects`: then the other effects that it hides are right, and nothing else.",
+    "The values of the rigs are off: inertia up to 15 %, damping 10 %, stiffness 3 %. That is no effect.",
+    f"{LIMIT:g} s for a record on two cores. A record without an answer, or one that took longer, counts as "
+    "answered with no effect.",
+    "Equal probabilities share the mean of their ranks.",
+)
+_NAME = re.compile(r"r[0-9]{4,6}")
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A data set as its manifest states it. hashes: of the truth, by record. limit: s for a record."""
+
+    folder: Path
+    hashes: Mapping[str, str]
+    effects: tuple[str, ...]
+    limit: float
+
+    @property
+    def manifest(self) -> Path:
+        """The manifest's file."""
+        return self.folder / MANIFEST
+
+    @property
+    def truth(self) -> Path:
+        """Where `make` puts the truth: beside the folder."""
+        return truth_path(self.folder)
+
+    def rig_path(self, name: str) -> Path:
+        """Return the rig file of a record."""
+        return self.folder / f"{name}.yaml"
+
+    def record(self, name: str) -> Record:
+        """Return a record. Raises BenchmarkError for a table that is not as COLUMNS say."""
+        path = self.folder / f"{name}.csv"
+        header, _, rows = read_text(path).partition("\n")
+        if tuple(header.strip().split(",")) != COLUMNS:
+            raise BenchmarkError(f"{path}: columns {text_of(header)}, expected {','.join(COLUMNS)}")
+        try:
+            table = np.loadtxt(rows.splitlines(), delimiter=",", ndmin=2)
+        except ValueError as error:
+            raise BenchmarkError(f"{path}: {error}, expected numbers") from None
+        if table.shape[0] < 2 or table.shape[1] != len(COLUMNS) or not np.isfinite(table).all():
+            raise BenchmarkError(f"{path}: expected at least 2 rows of {len(COLUMNS)} finite numbers")
+        columns = dict(zip(COLUMNS, np.ascontiguousarray(table.T), strict=True))
+        starts, ends = columns.pop("t_command"), columns.pop("t")
+        stamps = {name: starts if name == "command" else ends for name in columns}
+        return Record({n: Channel(stamps[n], y) for n, y in columns.items()}, str(path))
+
+
+def truth_path(folder: Path) -> Path:
+    """Return where the truth of a data set lies: beside its folder."""
+    return folder.with_name(f"{folder.name}.truth.json")
+
+
+def read_dataset(folder: Path) -> Dataset:
+    """Return the data set in a folder. Raises BenchmarkError for a manifest that is not of this version."""
+    path = folder / MANIFEST
+    body = read_json(path)
+    if body.get("version") != VERSION:
+        raise BenchmarkError(f"{path}: version = {text_of(body.get('version'))}, expected {VERSION!r}")
+    hashes, effects, limit = (body.get(key) for key in ("records", "effects", "seconds"))
+    if not isinstance(hashes, dict) or not hashes:
+        raise BenchmarkError(f"{path}: records = {text_of(hashes)}, expected a hash for each record")
+    wrong = [name for name in hashes if not _NAME.fullmatch(name)]
+    if wrong:
+        raise BenchmarkError(f"{path}: records has {text_of(wrong[0])}, expected names such as r0001")
+    if not isinstance(effects, dict) or not effects:
+        raise BenchmarkError(f"{path}: effects = {text_of(effects)}, expected the effects that can be named")
+    if not isinstance(limit, (int, float)) or isinstance(limit, bool) or not limit > 0.0:
+        raise BenchmarkError(f"{path}: seconds = {text_of(limit)}, expected a number > 0")
+    return Dataset(folder, hashes, tuple(effects), float(limit))
+
+
+def table_text(record: Record) -> str:
+    """Return a record's table."""
+    stamps = {"t_command": record["command"].t, "t": record["ft"].t}
+    columns = [stamps[n] if n in stamps else record[n].y for n in COLUMNS]
+    rows = (",".join(f"{value:.12g}" for value in row) for row in np.column_stack(columns))
+    return "\n".join([",".join(COLUMNS), *rows]) + "\n"
+
+
+def manifest_text(hashes: Mapping[str, str], effects: Mapping[str, str]) -> str:
+    """Return the manifest. effects: what each does, by name."""
+    units = {n: UNITS.get(n, "s") for n in COLUMNS}
+    contents = {
+        "schema": 1,
+        "benchmark": "cause naming of rotary series elastic actuators",
+        "version": VERSION,
+        "licence": "BSD-3-Clause, The rsea_ros authors",
+        "seconds": LIMIT,
+        "columns": units,
+        "holds": "a command acts from its stamp to the next; measurements are taken at theirs",
+        "effects": dict(effects),
+        "rules": list(RULES),
+        "records": dict(hashes),
+    }
+    return json.dumps(contents, indent=1) + "\n"

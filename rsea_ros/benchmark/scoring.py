@@ -1,0 +1,106 @@
+"""Scores of answers against the truth, with intervals from a bootstrap over records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from rsea_ros.benchmark.answers import Answer
+from rsea_ros.benchmark.truth import Truth
+from rsea_ros.signals import FloatArray
+
+NAMED = 0.5
+"""Probability from which an effect counts as named: likelier hidden than not."""
+DRAWS, SEED = 2000, 1
+"""Of the bootstrap: 2000 draws give the ends of a 95 % interval to about a tenth of its width."""
+
+
+class Interval(NamedTuple):
+    """A value with its 95 % interval; NaN where no record has it."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Scores of a submission.
+
+    named_right: share of the hidden effects that are named. false_names: share of the names that are wrong.
+    silent: share of the records without a hidden effect of the list in which nothing is named.
+    brier: mean over records of the sum over effects of (probability - hidden)^2. rank: median place of a
+    hidden effect among those that are not hidden, 1 the first. answered: share of records with any name.
+    """
+
+    named_right: Interval
+    false_names: Interval
+    silent: Interval
+    brier: Interval
+    rank: Interval
+    answered: float
+
+
+@dataclass(frozen=True)
+class _Counts:
+    """What a record adds to the scores; ranks: of each hidden effect."""
+
+    hidden: int
+    right: int
+    names: int
+    empty: bool
+    brier: float
+    ranks: tuple[float, ...]
+
+
+def score(answers: Mapping[str, Answer], truths: Mapping[str, Truth], effects: Sequence[str]) -> Scores:
+    """Return the scores of answers to the records of `truths`; effects: the list that can be named."""
+    counts = [_counts(answers[name], truth, effects) for name, truth in truths.items()]
+    return Scores(
+        named_right=_interval(counts, lambda c: _share([x.right for x in c], [x.hidden for x in c])),
+        false_names=_interval(
+            counts, lambda c: _share([x.names - x.right for x in c], [x.names for x in c])
+        ),
+        silent=_interval(
+            counts, lambda c: _share([x.empty and not x.names for x in c], [x.empty for x in c])
+        ),
+        brier=_interval(counts, lambda c: float(np.mean([x.brier for x in c]))),
+        rank=_interval(counts, _median_rank),
+        answered=sum(c.names > 0 for c in counts) / len(counts),
+    )
+
+
+def _counts(answer: Answer, truth: Truth, effects: Sequence[str]) -> _Counts:
+    said = np.array([answer.causes.get(n, 0.0) for n in effects])
+    hidden = np.array([n in truth.causes for n in effects])
+    named = said >= NAMED
+    ranks = tuple(_rank(float(p), said[~hidden]) for p in said[hidden])
+    brier = float(np.sum((said - hidden) ** 2))
+    empty = not hidden.any()
+    return _Counts(int(hidden.sum()), int((named & hidden).sum()), int(named.sum()), empty, brier, ranks)
+
+
+def _rank(probability: float, others: FloatArray) -> float:
+    """Return the place among effects that are not hidden; equal ones share the mean of their places."""
+    return 1.0 + float(np.sum(others > probability)) + 0.5 * float(np.sum(others == probability))
+
+
+def _share(part: Sequence[float], whole: Sequence[float]) -> float:
+    return sum(part) / sum(whole) if sum(whole) else float("nan")
+
+
+def _median_rank(counts: Sequence[_Counts]) -> float:
+    ranks = [r for c in counts for r in c.ranks]
+    return float(np.median(ranks)) if ranks else float("nan")
+
+
+def _interval(counts: Sequence[_Counts], statistic: Callable[[Sequence[_Counts]], float]) -> Interval:
+    rng = np.random.default_rng(SEED)
+    drawn = rng.integers(len(counts), size=(DRAWS, len(counts)))
+    values = np.array([statistic([counts[k] for k in row]) for row in drawn])
+    values = values[np.isfinite(values)]
+    low, high = np.percentile(values, (2.5, 97.5)) if len(values) else (float("nan"), float("nan"))
+    return Interval(statistic(counts), float(low), float(high))

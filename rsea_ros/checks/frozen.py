@@ -1,0 +1,135 @@
+"""Frozen samples: a sensor or its driver that repeats its last value while the machine moves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rsea_ros.checks.motion import MotionBeside, motion_beside, witness_of
+from rsea_ros.identification.quantum import step_of
+from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
+
+SMALLEST_SHARE = 1e-3
+"""Of a channel's samples: fewer repeats are no fault."""
+_SLOW = 0.25
+"""Of the samples: a sensor that repeats more of them is slower than the log."""
+_COARSE = 0.5
+"""Share of the changes that are by one quantum: a sensor that skipped samples would catch up by several."""
+_MOVED = 0.3
+"""Share of the suspect samples that must fall into motion; a sensor that freezes at any time reaches more."""
+_MOVED_OF_NOISY = 0.1
+"""The same for long runs of a sensor whose noise would change its value even at standstill."""
+_LONG_RUN = 20.0
+"""Times the usual run of equal values: a longer one is no slow sensor."""
+_LONGEST_RUN = 0.5
+"""s. No coarse quantum holds a value so long while the machine moves."""
+_HELD = 0.95
+"""Share of the samples: a channel that repeats so many is held; a coarse one in motion repeats fewer."""
+_DITHER = 0.5
+"""Of the step between values: noise above it changes the value at standstill too; a step alone has 0.3."""
+_QUIETEST = 0.1
+"""Quantile of the noise of stretches of the record: in the quietest, motion adds least to it."""
+_STRETCH = 32
+"""Samples of a stretch, enough for the median of their fourth differences."""
+
+
+def frozen(channel: Channel, name: str) -> BoolArray:
+    """Return which samples repeat the one before more often than a quantum explains.
+
+    With a quantum, neighbouring values may be equal by chance; then as many differ by one quantum, plus or
+    minus three standard deviations. Where most values that change do so by one quantum, the quantum explains
+    all but long runs. A sensor that repeats every other sample or more is slower than the log,
+    which is no fault; but a few runs far longer than all others are.
+    """
+    if name in ("command", "reference"):
+        return np.zeros(len(channel), bool)
+    step = np.diff(channel.y, prepend=np.nan)
+    repeat: BoolArray = step == 0.0
+    moving = np.abs(step[np.isfinite(step) & ~repeat])
+    if not len(moving):
+        return repeat
+    by_one = moving < 1.5 * float(moving.min())
+    if by_one.mean() > _COARSE:
+        return repeat & in_long_runs(repeat, channel.rate)
+    by_chance = float(by_one.sum()) / 2.0
+    surplus = float(repeat.sum()) - 1.5 * by_chance - 3.0 * float(np.sqrt(repeat.sum()))
+    is_fault = max(5.0, SMALLEST_SHARE * len(channel)) < surplus < _SLOW * len(channel)
+    return repeat if is_fault else repeat & in_long_runs(repeat, channel.rate)
+
+
+def in_long_runs(repeat: BoolArray, rate: float) -> BoolArray:
+    """Return which samples lie in a run of repeats far longer than the usual one. rate: Hz."""
+    number = np.cumsum(~repeat)
+    length = np.bincount(number)
+    usual = float(np.quantile(length[length > 0], 0.95))
+    long: BoolArray = length[number] > max(_LONG_RUN * usual, _LONGEST_RUN * rate)
+    return long
+
+
+def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str) -> BoolArray:
+    """Return the suspect samples, none if the machine mostly stood still then.
+
+    A sensor that holds a value while nothing moves is sound: at rest, at a limit of the torque, stuck. One
+    that freezes does so in fast and in slow motion alike, a coarse one rather in slow motion.
+    """
+    motion = _motion(record, name, suspect, kind) if suspect.any() else None
+    if motion is None or not motion.moved.any():
+        return suspect if motion is None else np.zeros(len(suspect), bool)
+    if kind != "frozen_samples":
+        return _mostly(suspect, motion.moved)
+    long = suspect & in_long_runs(suspect, record[name].rate)
+    fast = motion.moved & (motion.speed > np.median(motion.speed[motion.moved]))
+    share = _MOVED_OF_NOISY if long.any() and _dithers(record[name]) else _MOVED
+    return _mostly(long, motion.moved, share) | _mostly(suspect & ~long, fast)
+
+
+def _mostly(suspect: BoolArray, clearly: BoolArray, share: float = _MOVED) -> BoolArray:
+    """Return the suspect samples if enough of them fall into motion, else none."""
+    enough = suspect.any() and clearly[suspect].mean() > share
+    return suspect if enough else np.zeros(len(suspect), bool)
+
+
+def _motion(record: Record, name: str, suspect: BoolArray, kind: str) -> MotionBeside | None:
+    """Return how the best witness moved at the samples of a channel, None without a witness.
+
+    Sensors that are held with the channel are no witnesses. Where none is left, the command speaks for a
+    motion only if the noise of one of them would have shown at standstill.
+    """
+    if kind != "frozen_samples":
+        return motion_beside(record, name, witness_of(record, name))
+    at = record[name].t[suspect]
+    held = {n for n in record.channels if n != "command" and _is_held(record[n], at)}
+    witness = witness_of(record, name, but=held - {name})
+    others = witness_of(record, name)
+    alone = others != witness and witness in (None, "command", "motor_torque")
+    shown = not alone or any(_dithers(record[n]) for n in held)
+    return motion_beside(record, name, witness if shown else others)
+
+
+def _is_held(channel: Channel, at: FloatArray) -> bool:
+    """Return whether a channel repeats its value at nearly all of some times, s."""
+    repeats = np.diff(channel.y, prepend=np.nan) == 0.0
+    nearest = np.clip(np.searchsorted(channel.t, at), 0, len(channel) - 1)
+    return bool(np.mean(repeats[nearest]) > _HELD)
+
+
+def _dithers(channel: Channel) -> bool:
+    """Return whether the noise of a sensor is large enough to change its value at standstill."""
+    moving = channel.y[np.diff(channel.y, prepend=np.nan) != 0.0]
+    size = len(moving) // _STRETCH
+    if size < 2:
+        return False
+    fourth = np.abs(np.diff(moving[: size * _STRETCH].reshape(size, _STRETCH), 4, axis=1))
+    white = np.median(fourth, axis=1) / 0.6745 / math.sqrt(70.0)
+    return bool(np.quantile(white, _QUIETEST) > _DITHER * step_of(moving))
+
+
+def longest(channel: Channel, marked: BoolArray) -> str:
+    """Return from when to when the longest run of marked samples lasts, for people; empty for short ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
+    first, last = edges[::2], edges[1::2] - 1
+    k = int(np.argmax(last - first)) if len(first) else 0
+    if not len(first) or channel.t[last[k]] - channel.t[first[k]] < _LONGEST_RUN:
+        return ""
+    return f"at {channel.y[first[k]]:.4g} from {channel.t[first[k]]:.4g} s to {channel.t[last[k]]:.4g} s"

@@ -1,0 +1,40 @@
+"""Finding about the zero of the F/T sensor: an offset that no torque of the run explains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rsea_ros.checks.expected import Side
+from rsea_ros.checks.finding import Finding
+from rsea_ros.signals import Record
+
+_LARGE, _FAR = 1.0, 3.0
+"""Times the largest torque of the run: a zero that was never set; an offset that no zero explains."""
+
+
+def offset_findings(record: Record, compared: Mapping[str, Side]) -> list[Finding]:
+    """Return the finding of an F/T torque that lies far from what the rig would give.
+
+    compared: the record beside the rig's simulation, which has the gravity of its loads.
+    """
+    side = compared.get("ft")
+    if side is None or "command" not in record:
+        return []
+    offset = float(np.median(side.y) - np.median(side.p))
+    largest = max(float(np.max(np.abs(record["command"].y))), float(np.max(np.abs(side.p))))
+    if abs(offset) <= _LARGE * largest:
+        return []
+    return [
+        Finding(
+            "red" if abs(offset) > _FAR * largest else "amber",
+            "offset",
+            "ft",
+            offset,
+            "N m",
+            expected=f"less than {largest:.3g}, the largest torque of the run",
+            detail=f"{abs(offset) / largest:.2g} times that torque at all times",
+            remedy="set the sensor's zero, look at its mount, or give the constant in the import map",
+        )
+    ]

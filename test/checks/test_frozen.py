@@ -1,0 +1,70 @@
+"""Sensors that freeze together are named, each of them; a machine that stands still is not."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+from rsea_ros.checks.check import check_record
+from rsea_ros.checks.faults import check
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+RIG = load_rig("paper_high_impedance")
+RATE, LENGTH = 280.0, 12.0
+
+
+@functools.cache
+def run():
+    u = excitation("white_noise", ExcitationSettings(rate=RATE, duration=LENGTH, seed=1))
+    return synthesize(RIG, Channel(np.arange(len(u)) / RATE, u))
+
+
+def frozen(record, names, start, stop=LENGTH + 1.0):
+    """Return the record with the values of some channels held between two times, s."""
+    held = {}
+    for name in names:
+        t, y = record[name].t, record[name].y.copy()
+        at = (t > start) & (t < stop)
+        y[at] = y[np.argmax(at)]
+        held[name] = Channel(t, y)
+    return record.with_channels(**held)
+
+
+def named(record):
+    return {f.channel for f in check(record, RIG).faults if f.kind == "frozen_samples"}
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("position", "velocity", "ft"),
+        ("position", "velocity", "ft", "motor_torque"),
+        ("position", "ft"),
+        ("position", "velocity"),
+        ("ft",),
+    ],
+)
+@pytest.mark.parametrize("span", [(1.0,), (4.0,), (4.0, 6.0), (10.5,)])
+def test_every_channel_of_a_driver_that_stops_is_named(names, span):
+    assert named(frozen(run(), names, *span)) == set(names)
+
+
+def test_it_is_said_from_when_to_when_and_not_that_the_machine_is_another_or_a_sensor_noisy():
+    findings = check_record(frozen(run(), ("position", "velocity", "ft"), 4.0, 6.0), RIG).findings
+    assert {f.kind for f in findings if f.light != "green"} == {"frozen_samples"}
+    assert all("from 4.007 s to 5.996 s" in f.detail for f in findings if f.kind == "frozen_samples")
+
+
+@pytest.mark.parametrize("noise", [False, True])
+def test_a_machine_that_sticks_while_the_command_goes_on_is_not_frozen(noise):
+    """Dry friction of 15 N m under a slow command of 20 N m: all sensors without noise hold for seconds."""
+    rig = RIG.with_effects(EffectSetting("coulomb_friction", {"torque": 15.0}))
+    t = np.arange(int(20.0 * RATE)) / RATE
+    record = synthesize(rig, Channel(t, 20.0 * np.sin(2.0 * np.pi * 0.1 * t)), noise=noise)
+    assert named(record) == set()

@@ -1,0 +1,72 @@
+"""Texts as other programs write them: preambles, units below the names, decimal commas, D exponents."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from msg_adapters.tables import import_record, load_map
+from rsea_ros.errors import ImportMapError
+
+MAP = """time: {column: t, unit: s}
+channels:
+  command: {column: u, unit: N m}
+"""
+STAMPS, VALUES = [0.0, 0.1, 0.2], [1.5, -2.5, 1500.0]
+
+TEXTS = {
+    "units below the names": ("t,u,note\ns,N m,-\n0,1.5,a\n0.1,-2.5,b\n0.2,1500,c\n", ""),
+    "units in brackets": ("t;u\n[s];[Nm]\n0;1.5\n0.1;-2.5\n0.2;1500\n", ""),
+    "preamble": ("Bench 3\nDate: 12.3.2024, 14:05\n\nt,u\n0,1.5\n0.1,-2.5\n0.2,1500\n", ""),
+    "preamble and units": ("a;b;c;d\n1;2\nt;u\ns;Nm\n0;1.5\n0.1;-2.5\n0.2;1500\n", ""),
+    "decimal commas": ("t;u\n0,0;1,5\n0,1;-2,5\n0,2;1,5e3\n", 'decimal: ","\n'),
+    "decimal commas in quotes": (
+        't,u\n"0,0","1,5"\n"0,1","-2,5"\n"0,2","1500"\n',
+        'decimal: ","\ndelimiter: ","\n',
+    ),
+    "D exponents": ("t u\n 0.0D+00 1.5D0\n 1.0D-01 -2.5d+00\n 2.0D-1 0.15D+04\n", ""),
+}
+
+
+def imported(folder, text, more=""):
+    (folder / "run.csv").write_text(text)
+    (folder / "map.yaml").write_text(MAP + more)
+    return import_record(folder / "run.csv", load_map(folder / "map.yaml"))
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_it_is_read(name, tmp_path):
+    command = imported(tmp_path, *TEXTS[name])["command"]
+    np.testing.assert_allclose(command.t, STAMPS, atol=1e-12)
+    np.testing.assert_allclose(command.y, VALUES)
+
+
+@pytest.mark.parametrize("decimal", ["", 'decimal: ","\n'])
+@pytest.mark.parametrize("sign", [".", ","])
+def test_a_table_without_names_is_read_or_refused_with_the_line_that_reads_it(decimal, sign, tmp_path):
+    numbered = MAP.replace("column: t", "column: 1").replace("column: u", "column: 2")
+    (tmp_path / "run.csv").write_text("0.0;1.5\n0.1;-2.5\n0.2;1500\n".replace(".", sign))
+    (tmp_path / "map.yaml").write_text(numbered + decimal)
+    if sign == "," and not decimal:
+        with pytest.raises(ImportMapError, match='`decimal: ","` in the map'):
+            import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
+        return
+    record = import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
+    np.testing.assert_allclose(record["command"].y, VALUES)
+
+
+def test_what_is_left_out_is_noted(tmp_path):
+    notes = " ".join(imported(tmp_path, *TEXTS["preamble and units"]).notes)
+    assert "lines 1 to 2 above the names of the columns are left out" in notes
+    assert "line 4 is taken for the units: s;Nm" in notes
+
+
+@pytest.mark.parametrize("row", ["0x10,1.5", "12:30,s", "1.2.3,N m"])
+def test_a_first_row_with_a_number_that_is_none_is_refused_as_before(row, tmp_path):
+    with pytest.raises(ImportMapError, match="line 2, column 't' is"):
+        imported(tmp_path, f"t,u\n{row}\n0,1.5\n0.1,-2.5\n")
+
+
+def test_another_decimal_sign_is_refused(tmp_path):
+    with pytest.raises(ImportMapError, match=r"decimal is ';', expected '\.' or ','"):
+        imported(tmp_path, "t,u\n0,1\n1,2\n", 'decimal: ";"\n')

@@ -1,0 +1,118 @@
+"""Plant and controller with an encoder on the spring: what it is worth, and that it may die.
+
+The encoder's topic passes through this process, so that it can be cut off while everything else goes on.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from msg_adapters.ros import JointState, effort_of, joint_state_of, stamp_of
+from rsea_ros.model.rig import Sensor
+from rsea_ros.model.rig_file import load_rig, save_rig
+from rsea_ros.nodes._qos import MEASURED, MEASUREMENT
+from test.nodes.torque_loop import RATE, SETTLED, Loop
+
+HZ, AMPLITUDE = 10.0, 5.0
+DIES, SECONDS = 2.5, 4.0
+"""s from the begin of the sine."""
+GAINS = {"k_p": 0.2575, "k_d": 0.003029, "k_i": 1.195, "q_frequency": 6.99, "k_w": 42.9}
+"""Of the synthesis, which takes 3 s."""
+
+
+class Encoder:
+    """The encoder's topic on its way from plant to controller."""
+
+    def __init__(self, listener):
+        self.alive, self.angles = True, []
+        self._publisher = listener.node.create_publisher(JointState, "/rsea/deflection", MEASURED)
+        listener.node.create_subscription(JointState, "/rsea/encoder", self._pass_on, MEASUREMENT)
+
+    def _pass_on(self, message):
+        self.angles.append(joint_state_of(message)[:2])
+        if self.alive:
+            self._publisher.publish(message)
+
+
+@pytest.fixture(scope="module")
+def rigs(tmp_path_factory):
+    """The bench, free, and what the controller believes: both ends held; both with an encoder."""
+    folder = tmp_path_factory.mktemp("rigs")
+    for name in ("paper_moving_output", "paper_high_impedance"):
+        rig = load_rig(name)
+        encoder = {"deflection": Sensor(noise=5e-6)}
+        save_rig(replace(rig, sensors={**rig.sensors, **encoder}), folder / f"{name}.yaml")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def loop(start, listener, rigs):
+    """Plant and controller that run."""
+    topics = Loop(listener)
+    topics.encoder = Encoder(listener)
+    moving, held = (rigs / f"{name}.yaml" for name in ("paper_moving_output", "paper_high_impedance"))
+    start("plant", remaps={"deflection": "encoder"}, rig=moving, rate=RATE)
+    topics.controller = start("controller", rig=held, rate=RATE, stale=0.5, **GAINS)
+    topics.ready()
+    listener.until(lambda: len(topics.encoder.angles) > 220)
+    return topics
+
+
+@pytest.fixture(scope="module")
+def run(loop):
+    """A sine in the middle of which the encoder dies: errors with and without it, and when that was."""
+    for _ in range(4):
+        with_it, without, link = followed(loop)
+        if "before" in link and with_it < 0.05:
+            break  # else the machine stalled
+    return with_it, without, link
+
+
+def followed(loop):
+    """Follow the sine; return the median error with the encoder and without, and what was seen of it."""
+    loop.encoder.alive, link = True, {}
+    errors = loop.sine(AMPLITUDE, HZ, SECONDS, lambda t: follow(loop, t, link))
+    until, since = (round((DIES - SETTLED + off) * HZ) for off in (0.0, 0.3))
+    return np.median(errors[:until]), np.median(errors[since:]), link
+
+
+def follow(loop, t, link):
+    """Cut the encoder off in time, and note what the controller says of it before."""
+    if t > DIES and loop.encoder.alive:
+        loop.encoder.alive = False
+        link["at"] = stamp_of(loop.states[-1].header.stamp)
+    elif 2.0 < t < DIES and loop.values().get("link") == "used":
+        link["before"] = "used"
+
+
+def test_the_plant_publishes_the_deflection_of_each_state(loop):
+    angles = loop.encoder.angles[-200:-10]
+    loop.listener.until(lambda: stamp_of(loop.states[-1].header.stamp) > angles[-1][0])
+    at = [stamp_of(m.header.stamp) for m in loop.states]
+    between = [stamp for stamp in at if angles[0][0] <= stamp <= angles[-1][0]]
+    assert [stamp for stamp, _ in angles] == between
+    assert np.isfinite([angle for _, angle in angles]).all()
+
+
+def test_an_unknown_free_load_is_followed_better_with_the_encoder(run):
+    """Simulated faster than real time: 3.4 and 6.2 %."""
+    with_it, without, link = run
+    assert link["before"] == "used"
+    assert with_it < 0.7 * without and with_it < 0.05, run
+
+
+def test_an_encoder_that_dies_makes_no_jump(loop, run):
+    """Second differences of the command, which a jump would show in."""
+    stamps, torques = np.array([effort_of(m)[:2] for m in loop.commands]).T
+    second = np.abs(np.diff(torques, 2))
+    t = (stamps[2:] - run[2]["at"]) * 1e-9
+    before, after = (second[(t > low) & (t < high)].max() for low, high in ((-1.0, -0.1), (-0.1, 0.5)))
+    assert after < 1.5 * before
+
+
+def test_diagnostics_say_that_the_encoder_died(loop, run):
+    shown = loop.values()
+    assert shown["link"] == "not used: no deflection" and int(shown["link_losses"]) >= 1
+    summaries = [m.status[0].message for m in loop.health if m.status[0].name.endswith("controller")]
+    assert any("without the link's motion: no deflection" in words for words in summaries)
