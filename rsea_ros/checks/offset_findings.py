@@ -47,7 +47,7 @@ def angle_offset_findings(rig: Rig, compared: Mapping[str, Side]) -> list[Findin
     if side is None or rig.zero_unknown("position"):
         return []
     middle, rest = float(np.median(side.y)), float(np.median(side.p))
-    if abs(middle - rest) <= float(np.ptp(side.y)):
+    if min(abs(middle), abs(middle - rest)) <= float(np.ptp(side.y)):
         return []
     return [
         Finding(

@@ -25,10 +25,12 @@ def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, mask
         require_motion(record)
     checks = [check_record(record, rig, axis) for record in records]
     if not quiet:
+        print_warnings(checks, rig)
+    kept = [with_faults(noted(r, rig), f, masks=masks) for r, f in zip(records, checks, strict=True)]
+    if not quiet:
         for sentence in dict.fromkeys(filter(None, (unused_sentence(r, rig) for r in records))):
             say(sentence)
-        print_warnings(checks, rig)
-    return [with_faults(noted(r, rig), f, masks=masks) for r, f in zip(records, checks, strict=True)]
+    return kept
 
 
 def print_warnings(checks: Sequence[Findings], rig: Rig) -> None:
