@@ -1,0 +1,116 @@
+"""Four small effects at once on a plant that shares no code with the project: named, missed, and false.
+
+    python bench/overlap.py play --log overlap.jsonl [--records 10]     resumes
+    python bench/overlap.py score --log overlap.jsonl
+
+Each effect is mild to medium (test/independent/severities.py), of another mechanism than the others: two
+frictions in one gear would be one law. Named: with any status, or as a rival of a named cause. False: a cause
+with status `confirmed` that is not hidden. One that hides below the noise counts as missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from effect_coverage_records import COMMANDS
+from independent.bench import drawn_bench, record_command
+from independent.hidden import hide
+from independent.severities import drawn_parameters
+from json_log import append_to_log, read_log
+
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Record
+
+MECHANISMS = (
+    ("coulomb_friction", "asymmetric_friction", "load_dependent_friction"),
+    ("nonlinear_spring", "spring_hysteresis", "stiffness_drift"),
+    ("command_delay", "current_loop_lag", "torque_constant_error"),
+    ("ft_drift", "mains_interference", "structural_resonance"),
+    ("torque_ripple", "damping_drift"),
+)
+HIDDEN, DURATION = 4, 25.0
+WORK = ("chirp", "multisine", "work")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Play records or score them."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("step", choices=("play", "score"))
+    parser.add_argument("--log", type=Path, required=True, help="JSON lines, a record each")
+    parser.add_argument("--records", type=int, default=10, help="seeds from 0 on (default %(default)s)")
+    parser.add_argument("--max-causes", type=int, default=6, help="of the search (default %(default)s)")
+    args = parser.parse_args(argv)
+    if args.step == "play":
+        _play(args.log, args.records, args.max_causes)
+    else:
+        print(scored(read_log(args.log)))
+    return 0
+
+
+def _play(log: Path, records: int, most: int) -> None:
+    done = {entry["seed"] for entry in read_log(log)}
+    for seed in (s for s in range(records) if s not in done):
+        entry = _outcome(seed, most)
+        append_to_log(log, entry)
+        print(entry, flush=True)
+
+
+def made(seed: int) -> tuple[Record, Mapping[str, Mapping[str, float]], str]:
+    """Return a record, the parameters of what is hidden in it by effect, and its kind of work."""
+    rng = np.random.default_rng([12, seed])
+    groups = rng.permutation(len(MECHANISMS))[:HIDDEN]
+    names = [str(rng.choice(MECHANISMS[k])) for k in sorted(groups)]
+    hidden = {n: drawn_parameters(n, str(rng.choice(("mild", "medium"))), rng) for n in names}
+    bench = drawn_bench(rng)
+    for name, parameters in hidden.items():
+        bench = hide(bench, name, parameters)
+    work = WORK[seed % len(WORK)]
+    return record_command(bench, COMMANDS[work](bench, DURATION, rng), rng), hidden, work
+
+
+def _outcome(seed: int, most: int) -> dict[str, Any]:
+    record, hidden, work = made(seed)
+    start = time.process_time()
+    result = diagnose([record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(most))
+    rivals = [a.name for a in result.alternatives]
+    causes = {c.name: c.status for c in result.causes}
+    named = [n for n in hidden if n in causes or n in rivals]
+    false = [n for n, status in causes.items() if n not in hidden and status == "confirmed"]
+    return {
+        "seed": seed,
+        "work": work,
+        "hidden": {n: dict(p) for n, p in hidden.items()},
+        "causes": causes,
+        "rivals": rivals,
+        "named": named,
+        "false": false,
+        "verdict": result.verdict,
+        "seconds": round(time.process_time() - start, 1),
+    }
+
+
+def scored(entries: Sequence[Mapping[str, Any]]) -> str:
+    """Return shares of hidden effects that were named and of said causes that are false."""
+    hidden, named, said, false = (
+        sum(len(e[k]) for e in entries) for k in ("hidden", "named", "causes", "false")
+    )
+    seconds = float(np.median([e["seconds"] for e in entries])) if entries else 0.0
+    return (
+        f"{len(entries)} records: {named} of {hidden} hidden effects named ({named / max(hidden, 1):.0%}), "
+        f"{false} of {said} causes confirmed and false ({false / max(said, 1):.0%}); "
+        f"median {seconds:.0f} s of processor"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
