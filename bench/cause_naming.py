@@ -29,7 +29,7 @@ from rsea_ros.benchmark.dataset import MANIFEST, VERSION, manifest_text, table_t
 from rsea_ros.benchmark.truth import RecordTruth, truth_hash, truth_text
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_text
-from rsea_ros.new_files import NewFiles, check_free, write_text
+from rsea_ros.new_files import Destination, NewFiles, check_free, write_text
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
 
@@ -69,7 +69,7 @@ def write(folder: Path, count: int, duration: float, seed: str, tell: Progress) 
     check_free([folder, truth_file])
     rig = rig_text(load_rig(RIG))
     truths: dict[str, RecordTruth] = {}
-    with NewFiles(folder) as new:
+    with NewFiles(Destination(folder)) as new:
         for number in range(1, count + 1):
             name = f"r{number:04d}"
             tell(name, (number - 1) / count)

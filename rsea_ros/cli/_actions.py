@@ -1,4 +1,4 @@
-"""Actions of a verb: `rsea VERB ACTION …`."""
+"""Actions of a verb: `rsea fleet run`, `rsea benchmark make`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Action(NamedTuple):
-    """An action of a verb."""
+    """What a verb can do. help: one line. add: declares its arguments. run: returns the exit status."""
 
     help: str
     add: Callable[[argparse.ArgumentParser], None]
@@ -16,7 +16,7 @@ class Action(NamedTuple):
 
 
 def add_actions(parser: argparse.ArgumentParser, actions: Mapping[str, Action]) -> None:
-    """Declare the actions; the chosen name is `args.action`."""
-    parsers = parser.add_subparsers(dest="action", required=True, metavar="|".join(actions))
+    """Declare the actions of a verb; the chosen one becomes `args.action`."""
+    added = parser.add_subparsers(dest="action", required=True, metavar="|".join(actions))
     for name, action in actions.items():
-        action.add(parsers.add_parser(name, help=action.help, description=action.help))
+        action.add(added.add_parser(name, help=action.help, description=action.help))

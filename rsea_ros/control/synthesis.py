@@ -51,6 +51,8 @@ SOFT = (0.1, 0.3, 1.0, 3.0)
 _START = (0.3, 0.0025, 2.0, 12.0, 42.0)
 """k_p; k_d, s; k_i; q_frequency, Hz; k_w, N m s/rad."""
 _SHORT = 0.02
+_AIM = 0.9995
+"""Of the impedance allowed: the search may end that much beside its aim."""
 HEAVY = ("x 4", "x 30", "x 100")
 """Loads between others, or nearly locked: they are left to the check of what was found."""
 
@@ -81,7 +83,10 @@ class ControllerDesign:
 
 @dataclass(frozen=True)
 class SynthesisProblem:
-    """What a design is looked for on: the corners of the set, and the locked rig moved from outside."""
+    """What a design is looked for on: the corners of the set, and the locked rig moved from outside.
+
+    The latter on the grid of `check`: between 60 frequencies the impedance was 0.5 % above its limit.
+    """
 
     rig: Rig
     rate: float
@@ -109,16 +114,16 @@ def design(
 
     def cost(x: FloatArray) -> float:
         score = _score(problem, _gains(x, rate))
-        soft = np.interp(SOFT, problem.family.hz, score.softness)
+        soft = np.interp(SOFT, problem.moved.hz, score.softness)
         wanted = np.log(score.friction.max()) + np.mean(np.log(soft))
         return float(wanted) + 20.0 * _lacking(problem, score, demand) + 20.0 * _stiff(score, demand)
 
     gains = _gains(_search(cost, np.log(_START)), rate)
     if _lacking(problem, _score(problem, gains), demand) > _SHORT:
-        found = _design(problem, gains)
+        nearest = _design(problem, gains)
         raise ParameterError(
             f"rig {rig.name}: no gains keep the whole set of benches stable with its margins at {rate:g} Hz: "
-            f"largest sensitivity {found.sensitivity:.2f}, expected {demand.robust:g}"
+            f"largest sensitivity {nearest.sensitivity:.2f}, expected {demand.robust:g}"
         )
     return check(rig, loads, rate, gains)
 
@@ -145,9 +150,9 @@ def check(rig: Rig, loads: Mapping[str, Rig], rate: float, gains: Gains) -> Cont
     return _design(problem, gains)
 
 
-def worst(found: ControllerDesign) -> str:
+def worst(designed: ControllerDesign) -> str:
     """Return the least margins in words."""
-    name, least = min(found.margins.items(), key=lambda item: item[1].phase)
+    name, least = min(designed.margins.items(), key=lambda item: item[1].phase)
     return (
         f"phase margin {least.phase:.1f} deg, gain margin {least.gain:.1f} dB, "
         f"delay margin {least.delay:.2f} samples with load {name!r}"
@@ -166,18 +171,17 @@ def grid(rate: float, points: int = 150) -> FloatArray:
 
 def _problem(rig: Rig, loads: Mapping[str, Rig], rate: float, hz: FloatArray) -> SynthesisProblem:
     u = Uncertainty()
-    return SynthesisProblem(
-        rig, rate, family(loads, corners(tuple(loads), u), u, rate, hz), moved(rig, rate, hz)
-    )
+    benches = family(loads, corners(tuple(loads), u), u, rate, hz)
+    return SynthesisProblem(rig, rate, benches, moved(rig, rate, grid(rate)))
 
 
 def _score(problem: SynthesisProblem, gains: Gains) -> RobustnessScore:
     law, f = law_of(problem.rig, problem.rate, gains), problem.family
-    own, whole = returns(law, f.plant, f.hz, f.path, f.current)
-    sensitivity = (np.maximum(np.abs(own), 1.0) / np.abs(whole)).max(axis=1)
+    memory, whole = returns(law, f.plant, f.hz, f.path, f.current)
+    sensitivity = (np.maximum(np.abs(memory), 1.0) / np.abs(whole)).max(axis=1)
     return RobustnessScore(
         sensitivity,
-        friction_left(f.plant[FT] * own / whole, f.hz),
+        friction_left(f.plant[FT] * memory / whole, f.hz),
         encirclements(whole),
         problem.moved.ratio(law),
     )
@@ -194,16 +198,16 @@ def friction_left(response: FloatArray, hz: FloatArray) -> FloatArray:
 
 def _design(problem: SynthesisProblem, gains: Gains) -> ControllerDesign:
     law, f, score = law_of(problem.rig, problem.rate, gains), problem.family, _score(problem, gains)
-    own, whole = returns(law, f.plant, f.hz, f.path, f.current)
-    found = {
-        case.load: margins(whole[k] / own[k] - 1.0, f.hz, 1.0 / problem.rate)
+    memory, whole = returns(law, f.plant, f.hz, f.path, f.current)
+    by_load = {
+        case.load: margins(whole[k] / memory[k] - 1.0, f.hz, 1.0 / problem.rate)
         for k, case in enumerate(f.cases)
         if case.nominal
     }
     return ControllerDesign(
         gains,
         problem.rate,
-        MappingProxyType(found),
+        MappingProxyType(by_load),
         float(score.friction.max()),
         float(score.sensitivity.max()),
         float(score.softness.max()),
@@ -218,7 +222,7 @@ def _lacking(problem: SynthesisProblem, score: RobustnessScore, demand: DesignLi
 
 
 def _stiff(score: RobustnessScore, demand: DesignLimits) -> float:
-    return max(0.0, float(score.softness.max()) / demand.impedance - 1.0)
+    return max(0.0, float(score.softness.max()) / (_AIM * demand.impedance) - 1.0)
 
 
 def _odd(highest: float) -> FloatArray:
