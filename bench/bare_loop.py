@@ -1,8 +1,8 @@
-"""A loop that does nothing at absolute deadlines: what the machine allows, measured beside what is judged.
+"""A loop that does nothing at absolute deadlines: what this machine allows, measured beside the driver.
 
 Run: bare_loop.py RATE SECONDS PRIORITY FILE [PORT]. The file gets a row for each cycle: due, begun, done, ns.
-With a PORT each cycle does what a driver cannot leave out: two requests to the motor there, each with its
-reply.
+With a PORT, each cycle sends the two requests that a driver cannot leave out to the motor on that port and
+awaits each reply.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ class BareLoop:
         self._process = subprocess.Popen([sys.executable, *words], stdin=subprocess.DEVNULL)
 
     def cycles(self) -> np.ndarray:
-        """Wait for its end and return due, begun and done of each cycle, shape (n, 3), ns."""
+        """Wait for the end of the loop and return due, begun and done of each cycle, shape (n, 3), ns."""
         self._process.wait()
         return np.load(self._file)
 
 
 def permitted(priority: int) -> bool:
-    """Tell whether this process may have a priority."""
+    """Return whether this process may have a priority."""
     if priority == 0:
         return True
     try:

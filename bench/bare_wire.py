@@ -1,4 +1,4 @@
-"""What the wire of the bench can by itself: how late replies are, and what the driver's rule makes of it."""
+"""The wire of the bench alone: lateness of its replies, and the faults that the driver's rule would latch."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rsea_ros.nodes.driver import TABLE
 ALONE = 6.0
 """s; as long as the sine of a trial."""
 IN_TIME = 0.8
-"""Of a period: so long a driver waits for both replies."""
+"""Share of a period in which a driver waits for both replies."""
 
 
 def wire_alone(rate: float, priority: int, folder: Path, bench: RemoteBench) -> tuple[int, str]:
-    """Run the two requests of each cycle and nothing else; return the faults and what came of it in words."""
+    """Run only the two requests of each cycle; return the number of faults, and a sentence about the wire."""
     cycles = BareLoop(rate, ALONE, folder, priority, bench.port).cycles()
     limit = limits_of({p.name: p.default for p in TABLE} | {"rate": rate}).lost_cycles
     late, longest, faults = outcome(cycles, rate, limit)

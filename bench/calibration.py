@@ -56,9 +56,9 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(required=True, metavar="make|fit|score")
     make = verbs.add_parser("make", help="diagnose records and keep the evidence; goes on where it stopped")
     make.add_argument("--records", type=int, default=600, help="how many (default %(default)s)")
-    make.add_argument("--searches", type=Path, help="keep the searches here, to weigh them anew without one")
+    make.add_argument("--searches", type=Path, help="keep the searches here, to weigh them again later")
     make.add_argument(
-        "--pool", type=int, default=0, help="try only so many effects a record, 0: all (default %(default)s)"
+        "--pool", type=int, default=0, help="try at most N effects a record, 0: all (default %(default)s)"
     )
     make.set_defaults(step=_make)
     verbs.add_parser("fit", help=f"write {TABLE.name} from the project's own plants").set_defaults(step=_fit)
@@ -91,7 +91,7 @@ def _fit(args: argparse.Namespace) -> None:
 
 
 def _score(args: argparse.Namespace) -> None:
-    """Score what is said of the plants that judge, and of those that were fitted to."""
+    """Score the probabilities on the plants that judge, and on those of the fit."""
     text = []
     for title, chosen in (("The plant that judges", True), ("The plants that were fitted to", False)):
         entries = [e for e in usable(args.cache) if (e["family"] == JUDGES) == chosen]
@@ -110,7 +110,7 @@ def usable(cache: Path) -> list[dict[str, Any]]:
 
 
 def _entry(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
-    """Return what came of one record; an exception is an outcome too."""
+    """Return the outcome of one record; an exception is an outcome too."""
     start = time.perf_counter()
     entry = {"name": plan.name, "family": plan.family, "group": plan.group, "truth": list(plan.truth)}
     entry |= {"off": plan.off[0] if plan.off else None, "excitation": plan.excitation, "pool": pool}

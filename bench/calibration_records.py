@@ -42,7 +42,7 @@ GROUPS = {
     "taken_out": 0.08,
     "clean": 0.01,
 }
-"""Share of the records by what is hidden: effects of the catalogue, a law that it lacks (off), or both."""
+"""Share of the records by hidden causes: effects of the catalogue, a law that it lacks (off), or both."""
 COUNT = {"one": 1, "two": 2, "three": 3, "four": 4, "off_and_one": 1, "off_and_two": 2, "taken_out": 2}
 ON_RIGID = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "torque_ripple", "damping_drift")
 NOT_ON_SEA = ("torque_constant_error", "current_loop_lag", "hard_stop")
@@ -54,7 +54,7 @@ class Plan:
     """What a record is made from.
 
     hidden: effects with their parameters. off: a law outside the catalogue and its relative size. without:
-    effects that the diagnosis has to do without. coloured: N m RMS of such noise in the F/T sensor.
+    effects that the diagnosis may not use. coloured: N m RMS of such noise in the F/T sensor.
     """
 
     name: str
@@ -104,7 +104,7 @@ def _plan(k: int, rng: np.random.Generator) -> Plan:
 
 
 def _unknown(family: str, off: tuple[str, float] | None) -> tuple[str, ...]:
-    """Return the effect that a law is, which the diagnosis is not to know."""
+    """Return the effect of the catalogue that a law equals, which the diagnosis may not use."""
     known = LAWS[off[0]].known_as if off and family != "second" else ""
     return (known,) if known in catalogue() else ()
 
@@ -138,9 +138,9 @@ def _kin(name: str) -> tuple[str, ...]:
 
 
 def left_out(plan: Plan, pool: int) -> tuple[str, ...]:
-    """Return what a diagnosis has to do without: the plan's, and all but `pool` effects where pool is not 0.
+    """Return the effects that a diagnosis may not use: the plan's, and all but `pool` where pool is not 0.
 
-    What is hidden and what it is confused with stay, so that a pool leaves the likeliest wrong names in.
+    The hidden effects and those confused with them stay, so a pool keeps the likeliest wrong names.
     """
     effects = catalogue()
     mimics = OFF_CATALOGUE[plan.off[0]][1] if plan.off and plan.off[0] in OFF_CATALOGUE else ()
@@ -226,7 +226,7 @@ def _simulated(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
 
 
 def _looped(channels, rig: Rig, commanded: FloatArray, acting: FloatArray):
-    """Return channels with a reference (rad) that asks for about what was commanded."""
+    """Return channels with a reference (rad) that demands about the commanded torque."""
     softness = 2.0 / rig["spring.stiffness"] if not rig.rigid_spring else 0.02
     reference = Channel(channels["command"].t, softness * commanded)
     return {**channels, "command": Channel(reference.t, acting - commanded), "reference": reference}

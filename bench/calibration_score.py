@@ -17,7 +17,7 @@ from rsea_ros.diagnosis.naming.signature import Signature
 from rsea_ros.diagnosis.naming.status import probabilities_and_status
 
 OUTSIDE = ("off", "taken_out")
-"""Groups, by how their names begin, whose record holds a law that the diagnosis cannot know."""
+"""Beginnings of the names of groups whose record holds a law that the diagnosis cannot know."""
 JUDGES = "second"
 """The plant that no coefficient is fitted on."""
 EXPECTED = {
@@ -29,17 +29,17 @@ EXPECTED = {
     "flexible": -3.0,
     "edge": -0.7,
 }
-"""Coefficients beforehand: the sign that theory gives each, and a size that a few records may overrule."""
+"""Prior of the coefficients: their signs by theory, and sizes that a few records may overrule."""
 _RIDGE = 1.0
 """Of each coefficient, the intercept apart: a standard deviation of 1 around what is expected."""
 _ITERATIONS = 50
 EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.85, 0.95, 0.99, 1.0)
-"""Of the bins of the reliability diagram; 0.85 to 0.95 are the causes said with 90 %."""
+"""Of the bins of the reliability diagram; 0.85 to 0.95 are the causes with a probability of about 90 %."""
 
 
 @dataclass(frozen=True)
 class Said:
-    """One cause of one record: what was said and whether it is right. is_rival: only an alternative."""
+    """One named cause of one record: its probability, whether it is right, whether it is only a rival."""
 
     record: str
     group: str
@@ -53,7 +53,7 @@ class Said:
 
 @dataclass(frozen=True)
 class Bin:
-    """Causes with a probability of low to high: how many, the mean said, the share that is right."""
+    """Causes with a probability of low to high: how many, their mean probability, the share that is right."""
 
     low: float
     high: float
@@ -94,7 +94,7 @@ def fitted(found: Sequence[Mapping[str, float]], right: np.ndarray) -> dict[str,
 def said(
     entries: Sequence[Mapping[str, Any]], coefficients: Mapping[str, float] = COEFFICIENTS
 ) -> Iterator[Said]:
-    """Yield what would be said of every cause and rival of some records."""
+    """Yield the probability of every cause and rival of some records."""
     for record in entries:
         for place in record["places"]:
             evidence = [evidence_from(e) for e in place]
@@ -128,7 +128,7 @@ def brier(causes: Sequence[Said]) -> float:
 
 
 def table(causes: Sequence[Said]) -> list[str]:
-    """Return the score of what was said as lines of Markdown."""
+    """Return the score of the probabilities as lines of Markdown."""
     lines = [f"{len(causes)} causes and rivals weighed, Brier score {brier(causes):.3f}", ""]
     lines += ["| probability said | causes | mean said | right |", "|---|--:|--:|--:|"]
     for b in reliability(causes):

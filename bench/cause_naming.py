@@ -26,10 +26,10 @@ from independent.hidden import hide_off_catalogue as hide_outside
 from independent.severities import SEVERITIES, drawn_parameters
 
 from rsea_ros.benchmark.dataset import MANIFEST, VERSION, manifest_text, table_text, truth_path
-from rsea_ros.benchmark.truth import Truth, truth_hash, truth_text
+from rsea_ros.benchmark.truth import RecordTruth, truth_hash, truth_text
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_text
-from rsea_ros.new_files import NewFiles, Place, check_free, write_text
+from rsea_ros.new_files import Destination, NewFiles, check_free, write_text
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
 
@@ -68,8 +68,8 @@ def write(folder: Path, count: int, duration: float, seed: str, tell: Progress) 
     truth_file = truth_path(folder)
     check_free([folder, truth_file])
     rig = rig_text(load_rig(RIG))
-    truths: dict[str, Truth] = {}
-    with NewFiles(Place(folder)) as new:
+    truths: dict[str, RecordTruth] = {}
+    with NewFiles(Destination(folder)) as new:
         for number in range(1, count + 1):
             name = f"r{number:04d}"
             tell(name, (number - 1) / count)
@@ -82,7 +82,7 @@ def write(folder: Path, count: int, duration: float, seed: str, tell: Progress) 
     return write_text(truth_file, truth_text(truths))
 
 
-def made(seed: str, number: int, duration: float) -> tuple[Record, Truth]:
+def made(seed: str, number: int, duration: float) -> tuple[Record, RecordTruth]:
     """Return a record (duration in s) and what it hides."""
     digest = hashlib.sha256(f"rsea cause naming {VERSION}:{number}:{seed}".encode())
     rng = np.random.default_rng(int.from_bytes(digest.digest()))
@@ -102,7 +102,7 @@ def made(seed: str, number: int, duration: float) -> tuple[Record, Truth]:
         }
         if all(times >= 1.0 for times in shown.values()):
             outside = hidden.outside[0] if hidden.outside else ""
-            return replace(record, source=""), Truth(hidden.effects, outside, shown, salt)
+            return replace(record, source=""), RecordTruth(hidden.effects, outside, shown, salt)
     raise AssertionError(f"record {number}: no draw of {TRIES} shows")
 
 

@@ -1,8 +1,8 @@
 """The controller node in a process of its own, with the instants at which it latches a fault written down.
 
 From SIGUSR1 on, until it comes again, HELD periods pass between taking measurements and commanding for them:
-as on a busy machine, but by plan. SIGSTOP would not do: a subscriber that is stopped while it takes a message
-out of shared memory holds up whoever publishes, here the driver, for a second.
+as on a busy machine, but at planned times. SIGSTOP is no substitute: a subscriber that is stopped while it
+takes a message out of shared memory blocks the publisher, here the driver, for a second.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ HELD = 4.0
 
 
 class Hold:
-    """Whether the work is held up. period: s."""
+    """Delay of the node's work. period: s."""
 
     def __init__(self, period: float) -> None:
         self._period, self._on = period, False
 
     def toggle(self, number: int, frame: object) -> None:
-        """Begin, or end."""
+        """Begin or end the delay."""
         self._on = not self._on
 
     def pause(self) -> None:
-        """Hold the caller up."""
+        """Delay the caller."""
         if self._on:
             time.sleep(HELD * self._period)
 

@@ -21,7 +21,7 @@ from diagnosis_shared import SHARED, shared_cases
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the cases asked for, print what comes as it comes and the summary at the end."""
+    """Run the requested cases, print each outcome when it arrives and the summary at the end."""
     args = _parser().parse_args(argv)
     jobs = _jobs(args)
     outcomes = []
@@ -40,7 +40,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--cases", choices=("shared", "own", "all"), default="all", help="which records")
     parser.add_argument("--select", default="", metavar="TEXT", help="only cases with TEXT in name or group")
     parser.add_argument("--limit", type=int, metavar="N", help="only N cases, spread evenly over all")
-    parser.add_argument("--seed", type=int, default=2024, help="seed of the own cases (default %(default)s)")
+    parser.add_argument("--seed", type=int, default=2024, help="seed of the cases (default %(default)s)")
     parser.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="cases at a time (default %(default)s)"
     )
@@ -75,7 +75,7 @@ def _run_shared(number: str) -> Outcome:
 
 
 def _run(jobs: Sequence[partial[Outcome]], workers: int) -> Iterator[Outcome]:
-    """Yield outcomes as they come, from `workers` processes, or from this one when that is 1."""
+    """Yield outcomes as they arrive, from `workers` processes, or from this one when that is 1."""
     if workers == 1:
         yield from (job() for job in jobs)
         return
@@ -85,7 +85,7 @@ def _run(jobs: Sequence[partial[Outcome]], workers: int) -> Iterator[Outcome]:
 
 
 def _line(outcome: Outcome, number: int, total: int) -> str:
-    """Return one case in one line: truth or faults, what was said, sizes found, gain, time."""
+    """Return one case in one line: truth or faults, named causes, their sizes, gain, time."""
     sizes = ", ".join(f"{f.parameter} {f.value:.4g} of {f.truth:.4g}" for f in outcome.found if f.main)
     said = " + ".join(outcome.named) or outcome.verdict
     mark = "ok   " if outcome.right else "rival" if outcome.right_or_rival else "WRONG"
@@ -98,7 +98,7 @@ def _line(outcome: Outcome, number: int, total: int) -> str:
 
 
 def _write(args: argparse.Namespace, outcomes: Sequence[Outcome]) -> None:
-    """Write what there is so far, aside first, so that a run that is stopped leaves whole files."""
+    """Write the outcomes so far to a new file first, so that a stopped run leaves whole files."""
     entries = [{**asdict(o), "right": o.right, "right_or_rival": o.right_or_rival} for o in outcomes]
     summary = [asdict(m) for m in measures(outcomes)]
     for path, text in (

@@ -1,6 +1,6 @@
 """Records with a known cause, for measuring the diagnosis: made by the second bench, not by the model.
 
-`plan(seed)` lists what there is; `Plan.make()` simulates one case, so that a run needs only one in memory.
+`plan(seed)` lists the cases; `Plan.make()` simulates one case, so that a run needs only one in memory.
 """
 
 from __future__ import annotations
@@ -69,12 +69,12 @@ READINGS = (
         {"ripple": 0.0, "cogging": 1.2, "cogging_period": 0.011},  # a wave of the output angle: the same law
     ),
 )
-"""Effect, its size, and values of the bench that make another sentence of the contract's row of it."""
+"""Effect, its size, and values of the bench that stand for another reading of its definition."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One record, what is hidden in it, and another record of the same bench with another seed."""
+    """One record, its hidden effects, and another record of the same bench with another seed."""
 
     name: str
     record: Record
@@ -89,7 +89,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a case is made from; without: effects that the diagnosis has to do without.
+    """The ingredients of a case; without: effects that the diagnosis may not use.
 
     group: single, pair, clean, off_catalogue, taken_out, faulty, reading, drawn_pair, drawn_triple, newer, or
     unsearched (an effect that a diagnosis does not try unless a rig states it).
@@ -187,7 +187,7 @@ def _off_catalogue(rng: np.random.Generator) -> Iterator[Plan]:
 
 
 def _taken_out(rng: np.random.Generator) -> Iterator[Plan]:
-    """Every effect hidden, and taken out of the catalogue with all that are said to be confused with it."""
+    """Every effect hidden, and taken out of the catalogue with all effects that are confused with it."""
     for k, (name, effect) in enumerate(catalogue().items()):
         if name in SIZES:
             kin = [n for n, e in catalogue().items() if name in e.claims.confusable_with]
@@ -197,7 +197,7 @@ def _taken_out(rng: np.random.Generator) -> Iterator[Plan]:
 
 
 def _faulty(rng: np.random.Generator) -> Iterator[Plan]:
-    """Every fault on a bench with nothing wrong, and on one with an effect to be found in spite of it."""
+    """Every fault on a healthy bench, and on a bench with an effect that must be named in spite of it."""
     for k, fault in enumerate(FAULTS):
         yield Plan(f"fault-{fault}", "faulty", _seed(rng), _excitation(k), faults=(fault,))
         if fault != "missing_topic":
@@ -233,7 +233,7 @@ def _newer(rng: np.random.Generator) -> Iterator[Plan]:
 
 
 def _readings(rng: np.random.Generator) -> Iterator[Plan]:
-    """The contract's rows read otherwise; asked values don't hold for these, the matrix shows them."""
+    """Other readings of the definitions of effects; no limits hold for these, but the matrix shows them."""
     for effect, parameters, values in READINGS:
         for excitation in ("chirp_noise", "multisine"):
             name = f"reading-{effect}-{excitation}"

@@ -1,4 +1,4 @@
-"""The asked measures over many outcomes, a table for each effect, and the confusion matrix."""
+"""The required measures over many outcomes, a table for each effect, and the confusion matrix."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NOTHING, UNEXPLAINED, OFF = "nothing wrong", "unexplained", "not in the catalogu
 
 @dataclass(frozen=True)
 class Measure:
-    """One line of the summary: what, how much, out of how many cases, and what is asked of it."""
+    """One line of the summary: name, value, number of cases, and the required value."""
 
     what: str
     value: float

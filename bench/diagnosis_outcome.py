@@ -1,4 +1,4 @@
-"""What came of one case: the diagnosis beside the truth, as plain values that go into a JSON file."""
+"""The outcome of one case: the diagnosis beside the truth, as plain values that go into a JSON file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OUTSIDE = ("off_catalogue", "taken_out", "unsearched")
 
 @dataclass(frozen=True)
 class Found:
-    """A parameter as it is and as the diagnosis has it, in SI."""
+    """The true value of a parameter and the one of the diagnosis, in SI."""
 
     effect: str
     parameter: str
@@ -37,7 +37,7 @@ class Found:
 
     @property
     def error(self) -> float:
-        """Error relative to the truth; as it is where that is zero."""
+        """Error relative to the truth; absolute where the truth is zero."""
         return abs(self.value - self.truth) / (abs(self.truth) or 1.0)
 
     @property
@@ -98,7 +98,7 @@ class Outcome:
 def run_case(
     case: Case, rig_name: str = "paper_high_impedance", settings: DiagnosisSettings = DEFAULT
 ) -> Outcome:
-    """Diagnose a case and set the result beside the truth; an exception is an outcome too."""
+    """Diagnose a case and compare the result with the truth; an exception is an outcome too."""
     start = time.perf_counter()
     try:
         settings = replace(settings, without=case.without)

@@ -28,11 +28,11 @@ PARAMETERS = {
     "mains_interference": {"amplitude": ("hum",), "frequency": ("hum_f",)},
     "damping_drift": {"relative_change": ("damp_drift",)},
 }
-"""Parameter of the contract: what the truth file calls it, where that is another name."""
+"""Parameters that have another name in the truth file."""
 
 
 def shared_cases(folder: Path = SHARED) -> Iterator[Case]:
-    """Yield the shared cases; another bag of the same bench is not to be had for them."""
+    """Yield the shared cases; no second bag of the same bench exists for them."""
     truth = json.loads((folder / "truth" / "truth.json").read_text())
     for number, entry in sorted(truth.items()):
         causes = tuple(entry["causes"])

@@ -1,4 +1,4 @@
-"""What the driver reaches on the bench on a wire, beside a bare loop with absolute deadlines in the same run.
+"""Performance of the driver on the bench on a wire, beside a bare loop with absolute deadlines.
 
 Run: python bench/driver.py [SECTION …] [--seconds 30] [--strings 1000000] [--rate 280 1000] [--priority 0 80]
 The sections: timing, loss, faults, random, controller, stream, fuzz; all of them without a name. `random
@@ -37,7 +37,7 @@ SECTIONS: dict[str, Callable[[argparse.Namespace, Path], list[tuple[str, str, st
 
 
 def main() -> None:
-    """Measure and print asked | measured."""
+    """Measure, and print required and measured values."""
     parser = parser_of(__doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="of each run of the loop")
     parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="of `timing`, Hz")

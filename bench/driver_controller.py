@@ -1,8 +1,8 @@
 """Controller and driver together on the bench on a wire, quiet and beside processes that burn every core.
 
 A sine of 5 Hz, 10 N m, 4.7 N m with a free end: its error, RMS, and the largest |ft|, which a load may not
-raise. The bare loop of the same minute tells what the machine can, and so does a loop of nothing but the
-two requests to the motor, on the same terminal once the driver has left it: how long it waits for a reply,
+raise. The bare loop of the same minute shows what the machine can do, and so does a loop of only the two
+requests to the motor, on the same terminal once the driver has left it: how long it waits for a reply,
 and how many faults the driver's rule would make of that. The bench on a wire runs at SCHED_FIFO if that is
 permitted, above both nodes: motor and sensor have processors of their own; at 1 kHz a bench that waits for
 one is a motor that does not answer. Each rate as any process, and with both nodes at SCHED_FIFO where
@@ -38,7 +38,7 @@ from rsea_ros.hardware.peer.remote import RemoteBench
 
 
 class Kind(NamedTuple):
-    """A bench: its rig, amplitude of the sine (N m), error that is asked for (%)."""
+    """A bench: its rig, amplitude of the sine (N m), largest allowed error (%)."""
 
     name: str
     rig: str
@@ -47,7 +47,7 @@ class Kind(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """What came of one: in words; largest |ft|, N m; whether replies were lost; what the wire does alone."""
+    """The outcome of a trial: a sentence; largest |ft|, N m; whether replies were lost; the wire alone."""
 
     told: str
     largest: float
@@ -58,19 +58,19 @@ class Trial(NamedTuple):
 
 LOCKED = Kind("locked", "paper_high_impedance", 10.0, 2.0)
 FREE = Kind("free", "paper_moving_output", 4.7, 4.0)
-"""4.7 N m: more on a free end is beyond a motor of 68 N m."""
+"""4.7 N m: a motor of 68 N m cannot make more on a free end."""
 PATIENT = {"lost_cycles": 100, "ft_timeout": 1.0, "command_timeout": 1.0}
-"""Of the driver on a machine whose terminals stall: then the error says what the controller does between."""
+"""Limit of the driver on a machine whose terminals stall: the error is then that between stalls."""
 TRIES = 3
 """Of a quiet trial in which the wire itself lost the replies."""
 MEASURED, ATTEMPTS = 3, 8
-"""Faults by lateness that are measured, and how often one is tried for."""
+"""Faults by lateness to measure, and attempts for each."""
 BURN = "while True: pass"
 
 
 @contextmanager
 def burning(count: int) -> Iterator[None]:
-    """Run so many processes that do nothing but compute."""
+    """Run this many processes that only compute."""
     processes = [subprocess.Popen([sys.executable, "-c", BURN]) for _ in range(count)]
     try:
         yield
@@ -119,7 +119,7 @@ def _tried(
 def _trial(
     kind: Kind, rate: float, load: int, priority: int, path: Path, patient: Mapping[str, object]
 ) -> Trial:
-    """Run one trial once; a fault ends the sine, which is part of what is asked."""
+    """Run one trial once; a fault ends the sine, which is part of the requirement."""
     outside = Outside()
     with ExitStack() as kept, ExitStack() as nodes:
         bench = kept.enter_context(RemoteBench(path, "--rig", kind.rig))
@@ -182,7 +182,7 @@ def _drive(outside: Outside) -> None:
 
 
 def _faults(outside: Outside) -> list[str]:
-    """Return the faults that the nodes told of last."""
+    """Return the faults that the nodes reported last."""
     return [v["fault"] for v in outside.health.values() if v.get("fault", "none") != "none"]
 
 

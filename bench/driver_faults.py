@@ -3,8 +3,8 @@
 Times are the bench's own, over the cycle's period: a machine that stalls shows in `most`. What is asked is
 judged by the driver's own cycles until it writes zero, which no machine stretches; by time where it stands
 still itself, is asked to end, or the supervisor is at work. The bench runs at SCHED_FIFO where that is
-permitted. Where it or this loop stood still for a cycle and the driver did not hear it, that is no answer
-to what is asked: such a run is done again, and told.
+permitted. Where it or this loop stood still for a cycle and the driver did not hear it, the run does not
+answer the question: it is repeated, and the repeats are reported.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from rsea_ros.nodes.driver import TABLE
 RATE = 280.0
 RUNS, AGAIN = 3, 10
 QUICK, SLOW = 4.0, 300.0
-"""Periods within which the torque must be zero: of what a cycle sees, of what is looked at once a second."""
+"""Periods within which the torque must be zero: for faults seen in each cycle, and once a second."""
 
 Request = tuple[str, Mapping[str, Any]]
 
 
 class Run(NamedTuple):
-    """What came of a trial once: periods and cycles until zero, the cause that is latched, what ended it."""
+    """One run of a trial: periods and cycles until zero torque, the latched cause, and the end of it."""
 
     periods: float
     cycles: int
@@ -41,7 +41,7 @@ class Run(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """What is done to the bench, what undoes it, the service that ends it, and periods that it may take.
+    """How the bench is disturbed and restored, the service that ends the fault, the allowed periods.
 
     latched: whether it is a fault at all.
     """
@@ -65,7 +65,7 @@ def reads(name: str, value: float, right: float, within: float = QUICK) -> Trial
 
 
 def host(what: str, within: float, service: str = "clear") -> Trial:
-    """Return a trial of what happens to the driver itself, a function of this file."""
+    """Return a trial of an event in the driver itself, given by a function of this file."""
     return Trial(("host", {"what": what}), None, service, within)
 
 
@@ -141,7 +141,7 @@ FAULTS: dict[str, Trial] = {
 
 
 def faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
-    """Provoke each, some times over."""
+    """Provoke each fault several times."""
     rows = []
     with RemoteBench(folder / "tty") as bench:
         bench.hurry()
@@ -165,7 +165,7 @@ def faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]
 
 
 def _runs(loop: Loop, bench: RemoteBench, trial: Trial) -> tuple[list[Run], int, str]:
-    """Return RUNS of a trial; how many were done again because the machine stood still, and the last such."""
+    """Return RUNS of a trial, the number of repeats after stalls of the machine, and the last stall."""
     runs: list[Run] = []
     again, why = 0, ""
     while len(runs) < RUNS:
@@ -182,7 +182,7 @@ def _runs(loop: Loop, bench: RemoteBench, trial: Trial) -> tuple[list[Run], int,
 
 
 def _once(loop: Loop, bench: RemoteBench, trial: Trial) -> Run:
-    """Do a trial once."""
+    """Run a trial once."""
     _calm(loop)
     age = 0.0
     if trial.wrong[0] == "host":
@@ -223,11 +223,11 @@ HOST: dict[str, Callable[[Loop], float | None]] = {
     "silence": lambda loop: 1.0 / RATE,
     "reboot": lambda loop: loop.device._motor.bus.reboot(),
 }
-"""What happens to the driver; the age of its command where that ceases."""
+"""Event in the driver; the age of its command where commands cease."""
 
 
 def _recover(loop: Loop, service: str) -> str:
-    """Call the service until it ends the fault; return how it did."""
+    """Call the service until it ends the fault; return its answer."""
     loop.guarded.guard.halted = False
     for attempt in range(1, 6):
         try:

@@ -1,6 +1,6 @@
 """Random and mutated byte strings into both receivers.
 
-RDT has no check of its own over its values: damage there is for the checksum of UDP, and is not tried here.
+RDT does not check its values: the checksum of UDP must reject damage to them, which is not tried here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rsea_ros.hardware.peer import protocol2
 
 
 def fuzz(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
-    """Feed them; an exception would end the run."""
+    """Feed both receivers; an exception ends the run."""
     accepted, wrong, undetectable = _frames(args.strings)
     records, strange = _records(args.strings)
     limit = f"a CRC of 16 bits misses {undetectable / 65536:.1f} of {undetectable}"

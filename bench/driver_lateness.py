@@ -29,7 +29,7 @@ LONGEST = 8.0
 ASKED = 50.0
 """ms."""
 SMALL, REACHED = 0.5, 8.0
-"""N m of the motor that are noise, and that are the torque which is asked for."""
+"""N m of the motor that count as noise, and as the commanded torque."""
 
 
 class Torques:
@@ -70,7 +70,7 @@ def noted_controller(
 
 @contextmanager
 def _held_up(process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """Hold its work up meanwhile."""
+    """Delay the controller's work within a with statement."""
     process.send_signal(signal.SIGUSR1)
     try:
         yield
@@ -81,7 +81,7 @@ def _held_up(process: subprocess.Popen[bytes]) -> Iterator[None]:
 def to_zero(
     outside: Outside, torques: Torques, process: subprocess.Popen[bytes], file: Path
 ) -> tuple[str, str]:
-    """Hold 10 N m, hold the controller up, and return what was measured and which fault it was."""
+    """Hold 10 N m, delay the controller, and return the measured torques and the fault."""
     faults = file.read_text().splitlines()
     end = time.monotonic() + LONGEST
     _hold(outside, lambda: torques.newest() > REACHED or time.monotonic() > end)

@@ -47,6 +47,6 @@ class Loop:
         return state
 
     def run(self, seconds: float, torque: Callable[[int], float]) -> None:
-        """Run for a while; torque of the cycle's number."""
+        """Run for some seconds; torque: N m, by the number of the cycle."""
         for k in range(round(seconds * 1e9 / self._period)):
             self.cycle(torque(k))

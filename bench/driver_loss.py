@@ -1,4 +1,4 @@
-"""One lost reply, and 1 % of the packets lost for a while: what it costs, and that no value is wrong."""
+"""One lost reply, and 1 % of the packets lost for a while: their cost, and a check that no value is wrong."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _costs(loop: Loop) -> str:
 
 
 def _wrong(loop: Loop, log: dict) -> int:
-    """Count samples that are none of those that the bench has logged as sent."""
+    """Count the samples that the bench has not logged as sent."""
     table = TABLES[54024]
     start = table.sample[0]
     sent = {

@@ -1,8 +1,9 @@
 """Random faults at random instants, several at once, beside a monitor that knows one rule of the torque.
 
-No torque unless active, commanded in the last 100 ms, without fault. The seed of a violation repeats what was
-done; the machine's own stalls are not in it. A torque that the bench has kept while it stood still itself, by
-its own account, is counted apart: a motor does not stand still, and no driver could have told it anything.
+No torque unless active, commanded in the last 100 ms, without fault. The seed of a violation repeats the
+faults; it does not repeat stalls of the machine. A torque that the bench has kept while it stood still
+itself, by its own account, is counted apart: a motor does not stand still, and no driver could have
+reached it.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ RATE = 280.0
 CALM = {"drop": 0.0, "delay": 0.0, "corrupt": 0.0, "wrong_crc": 0.0, "silent": False, "ft_silent": False}
 LIMITS = limits_of({p.name: p.default for p in TABLE})
 LONGEST, GRACE = 100_000_000, 50_000_000
-"""ns that a command excuses a torque; that a fault may act on: its cycle, the ramp, a lost write."""
+"""ns for which a command allows a torque, and after a fault: its cycle, the ramp, a lost write."""
 
 
 class Watched:
-    """A loop, what happens to it, and what is wrong with its torque."""
+    """A loop, the faults that it suffers, and the violations of its torque."""
 
     def __init__(self, bench: RemoteBench, seed: int) -> None:
         self.bench, self.loop, self.dice = bench, Loop(bench, RATE, limits=LIMITS), random.Random(seed)
@@ -42,7 +43,7 @@ class Watched:
         self.looked = self.begun = time.monotonic_ns()
 
     def cycle(self) -> None:
-        """Do a cycle, and look at what the motor has been told since the last look."""
+        """Run a cycle, and check the commands that the motor has received since the last check."""
         guarded = self.loop.guarded
         if self.dice.random() < 0.01:
             self._happen()
@@ -76,7 +77,7 @@ class Watched:
             self._violated(f"{fault} for {(now - since) / 1e6:.0f} ms", held_up)
 
     def _violated(self, why: str, held_up: int) -> None:
-        """Note a violation with what went before it; apart where the bench itself stood still."""
+        """Note a violation with the faults before it; apart where the bench itself stood still."""
         still = self.bench.stood_still(time.monotonic_ns() - 10 * LONGEST)
         after = f"{(time.monotonic_ns() - self.begun) / 1e9:.1f} s after the start"
         told = f"{why}, {after}, this loop {held_up / 1e6:.0f} ms a turn, the bench still for {still:.0f} ms"

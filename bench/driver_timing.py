@@ -3,8 +3,8 @@
 Each rate as any process, then at SCHED_FIFO where that is permitted: driver and bare loop at the same
 priority, the bench on a wire one above, since hardware does not wait for our processor. After each, for half
 as long, a minute at most, and beside another bare loop: a loop of nothing but the two requests to the motor.
-What that one is late, pseudo-terminal and bench are: the kernel hands its bytes on in a worker of usual
-priority. A driver is less often late than that only where it does not wait for a reply.
+Its lateness is that of pseudo-terminal and bench: the kernel passes the bytes on in a worker of usual
+priority. A driver is late less often only where it does not wait for a reply.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def _left_out(cycles: np.ndarray, period: float) -> int:
 
 
 def _latencies(here: str, node: np.ndarray, delays: FloatArray) -> list[Row]:
-    """Return those of publication and reception. node: sample and publication, ns, 0 without; delays: ms."""
+    """Return the latencies of publication and reception. node: sample, publication, ns or 0; delays: ms."""
     replied = node[:, 0] > 0
     published = (node[replied, 1] - node[replied, 0]) / 1e6
     (p50, p99), (r50, r99) = np.quantile(published, [0.5, 0.99]), np.quantile(delays, [0.5, 0.99])

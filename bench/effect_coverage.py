@@ -34,7 +34,7 @@ PERIODIC = ("phase", "cycles_per_revolution")
 """Parameters with several values that mean the same."""
 DOUBTED = ", the simulation's own error included"
 SHOWS = 1.1
-"""Times the noise that the fitted rig leaves, from which an effect shows."""
+"""Residual of the fitted rig over the noise from which an effect shows."""
 MARKS = {"named": "+", "rival": "r", "other": "x", "none": "-", "hidden": ".", "error": "E"}
 
 
@@ -53,7 +53,7 @@ def _parser() -> argparse.ArgumentParser:
     play.add_argument("--severity", choices=SEVERITIES, action="append", help="by default all")
     play.add_argument("--work", choices=COMMANDS, action="append", help="by default all")
     play.add_argument("--effect", choices=SIZES, action="append", help="by default all")
-    play.add_argument("--sample", type=int, help="only so many cells, drawn by the seed")
+    play.add_argument("--sample", type=int, help="at most N cells, drawn by the seed")
     play.add_argument("--seed", type=int, default=5, help="of records (default %(default)s)")
     play.add_argument("--duration", type=float, default=20.0, help="of records, s (default %(default)s)")
     play.set_defaults(step=_play)

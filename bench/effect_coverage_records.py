@@ -1,7 +1,7 @@
 """Records for the coverage table: one effect, one kind of work, one severity, on test/independent.
 
-That plant shares no code with the project. Six kinds of work: what benches are driven with, and what
-machines do.
+That plant shares no code with the project. Six kinds of work: commands of benches, and motions of
+machines at work.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ RIG_VALUES = {
     "spring.stiffness": "k_s",
     "spring.damping": "b_s",
 }
-"""Value of the rig, and what the second bench calls it."""
+"""Value of the rig, and its name on the second bench."""
 STIFF, DAMPED = 900.0, 15.0
 """Gains of the closed loop on the deflection, N m/rad and N m s/rad."""
 SOFTNESS = 25.0 / 1500.0
-"""Largest angle that the closed loop is asked for, rad."""
+"""Largest target of the closed loop, rad."""
 
 
 class Made(NamedTuple):
-    """A record, the parameters of what is hidden in it, and the true values of the rig, in SI units."""
+    """A record, the parameters of the hidden effect, and the true values of the rig, in SI units."""
 
     record: Record
     parameters: Mapping[str, float]

@@ -1,4 +1,4 @@
-"""Experiments that are designed, against fixed ones: python bench/experiment.py COMMAND LOG …
+"""Designed experiments against fixed ones: python bench/experiment.py COMMAND LOG …
 
     causes LOG [FIRST COUNT]   hidden-cause benches, each line of LOG one of them; goes on where it stopped
     summary LOG                the figures of those lines
@@ -50,10 +50,10 @@ from rsea_ros.signals import Channel  # noqa: E402
 
 RATE, CHIRP = 280.0, 20.0
 ALIKE = {"torque_constant_error", "ft_gain_error"}
-"""No run tells these apart without a value measured apart: proved by experiment/bound.py on each bench."""
+"""No run separates these without another measurement: proved by experiment/bound.py on each bench."""
 LIMITS = RunLimits(torque=25.0, velocity=2.0, deflection=0.04)
 DESIGNS = 5
-"""Benches whose designed runs are played again and again for the limits."""
+"""Benches whose designed runs are repeated for the limits."""
 SECONDS, SHORTEST = 20.0, 0.1
 """s of excitation that a policy has, and of its first run at least."""
 
@@ -69,13 +69,13 @@ def hidden(k):
 
 
 def slow_work(seconds=10.0, amplitude=0.5):
-    """Return a command that tells little, N m."""
+    """Return a command with little information, N m."""
     t = np.arange(round(seconds * RATE)) / RATE
     return amplitude * np.sin(2.0 * np.pi * 0.25 * t) * (1.0 + 0.3 * np.sin(2.0 * np.pi * 0.07 * t))
 
 
 def is_shown(plain, bench):
-    """Tell whether the cause shows at all within the limits: in 20 s of chirp, beside the same noise."""
+    """Return whether the cause shows within the limits: in 20 s of chirp, beside the same noise."""
     command = fixed_chirp()
     with_it, without = (record_command(b, command, np.random.default_rng(5)) for b in (bench, plain))
     sizes = {"ft": 0.03, "position": 6e-6}
@@ -104,7 +104,7 @@ class Fixed:
 
 
 class _Played:
-    """What the campaign asks of a proposal."""
+    """The part of a proposal that the campaign uses."""
 
     def __init__(self, run):
         command = at_rest_around(run, RATE)
@@ -156,7 +156,7 @@ def one(k, pools):
 
 
 def said(outcome):
-    """Return what counts of an outcome."""
+    """Return the part of an outcome that counts."""
     kinds = [getattr(getattr(r.proposal, "shape", None), "kind", "") for r in outcome.rounds if r.proposal]
     return {
         "end": outcome.end,
@@ -218,12 +218,12 @@ def summary(log):
 
 
 def good(x, policy):
-    """Tell whether a policy confirmed the right cause."""
+    """Return whether a policy confirmed the right cause."""
     return x[policy]["end"] == "confirmed" and x[policy]["cause"] == x["cause"]
 
 
 def limits(runs):
-    """Count violations in designed runs on benches drawn from what is known of them."""
+    """Count violations in designed runs on benches drawn from their intervals."""
     rig, rng, broken, worst, made = load_rig("paper_high_impedance"), np.random.default_rng(3), 0, 0.0, 0
     tight = RunLimits(torque=25.0, velocity=1.0, deflection=0.015, ft=22.0)
     with worker_pools() as pools:

@@ -1,10 +1,11 @@
-"""Every effect in every target: said or left out, and where the target runs here, how far it is from ours.
+"""Every effect in every target: exported or left out and, where the target runs here, its difference from
+this project's simulation.
 
     python bench/exports.py                                  the rigs that have a spring, all effects, MuJoCo
     python bench/exports.py paper_high_impedance --fmu       the same in FMUs
 
 A line for each rig and effect: difference / size of the effect, both in times the sensor's noise, by channel.
-Status 1 where a nominal rig differs by more than NOMINAL, which is what the integrators may part by.
+Status 1 where a nominal rig differs by more than NOMINAL, the allowed difference of the integrators.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def words() -> None:
-    """Print how many effects each target has words for, and which it leaves out."""
+    """Print how many effects each target can express, and which it leaves out."""
     targets: dict[str, Callable[[Rig], object]] = {
         "mjcf": export_mjcf, "sdf": export_sdf, "urdf": export_urdf, "isaac": export_isaac, "bam": export_bam,
     }  # fmt: skip
@@ -73,7 +74,7 @@ def _made(export: Callable[[Rig], object], name: str) -> object:
 
 
 def command(rig: Rig, seconds: float) -> FloatArray:
-    """Return the chirp that is played, N m or rad."""
+    """Return the chirp, N m or rad."""
     base = JOINT if rig.loop else ExcitationSettings(amplitude=10.0, noise=2.0, high=60.0)
     return excitation("chirp", replace(base, rate=RATE, duration=seconds, low=0.5))
 

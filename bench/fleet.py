@@ -1,4 +1,4 @@
-"""What `rsea fleet` costs, and what it survives, with figures.
+"""Cost of `rsea fleet`, and the failures that it survives, in figures.
 
 Run: python bench/fleet.py cost|faults [PART …]. Ratios and counts do not depend on the machine, seconds do.
 """
@@ -15,7 +15,7 @@ import rsea_ros.cli  # noqa: F401  keeps numpy from starting threads
 
 
 def main(arguments: list[str]) -> int:
-    """Run what is asked for."""
+    """Run the requested parts."""
     match arguments:
         case ["client", bags, store]:
             from fleet_faults import client

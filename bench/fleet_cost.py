@@ -1,4 +1,4 @@
-"""What a run costs: equal rows, speed-up, overhead, the scheduler's memory, reading, and a million."""
+"""Cost of a run: equal rows, speed-up, overhead, memory of the scheduler, reading, a million recordings."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ MEGA = 1e6
 
 
 def line(name: str, asked: str, measured: str, good: bool = True) -> bool:
-    """Print a figure beside what is asked of it."""
+    """Print a figure beside the required one."""
     print(f"{name:<30} {measured:<60} asked: {asked}{'' if good else '  NOT REACHED'}", flush=True)
     return good
 
 
 def content(store: Store) -> list[dict[str, object]]:
-    """Return the rows without what may differ from run to run, in a fixed order."""
+    """Return the rows in a fixed order, without the columns that may differ from run to run."""
     tables = [read(file) for file in store.rows.glob("joint=*/month=*/*.parquet")]
     rows = pa.concat_tables(tables).drop_columns(list(VARYING)).to_pylist()
     return sorted(rows, key=lambda row: row["recording"])
@@ -67,7 +67,7 @@ def real() -> bool:
 
 
 def overhead(name: str, took: float, work: float) -> bool:
-    """Print the share of a run's time that is no work."""
+    """Print the share of a run's time that is not spent in tasks."""
     share = took / work - 1.0
     return line(name, "≤ 5 %", f"{100.0 * share:.1f} % of {work:.1f} s of work", share <= 0.05)
 
@@ -167,7 +167,7 @@ def reading(count: int = 100_000) -> bool:
 
 
 def memory() -> bool:
-    """Identify recordings of several lengths, each in a new process: what a worker takes for each byte."""
+    """Identify recordings of several lengths, each in a new process: the memory of a worker for each byte."""
     from fleet_memory import peaks
 
     found = peaks()
@@ -178,7 +178,7 @@ def memory() -> bool:
 
 
 def million() -> bool:
-    """Simulate 10^6 recordings on 100 workers from the costs measured here; say what breaks first."""
+    """Simulate 10^6 recordings on 100 workers from the costs measured here; print what breaks first."""
     from fleet_million import report
 
     return report(line)

@@ -1,4 +1,4 @@
-"""What a run survives: lost workers, clients and schedulers, a full disk, poison, another run beside it."""
+"""A run survives: lost workers, clients and schedulers, a full disk, poison, another run beside it."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ MEMORY = 1_000_000_000
 
 @contextmanager
 def place(count: int) -> Iterator[tuple[Path, Path]]:
-    """Give a folder of stub recordings and the path of a store to be."""
+    """Yield a folder of stub recordings and the path of a future store."""
     with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:
         yield stub.make_bags(Path(folder) / "bags", count), Path(folder) / "store"
 
 
 def verdict(name: str, store: Path, count: int, more: str) -> bool:
-    """Print what is in a store beside what should be; return whether every recording is there once."""
+    """Print the rows of a store beside the expected ones; return whether every recording is there once."""
     held, apart = stub.rows(open_store(store))
     good = held == apart == count
     print(f"{name:<28} {count - apart} lost, {held - apart} double of {count}; {more}"
@@ -64,7 +64,7 @@ def workers_killed(count: int = 60) -> bool:
 
 
 def client(folder: str, path: str) -> None:
-    """Be a client that can be killed: the whole of a run with its cluster."""
+    """Run a whole run with its cluster, as a client that can be killed."""
     store = open_store(path, create=True)
     with locked(store, lambda holder: None), on_this_machine(1, MEMORY, "127.0.0.1:0") as (workers, _):
         store.finish()
@@ -113,7 +113,7 @@ def _kill_after(process: subprocess.Popen[bytes], store: Store, least: int) -> N
 
 @contextmanager
 def _cluster() -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """Give the address of a scheduler with one worker, both processes of their own."""
+    """Yield the address of a scheduler with one worker, both processes of their own."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scheduler.json"
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -181,7 +181,7 @@ def two_at_once(count: int = 40) -> bool:
 
 
 def truncated() -> bool:
-    """Truncate a real recording while it is read: no row; the next run says what is left of it."""
+    """Truncate a real recording while it is read: no row; the next run reads the rest of it."""
     from fleet_real import make_fleet, run_real
 
     with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:

@@ -60,7 +60,7 @@ def simulate(costs: Costs, tasks: int, workers: int = WORKERS, seed: int = 1) ->
 
 
 def report(line: Callable[..., bool]) -> bool:
-    """Print what the simulation says for several kinds of work, and what breaks first."""
+    """Print the simulated rates for several kinds of work, and what breaks first."""
     for work in (0.5, 5.0, 60.0):
         rate, workers, client = simulate(Costs(work, CLIENT_S), 50_000)
         hours = RECORDINGS / rate / 3600.0

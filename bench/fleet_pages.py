@@ -1,10 +1,10 @@
-"""How long the report of a fleet takes to write and its pages to open: asked beside measured.
+"""How long the report of a fleet takes to write and its pages to open: required and measured times.
 
 .venv/bin/python bench/fleet_pages.py [--rows 100000] [--chromium chromium]
 
 Writes the report of a simulated fleet of 10 000 recordings and of a history of --rows rows; opens the page of
-the fleet and of two joints in a headless Chromium; counts what they ask for from outside and what they write
-to the console.
+the fleet and of two joints in a headless Chromium; counts their requests to other hosts and their messages on
+the console.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def enlarged(history: Mapping[str, np.ndarray], rows: int) -> dict[str, np.ndarr
 
 
 class Browser:
-    """A headless Chromium that is asked over its debugging port."""
+    """A headless Chromium, controlled over its debugging port."""
 
     def __init__(self, program: str, folder: str) -> None:
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"]
@@ -108,7 +108,7 @@ class Browser:
 
 
 class Talk:
-    """Questions and answers of the debugging protocol; what the page does meanwhile is counted."""
+    """Questions and answers of the debugging protocol; events of the page in between are counted."""
 
     def __init__(self, socket: WebSocketClientConnection) -> None:
         self._socket, self._number = socket, 0

@@ -1,6 +1,6 @@
 """A fleet over a year: 20 joints of test/independent whose recordings are drawn from a played sample.
 
-What a recording says of its joint (errors, intervals, what cannot be told, causes named, refusals) is drawn
+The results of a recording (errors, intervals, undetermined parameters, named causes, refusals) are drawn
 from fleet_trends_played.json, where recordings of the same kind of work and of like wear were simulated and
 diagnosed in full. Diagnosing 10 x 10 000 recordings would take a week.
 """
@@ -42,13 +42,13 @@ PER_KELVIN = {
     "coulomb_friction": FRICTION_PER_K,
 }
 TOLD = 0.5
-"""Share that the data must have brought for a parameter to count as told."""
+"""Share that the data must have brought for a parameter to count as identifiable."""
 MIX = {"handling": 0.4, "stepping": 0.15, "walking": 0.25, "holding": 0.2}
 
 
 @dataclass(frozen=True)
 class Wear:
-    """What happens to a joint. kind: key of fleet_plants.joint, `replaced` or `fault`. size: at the end.
+    """The wear of a joint. kind: key of fleet_plants.joint, `replaced` or `fault`. size: at the end.
 
     since: day of the year. ramp: days over which it comes, 0 for at once.
     """
@@ -60,7 +60,7 @@ class Wear:
     fault: str = ""
 
     def share(self, day: np.ndarray) -> np.ndarray:
-        """Return how much of it has come, 0 to 1."""
+        """Return the share of the wear that has occurred, 0 to 1."""
         if self.ramp:
             return np.clip((day - self.since) / self.ramp, 0.0, 1.0)
         return (day >= self.since).astype(float)
@@ -76,7 +76,7 @@ class Fleet:
 
 
 def drawn_wear(rng: np.random.Generator, joints: int, days: int) -> dict[str, Wear]:
-    """Return what happens to whom: five wear, one is replaced, three get faults of the data."""
+    """Return the wear of each joint: five wear, one is replaced, three get faults of the data."""
     names = [f"J{i + 1:02d}" for i in rng.permutation(joints)]
     when = rng.uniform(0.2, 0.55, 5) * days
     kinds = [
@@ -179,7 +179,7 @@ def _like(
 
 
 def _distance(wear: Mapping[str, float], what: str, size: float) -> float:
-    """Return by how much the wear of a played joint differs, in logarithms of what is off."""
+    """Return the difference of a played joint's wear, in logarithms of its factors."""
     null = 0.0 if what in ("gap", "delay") else 1.0
     floor = {"gap": 0.015e-3, "delay": 0.1e-3}.get(what, 0.005)
     if wear and what not in wear:
@@ -215,7 +215,7 @@ def _row(
 
 
 def _estimate(played: list[float], was: float, true: float, rng: np.random.Generator) -> tuple[float, ...]:
-    """Return value, low, high and share told: the played error and interval, relative, on another truth."""
+    """Return value, low, high and data share: the played error and interval, relative, on another truth."""
     value, low, high, told = played
     shift = (high - low) / 3.92 * float(rng.normal())
     return (*(true * (v + shift) / was for v in (value, low, high)), told)

@@ -71,7 +71,7 @@ def played(
 
 
 def rows(store: Store) -> tuple[int, int]:
-    """Return how many rows all files hold together, and how many recordings they are of."""
+    """Return the number of rows in all files, and of the recordings in them."""
     import pyarrow.dataset
 
     table = pyarrow.dataset.dataset(store.rows, partitioning="hive", format="parquet").to_table(["recording"])
@@ -84,7 +84,7 @@ def outcomes(store: Store) -> dict[str, int]:
 
 
 def wait_for(condition, limit: float) -> None:
-    """Wait until something is so. Raises TimeoutError."""
+    """Wait until a condition holds. Raises TimeoutError."""
     end = time.monotonic() + limit
     while not condition():
         if time.monotonic() > end:

@@ -1,11 +1,12 @@
-"""Ten simulated fleets over a year through the trends and alarms of `rsea fleet`: asked beside measured.
+"""Ten simulated fleets over a year through trends and alarms of `rsea fleet`: required and measured values.
 
 .venv/bin/python bench/fleet_trends.py --log /tmp/fleets.jsonl [--seeds 10] [--seconds 200]
 
 A fleet: 20 joints, 500 recordings each, a season of temperature, a day effect, normal work. Five wear, one is
-replaced, three get faults of the data. `alarms` looks at what is there every week of the year, as
-`rsea fleet watch` does. What a recording tells is drawn from a played sample (fleet_trends_played.py), for
-diagnosing 100 000 recordings would take a week. The log goes on where it stopped.
+replaced, three get faults of the data. Every week of the year `alarms` looks at the recordings so
+far, as `rsea fleet watch` does. The results of a recording are drawn from a played sample
+(fleet_trends_played.py), because diagnosing 100 000 recordings would take a week. The log goes on
+where it stopped.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ RIGHT = {
     "delay": ("command_delay",),
     "ft_gain": ("ft_gain_error",),
 }
-"""What an alarm of a worn joint is about where it is right. A replaced joint may differ in anything."""
+"""Right subjects of an alarm, by kind of wear. A replaced joint may differ in anything."""
 
 
 def look(made: Fleet, day: float) -> tuple[Alarm, ...]:
-    """Return the alarms on what a fleet has recorded until a day."""
+    """Return the alarms on the recordings of a fleet until a day."""
     parts = []
     for table in (made.history, made.recordings):
         until = table["time_s"] < START + DAY * day
@@ -47,7 +48,7 @@ def look(made: Fleet, day: float) -> tuple[Alarm, ...]:
 
 
 def outcome(seed: int, values: str) -> dict[str, Any]:
-    """Return what came of the fleet of a seed."""
+    """Return the outcome of the fleet of a seed."""
     begun = time.perf_counter()
     made = fleet(seed, values=values)
     first: dict[str, tuple[float, Alarm]] = {}
@@ -110,7 +111,7 @@ def judged(
 def limit(made: Fleet, joint: str, wear: Wear) -> float | None:
     """Return days after the onset from which an observer who knows the shape could be sure, by the intervals.
 
-    Of a parameter: its expected score, from the told recordings' intervals and the true day effect, passes
+    Of a parameter: its expected score, from the recordings' intervals and the true day effect, passes
     the threshold of the alarms. Of a cause or a fault: the third day that names it.
     """
     settings = TrendSettings()
@@ -156,7 +157,7 @@ def _limit_of_parameter(made: Fleet, joint: str, wear: Wear, about: str) -> floa
 
 
 def table(outcomes: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Yield the lines: asked beside measured, then by what happened."""
+    """Yield the lines of the table: required and measured values, then by kind of wear."""
     worn = [w for o in outcomes for w in o["worn"]]
     real = [w for w in worn if w["kind"] in RIGHT]
     dated = [
@@ -203,7 +204,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--log", type=Path, required=True, help="JSON lines, a fleet each")
     parser.add_argument("--seeds", type=int, default=10, help="fleets (default %(default)s)")
     parser.add_argument(
-        "--seconds", type=float, default=200.0, help="begin no fleet after so long (%(default)s)"
+        "--seconds", type=float, default=200.0, help="begin no fleet after this time, s (%(default)s)"
     )
     parser.add_argument(
         "--values", choices=("parameters", "identified"), default="parameters",

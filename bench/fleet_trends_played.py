@@ -1,9 +1,9 @@
-"""Simulate and diagnose a sample of a fleet's recordings, to measure what a recording tells of its joint.
+"""Simulate and diagnose a sample of a fleet's recordings, to measure what a recording shows of its joint.
 
 .venv/bin/python bench/fleet_trends_played.py --log /tmp/played.jsonl [--seconds 200] [--write]
 
 Each plan is a joint of test/independent with some wear, at some temperature, at some kind of normal work.
-The log goes on where it stopped. --write puts the sample, without what is not needed, beside this file; the
+The log goes on where it stopped. --write puts the sample, without unneeded fields, beside this file; the
 ten fleets of bench/fleet_trends.py draw their recordings from it.
 """
 
@@ -40,7 +40,7 @@ TRIED = (
     "coulomb_friction", "backlash", "command_delay", "ft_gain_error", "torque_constant_error",
     "stribeck_friction", "ft_sensor_lag", "current_loop_lag", "gear_compliance", "load_dependent_friction",
 )  # fmt: skip
-"""Effects that are tried: the fleet's, and those that they are easily taken for. All would take an hour."""
+"""Effects to try: the fleet's, and those easily confused with them. All would take an hour."""
 WEAR: tuple[Mapping[str, float], ...] = (
     {},
     {},
@@ -69,7 +69,7 @@ SLIGHT: tuple[Mapping[str, float], ...] = (
     {"ft_gain": 0.98},
     {"ft_gain": 0.99},
 )
-"""Where naming begins, and more joints without wear: what they are said to have is said in error."""
+"""Sizes near the threshold of naming, and more joints without wear, on which every cause is wrong."""
 SPOILT = ("dropped_samples", "outliers", "frozen_samples")
 """Faults of recording that a joint of the fleet can have."""
 TRUE = {
@@ -106,7 +106,7 @@ def plans() -> Iterator[Plan]:
 
 
 def recorded(plan: Plan) -> tuple[Bench, Record]:
-    """Return the joint of a plan and what it logs."""
+    """Return the joint of a plan and its record."""
     bench = joint(plan.seed, temperature=plan.temperature, **plan.wear)
     record = recording(bench, plan.kind, plan.seed + 1)
     if plan.fault:
@@ -115,7 +115,7 @@ def recorded(plan: Plan) -> tuple[Bench, Record]:
 
 
 def identified(plan: Plan) -> dict[str, Any]:
-    """Return what identify, which trusts the rig's structure, says of a plan; nothing if it refuses."""
+    """Return the result of identify, which trusts the rig's structure; nothing if it refuses."""
     start = time.perf_counter()
     parameters = {}
     with suppress(RseaError):
@@ -125,7 +125,7 @@ def identified(plan: Plan) -> dict[str, Any]:
 
 
 def played(plan: Plan) -> dict[str, Any]:
-    """Return what came of a plan beside the truth; a refusal is an outcome too."""
+    """Return the outcome of a plan beside the truth; a refusal is an outcome too."""
     start = time.perf_counter()
     bench, record = recorded(plan)
     entry: dict[str, Any] = {**asdict(plan), "outcome": "done", "true": truth(bench)}
@@ -149,7 +149,7 @@ def truth(bench: Bench) -> dict[str, float]:
 
 
 def said(d: Diagnosis) -> dict[str, Any]:
-    """Return what a diagnosis says, rounded: parameters, causes, faults, verdict."""
+    """Return the result of a diagnosis, rounded: parameters, causes, faults, verdict."""
     parameters = {p.name: [p.value, *p.ci95, p.told_by_data] for p in final_values(d) if p.name in TRUE}
     causes = [
         {
@@ -181,7 +181,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--log", type=Path, required=True, help="JSON lines, a recording each")
-    parser.add_argument("--seconds", type=float, default=200.0, help="stop after so long (%(default)s)")
+    parser.add_argument("--seconds", type=float, default=200.0, help="stop after this time, s (%(default)s)")
     parser.add_argument("--write", action="store_true", help=f"write {SAMPLE.name} from the log")
     args = parser.parse_args(argv)
     end = time.perf_counter() + args.seconds
@@ -203,7 +203,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _kept(log: Path, done: dict[str, dict[str, Any]], entry: dict[str, Any]) -> None:
-    """Write what came of a recording to the log and the screen."""
+    """Write the outcome of a recording to the log and the screen."""
     done.setdefault(entry["name"], {}).update(entry)
     append_to_log(log, entry)
     names = ", ".join(c["name"] for c in entry.get("causes", [])) or "identified"

@@ -1,4 +1,4 @@
-"""What the watch over a joint reaches: asked beside measured.
+"""Performance of the health monitor: required and measured values.
 
 Run: python bench/health.py [SECTION …] [--hours 1] [--seeds 0 1 2] [--seconds 60]
 white   false alarms of the sums on scores drawn at the edge of the doubt: stated, measured
@@ -72,7 +72,7 @@ def alarms(args: argparse.Namespace) -> Iterator[str]:
 
 
 class _noted:
-    """Note what every CUSUM is given meanwhile: (inner, outer, score, information, phi)."""
+    """Note every input of every CUSUM: (inner, outer, score, information, phi)."""
 
     def __enter__(self) -> list[tuple[Cusum, tuple[np.ndarray, ...]]]:
         rows: list[tuple[Cusum, tuple[np.ndarray, ...]]] = []

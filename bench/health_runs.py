@@ -1,4 +1,4 @@
-"""Joints of test/independent at work, healthy and then not, and what the monitor makes of them."""
+"""Joints of test/independent at work, first healthy and then with a fault, and the monitor's findings."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FRICTION_DOUBT = 0.03
 
 @dataclass(frozen=True)
 class Fault:
-    """What changes in the bench, and the code that is right. times: factors, not values."""
+    """A change of the bench, and the right code for it. times: factors, not values."""
 
     code: str
     change: Mapping[str, float]
@@ -122,7 +122,7 @@ def pieces(bench: Bench, seconds: float, rng: np.random.Generator, start: float 
 
 
 def watch(monitor: Monitor, records: Iterator[Record]) -> Iterator[tuple[float, HealthFinding]]:
-    """Give a monitor what comes, as a node does; yield the time of each finding that is new, s."""
+    """Feed a monitor with the measurements, as a node does; yield the time of each finding that is new, s."""
     for record in records:
         t, kind, values = events_of(record)
         step = max(1, round(len(t) * 0.25 / max(float(t[-1] - t[0]), 0.25)))

@@ -29,7 +29,7 @@ from rsea_ros.signals import Channel, Record
 ROOT = Path(__file__).resolve().parents[1]
 RATE, DURATION = 280.0, 160.0
 OFF = 1.08
-"""The true values, in those of the rig: a fit that starts at the truth would be too quick."""
+"""True values over those of the rig: a fit that starts at the truth would be too quick."""
 
 
 def bench_record() -> Record:
@@ -41,7 +41,7 @@ def bench_record() -> Record:
 
 
 def plain_response(record: Record) -> None:
-    """Do what a script does: H1 by Welch of F/T torque and position to the command."""
+    """Estimate responses as a script does: H1 by Welch of F/T torque and position to the command."""
     u = record["command"].y
     for name in ("ft", "position"):
         _, s_uy = csd(u, record[name].y, RATE, nperseg=4096)

@@ -29,7 +29,7 @@ from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel, FloatArray, Record
 
 RATE, OFF, SETTLE = 280.0, 1.08, 84
-"""Hz; the true values in those of the rig; samples at the start that no fit looks at."""
+"""Hz; true values over those of the rig; samples at the start that no fit uses."""
 NAMES = ("rotor.reflected_inertia", "rotor.reflected_damping", "spring.stiffness", "spring.damping")
 
 
@@ -89,7 +89,7 @@ def _values(rig: Rig) -> FloatArray:
 
 
 def _simulated(values: FloatArray, u: FloatArray, chassis: float) -> dict[str, FloatArray]:
-    """Return what the sensors read at the end of each period of the held command."""
+    """Return the readings of the sensors at the end of each period of the held command."""
     j_m, b_m, k_s, b_s = values
     below = [j_m + chassis, b_m + b_s, k_s]
     above = {"ft": [b_s, k_s], "position": [1.0], "velocity": [1.0, 0.0]}

@@ -1,4 +1,4 @@
-"""Bad and unusual inputs: what a bench or a recorder may bring, through the command line, with ceilings.
+"""Bad and unusual inputs, as a bench or a recorder may make them, through the command line, with ceilings.
 
     python bench/inputs.py                    all parts, a table
     python bench/inputs.py --quick            a few minutes of them
@@ -36,7 +36,7 @@ PARTS = ("matrix", "mutations")
 
 
 def main() -> int:
-    """Play what is asked for and print the table; status 1 when a promise was broken."""
+    """Play the requested parts and print the table; status 1 when a promise was broken."""
     args = _arguments()
     folder = Path(tempfile.mkdtemp(prefix="rsea-inputs-"))
     warm()
@@ -71,10 +71,10 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--only", nargs="+", default=[], metavar="TEXT", help="lines that hold all of these")
     parser.add_argument("--log", type=Path, help="JSON lines: every case with its outcome")
     parser.add_argument(
-        "--resume", type=Path, metavar="LOG", help="do not play again what this log holds with a kept promise"
+        "--resume", type=Path, metavar="LOG", help="skip the cases of this log that kept the promise"
     )
     parser.add_argument("--keep", type=Path, metavar="DIR", help="copy mutated files that broke a promise")
-    parser.add_argument("--verbose", action="store_true", help="what went wrong in full")
+    parser.add_argument("--verbose", action="store_true", help="print each failure in full")
     return parser.parse_args()
 
 
@@ -149,7 +149,7 @@ def kept_promises(log: Path | None) -> dict[str, Outcome]:
 
 
 def _case(name: str) -> str:
-    """Return what a case is, without its number, which new rigs and effects change."""
+    """Return a case without its number, because new rigs and effects change that."""
     return name.partition(" ")[2]
 
 

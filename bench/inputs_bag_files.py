@@ -159,7 +159,7 @@ _COLUMNS = {
 
 
 STEPS = 5_000_000
-"""Of a statement that damages a database: more of them are without end."""
+"""Steps of a statement that damages a database; one with more does not end."""
 
 
 def damaged_sqlite(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:

@@ -19,13 +19,13 @@ from rsea_ros.signals import Channel, FloatArray, Record
 
 CHANNELS = ("ft", "position", "velocity", "motor_torque", "deflection")
 OF_SPRING = ("ft", "deflection")
-"""What a simulation of a rig without a spring does not give."""
+"""Channels that a simulation of a rig without a spring lacks."""
 FEWEST = 10
 """Samples of a command: fewer are refused by the package's excitations, but may stand in a bag."""
 TARGETS = {True: 0.02, False: 1e-3}
 """rad of reference for each N m of a case's command, with and without a position loop in the rig."""
 MISFIT = 1.6
-"""By which the bench's damping and inertia differ from the rig's where the case says so."""
+"""Factors of the bench's damping and inertia over the rig's, in cases with another bench."""
 
 
 def sensors_of(rig: Rig, stated: str) -> Rig:

@@ -1,4 +1,4 @@
-"""Damage that knows nothing of the format: bits, blocks, lengths, ends."""
+"""Damage without regard to the format: bits, blocks, lengths, ends."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ODD_DOUBLES = (
 
 
 def damaged(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
-    """Return bytes with one or a few places changed. other: what may be spliced in."""
+    """Return bytes with one or a few places changed. other: bytes that may be spliced in."""
     for _ in range(rng.choice((1, 1, 1, 2, 4, 16))):
         data = rng.choice(_KINDS)(rng, data, other) if data else rng.randbytes(8)
     return data

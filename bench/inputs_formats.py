@@ -1,4 +1,4 @@
-"""Every format that is read: well-formed files to begin with, how they are damaged, and who reads them."""
+"""Every format that is read: well-formed files to begin with, the damage to them, and their reader."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from rsea_ros.signals import Channel, Record
 
 RIG = "paper_high_impedance"
 EVERY = 8
-"""Of what is read without complaint, one in so many goes on into a verb that computes with it."""
+"""One in this many accepted files goes on into a verb that computes with it."""
 Damage = Callable[[random.Random, bytes, bytes], bytes]
 
 

@@ -1,4 +1,4 @@
-"""The matrix: every rig, every verb, every subset of channels, and pairwise everything else that may vary."""
+"""The matrix: every rig, every verb, every subset of channels, and pairs of values of all other factors."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def rigs() -> list[str]:
 
 
 def bag_factors(names: Sequence[str]) -> dict[str, list[Any]]:
-    """Return what varies from bag to bag; common values stand several times."""
+    """Return the factors that vary from bag to bag; common values stand several times."""
     return {
         "rig": list(names),
         "verb": [v for v in BAG_VERBS if v in verbs()],
@@ -74,12 +74,12 @@ def bag_cases(seed: int, quick: bool) -> tuple[list[Case], str]:
 
 
 def samples(case: Case) -> float:
-    """Return how many samples the longest channel of a case has, or what stands for them."""
+    """Return the number of samples of the longest channel of a case, or a stand-in for it."""
     return float(case.get("rate", 1.0) * case.get("duration", 1.0) * max(1.0, case.get("states", 1.0)))
 
 
 def expense(case: Case) -> tuple[bool, float]:
-    """Return what sorts cases by what they cost: a run that is broken off has played the most."""
+    """Return a key that sorts cases by their cost, so that an interrupted run has played the most."""
     return case["verb"] == "control", samples(case)
 
 

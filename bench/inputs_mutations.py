@@ -1,7 +1,7 @@
 """Damaged files in batches: each batch is one child that makes and reads files, one after another.
 
-A batch keeps what brought an answer that it had not had before, and damages that further: a cheap stand-in
-for the coverage of code, which finds what lies behind the first check.
+A batch keeps each file that brought a new answer, and damages it further: a cheap stand-in for the coverage
+of code, which reaches the code behind the first check.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def batches(seed: int, count: int) -> Iterator[tuple[Format, int]]:
 
 
 def files_of(form: Format, seed: int, answers: dict[str, bytes]) -> Iterator[tuple[int, bytes]]:
-    """Yield number and content of the files of a batch. answers: filled by the reader, what brought each."""
+    """Yield number and content of the files of a batch. answers: the file of each, from the reader."""
     rng = random.Random(seed)
     seeds = list(form.seeds())
     for number in range(BATCH):

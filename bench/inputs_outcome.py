@@ -1,4 +1,4 @@
-"""One call of `main()` in a forked child with ceilings of memory and time, and what came of it."""
+"""One call of `main()` in a forked child with ceilings of memory and time, and its outcome."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def limit_child(seconds: int = SECONDS) -> None:
 
 
 def limit_seconds(seconds: int) -> None:
-    """Let this process end after so many seconds of processor from now."""
+    """End this process after some seconds of processor time from now."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     cpu = int(used.ru_utime + used.ru_stime) + seconds
     resource.setrlimit(resource.RLIMIT_CPU, (cpu, resource.getrlimit(resource.RLIMIT_CPU)[1]))
@@ -103,7 +103,7 @@ def call(arguments: list[str]) -> Outcome:
 
 @contextlib.contextmanager
 def captured() -> Iterator[tuple[int, int]]:
-    """Point stdout and stderr to files, libraries that are no Python included; give their descriptors."""
+    """Redirect stdout and stderr to files, for libraries in C too; yield the descriptors of the files."""
     kept, files = [os.dup(1), os.dup(2)], [os.memfd_create("out"), os.memfd_create("err")]
     sys.stdout.flush()
     sys.stderr.flush()
@@ -121,7 +121,7 @@ def captured() -> Iterator[tuple[int, int]]:
 
 
 def read(file: int) -> str:
-    """Return what a captured stream holds."""
+    """Return the text of a captured stream."""
     os.lseek(file, 0, os.SEEK_SET)
     with open(file, encoding="utf-8", errors="replace") as stream:
         return stream.read()
@@ -203,7 +203,7 @@ def forked(work: Callable[[], Outcome], answer: Path) -> int:
 
 
 def collected(status: int, usage: resource.struct_rusage, answer: Path, late: bool) -> Outcome:
-    """Return what a child that ended has left."""
+    """Return the outcome that a child has left in its file."""
     if late:
         return Outcome("time-out", "neither done nor at work")
     try:
@@ -216,7 +216,7 @@ def collected(status: int, usage: resource.struct_rusage, answer: Path, late: bo
 
 
 def ended(status: int, usage: resource.struct_rusage) -> Outcome:
-    """Return what a child that ended without an answer came to."""
+    """Return the outcome of a child that ended without an answer."""
     outcome = Outcome("crash", f"ended with status {os.waitstatus_to_exitcode(status)} without an answer")
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)

@@ -42,11 +42,11 @@ FIRST = (
 """Verbs that are run once before all others."""
 
 Work = tuple[str, Callable[[Path], Outcome]]
-"""A name, and what to do in a folder of its own."""
+"""A name, and the work to do in its own folder."""
 
 
 def warm() -> None:
-    """Import what the verbs import and run them: no child pays for that, or for loading compiled code."""
+    """Import all modules of the verbs and run the verbs, so that no child has to load code."""
     for name in MODULES:
         importlib.import_module(name)
     catalogue()

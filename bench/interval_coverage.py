@@ -28,7 +28,7 @@ RIG = "paper_high_impedance"
 COLOURED = {"ft": 0.06, "position": 1.5e-5}
 """RMS of the coloured noise, N m and rad."""
 CLOCKS = {"ft": "ft", "command": "command", "position": "joint", "velocity": "joint", "motor_torque": "joint"}
-"""Which stamps come in one message."""
+"""Channels whose stamps come in one message."""
 
 Spoil = Callable[[Record, np.random.Generator], Record]
 
@@ -49,7 +49,7 @@ def coloured(record: Record, rng: np.random.Generator) -> Record:
 
 
 def jittered(clocks: Sequence[str], by: float = 3e-4) -> Spoil:
-    """Return what puts the stamps of every message of these clocks off by up to `by` s."""
+    """Return a function that shifts every stamp of these clocks by up to `by` s."""
 
     def spoil(record: Record, rng: np.random.Generator) -> Record:
         off = {c: rng.uniform(-by, by, len(record["command"])) for c in clocks}

@@ -1,4 +1,4 @@
-"""A log of JSON lines: what a long bench has played, so that the next run goes on where it stopped."""
+"""A log of JSON lines: the outcomes of a long bench, so that the next run goes on where it stopped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws for what has no name: what comes back of laws that the search does not know, on fresh records.
+"""Laws for errors without a name: how well `law` recovers laws that it does not know, on fresh records.
 
     .venv/bin/python bench/laws.py --group catalogue --log out/laws.jsonl    each effect taken out in turn
     .venv/bin/python bench/laws.py --group unknown --log out/laws.jsonl      laws the catalogue never had
@@ -86,7 +86,7 @@ def _kept(case: LawCase, duration: float) -> dict[str, object]:
 
 
 def outcome(case: LawCase, duration: float) -> dict[str, object]:
-    """Return what comes back of a case."""
+    """Return the outcome of a case."""
     record, fresh = case.records(duration)
     rig = load_rig(case.rig)
     start = time.process_time()
@@ -155,7 +155,7 @@ def _line(row: dict[str, object]) -> str:
 
 
 def table(rows: Sequence[dict[str, object]]) -> str:
-    """Return the figures of a log, asked and measured."""
+    """Return the figures of a log, required and measured."""
     lines = ["| figure | asked | measured |", "|---|---|---|"]
     for group, share, asked in (("catalogue", 0.9, 80), ("unknown", 0.7, 80)):
         some = [r for r in rows if r["group"] == group]

@@ -37,7 +37,7 @@ _CLAIMS = Claims("velocity", "neither", None)
 
 @dataclass(frozen=True)
 class LawCase:
-    """A hidden law. effect: what is true of it, fitted for comparison. right: regressors that are right."""
+    """A hidden law. effect: the true effect, fitted for comparison. right: the right regressors."""
 
     name: str
     group: str
@@ -70,7 +70,7 @@ class LawCase:
 
 
 def _moved(rig: Rig, seed: int) -> Rig:
-    """Return a rig whose inertia, damping and stiffness are others than its file says."""
+    """Return a rig whose inertia, damping and stiffness differ from its file."""
     rng = np.random.default_rng(seed)
     spans = {"rotor.reflected_inertia": 0.15, "rotor.reflected_damping": 0.1, "spring.stiffness": 0.03}
     return rig.with_values({n: rig[n] * float(rng.uniform(1 - s, 1 + s)) for n, s in spans.items()})

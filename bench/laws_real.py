@@ -1,4 +1,4 @@
-"""Real machines: what is left after naming, its law, and what it gains held out.
+"""Real machines: the residual after naming, its law, and the gain of the law on held-out data.
 
     .venv/bin/python bench/laws_real.py emps --out out/laws-real      a diagnosis, then a law on its model
     .venv/bin/python bench/laws_real.py --table --out out/laws-real    the machines that are done, as a table
@@ -57,7 +57,7 @@ MACHINES: Mapping[str, tuple[Callable[[], Record], str | Path, bool]] = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Do one machine, or print the table of those that are done."""
+    """Play one machine, or print the table of those played."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -89,7 +89,7 @@ def _named(record: Record, rig: Rig) -> tuple[list[str], Rig]:
 
 
 def table(folder: Path) -> str:
-    """Return what was named, the law of the rest and its gain, a row a machine."""
+    """Return named causes, the law of the rest and its gain, a row for each machine."""
     rows = [
         "| machine | named before | what is left depends on | law | gain, held out (95 %) |",
         "|---|---|---|---|---|",

@@ -1,11 +1,11 @@
 """The same swept sine through MuJoCo and through our plant: the prototype in a knee, open loop.
 
-The engine is told bodies, bearings and one pair of teeth (design/mjcf.py); which way the rotor turns, and so
-whether T_d/T_p resonates, is its own result.
+The engine gets bodies, bearings and one pair of teeth (design/mjcf.py); the direction of the rotor, and so
+whether T_d/T_p resonates, is a result of the engine.
 
 MuJoCo is among the packages of the tests, for Python 3.11 or later.
 Run: .venv/bin/python bench/mujoco_second_opinion.py [RIG] [--train TRAIN] [--seconds 20]
-Status 1 when they part by more than 2 % in gain or 3 degrees in phase up to 100 Hz, or by more than 5 % in
+Status 1 when they differ by more than 2 % in gain or 3 degrees in phase up to 100 Hz, or by more than 5 % in
 |T_d/T_p| at a line off its resonance.
 """
 

@@ -93,7 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def show(played: Played, reasons: Reasons) -> int:
-    """Print what came of a module; return how many promises it breaks."""
+    """Print the outcomes of a module; return the number of broken promises."""
     counts = Counter(played.outcomes.values())
     sample = f" (sample of {played.total})" if len(played.outcomes) < played.total else ""
     print(
@@ -133,7 +133,7 @@ def _outcomes(
 
 
 def _key(target: str, m: Mutant) -> tuple[str, ...]:
-    """Return what names a mutant in a log."""
+    """Return the key of a mutant in a log."""
     return target, str(m.line), m.where, m.text, str(m.place), str(m.choice)
 
 
@@ -161,7 +161,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--sample", type=int, metavar="N", help=f"so many of each module, {FEWEST} or more")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the sample")
     parser.add_argument("--log", type=Path, metavar="F", help="append each outcome to a file")
-    parser.add_argument("--resume", type=Path, metavar="F", help="take what a log has, of the same tree")
+    parser.add_argument("--resume", type=Path, metavar="F", help="take outcomes of a log of the same tree")
     parser.add_argument("--list", action="store_true", help="print the mutants and run nothing")
     args = parser.parse_args(argv)
     unknown = [m for m in args.modules if m not in TARGETS]

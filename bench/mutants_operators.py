@@ -185,7 +185,7 @@ def _where(node: ast.AST, parents: dict[ast.AST, ast.AST]) -> str:
 
 
 def _text(node: ast.expr | ast.stmt, new: ast.expr | ast.stmt, parent: ast.AST | None) -> str:
-    """Return what the mutant changes; a number or text with what stands around it."""
+    """Return the changed text; of a number or a text also the expression around it."""
     if isinstance(node, ast.Constant) and parent is not None and not isinstance(parent, ast.Module):
         around = copy.copy(parent)
         for name, value in ast.iter_fields(parent):

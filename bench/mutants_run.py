@@ -33,7 +33,7 @@ class BenchError(Exception):
 def outcomes(
     target: str, tests: Sequence[str], mutants: Sequence[Mutant], tell: Callable[[Mutant, str, float], None]
 ) -> None:
-    """Run the tests of a module for each mutant and tell outcome and seconds of each.
+    """Run the tests of a module for each mutant; yield outcome and seconds of each.
 
     Raises BenchError where they fail without one.
     """

@@ -1,7 +1,7 @@
-"""Which modules are mutated, and which tests must notice: those of the module that run in a second or two.
+"""The mutated modules, and the tests that must notice: those of the module that run in a second or two.
 
 Tests are run in this order up to the first that fails. The slow tests of whole records would kill more, but
-late: what a decision function does is to be held by a table of it.
+late: a table test must hold each decision function.
 """
 
 from __future__ import annotations
@@ -10,7 +10,11 @@ GUARD = ("hardware/test_limit_tables.py", "hardware/test_guard_tables.py", "hard
 
 TARGETS: dict[str, tuple[str, ...]] = {
     "hardware/limits": GUARD,
-    "hardware/guarded": ("hardware/test_guarded.py", "hardware/test_limits.py"),
+    "hardware/guarded": (
+        "hardware/test_guarded.py",
+        "hardware/test_guarded_services.py",
+        "hardware/test_limits.py",
+    ),
     "identification/noise": ("identification/test_noise_tables.py",),
     "identification/quantum": ("identification/test_noise_tables.py",),
     "identification/noise_level": ("identification/test_noise_level_tables.py",),

@@ -1,13 +1,13 @@
-"""What the observer and the pure-torque flag reach: asked beside measured.
+"""Performance of the observer and the pure-torque flag: required and measured values.
 
 Run: python bench/observer.py [SECTION …] [--hours 10] [--seconds 20]
 rigs     RMS error of both torques, unlumped and lumped observer, in the same run
 effects  the same with each effect of the catalogue in the plant: nominal and extended model
-walk     what the intensity of the disturbance's random walk matters
+walk     influence of the intensity of the disturbance's random walk
 sines    how soon the flag is right for sines on either side of the edge
 noise    false alarms on the sensors' noise alone, and on noise with a torque in the band
 flag     the flag against the true error |T_p - T_d| / |T_d|, over a table of signals
-tight    time of one sample in a loop of nothing else
+tight    time of one sample in a loop without other work
 timing   time in the node, latency to a third process, CPU; a bare loop in the same run
 """
 

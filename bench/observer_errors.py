@@ -30,7 +30,7 @@ def command(amplitude: float = 12.0) -> FloatArray:
 
 
 def errors(model: Rig, truth: Truth, noise: Noise | None = None) -> tuple[float, float, str]:
-    """Return the RMS errors of T_d and T_p, N m, and which channels deny the model, with how much."""
+    """Return the RMS errors of T_d and T_p, N m, and the channels that contradict the model."""
     observer = Observer(model, noise, duration=SECONDS)
     _, estimates = observe(observer, truth.record)
     skip = round(SETTLE * RATE)

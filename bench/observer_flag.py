@@ -20,7 +20,7 @@ CHUNK = 280 * 600
 
 
 def settled(rig: Rig, rate: float) -> ErrorModel:
-    """Return what noise makes of the estimates of an observer that has run for a second."""
+    """Return the estimates of an observer from noise alone, once it has run for a second."""
     observer = Observer(rig)
     for k in range(round(rate)):
         observer.state(k / rate, 0.0, 0.0)

@@ -29,7 +29,7 @@ OTHERS = {
     "J_m - 25 %": {"rotor.reflected_inertia": 0.715},
     "J_m + 25 %": {"rotor.reflected_inertia": 1.191},
 }
-"""What a bench may be while the model is Table 2's."""
+"""Possible benches, while the model is that of Table 2."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def command_for(rig: Rig, torque: FloatArray, rate: float) -> FloatArray:
 
 
 def outcome(rig: Rig, command: FloatArray, rate: float, settings: ErrorSettings, model: Rig) -> Outcome:
-    """Return how the flag of a model does on a simulated rig."""
+    """Return the outcome of a model's flag on a simulated rig."""
     truth = true_run(rig, command, rate, seed=1)
     t, rows = observe(Observer(model), truth.record)
     flag = ErrorFlag(model, settings)
@@ -181,7 +181,7 @@ def restless(rig: Rig) -> tuple[float, float]:
 
 
 def flag(args: argparse.Namespace) -> Iterator[str]:
-    """Print the table, then latencies, then benches that are not the model."""
+    """Print the table, then latencies, then benches that differ from the model."""
     settings = ErrorSettings()
     names = ("share", "judged", "agree", "changes/s", "longest wrong, s")
     head = f"  {'signal':36} {names[0]:>7} {names[1]:>7} {names[2]:>7} {names[3]:>10} {names[4]:>17}"

@@ -1,7 +1,7 @@
 """Observer and flag without a node: command, state, ft and flag of one sample.
 
-In a tight loop the caches are warm. After a sleep of a period they are not: that is the machine's share in
-what the node takes.
+In a tight loop the caches are warm. After a sleep of a period they are not: that is the machine's share of
+the node's time.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The model node in its place: plant, excite and model in processes of their own, this one receives.
+"""The model node in its place: plant, excite and model in processes of their own; this process receives.
 
 Each rate as any process, then at SCHED_FIFO where that is permitted: the model node, and one above it the
-plant, which stands for hardware. Beside it, in the same run: how long ft itself takes to here, and a bare
+plant, which stands for hardware. Beside it, in the same run: the latency of ft to this process, and a bare
 loop with absolute deadlines.
 """
 

@@ -1,4 +1,4 @@
-"""Size of every kind of page, and what a browser says of it: python bench/pages.py [--chromium PROGRAM].
+"""Size of every kind of page, and its errors in a browser: python bench/pages.py [--chromium PROGRAM].
 
 The records are of the paper's length, 160 s at 280 Hz. Status 1 when a page without 3-D is larger than
 1.5 MB, or a browser logs an error of a page. Some minutes.

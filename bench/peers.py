@@ -24,7 +24,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parent))
 
-from peers_cases import REAL, SIMULATED, TestCase
+from peers_cases import REAL, SIMULATED, PeerRecord
 
 HERE = Path(__file__).resolve().parent / "peers"
 PEERS = ("rsea", "mujoco_sysid", "bam", "cma_pace", "sysidentpy", "jax_sysid", "pysindy", "lstm", "gp")
@@ -37,6 +37,9 @@ HEAD = (
 PATIENCE = 8.0
 """Times the budget: wall seconds after which a peer is stopped; the machine may be busy with others."""
 INSTALL = 900.0
+"""s for an environment."""
+DIVERGED = -1000.0
+"""Fit, %, below which a free run is said to diverge."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -73,16 +76,19 @@ def _parser() -> argparse.ArgumentParser:
     add("--budget", type=float, default=20.0, help="processor seconds for a fit (default %(default)g)")
     add("--envs", type=Path, default=Path("out/peers/envs"), help="environments (default %(default)s)")
     add("--out", type=Path, default=Path("out/peers"), help="cases and results (default %(default)s)")
+    add("--table", action="store_true", help="run nothing, print the results so far")
     add("--write", action="store_true", help=f"put the table into docs/{PAGE.name} too")
     return parser
 
 
-def _result(peer: str, case: TestCase, args: argparse.Namespace) -> dict[str, Any]:
+def _result(peer: str, case: PeerRecord, args: argparse.Namespace) -> dict[str, Any]:
     """Return the result of a peer, from its file if there is one."""
     stem = f"{case.name.replace(' ', '_').replace(',', '').replace(chr(39), '')}"
     target = args.out / f"{stem}.{peer}.json"
     if target.exists():
         return dict(json.loads(target.read_text(encoding="utf-8")))
+    if args.table:
+        return {"not_run": "not yet"}
     python, reason = _python(peer, args.envs)
     if reason:
         return {"not_run": reason}
@@ -129,19 +135,20 @@ def _python(peer: str, envs: Path) -> tuple[Path, str]:
     return python, ""
 
 
-def _row(peer: str, case: TestCase, result: dict[str, Any]) -> str:
+def _row(peer: str, case: PeerRecord, result: dict[str, Any]) -> str:
     if "not_run" in result:
         return f"| {case.name} | {peer} | not run: {_cell(result['not_run'])} | | | | | |"
     error = np.array(result["prediction"]) - case.y[case.split :]
     rms = float(np.sqrt(np.mean(error**2)))
     fit = 100.0 * (1.0 - rms / float(case.y[case.split :].std()))
     cause = _cell(result["cause"] or "none named")
-    texts = [_number(rms / case.noise), _number(fit), _number(_values_off(case, result)), cause]
+    fits = _number(fit) if fit > DIVERGED else "diverges"
+    texts = [_number(rms / case.noise), fits, _number(_values_off(case, result)), cause]
     cells = (case.name, peer, *texts, f"{result['seconds']:.1f}", _cell(result["note"]))
     return f"| {' | '.join(cells)} |"
 
 
-def _values_off(case: TestCase, result: dict[str, Any]) -> float:
+def _values_off(case: PeerRecord, result: dict[str, Any]) -> float:
     """Return the RMS relative error of the true values that a peer states, %; not a number for none."""
     pairs = [(result["parameters"][n], v) for n, v in case.truth.items() if n in result["parameters"]]
     errors = [float(value) / true - 1.0 for value, true in pairs]
@@ -151,7 +158,7 @@ def _values_off(case: TestCase, result: dict[str, Any]) -> float:
 def _number(value: float) -> str:
     if not math.isfinite(value):
         return "–"
-    return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
+    return f"{value:.3g}" if not 1e3 <= abs(value) < 1e6 else f"{value:.0f}"
 
 
 def _cell(text: str) -> str:

@@ -33,7 +33,7 @@ FINER = 16
 
 
 @dataclass(frozen=True)
-class TestCase:
+class PeerRecord:
     """Samples of a case. noise: of y, in its unit, not a number where unknown. truth: values and cause."""
 
     name: str
@@ -65,7 +65,7 @@ class TestCase:
         return {"name": self.name, "physics": self.physics, "stated": dict(self.stated), **sizes}
 
 
-def _sea(name: str, cause: str, **hidden: float) -> TestCase:
+def _sea(name: str, cause: str, **hidden: float) -> PeerRecord:
     values = {"j_m": 1.08 * 0.953, "b_m": 0.93 * 23.088, "k_s": 1.02 * 1530.456, **hidden}
     bench = Bench().having(**values)
     plant = bench.plant
@@ -74,20 +74,20 @@ def _sea(name: str, cause: str, **hidden: float) -> TestCase:
     y, position, velocity = (np.array(record[n].y) for n in ("ft", "position", "velocity"))
     u = np.array(record["command"].y)
     split = 3 * len(u) // 4
-    return TestCase(name, u, y, 280.0, split, "sea", SEA_VALUES, 0.03, position, velocity, truth, cause)
+    return PeerRecord(name, u, y, 280.0, split, "sea", SEA_VALUES, 0.03, position, velocity, truth, cause)
 
 
-def sea() -> TestCase:
+def sea() -> PeerRecord:
     """A bench with wrong nominal values and nothing else."""
     return _sea("sea", "")
 
 
-def sea_backlash() -> TestCase:
+def sea_backlash() -> PeerRecord:
     """4 mrad of play, and a spring that is 15.6 % stiffer than stated."""
     return _sea("sea, backlash", "backlash", gap=4.0e-3, k_s=1.156 * 1530.456)
 
 
-def pendulum() -> TestCase:
+def pendulum() -> PeerRecord:
     """A pendulum with BAM's friction: Coulomb, Stribeck and load-dependent parts."""
     rate, n = 200.0, 4000
     stated = {"inertia": 0.155, "damping": 0.05, "gravity": 3.0}
@@ -105,27 +105,27 @@ def pendulum() -> TestCase:
     velocity = np.gradient(q, 1.0 / rate) + 0.02 * rng.normal(size=n)
     y, noise = q + 5e-4 * rng.normal(size=n), 5e-4
     name, cause, split = "pendulum, BAM's friction", "friction", 3 * n // 4
-    return TestCase(name, u, y, rate, split, "joint", stated, noise, y, velocity, truth, cause)
+    return PeerRecord(name, u, y, rate, split, "joint", stated, noise, y, velocity, truth, cause)
 
 
-def black_box() -> TestCase:
+def black_box() -> PeerRecord:
     """A filter, a saturating curve, a filter: no joint at all."""
     rng = np.random.default_rng(6)
     n = 3000
     u = lfilter(*butter(2, 0.3), rng.normal(size=n))
     inner = lfilter(*butter(2, 0.2), u) / 0.25
     y = lfilter(*butter(1, 0.25), np.tanh(inner) + 0.2 * inner**2)
-    return TestCase("black box", u, y + 0.005 * rng.normal(size=n), 100.0, 2250, "none", {}, 0.005)
+    return PeerRecord("black box", u, y + 0.005 * rng.normal(size=n), 100.0, 2250, "none", {}, 0.005)
 
 
-def silverbox(data: Path) -> TestCase:
+def silverbox(data: Path) -> PeerRecord:
     """The first 10 000 samples of the multisine of the training part; the last 2500 held out."""
     path = data / "silverbox" / "SNLS80mV.csv"
     u, y = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=(0, 1), max_rows=50650)[40650:].T
-    return TestCase("silverbox", u.copy(), y.copy(), 1e7 / 2**14, 7500, "duffing", {})
+    return PeerRecord("silverbox", u.copy(), y.copy(), 1e7 / 2**14, 7500, "duffing", {})
 
 
-def emps(data: Path) -> TestCase:
+def emps(data: Path) -> PeerRecord:
     """The identification record at 100 Hz, force as input; after 16 s held out, a free run."""
     held = loadmat(data / "emps" / "DATA_EMPS.mat")
     force = np.ravel(held["vir"]) * float(np.ravel(held["gtau"])[0])
@@ -133,8 +133,8 @@ def emps(data: Path) -> TestCase:
     u, y = force[: 10 * n].reshape(n, 10).mean(axis=1), np.ravel(held["qm"])[9 : 10 * n : 10].astype(float)
     stated = {"inertia": 80.0, "damping": 150.0}
     published = {"inertia": 95.109, "damping": 203.503}
-    return TestCase("emps", u, y, 100.0, 1600, "drive", stated, position=y, truth=published)
+    return PeerRecord("emps", u, y, 100.0, 1600, "drive", stated, position=y, truth=published)
 
 
-SIMULATED: tuple[Callable[[], TestCase], ...] = (sea, sea_backlash, pendulum, black_box)
-REAL: tuple[Callable[[Path], TestCase], ...] = (silverbox, emps)
+SIMULATED: tuple[Callable[[], PeerRecord], ...] = (sea, sea_backlash, pendulum, black_box)
+REAL: tuple[Callable[[Path], PeerRecord], ...] = (silverbox, emps)

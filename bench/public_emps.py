@@ -34,7 +34,7 @@ ONE_SIDED = EffectSetting("asymmetric_friction", {"offset": 0.0, "viscous_differ
 ALIKE = "asymmetric_friction.viscous_difference"
 HELD = {"gear.ratio", "spring_end.inertia", "coulomb_friction.creep_velocity"}
 CHOICES = tuple(product((2.0, 4.0, 8.0), (HELD | {ALIKE}, HELD)))
-"""Length of the pieces, s, and what of the drive and its friction is held: alike both ways, or not."""
+"""Length of the pieces, s; whether drive and friction are alike in both directions."""
 
 
 def scores() -> list[Score]:

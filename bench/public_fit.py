@@ -1,4 +1,4 @@
-"""What the public benchmarks share: a rig fitted by output error on position, and its error on a test record.
+"""For all public benchmarks: a rig fitted by output error on position, and its error on a test record.
 
 The simulation, the effects and the solver are the project's; nothing is fitted to a test record but the two
 numbers of its initial state, and those on the first samples only, which no score counts.
@@ -24,12 +24,12 @@ from rsea_ros.signals import Channel, FloatArray, Record
 DATA = Path(__file__).resolve().parents[2] / "shared" / "realdata"
 RIGS = Path(__file__).resolve().parent / "public_rigs"
 REFINE = 4
-"""Steps are so much shorter than usual: the errors scored here lie far below a sensor's noise."""
+"""Factor by which steps are shorter than usual: the errors scored here lie far below a sensor's noise."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """A test: what was scored, its error, published errors, and the limit asked for, inf for none."""
+    """A test: its name, its error, published errors, and the limit asked for, inf for none."""
 
     test: str
     error: float

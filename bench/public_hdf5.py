@@ -1,4 +1,4 @@
-"""Arrays of 64-bit floats from an HDF5 file of the old format, in one piece: all that the benchmarks have.
+"""Arrays of 64-bit floats from an HDF5 file of the old format, in one piece, as the benchmarks have them.
 
 The lock has no HDF5 library. Source: HDF5 File Format Specification 3.0, sections II.A, III.A to III.D, IV.A.
 """

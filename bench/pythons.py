@@ -1,6 +1,6 @@
 """Test every supported Python: the locked environment, the wheel and the fast part of the suite.
 
-    python bench/pythons.py                    all that this machine has of 3.10 to 3.14
+    python bench/pythons.py                    all versions from 3.10 to 3.14 on this machine
     python bench/pythons.py --only 3.13
 
 Nodes are left out, because the wheels of ROS 2 exist for one Python. A missing version counts as untried.
@@ -36,7 +36,7 @@ def main() -> int:
 
 
 def tried(version: str) -> str:
-    """Try a version, print what became of it, and return passed, failed or untried."""
+    """Try a version, print the outcome, and return passed, failed or untried."""
     interpreter = interpreter_of(version)
     if interpreter is None:
         print(f"{version}: untried, this machine has none")
@@ -80,7 +80,7 @@ def fast_tests() -> list[str]:
 
 
 def runs(command: list[str], *, show: bool = True) -> bool:
-    """Run a command and tell whether it succeeded; show the end of what a failed one wrote."""
+    """Run a command and return whether it succeeded; show the end of the output of a failed one."""
     try:
         done = subprocess.run(command, capture_output=True, text=True)
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""What a process that subscribes gets: the delays from stamp to reception by the middleware."""
+"""Delays from stamp to reception by the middleware, in a process that subscribes."""
 
 from __future__ import annotations
 
@@ -48,22 +48,22 @@ class Reception:
         return waiter
 
     def wait(self, topic: str, messages: int = 100) -> None:
-        """Return once so many have come."""
+        """Wait until this many messages have arrived."""
         deadline = time.monotonic() + PATIENCE
         while len(self._delays[topic]) < messages and time.monotonic() < deadline:
             time.sleep(TICK)
 
     def forget(self) -> None:
-        """Count from now on."""
+        """Discard the messages so far."""
         for delays in self._delays.values():
             delays.clear()
 
     def delays(self, topic: str) -> FloatArray:
-        """Return those of a topic so far, ms."""
+        """Return the delays of a topic so far, ms."""
         return np.array(self._delays[topic]) / 1e6
 
     def close(self) -> None:
-        """Listen no more."""
+        """End the subscriptions."""
         for waiter in self._waiters:
             waiter.stop()
         self._node.destroy_node()

@@ -21,7 +21,7 @@ from rsea_ros.identification.problem import Case, Problem
 
 
 class Remembered:
-    """Results by what they are made of, and digests of cases as long as these live."""
+    """Results by the digest of their inputs, and digests of cases as long as these live."""
 
     def __init__(self) -> None:
         self._results: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""A benchmark of several sections as a command: those that are named are run, all of them without a name."""
+"""A benchmark of several sections as a command: it runs the named sections, or all without a name."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print a line for each value: cases right, causes named that are none, causes missed, seconds."""
+    """Print a line for each value: cases right, wrong causes, missed causes, seconds."""
     args = _parser().parse_args(argv)
     if args.list or args.setting is None:
         for s in DEFAULT.listed():

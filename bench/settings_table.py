@@ -42,7 +42,7 @@ CASES = (
     "nonlinear_spring+damping_drift", "torque_constant_error+structural_resonance",
     "stiffness_drift+damping_drift+ft_drift-medium",
 )  # fmt: skip
-"""Mild effects, which a threshold loses first, nothing, what no effect explains, two and three at once."""
+"""Mild effects, which a threshold loses first; none; one outside the catalogue; two and three at once."""
 DURATION = 12.0
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
 
@@ -63,7 +63,7 @@ class Played:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play what the log lacks, or write the page of it."""
+    """Play the records that the log lacks, or write its page."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -109,7 +109,7 @@ def _values() -> Iterator[tuple[str, float]]:
 
 
 def read(log: Path) -> list[Played]:
-    """Return what a log holds; a last line that was cut off does not count."""
+    """Return the entries of a log; a truncated last line does not count."""
     lines = log.read_text().splitlines() if log.exists() else []
     return [Played(**{k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(line).items()})
             for line in lines if line.endswith("}")]  # fmt: skip

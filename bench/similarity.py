@@ -35,7 +35,7 @@ DURATION = 12.0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play what the log lacks, then print the table; status 1 where an outcome differs."""
+    """Play the records that the log lacks, then print the table; status 1 where an outcome differs."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

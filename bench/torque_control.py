@@ -1,10 +1,10 @@
 """The torque controller on the simulated bench, faster than real time: its tables, as Markdown.
 
 Run: python bench/torque_control.py [SECTION …] [RIG] [--free RIG] [--rate 280 1000].
-Sections: trials (all that is asked, the worst of the set beside the nominal; the whole set swept), followed
+Sections: trials (all requirements, the worst of the set beside the nominal; the whole set swept), followed
 (5 Hz on every simulated bench of the set), free (a free load, unknown, by frequency and amplitude, without
-and with an encoder on the link), impedance (the outer loop), link (what that encoder is worth), stiffest
-(what a limit of |Z| for the whole set costs), late (samples that come when they come), baselines
+and with an encoder on the link), impedance (the outer loop), link (the benefit of that encoder), stiffest
+(the cost of a limit of |Z| for the whole set), late (samples with irregular arrival), baselines
 (docs/baselines.md), cost. Through real nodes: torque_control_nodes.py.
 """
 
@@ -35,7 +35,7 @@ from rsea_ros.control.loads import LOCKED, load_range, locked
 from rsea_ros.control.robustness import robustness
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
-from rsea_ros.control.trials import LEARNED, LONG, hardest, sine, tracked
+from rsea_ros.control.trials import LEARNED, hardest, sine, tracked
 from rsea_ros.control.uncertainty import Uncertainty
 from rsea_ros.control.virtual import Virtual, passive_to, stiffest
 from rsea_ros.model.rig import Rig
@@ -54,7 +54,7 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def trials(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
-    """Design, try everything, sweep the set densely."""
+    """Design, run all trials, sweep the set densely."""
     found = study(rig, free, rates, motors(rig))
     shown = [f"{at.design.rate:g} Hz" for at in found.rates]
     yield "\n".join(tables.gains_words(found))
@@ -88,7 +88,7 @@ def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
         for hz in (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0):
             most = min(10.0, 0.8 * largest(free, hz, TorqueLimits().torque, math.inf))
             errors = [
-                sine(free, locked(rig), found, part * most, hz, seconds=LONG, settle=LEARNED, link=link)
+                sine(free, locked(rig), found, part * most, hz, span=LEARNED, link=link)
                 for link in (None, share)
                 for part in (1.0, 0.3)
             ]
@@ -127,7 +127,7 @@ def outer(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
 
 
 def late(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
-    """Let measurements and commands come when they come: largest |ft| and command for 10 N m at 5 Hz."""
+    """Let measurements and commands arrive irregularly: largest |ft| and command for 10 N m at 5 Hz."""
     for found in designs(rig, load_range(rig, free), rates):
         for name, (taken, acting) in _kinds(round(3.0 * found.rate)).items():
             wanted = 10.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(len(taken)) / found.rate)
@@ -154,7 +154,7 @@ def _kinds(n: int) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def cost(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
-    """Tell what a step costs, as a part of its period; medians of 1000."""
+    """Print the time of a step as a share of its period; medians of 1000."""
     for found in designs(rig, load_range(rig, free), rates):
         controller, times = TorqueController(rig, found.rate, found.gains), []
         for k in range(1000):
@@ -179,7 +179,7 @@ SECTIONS: dict[str, Callable[[Rig, Rig, Sequence[float]], Iterator[str]]] = {
 
 
 def main() -> None:
-    """Design, try, print."""
+    """Run the requested sections."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
     parser.add_argument("--rig", default="paper_high_impedance")

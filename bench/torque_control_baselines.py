@@ -1,7 +1,7 @@
 """Controllers of the literature, each in about ten lines, on the same trials as this project's.
 
-All hear ft and velocity at the samples and command one sample later, as the project's does. Gains are those
-as high as the nominal locked loop lets them; none knows a load.
+All measure ft and velocity at the samples and command one sample later, as the project's does. Their gains
+are as high as the nominal locked loop allows; none knows a load.
 
 none               u = r
 pratt_williamson   inverse of the locked actuator on r, PD on the torque error (Pratt, Williamson, Series
@@ -135,7 +135,7 @@ def cases(loads: Sequence[str]) -> dict[str, BenchVariant]:
 
 
 def error_of(step: Step, true: Rig, rate: float, amplitude: float, late: int) -> float:
-    """Return the error of a sine of 5 Hz from 3 s on, over its RMS; above 1 it is of no use."""
+    """Return the error of a sine of 5 Hz from 3 s on, over its RMS; above 1 the controller is useless."""
     plant, limit = Plant(true, rate), TorqueLimits().torque
     sample, pending, errors = plant.step(0.0), [0.0] * (1 + late), []
     for k in range(round(4.0 * rate)):

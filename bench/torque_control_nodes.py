@@ -1,4 +1,4 @@
-"""The torque controller through real nodes: plant and controller processes, a sender of desired torques here.
+"""The torque controller through real nodes: plant and controller as processes, desired torques from here.
 
 Run: python bench/torque_control_nodes.py [--rate 280 1000] [--priority 0 80]. The error is that of a sine of
 5 Hz, the median over its periods, so a stall of the machine shows in `worst` and in the late commands, not in
@@ -43,9 +43,9 @@ HZ, SECONDS, SETTLE, LEAD = 5.0, 6.0, 1.0, 0.2
 
 @dataclass(frozen=True)
 class Case:
-    """What the plant is, what the controller believes, amplitude (N m) of the sine, error asked for (%).
+    """The plant, the controller's rig, amplitude (N m) of the sine, largest allowed error (%).
 
-    asked: None where no error is asked for. limit: of the motor's torque, N m. A controller is told the
+    asked: None without such a limit. limit: of the motor's torque, N m. A controller knows the
     rig held at both ends, not the load that it meets.
     """
 
@@ -78,7 +78,7 @@ class Outside:
         )
 
     def until(self, condition: Callable[[], Any], timeout: float = 60.0) -> None:
-        """Hear until a condition holds. To look every ms loads the machine less than an executor."""
+        """Listen until a condition holds. Polling every ms loads the machine less than an executor."""
         end = time.monotonic() + timeout
         while not condition():
             if time.monotonic() > end:

@@ -1,4 +1,4 @@
-"""What the live view costs: its processor time as a share of one core, with a page open, at some rates.
+"""Cost of the live view: its processor time as a share of one core, with a page open, at some rates.
 
 Run: python bench/watch.py [--rate 280 1000] [--seconds 20]. A plant, the observer and the node `watch` run as
 processes of their own; a page is a socket that reads all frames. The plant's late cycles, without and with
@@ -107,7 +107,7 @@ def processor_time(pid: int) -> float:
 
 
 def awaited(ask: Callable[[], Any], seconds: float = 30.0) -> Any:
-    """Return what becomes true within some seconds."""
+    """Return the first true result of a function within some seconds."""
     deadline = time.monotonic() + seconds
     while not (result := ask()):
         if time.monotonic() > deadline:

@@ -19,7 +19,7 @@ SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
     ".db3": lambda path, contents, allowance: sqlite_file.scan(path, contents),
 }
 PACKED = ".zstd"
-TABLES = (".csv", ".tsv", ".txt", ".dat", ".mat", ".npz", ".npy", ".json", ".parquet", ".pq")
+TABLES = (".csv", ".tsv", ".txt", ".dat", ".mat", ".npz", ".npy", ".json", ".parquet", ".pq", ".zarr", ".tar")
 """Suffixes of files that `rsea import` converts."""
 
 BagPath = str | Path

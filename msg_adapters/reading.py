@@ -17,7 +17,8 @@ from msg_adapters.inferred import is_inferred
 from msg_adapters.topics import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel, FloatArray, IntArray, Record
-from rsea_ros.stamps import far_apart, in_order, repair_stamps, stray_fault
+from rsea_ros.stamp_order import far_apart, in_order, stray_fault
+from rsea_ros.stamps import repair_stamps
 from rsea_ros.wording import brief, did_you_mean
 
 _MOST_NAMED = 20

@@ -98,8 +98,8 @@ class NewFiles:
         """Make the folder and its missing parents, and return it."""
         first, fresh = self._place.folder, self._place.fresh
         if not fresh and (first.is_symlink() or (first.exists() and not first.is_dir())):
-            found = "symbolic link" if first.is_symlink() else "file"
-            raise OutputError(f"{first}: is a {found}, expected a directory or a new name")
+            kind = "symbolic link" if first.is_symlink() else "file"
+            raise OutputError(f"{first}: is a {kind}, expected a directory or a new name")
         self._made = make_folder(first.parent if fresh else first)
         for folder in siblings(first) if fresh else ():
             with suppress(FileExistsError):

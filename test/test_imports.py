@@ -14,14 +14,18 @@ MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT 
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "stamps", "version"}
+STAMPS = {"coverage", "stamps", "stamp_gaps", "stamp_order"}
+FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 AROUND = {"laws", "experiment", "health", "trends", "exports"}
 OWN = {
     "errors": set(),
     "signals": {"errors", "arrays"},
-    "stamps": {"errors", "signals"},
+    "coverage": {"signals"},
+    "stamps": {"coverage", "errors", "signals", "stamp_gaps", "stamp_order"},
+    "stamp_gaps": {"signals", "stamp_order"},
+    "stamp_order": {"signals"},
     "fault_kinds": set(),
     "fast_length": set(),
     "normal": set(),
@@ -148,7 +152,10 @@ FOREIGN = {
     "signals": {"numpy"},
     "arrays": {"numpy"},
     "library": {"numpy", "plotly", "rich"},
+    "coverage": {"numpy"},
     "stamps": {"numpy"},
+    "stamp_gaps": {"numpy"},
+    "stamp_order": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression", "asteval"}
     | {"pyarrow"}

@@ -7,7 +7,8 @@ import pytest
 
 from rsea_ros.errors import ChannelError
 from rsea_ros.signals import Channel, Record
-from rsea_ros.stamps import far_apart, jumps_back, repair_stamps
+from rsea_ros.stamp_order import far_apart, jumps_back
+from rsea_ros.stamps import repair_stamps
 
 PERIOD = 1 / 280
 COUNT = 2000
@@ -147,7 +148,20 @@ def test_a_sensor_that_starts_late_or_ends_early_is_reported_once(start, stop, d
 
 def test_commands_that_end_early_are_reported_and_commands_that_start_late_are_not():
     even = np.arange(COUNT) * PERIOD
-    assert repair_stamps(_record(even, command=even[even > 2.0]))[1] == []
+    still = {n: Channel(even, np.where(even > 2.1, even, 0.0)) for n in ("position", "ft")}
+    late = Channel(even[even > 2.0], np.ones(np.count_nonzero(even > 2.0)))
+    assert repair_stamps(Record({"command": late, **still}))[1] == []
     ((fault,),) = (repair_stamps(_record(even, command=even[even < 5.0]))[1],)
     assert (fault.kind, fault.channel) == ("partly_recorded", "command")
     assert fault.detail == "nothing from 4.996 s to 7.14 s, the last command is held"
+
+
+def test_a_motion_before_the_first_command_is_reported():
+    """The simulation stood still in that time: a prediction was as wrong as the motion is large."""
+    even = np.arange(COUNT) * PERIOD
+    motion = Channel(even, np.sin(even))
+    late = Channel(even[even > 2.0], np.ones(np.count_nonzero(even > 2.0)))
+    (fault,) = repair_stamps(Record({"command": late, "position": motion}))[1]
+    assert (fault.kind, fault.channel, fault.detail) == (
+        "partly_recorded", "command", "nothing from 0 s to 2.004 s",
+    )  # fmt: skip

@@ -7,7 +7,7 @@ from common import PeerCase, PeerResult, free_run, main, narx_rows, scaled
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, DotProduct, WhiteKernel
 
-LAGS, POINTS = 8, 800
+LAGS, POINTS = 8, 500
 
 
 def fit(case: PeerCase) -> PeerResult:

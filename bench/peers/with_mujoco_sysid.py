@@ -14,10 +14,11 @@ ARM = 1e-4
 XML = """<mujoco><option timestep="{step}" integrator="implicitfast"><flag contact="disable"/></option>
 <worldbody><body name="link">
 <inertial pos="0 0 -{arm}" mass="{mass}" diaginertia="1e-9 1e-9 1e-9"/>
-<joint name="joint" type="{kind}" axis="1 0 0" armature="{inertia}" damping="{damping}" stiffness="{stiffness}"
-frictionloss="{friction}"/></body></worldbody>
+<joint name="joint" type="{kind}" axis="1 0 0" armature="{inertia}" damping="{damping}"
+stiffness="{stiffness}" frictionloss="{friction}"/></body></worldbody>
 <actuator><motor name="motor" joint="joint"/></actuator>
-<sensor><jointpos name="position" joint="joint"/><jointvel name="velocity" joint="joint"/></sensor></mujoco>"""
+<sensor><jointpos name="position" joint="joint"/><jointvel name="velocity" joint="joint"/></sensor>
+</mujoco>"""
 MODIFIED = {"inertia": "armature", "damping": "damping", "stiffness": "stiffness", "friction": "frictionloss"}
 
 

@@ -16,8 +16,9 @@ sys.path.append(str(Path(__file__).resolve().parents[2]))
 
 from bench.public_fit import RIGS, case_of, fitted, record_of, rig_of
 from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.errors import RigError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import simulate
+from rsea_ros.model.simulation import simulate, simulate_drive
 from rsea_ros.signals import Channel, Record
 
 RIG_OF = {"sea": "paper_high_impedance", "joint": "pendulum", "drive": "emps"}
@@ -53,7 +54,7 @@ def fit(case: PeerCase) -> PeerResult:
 def _value(rig, name: str) -> float:
     try:
         return float(rig[name])
-    except KeyError:
+    except RigError:  # this rig has no such part
         return 0.0
 
 
@@ -79,8 +80,6 @@ def _duffing(case: PeerCase) -> PeerResult:
     rig = rig_of(fitted(rig, [case_of(rig, train, skip=200)]))
     whole = record_of(TORQUE * case.u, np.zeros(len(case.u)), rate)
     drive = case_of(rig, whole, skip=0).drive
-    from rsea_ros.model.simulation import simulate_drive
-
     return PeerResult(simulate_drive(rig, drive)["position"][n:] / ANGLE, note="rig with stated effects")
 
 

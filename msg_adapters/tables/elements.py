@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 CHOSEN = "#"
-"""In the place of a number: the one that is chosen on import."""
+"""In the place of a number: the one that is chosen on import. Twice in a name: the number with two digits."""
 _ELEMENT = re.compile(r"(?P<base>.+)\[(?:(?P<row>[0-9]{1,4}),:|(?::,)?(?P<column>[0-9]{1,4}))\]")
 _MATLAB = re.compile(r"(?P<base>.+)\((?:(?P<row>[0-9]{1,4}),:|:,(?P<column>[0-9]{1,4}))\)")
 
@@ -64,9 +64,10 @@ def number_in(cell: str, index: int) -> str:
 
 
 def chosen(column: str, index: int | None) -> str:
-    """Return a column, or an expression, with the number that is chosen in the place of each `#`."""
+    """Return a column, or an expression, with the chosen number in the place of each `[#]` and `##`."""
     if index is None:
         return column
+    column = column.replace(2 * CHOSEN, f"{index:02d}")
     return re.sub(r"(?<=[\[,:])#(?=[\],])", str(index), column)
 
 

@@ -15,6 +15,8 @@ from msg_adapters.tables.npz_file import read_npy, read_npz
 from msg_adapters.tables.parquet_file import read_parquet
 from msg_adapters.tables.table import Table
 from msg_adapters.tables.text_file import read_text
+from msg_adapters.tables.zarr_file import read_zarr
+from msg_adapters.tables.zarr_store import is_group
 from rsea_ros.errors import ImportMapError
 
 READERS: Mapping[str, Callable[[Path, Sequence[str]], Table]] = {
@@ -23,10 +25,13 @@ READERS: Mapping[str, Callable[[Path, Sequence[str]], Table]] = {
     ".npy": read_npy,
     ".parquet": read_parquet,
     ".pq": read_parquet,
+    ".zarr": read_zarr,
+    ".tar": read_zarr,
     ".json": read_json,
     **dict.fromkeys(json_file.LINES, read_json),
 }
-"""By suffix; a file with any other is text: CSV, TSV, blanks between numbers, gzipped or not."""
+"""By suffix; a file with any other is text: CSV, TSV, blanks between numbers, gzipped or not. A directory
+with a .zgroup is a zarr group whatever its name."""
 
 
 def read_columns(
@@ -42,7 +47,7 @@ def read_columns(
     1, 2, …. decimal: their decimal sign.
     Raises ImportMapError with file, line, column, value and expectation.
     """
-    reader = READERS.get(path.suffix.lower())
+    reader = read_zarr if is_group(path) else READERS.get(path.suffix.lower())
     try:
         return reader(path, columns) if reader else read_text(path, columns, delimiter, header, decimal)
     except (gzip.BadGzipFile, zlib.error, EOFError):

@@ -22,7 +22,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from msg_adapters.tables.elements import is_open
+from msg_adapters.tables.elements import chosen, is_open
 from msg_adapters.tables.keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
 from msg_adapters.tables.layout import DELIMITERS
 from msg_adapters.tables.terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
@@ -67,13 +67,15 @@ class ImportMap:
         channels = {
             name: tuple(term.at(index) for term in terms) for name, terms in self.channels.items()
         }
-        left = [t.column for terms in channels.values() for t in terms if is_open(t.column)]
+        where = self.where and replace(self.where, column=chosen(self.where.column, index))
+        columns = [t.column for terms in channels.values() for t in terms] + ([where.column] if where else [])
+        left = [column for column in columns if is_open(column)]
         if left:
             raise ImportMapError(
                 f"{self.path}: column {left[0]!r} holds several joints, expected the number of one, from 0 "
                 "(--index)"
             )
-        return replace(self, channels=channels)
+        return replace(self, channels=channels, where=where)
 
     def of_file(self, file: str) -> ImportMap:
         """Return the map of the channels that a file holds."""

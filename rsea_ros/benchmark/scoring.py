@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rsea_ros.benchmark.answers import Answer
-from rsea_ros.benchmark.truth import Truth
+from rsea_ros.benchmark.truth import RecordTruth
 from rsea_ros.signals import FloatArray
 
 NAMED = 0.5
@@ -18,7 +18,7 @@ DRAWS, SEED = 2000, 1
 """Of the bootstrap: 2000 draws give the ends of a 95 % interval to about a tenth of its width."""
 
 
-class Interval(NamedTuple):
+class ScoreInterval(NamedTuple):
     """A value with its 95 % interval; NaN where no record has it."""
 
     value: float
@@ -36,11 +36,11 @@ class Scores:
     hidden effect among those that are not hidden, 1 the first. answered: share of records with any name.
     """
 
-    named_right: Interval
-    false_names: Interval
-    silent: Interval
-    brier: Interval
-    rank: Interval
+    named_right: ScoreInterval
+    false_names: ScoreInterval
+    silent: ScoreInterval
+    brier: ScoreInterval
+    rank: ScoreInterval
     answered: float
 
 
@@ -56,7 +56,7 @@ class _Counts:
     ranks: tuple[float, ...]
 
 
-def score(answers: Mapping[str, Answer], truths: Mapping[str, Truth], effects: Sequence[str]) -> Scores:
+def score(answers: Mapping[str, Answer], truths: Mapping[str, RecordTruth], effects: Sequence[str]) -> Scores:
     """Return the scores of answers to the records of `truths`; effects: the list that can be named."""
     counts = [_counts(answers[name], truth, effects) for name, truth in truths.items()]
     return Scores(
@@ -73,7 +73,7 @@ def score(answers: Mapping[str, Answer], truths: Mapping[str, Truth], effects: S
     )
 
 
-def _counts(answer: Answer, truth: Truth, effects: Sequence[str]) -> _Counts:
+def _counts(answer: Answer, truth: RecordTruth, effects: Sequence[str]) -> _Counts:
     said = np.array([answer.causes.get(n, 0.0) for n in effects])
     hidden = np.array([n in truth.causes for n in effects])
     named = said >= NAMED
@@ -97,10 +97,10 @@ def _median_rank(counts: Sequence[_Counts]) -> float:
     return float(np.median(ranks)) if ranks else float("nan")
 
 
-def _interval(counts: Sequence[_Counts], statistic: Callable[[Sequence[_Counts]], float]) -> Interval:
+def _interval(counts: Sequence[_Counts], statistic: Callable[[Sequence[_Counts]], float]) -> ScoreInterval:
     rng = np.random.default_rng(SEED)
     drawn = rng.integers(len(counts), size=(DRAWS, len(counts)))
     values = np.array([statistic([counts[k] for k in row]) for row in drawn])
     values = values[np.isfinite(values)]
     low, high = np.percentile(values, (2.5, 97.5)) if len(values) else (float("nan"), float("nan"))
-    return Interval(statistic(counts), float(low), float(high))
+    return ScoreInterval(statistic(counts), float(low), float(high))

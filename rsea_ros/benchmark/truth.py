@@ -14,7 +14,7 @@ from rsea_ros.errors import BenchmarkError
 
 
 @dataclass(frozen=True)
-class Truth:
+class RecordTruth:
     """What one record hides.
 
     causes: effects of the list with their parameters, SI. outside: a law that is not in the list, empty for
@@ -38,19 +38,19 @@ class Truth:
         }
 
 
-def truth_hash(record: str, truth: Truth) -> str:
+def truth_hash(record: str, truth: RecordTruth) -> str:
     """Return the SHA-256 of a record's name and its truth, salt included, as JSON with sorted keys."""
     text = json.dumps([record, truth.document], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def truth_text(truths: Mapping[str, Truth]) -> str:
+def truth_text(truths: Mapping[str, RecordTruth]) -> str:
     """Return the truth file."""
     records = {name: truth.document for name, truth in truths.items()}
     return json.dumps({"schema": 1, "records": records}, indent=1) + "\n"
 
 
-def read_truth(path: Path, dataset: Dataset) -> dict[str, Truth]:
+def read_truth(path: Path, dataset: Dataset) -> dict[str, RecordTruth]:
     """Return the truth of every record of a data set.
 
     Raises BenchmarkError for a record that the file lacks, and where a hash is not the one of the manifest.
@@ -71,11 +71,11 @@ def read_truth(path: Path, dataset: Dataset) -> dict[str, Truth]:
     return truths
 
 
-def _truth(body: object, where: str) -> Truth:
+def _truth(body: object, where: str) -> RecordTruth:
     if not isinstance(body, dict):
         raise BenchmarkError(f"{where} is {text_of(body)}, expected an object")
     causes, shows = body.get("causes"), body.get("times_noise")
     values = [*causes.values()] if isinstance(causes, dict) else [None]
     if not all(isinstance(v, dict) for v in (*values, shows)):
         raise BenchmarkError(f"{where}: expected causes and times_noise as objects")
-    return Truth(causes, str(body.get("outside", "")), shows, str(body.get("salt", "")))  # type: ignore[arg-type]
+    return RecordTruth(causes, str(body.get("outside", "")), shows, str(body.get("salt", "")))  # type: ignore[arg-type]

@@ -33,21 +33,23 @@ def noted(record: Record, rig: Rig) -> Record:
     return replace(record, notes=(*record.notes, sentence)) if sentence else record
 
 
-def with_faults(record: Record, found: Findings, *, masks: bool) -> Record:
+def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     """Return a record with the faults that were found; a dead channel is left out.
 
     masks: the next stage finds, masks and reports faulty samples itself.
 
     Raises IdentificationError where no channel is left that measures anything.
     """
-    dead = {f.channel for f in found.faults if f.kind == "dead_channel"}
+    dead = {f.channel for f in findings.faults if f.kind == "dead_channel"}
     channels = {n: c for n, c in record.channels.items() if n not in dead}
     if not set(channels) - {"command", "reference"}:
-        reasons = "; ".join(f"{f.channel}: {f.detail or f.kind}" for f in found.faults if f.channel in dead)
+        reasons = "; ".join(
+            f"{f.channel}: {f.detail or f.kind}" for f in findings.faults if f.channel in dead
+        )
         raise IdentificationError(
             f"{record.source}: no sensor answers to the machine ({reasons}), expected one that does: "
             "rsea check shows each"
         )
     again = _AGAIN if masks else ()
-    kept = (*record.faults, *(f for f in found.faults if f.kind not in again and f not in record.faults))
+    kept = (*record.faults, *(f for f in findings.faults if f.kind not in again and f not in record.faults))
     return replace(record, channels=channels, faults=kept)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.checks.angle_jumps import jump_findings
 from rsea_ros.checks.expected import Side, is_full_of_gaps, quotients, sides
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings
@@ -17,13 +18,14 @@ from rsea_ros.checks.lag import in_step, lag_findings, lags
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.motion import is_commanded
-from rsea_ros.checks.offset_findings import offset_findings
+from rsea_ros.checks.offset_findings import angle_offset_findings, offset_findings
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.rig_values import value_findings
 from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
+from rsea_ros.checks.standstill import standstill_findings
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
@@ -42,7 +44,10 @@ _BRIDGED = 0.01
 """Share of masked samples above which the lines that bridge them are no measure of a sensor's noise."""
 _IN_COMMON = 0.3
 """Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
-FAULTY = ("sign", "scale", "offset", "smoothing", "clock_offset", "clock_drift", "wrong_rig")
+FAULTY = (
+    "sign", "scale", "offset", "angle_jumps", "standstill", "smoothing", "clock_offset", "clock_drift",
+    "wrong_rig",
+)  # fmt: skip
 """Kinds of findings that every result made from the record repeats, where they are not green."""
 
 
@@ -65,6 +70,8 @@ def check_record(
         every += [*order(record), *rates(record, rig)]
         if "command" in checked.record and len(checked.record["command"]) > 2:
             every += excitation(checked.record, rig)
+            every += jump_findings(checked.record)
+            every += [] if _bridged(checked) else standstill_findings(checked.record)
             every += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
         every += _other_axes(checked, rig, axis, wrench)
     faults = (*checked.faults, *(_fault(f) for f in every if f.kind in FAULTY and f.light != "green"))
@@ -131,14 +138,20 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
         record = in_step(record, late)
         findings = lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
+    if elsewhere := angle_offset_findings(rig, compared):
+        return [*findings, *elsewhere]
     readings, matched = _matched(record, compared, rig, axis)
     scaled = any(f.kind == "scale" and f.channel == "ft" and f.light == "red" for f in matched)
     matched += [] if scaled else offset_findings(record, compared)
-    bridged = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) > _BRIDGED * len(bad)}
-    findings += [*noises(record, rig, but=bridged), *matched]
+    findings += [*noises(record, rig, but=_bridged(checked)), *matched]
     if readings is None or late or _is_elsewhere(findings):
         return findings
     return [*findings, *_linearised(checked, rig, readings, values)]
+
+
+def _bridged(checked: Checked) -> set[str]:
+    """Return the channels of which so much was masked and bridged that what is between says nothing."""
+    return {n for n, bad in checked.masked.items() if np.count_nonzero(bad) > _BRIDGED * len(bad)}
 
 
 def _matched(
@@ -162,9 +175,9 @@ def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Fin
     return impedance_findings(compared.get("motor_torque"), rig) or restoring_findings(record, rig)
 
 
-def _is_elsewhere(found: list[Finding]) -> bool:
+def _is_elsewhere(findings: list[Finding]) -> bool:
     """Return whether clocks and sensitivities mean nothing: another rig, signs or scales."""
-    return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in found)
+    return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in findings)
 
 
 def _linearised(checked: Checked, rig: Rig, readings: Readings, values: bool) -> list[Finding]:

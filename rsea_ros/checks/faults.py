@@ -52,7 +52,7 @@ def check(record: Record, rig: Rig) -> Checked:
     masked, marked = {}, {}
     for name in repaired.channels:
         masked[name], marked[name] = _masked(repaired, name)
-    frozen_ones = {n for n, own in marked.items() if any(f.kind == "frozen_samples" for f in own)}
+    frozen_ones = {n for n, marks in marked.items() if any(f.kind == "frozen_samples" for f in marks)}
     finite = {n: not_finite(c, n) for n, c in repaired.channels.items()}
     filled = _filled(repaired, finite)
     compared = sides(filled, rig) if is_commanded(filled) else {}

@@ -18,8 +18,8 @@ class Finding:
     """The result of one check.
 
     kind: `topics`, `rate`, `gaps`, `order`, `clock_offset`, `clock_drift`, `noise`, `quantum`, `sign`,
-    `scale`, `offset`, `wrong_rig`, `rig_value`, `excitation`, `rest`, `identifiability`, or the kind of a
-    fault of the data.
+    `scale`, `offset`, `angle_jumps`, `standstill`, `wrong_rig`, `rig_value`, `excitation`, `rest`,
+    `identifiability`, or the kind of a fault of the data.
     channel: the channel or rig value concerned, empty for the whole record.
     value, low, high: the number with its 95 % interval, in `unit`, where one belongs to it.
     expected: the green range. detail: what and where. remedy: the advice, or the option to give.

@@ -20,6 +20,8 @@ _MOVED = 0.3
 """Share of the suspect samples that must fall into motion; a sensor that freezes at any time reaches more."""
 _MOVED_OF_NOISY = 0.1
 """The same for long runs of a sensor whose noise would change its value even at standstill."""
+_STEADY = 0.1
+"""Of the turned angle: a velocity and a position that agree so well both measure a steady speed."""
 _LONG_RUN = 20.0
 """Times the usual run of equal values: a longer one is no slow sensor."""
 _LONGEST_RUN = 0.5
@@ -28,6 +30,8 @@ _HELD = 0.95
 """Share of the samples: a channel that repeats so many is held; a coarse one in motion repeats fewer."""
 _DITHER = 0.5
 """Of the step between values: noise above it changes the value at standstill too; a step alone has 0.3."""
+_NONE = 1e-5
+"""Of a signal's RMS: no sensor has less noise, a simulation without noise has none."""
 _QUIETEST = 0.1
 """Quantile of the noise of stretches of the record: in the quietest, motion adds least to it."""
 _STRETCH = 32
@@ -78,10 +82,25 @@ def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str)
         return suspect if motion is None else np.zeros(len(suspect), bool)
     if kind != "frozen_samples":
         return _mostly(suspect, motion.moved)
+    if name == "velocity" and "position" in record:
+        suspect = suspect & ~_at_steady_speed(record, suspect)
     long = suspect & in_long_runs(suspect, record[name].rate)
     fast = motion.moved & (motion.speed > np.median(motion.speed[motion.moved]))
     share = _MOVED_OF_NOISY if long.any() and _dithers(record[name]) else _MOVED
     return _mostly(long, motion.moved, share) | _mostly(suspect & ~long, fast)
+
+
+def _at_steady_speed(record: Record, suspect: BoolArray) -> BoolArray:
+    """Return the samples of runs in which the position turned as the held velocity says."""
+    velocity, position = record["velocity"], record["position"]
+    steady = np.zeros(len(suspect), bool)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], suspect, [False]]).astype(np.int8)))
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        span = velocity.t[[first, end - 1]]
+        expected = float(velocity.y[first] * np.ptp(span))
+        turned = float(np.diff(np.interp(span, position.t, position.y))[0])
+        steady[first:end] = expected != 0.0 and abs(turned - expected) < _STEADY * abs(expected)
+    return steady
 
 
 def _mostly(suspect: BoolArray, clearly: BoolArray, share: float = _MOVED) -> BoolArray:
@@ -122,7 +141,8 @@ def _dithers(channel: Channel) -> bool:
         return False
     fourth = np.abs(np.diff(moving[: size * _STRETCH].reshape(size, _STRETCH), 4, axis=1))
     white = np.median(fourth, axis=1) / 0.6745 / math.sqrt(70.0)
-    return bool(np.quantile(white, _QUIETEST) > _DITHER * step_of(moving))
+    least = max(_DITHER * step_of(channel.y), _NONE * float(np.std(moving)))
+    return bool(np.quantile(white, _QUIETEST) > least)
 
 
 def longest(channel: Channel, marked: BoolArray) -> str:

@@ -16,7 +16,7 @@ _FAR, _MOVED, _ELSEWHERE = 4.0, 1.6, 4.0
 """Factor of a rig's value that is another machine's; that is worth a look; and spreads that go with both.
 
 A damping is no machine's mark: friction of any kind changes it."""
-_TOLD = 0.9
+_FROM_DATA = 0.9
 """Share of what is known of a value that the response must bring."""
 _APART = 5.0
 """Factor between the sizes of two signals that have nothing in common, from which the rig is another."""
@@ -113,7 +113,7 @@ def _of_rig(shape: FittedShape, rig: Rig) -> list[Finding]:
         factor, reach = value / rig[name] if rig[name] else 1.0, shape.reach[name]
         times = max(factor, 1.0 / max(factor, 1e-12))
         soft = name.endswith("damping")
-        if times > (_FAR if soft else _MOVED) and reach > _ELSEWHERE and shape.told[name] > _TOLD:
+        if times > (_FAR if soft else _MOVED) and reach > _ELSEWHERE and shape.data_share[name] > _FROM_DATA:
             light: Light = "red" if times > _FAR and not soft else "amber"
             findings.append(
                 Finding(

@@ -191,12 +191,12 @@ def inertia_spread(rig: Rig) -> float:
     return max((rig.spread(n) for n in rig.free() if n.endswith("inertia")), default=0.0)
 
 
-def _prior(channel: str, found: Mapping[str, ChannelCorrection]) -> Prior:
+def _prior(channel: str, corrections: Mapping[str, ChannelCorrection]) -> Prior:
     """Return the prior of a channel's quotient by the readings: its factor over the command's."""
     sign, mean, doubt = 1.0, 0.0, Prior().doubt
     for name, side in ((channel, 1.0), ("command", -1.0)):
-        if name in found:
-            reading = found[name]
+        if name in corrections:
+            reading = corrections[name]
             sign *= reading.sign
             mean += side * (math.log(reading.factor.value) if reading.factor else 0.0)
             mean += side * reading.gain if reading.odd else 0.0

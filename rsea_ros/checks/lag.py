@@ -66,10 +66,10 @@ def _correlation(y: FloatArray, p: FloatArray, period: float, reach: float) -> t
     return lag, np.asarray(alike / max(scale, 1e-300))
 
 
-def lag_findings(found: Mapping[str, float], channels: int) -> list[Finding]:
+def lag_findings(lags: Mapping[str, float], channels: int) -> list[Finding]:
     """Return a finding for each lag, one for the command where all channels share it."""
-    all_of_them = shared(found, channels)
-    off = {"command": -all_of_them} if all_of_them else found
+    all_of_them = shared(lags, channels)
+    off = {"command": -all_of_them} if all_of_them else lags
     against = "all that was measured" if all_of_them else "the command"
     return [
         Finding(
@@ -86,19 +86,19 @@ def lag_findings(found: Mapping[str, float], channels: int) -> list[Finding]:
     ]
 
 
-def shared(found: Mapping[str, float], channels: int) -> float:
+def shared(lags: Mapping[str, float], channels: int) -> float:
     """Return the lag (s) that all channels share, an error of the command's stamps; 0 for none.
 
     The motor torque, where it is measured, repeats the command and shows the lag best.
     """
-    values = list(found.values())
+    values = list(lags.values())
     together = len(values) == channels and len(values) > 0 and max(values) - min(values) <= _TOGETHER
-    return found.get("motor_torque", float(np.median(values))) if together else 0.0
+    return lags.get("motor_torque", float(np.median(values))) if together else 0.0
 
 
-def in_step(record: Record, found: Mapping[str, float]) -> Record:
+def in_step(record: Record, lags: Mapping[str, float]) -> Record:
     """Return the record with the stamps of some channels earlier by their lags (s), within the commands."""
-    moved = {n: Channel(record[n].t - lag, record[n].y) for n, lag in found.items()}
+    moved = {n: Channel(record[n].t - lag, record[n].y) for n, lag in lags.items()}
     record = record.with_channels(**moved)
     begin = max(c.t[0] for c in record.channels.values() if len(c))
     end = min(c.t[-1] for c in record.channels.values() if len(c))

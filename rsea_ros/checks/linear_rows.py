@@ -135,8 +135,8 @@ def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> F
     """Return the RMS over noise of each channel's residual, without bias and gain."""
     misfits = []
     for k in range(m):
-        columns, here = plain[of == k], residual[of == k]
-        left = here - columns @ np.linalg.lstsq(columns, here, rcond=None)[0]
+        columns, residuals = plain[of == k], residual[of == k]
+        left = residuals - columns @ np.linalg.lstsq(columns, residuals, rcond=None)[0]
         misfits.append(float(np.sqrt(np.mean(left**2))))
     return np.array(misfits)
 

@@ -45,9 +45,9 @@ def motion_beside(record: Record, name: str, witness: str | None) -> MotionBesid
     if witness is None:
         return None
     t, channel = record[name].t, record[witness]
-    moves = np.interp(t, channel.t, _moves(channel).astype(float)) >= 0.5
+    moved = np.interp(t, channel.t, moves(channel).astype(float)) >= 0.5
     speed = np.abs(np.diff(np.interp(t, channel.t, np.nan_to_num(channel.y)), prepend=np.nan))
-    return MotionBeside(moves, np.nan_to_num(speed))
+    return MotionBeside(moved, np.nan_to_num(speed))
 
 
 def is_commanded(record: Record) -> bool:
@@ -71,11 +71,11 @@ def _is_noise(channel: Channel) -> bool:
 def at_rest(record: Record) -> float:
     """Return the share of the commands at which neither command nor machine moved."""
     t = record["command"].t
-    still = ~_moves(record["command"])
+    still = ~moves(record["command"])
     for name in ("position", "velocity", "ft", "deflection"):
         if name in record and _is_witness(record[name]):
-            moves = _moves(record[name])
-            still &= ~moves[np.clip(np.searchsorted(record[name].t, t), 0, len(moves) - 1)]
+            moved = moves(record[name])
+            still &= ~moved[np.clip(np.searchsorted(record[name].t, t), 0, len(moved) - 1)]
             break
     return float(still.mean())
 
@@ -85,7 +85,7 @@ def _is_witness(channel: Channel) -> bool:
     return len(y) > 2 * _AROUND and float(np.ptp(y)) > 0.0
 
 
-def _moves(channel: Channel) -> BoolArray:
+def moves(channel: Channel) -> BoolArray:
     """Return at which samples a channel changes by more than its own noise, shape (n,)."""
     y = np.nan_to_num(channel.y, nan=float(np.nanmedian(channel.y)))
     if len(y) <= _AROUND:
@@ -94,5 +94,5 @@ def _moves(channel: Channel) -> BoolArray:
     change = np.ptp(windows, axis=1)
     quiet = float(np.quantile(change, 0.02))
     largest = float(np.quantile(change, 0.99))
-    moves: BoolArray = change > max(min(_CLEARLY * quiet, 0.5 * largest), 1e-3 * largest)
-    return moves
+    clearly: BoolArray = change > max(min(_CLEARLY * quiet, 0.5 * largest), 1e-3 * largest)
+    return clearly

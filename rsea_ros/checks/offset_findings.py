@@ -1,4 +1,4 @@
-"""Finding about the zero of the F/T sensor: an offset that no torque of the run explains."""
+"""Findings about zeros: an F/T torque or an angle that lies off the rig's at all times."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding
+from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
 
 _LARGE, _FAR = 1.0, 3.0
@@ -36,5 +37,27 @@ def offset_findings(record: Record, compared: Mapping[str, Side]) -> list[Findin
             expected=f"less than {largest:.3g}, the largest torque of the run",
             detail=f"{abs(offset) / largest:.2g} times that torque at all times",
             remedy="set the sensor's zero, look at its mount, or give the constant in the import map",
+        )
+    ]
+
+
+def angle_offset_findings(rig: Rig, compared: Mapping[str, Side]) -> list[Finding]:
+    """Return the finding of a position whose whole range lies away from where the rig would be."""
+    side = compared.get("position")
+    if side is None or rig.zero_unknown("position"):
+        return []
+    middle, rest = float(np.median(side.y)), float(np.median(side.p))
+    if abs(middle - rest) <= float(np.ptp(side.y)):
+        return []
+    return [
+        Finding(
+            "red",
+            "offset",
+            "position",
+            middle - rest,
+            "rad",
+            expected=f"motion about {rest:.3g}, where the rig rests",
+            detail=f"all of the motion is about {middle:.4g} rad",
+            remedy="`zero_unknown: true` for position in the rig, or give the constant in the import map",
         )
     ]

@@ -47,13 +47,13 @@ class FittedShape:
     """A fit of the shape. gain: logarithm, delay: s, both by channel.
 
     error: weighted median of the residual of ln R by channel, weights the power. values: of the rig, by name.
-    reach: how many of the rig's stated spreads each has moved; told: the share of its information that the
-    response provides.
+    reach: how many of the rig's stated spreads each has moved; data_share: the share of its information
+    that the response provides.
     """
 
     values: Mapping[str, float]
     reach: Mapping[str, float]
-    told: Mapping[str, float]
+    data_share: Mapping[str, float]
     gain: Mapping[str, float]
     delay: Mapping[str, float]
     error: Mapping[str, float]
@@ -87,8 +87,8 @@ class ShapeFit:
         centre = np.concatenate([self._start, gain, np.zeros(len(gain))])
         begin = [self._size(k) if priors[n].doubt > 1.0 else gain[k] for k, n in enumerate(self.channels)]
         theta = np.concatenate([self._start, begin, self._delays(sign)])
-        theta, here, cost = self._least(theta, centre, np.array(doubt), sign)
-        return self._shape(theta, here, cost, self._told(theta, here, np.array(doubt), sign))
+        theta, residual, cost = self._least(theta, centre, np.array(doubt), sign)
+        return self._shape(theta, residual, cost, self._data_shares(theta, residual, np.array(doubt), sign))
 
     def _size(self, k: int) -> float:
         """Return the logarithm of a channel's gain over all its lines."""
@@ -130,14 +130,14 @@ class ShapeFit:
             both = np.concatenate([(np.log(np.abs(left)) - gain) / self._sd, np.angle(left) / self._sd])
         return np.asarray(np.nan_to_num(both, nan=1e3, posinf=1e3, neginf=-1e3))
 
-    def _slope(self, theta: FloatArray, here: FloatArray, sign: FloatArray) -> FloatArray:
+    def _slope(self, theta: FloatArray, residual: FloatArray, sign: FloatArray) -> FloatArray:
         """Return d residual / d theta, by differences for the rig's values, exact for gains and delays."""
         n, m, lines = len(self._start), len(self.channels), len(self._of)
         slope = np.zeros((2 * lines, len(theta)))
         for i, unknown in enumerate(self.unknowns):
             moved = theta.copy()
             moved[i] += _STEP * unknown.scale
-            slope[:, i] = (self._residual(moved, sign) - here) / (_STEP * unknown.scale)
+            slope[:, i] = (self._residual(moved, sign) - residual) / (_STEP * unknown.scale)
         at = np.arange(lines)
         slope[at, n + self._of] = -1.0 / self._sd
         slope[lines + at, n + m + self._of] = 2.0 * np.pi * self._frequency / self._sd
@@ -184,16 +184,18 @@ class ShapeFit:
         share = np.cumsum(self._share[of][rising])
         return float(left[of][rising][int(np.searchsorted(share, 0.5 * share[-1]))])
 
-    def _told(self, theta: FloatArray, here: FloatArray, doubt: FloatArray, sign: FloatArray) -> FloatArray:
+    def _data_shares(
+        self, theta: FloatArray, residual: FloatArray, doubt: FloatArray, sign: FloatArray
+    ) -> FloatArray:
         """Return for each value the share of its information that the lines provide."""
-        slope, weight = self._slope(theta, here, sign), 1.0 / (1.0 + here**2)
+        slope, weight = self._slope(theta, residual, sign), 1.0 / (1.0 + residual**2)
         normal = ((slope * weight[:, None]).T @ slope) * np.outer(doubt, doubt) + np.eye(len(doubt))
-        told: FloatArray = 1.0 - np.diag(np.linalg.inv(normal))
-        return told
+        shares: FloatArray = 1.0 - np.diag(np.linalg.inv(normal))
+        return shares
 
-    def _shape(self, theta: FloatArray, here: FloatArray, cost: float, told: FloatArray) -> FittedShape:
+    def _shape(self, theta: FloatArray, residual: FloatArray, cost: float, shares: FloatArray) -> FittedShape:
         n, m, lines = len(self._start), len(self.channels), len(self._of)
-        left = np.hypot(here[:lines], here[lines:]) * self._sd
+        left = np.hypot(residual[:lines], residual[lines:]) * self._sd
         known = zip(self.unknowns, theta[:n], strict=True)
         return FittedShape(
             values={u.name: u.outer(float(v)) for u, v in known},
@@ -201,7 +203,7 @@ class ShapeFit:
                 u.name: abs(float(v) - u.inner(u.start)) / u.doubt
                 for u, v in zip(self.unknowns, theta, strict=False)
             },
-            told={u.name: float(share) for u, share in zip(self.unknowns, told, strict=False)},
+            data_share={u.name: float(share) for u, share in zip(self.unknowns, shares, strict=False)},
             gain=dict(zip(self.channels, theta[n : n + m].tolist(), strict=True)),
             delay=dict(zip(self.channels, theta[n + m :].tolist(), strict=True)),
             error={c: self._middle(left, k) for k, c in enumerate(self.channels)},

@@ -11,7 +11,7 @@ from rsea_ros.model.drive import SLOW
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, FloatArray, Record
-from rsea_ros.stamps import polls_unevenly
+from rsea_ros.stamp_gaps import polls_unevenly
 
 _AS_SECONDS = "are the stamps in s, not in ms or µs? If so, "
 _RED_SHARE = 0.2
@@ -66,10 +66,13 @@ def fault_finding(fault: Fault) -> Finding:
 def rates(record: Record, rig: Rig) -> list[Finding]:
     """Return the sample rate of every channel, and where it is too low for the rig."""
     natural, command = natural_frequency(rig), record["command"].rate if "command" in record else math.nan
-    return [_rate(n, c, natural, command) for n, c in record.channels.items() if len(c) > 2]
+    timed = {n: c for n, c in record.channels.items() if len(c) > 2}
+    slow = not any(c.rate > SLOW for c in timed.values())
+    return [_rate(n, c, natural, command, slow) for n, c in timed.items()]
 
 
-def _rate(name: str, channel: Channel, natural: float | None, command: float) -> Finding:
+def _rate(name: str, channel: Channel, natural: float | None, command: float, slow: bool) -> Finding:
+    """Return the finding of a channel's rate. slow: all channels are, so that another unit is likely."""
     steps = np.diff(channel.t)
     rate = channel.rate
     longest = f"longest interval {1e3 * float(steps.max()):.3g} ms"
@@ -86,7 +89,7 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float) ->
             "Hz",
             expected=expected,
             detail=longest,
-            remedy=f"{_AS_SECONDS if rate < SLOW else ''}record faster, or name the right rig with --rig",
+            remedy=f"{_AS_SECONDS if slow else ''}record faster, or name the right rig with --rig",
         )
     if rate < _SLOW * command:
         return Finding(

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 from rsea_ros.cli._columns import columns
 from rsea_ros.cli._output import path
+from rsea_ros.errors import ParameterError
 
 if TYPE_CHECKING:
-    from rsea_ros.benchmark.scoring import Interval, Scores
+    from rsea_ros.benchmark.scoring import ScoreInterval, Scores
 
 HEAD = (
     "entry", "named right, %", "false names, %", "silent if none, %", "Brier", "median rank", "answered, %",
@@ -38,7 +39,11 @@ def run(args: argparse.Namespace) -> int:
     dataset = read_dataset(args.dataset)
     truths = read_truth(args.truth or dataset.truth, dataset)
     entries = {name: make(dataset) for name, make in BASELINES.items()}
-    entries |= {file.name.removesuffix(".jsonl"): read_answers(file, dataset) for file in args.answers}
+    for file in args.answers:
+        name = file.name.removesuffix(".jsonl")
+        if name in entries:
+            raise ParameterError(f"{file}: a second row {name!r}, expected another file name")
+        entries[name] = read_answers(file, dataset)
     scores = {name: score(answers, truths, dataset.effects) for name, answers in entries.items()}
     if args.json:
         print(json.dumps({"records": len(truths), "entries": {n: _document(s) for n, s in scores.items()}}))
@@ -54,7 +59,7 @@ def _cells(scores: Scores) -> tuple[str, ...]:
     return (*(_cell(s, 100.0, 0) for s in percent), *plain, f"{100.0 * scores.answered:.0f}")
 
 
-def _cell(interval: Interval, factor: float, digits: int) -> str:
+def _cell(interval: ScoreInterval, factor: float, digits: int) -> str:
     if math.isnan(interval.value):
         return "–"
     value, low, high = (f"{factor * v:.{digits}f}" for v in interval)

@@ -23,17 +23,17 @@ def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, mask
     """
     for record in records:
         require_motion(record)
-    found = [check_record(record, rig, axis) for record in records]
+    checks = [check_record(record, rig, axis) for record in records]
     if not quiet:
         for sentence in dict.fromkeys(filter(None, (unused_sentence(r, rig) for r in records))):
             say(sentence)
-        print_warnings(found, rig)
-    return [with_faults(noted(r, rig), f, masks=masks) for r, f in zip(records, found, strict=True)]
+        print_warnings(checks, rig)
+    return [with_faults(noted(r, rig), f, masks=masks) for r, f in zip(records, checks, strict=True)]
 
 
-def print_warnings(found: Sequence[Findings], rig: Rig) -> None:
+def print_warnings(checks: Sequence[Findings], rig: Rig) -> None:
     """Print the amber and red findings, each line once, below the name of the rig."""
-    lines = dict.fromkeys(line for findings in found for line in warnings(findings))
+    lines = dict.fromkeys(line for findings in checks for line in warnings(findings))
     if lines:
         print(f"compared with rig {rig.name}:")
     for line in lines:

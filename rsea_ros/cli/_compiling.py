@@ -19,7 +19,7 @@ class _LineHandler(logging.Handler):
 
 
 @contextmanager
-def compiling_told() -> Iterator[None]:
+def compilation_announced() -> Iterator[None]:
     """In this block the compiler says on stderr that it compiles, if stderr is a terminal."""
     if sys.stderr is None or not sys.stderr.isatty():
         yield

@@ -15,11 +15,12 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.fleet.executor import Executor, serial
 from rsea_ros.fleet.joints import Diagnose, load_joints
 from rsea_ros.fleet.summary import RunSummary
+from rsea_ros.fleet.time_limit import TIME_LIMIT
 
 if TYPE_CHECKING:
     from rsea_ros.fleet.plan import Held
 
-GIGA = 1e9
+GIGA, MINUTE = 1e9, 60.0
 MOST_SHOWN = 10
 """Largest number of quarantined recordings to print; the store has all."""
 
@@ -38,6 +39,8 @@ def add_work(parser: argparse.ArgumentParser) -> None:
     add("--map", required=True, metavar="joints.yaml", help="joint map: rig and topics of each joint")
     add("--diagnose", choices=get_args(Diagnose), help="recordings to diagnose (default: as in the map)")
     add("--again", action="store_true", help="retry quarantined recordings")
+    limit = "quarantine a recording whose joint takes longer than this (default %(default)g)"
+    add("--time-limit", type=float, default=TIME_LIMIT / MINUTE, metavar="MIN", help=limit)
     where = parser.add_argument_group("workers")
     where.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: cores)")
     where.add_argument("--memory", type=float, metavar="GB", help="of each worker (default: all, shared)")
@@ -86,23 +89,24 @@ def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunSumma
         if args.again:
             store.take_out({"quarantined"})
         memory = None if args.serial or args.scheduler else _memory(args)
+        limits = EngineLimits(memory, time=args.time_limit * MINUTE)
         place = executor(args, memory) if is_anything_new(store, held) else serial()
         with place as places, progress("fleet") as tell:
-            return Engine(store, places, work, tell, EngineLimits(memory)).run(held)
+            return Engine(store, places, work, tell, limits).run(held)
 
 
 @contextmanager
 def executor(args: argparse.Namespace, memory: int | None) -> Iterator[Executor]:
     """Return the executor of the tasks. memory: bytes of each worker on this machine."""
     if args.serial:
-        with serial() as here:
-            yield here
+        with serial() as process:
+            yield process
         return
     from rsea_ros.fleet.cluster import on_scheduler, on_this_machine
 
     if args.scheduler:
-        with on_scheduler(args.scheduler) as there:
-            yield there
+        with on_scheduler(args.scheduler) as scheduler:
+            yield scheduler
         return
     assert memory is not None
     with on_this_machine(_workers(args), memory, args.dashboard) as (workers, link):
@@ -118,6 +122,8 @@ def check_options(args: argparse.Namespace) -> None:
         raise ParameterError(f"--workers {args.workers}, expected 1 or more")
     if args.memory is not None and not args.memory > 0.0:
         raise ParameterError(f"--memory {args.memory:g} GB, expected more than 0")
+    if not args.time_limit > 0.0:
+        raise ParameterError(f"--time-limit {args.time_limit:g} min, expected more than 0")
 
 
 def _workers(args: argparse.Namespace) -> int:

@@ -55,8 +55,8 @@ def node_calls(graph: str, assignments: Sequence[str]) -> list[NodeCall]:
     content = _graph()
     first = content["graphs"][graph]
     chosen = {first: content["first"][first]}
-    chosen |= {name: own for name, own in content["others"].items() if _is_true(name, values[name])}
-    return [_call(name, own, values) for name, own in chosen.items()]
+    chosen |= {name: settings for name, settings in content["others"].items() if _is_true(name, values[name])}
+    return [_call(name, settings, values) for name, settings in chosen.items()]
 
 
 def _given(assignments: Sequence[str]) -> dict[str, str]:
@@ -73,9 +73,9 @@ def _given(assignments: Sequence[str]) -> dict[str, str]:
     return given
 
 
-def _call(name: str, own: Mapping[str, str], values: Mapping[str, str]) -> NodeCall:
+def _call(name: str, settings: Mapping[str, str], values: Mapping[str, str]) -> NodeCall:
     file = Path(values["params"]) if name == "driver" else _config() / f"{name}.yaml"
-    parameters = {parameter: values[argument] for parameter, argument in own.items()}
+    parameters = {parameter: values[argument] for parameter, argument in settings.items()}
     return NodeCall(name, values["namespace"], file, parameters)
 
 

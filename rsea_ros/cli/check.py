@@ -70,15 +70,15 @@ def run(args: argparse.Namespace) -> int:
 
 def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[str, Channel]:
     """Return every axis of the wrench of a bag by name, for a check with a dead axis."""
-    found = {}
+    axes = {}
     for axis in AXES:
         try:
             record = read_record([bag], topics=replace(topics, axis=axis), strict=False)
         except RseaError:
             continue
         if "ft" in record:
-            found[axis] = cut(record, args)["ft"]
-    return found
+            axes[axis] = cut(record, args)["ft"]
+    return axes
 
 
 def _print(checks: list[Findings]) -> None:

@@ -51,16 +51,16 @@ def run(args: argparse.Namespace) -> int:
     place = results_place(args, "out/control", (CONTROL_JSON, REPORT), [args.rig, args.free])
     _check_rates(args.rate)
     rig = load_rig(args.rig)
-    with progress("control") as told:
-        found = study(rig, lightest(rig, args.free or ""), args.rate, motors(rig), progress=told)
+    with progress("control") as report_progress:
+        result = study(rig, lightest(rig, args.free or ""), args.rate, motors(rig), progress=report_progress)
     with NewFiles(place) as new:
-        path = new.write(CONTROL_JSON, json_text(control_json(found)))
-        report = new.write(REPORT, control_report(found))
+        path = new.write(CONTROL_JSON, json_text(control_json(result)))
+        report = new.write(REPORT, control_report(result))
     if args.json:
         print_file(path)
     else:
-        _print(found, report)
-    missed = any(trial.met is False for at in found.rates for trial in at.trials)
+        _print(result, report)
+    missed = any(trial.met is False for at in result.rates for trial in at.trials)
     return 1 if args.fail_on and missed else 0
 
 
@@ -71,15 +71,15 @@ def motors(rig: Rig) -> list[MotorLimits]:
     from rsea_ros.design.catalogue import catalogue
 
     limit, where = TorqueLimits().torque, "torque_limit of config/nodes/driver.yaml"
-    found = [MotorLimits("driver's limit", limit, float("inf"), where)]
+    limits = [MotorLimits("driver's limit", limit, float("inf"), where)]
     for unit in catalogue().values():
         if unit["ratio"] == rig["gear.ratio"]:
             speed = unit.values.get("no_load_speed", float("inf"))
             for kind in ("continuous_torque", "peak_torque"):
                 if kind in unit.values:
                     name = f"{unit.name}, {kind.partition('_')[0]}"
-                    found.append(MotorLimits(name, unit[kind], speed, unit.sources[kind]))
-    return found
+                    limits.append(MotorLimits(name, unit[kind], speed, unit.sources[kind]))
+    return limits
 
 
 def _check_rates(rates: list[float]) -> None:
@@ -90,20 +90,20 @@ def _check_rates(rates: list[float]) -> None:
             raise ParameterError(f"--rate {rate:g} Hz, expected 50 to 10000 Hz")
 
 
-def _print(found: Study, report: Path) -> None:
+def _print(result: Study, report: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
     from rsea_ros.report.control import tables
 
     console = Console()
-    for line in tables.gains_words(found):
+    for line in tables.gains_words(result):
         console.print(line, highlight=False)
-    rates = [f"{at.design.rate:g} Hz" for at in found.rates]
+    rates = [f"{at.design.rate:g} Hz" for at in result.rates]
     blocks = [
-        (tables.trial_head(found), tables.trial_rows(found)),
-        (["compensated", "sine", *rates], tables.compensation_rows(found)),
-        (["motor", "amplitude", "clamped: limit from", "free: limit from"], tables.reach_rows(found)),
+        (tables.trial_head(result), tables.trial_rows(result)),
+        (["compensated", "sine", *rates], tables.compensation_rows(result)),
+        (["motor", "amplitude", "clamped: limit from", "free: limit from"], tables.reach_rows(result)),
     ]
     for head, rows in blocks:
         shown = Table(*head, box=None, pad_edge=False, header_style="dim")

@@ -163,11 +163,11 @@ def evaluate(nodes: Processes, bag: Path, out: Path, duration: float) -> None:
         nodes.wait("identify", START_UP, tell)
 
 
-def table(start: Rig, true: Rig, found: Rig) -> str:
+def table(start: Rig, true: Rig, identified: Rig) -> str:
     """Return identified values with their 95 % interval beside the true ones, as text."""
     rows = [("", "true", "identified", "95 % interval", "start", "unit")]
     for name in start.free():
-        quantity = found.quantities[name]
+        quantity = identified.quantities[name]
         low, high = quantity.ci95 or (float("nan"), float("nan"))
         interval = f"{low:.5g} to {high:.5g}"
         rows.append(
@@ -177,7 +177,7 @@ def table(start: Rig, true: Rig, found: Rig) -> str:
                 f"{quantity.value:.5g}",
                 interval,
                 f"{start[name]:.5g}",
-                found.unit(name),
+                identified.unit(name),
             )
         )
     return columns(rows)

@@ -140,7 +140,7 @@ def _excitation(rig: Rig, args: argparse.Namespace, rate: float) -> Any:
 
 
 def _lines(
-    made: Export, rig: Rig, out: Path, found: tuple[Difference, ...], not_played: str
+    made: Export, rig: Rig, out: Path, differences: tuple[Difference, ...], not_played: str
 ) -> list[str]:
     """Return the report as text: file, content, omissions, differences."""
     from rsea_ros.exports.coverage import coverage_lines
@@ -150,13 +150,13 @@ def _lines(
     lines += [
         f"played in both: {one.channel} differs by {one.times_noise:.3g} times the sensor's noise "
         f"({one.rms:.3g} {one.unit} of {one.signal:.3g})"
-        for one in found
+        for one in differences
     ]
     return [*lines, f"not played: {not_played}"] if not_played else lines
 
 
 def _document(
-    made: Export, rig: Rig, out: Path, found: tuple[Difference, ...], not_played: str
+    made: Export, rig: Rig, out: Path, differences: tuple[Difference, ...], not_played: str
 ) -> dict[str, Any]:
     return {
         "schema": 1,
@@ -171,6 +171,6 @@ def _document(
                 "times_noise": one.times_noise, "rms": one.rms, "signal": one.signal, "noise": one.noise,
                 "unit": one.unit,
             }
-            for one in found
+            for one in differences
         },
     }  # fmt: skip

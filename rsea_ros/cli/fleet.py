@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from collections.abc import Mapping
 
 from rsea_ros.cli import _fleet_report, _fleet_run, _fleet_sql, _fleet_watch
+from rsea_ros.cli._actions import Action, add_actions
 from rsea_ros.fleet.extra import need_extra
 
 HELP = "process bags of many joints: store (run), reports (report), alarms (watch), queries (sql)"
 EXAMPLE = "rsea fleet run recordings --map joints.yaml --out store && rsea fleet report store --out report"
-
-
-class Action(NamedTuple):
-    """The interface of an action of `fleet`."""
-
-    help: str
-    add: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace], int]
-
-
 ACTIONS: Mapping[str, Action] = {
     "run": Action("process new recordings, with Dask", _fleet_run.add_run, _fleet_run.run),
     "report": Action(
@@ -33,9 +23,7 @@ ACTIONS: Mapping[str, Action] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the actions."""
-    actions = parser.add_subparsers(dest="action", required=True, metavar="|".join(ACTIONS))
-    for name, action in ACTIONS.items():
-        action.add(actions.add_parser(name, help=action.help, description=action.help))
+    add_actions(parser, ACTIONS)
 
 
 def run(args: argparse.Namespace) -> int:

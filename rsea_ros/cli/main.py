@@ -15,7 +15,7 @@ from typing import NoReturn, Protocol, cast
 
 from rsea_ros.cli import _lines
 from rsea_ros.cli._columns import columns
-from rsea_ros.cli._compiling import compiling_told
+from rsea_ros.cli._compiling import compilation_announced
 from rsea_ros.cli._shown import shown
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.interrupts import Stopped, Stops
@@ -44,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = arguments[0] if arguments else "--help"
     prefix = f"rsea {name}" if name in verbs() else "rsea"
-    with shown(), compiling_told(), Stops() as stops:
+    with shown(), compilation_announced(), Stops() as stops:
         try:
             status = _call(name, arguments[1:])
             sys.stdout.flush()

@@ -53,8 +53,9 @@ def run(args: argparse.Namespace) -> int:
     errors = {
         n: numbers({"rms_error": c.rms_error, "fit_percent": c.fit_percent}) for n, c in comparisons.items()
     }
-    told = [fault_json(fault) for fault in check(record, rig).faults]
-    print(json.dumps({"channels": errors, "data": {"faults": told}}, indent=2))
+    with np.errstate(all="ignore"):
+        faults_json = [fault_json(fault) for fault in check(record, rig).faults]
+    print(json.dumps({"channels": errors, "data": {"faults": faults_json}}, indent=2))
     return 0
 
 

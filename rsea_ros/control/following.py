@@ -87,8 +87,8 @@ def following(
 ) -> Following:
     """Follow sines on a bench without noise and limits; the controller does not know its load."""
     hz = np.array([f for f in SINES if f < HIGHEST * design.rate])
-    found = [_sine(true, locked(model), design, float(f), late, learn) for f in hz]
-    return Following(hz, np.array([t for t, _ in found]), np.array([m for _, m in found]))
+    responses = [_sine(true, locked(model), design, float(f), late, learn) for f in hz]
+    return Following(hz, np.array([t for t, _ in responses]), np.array([m for _, m in responses]))
 
 
 def _sine(

@@ -54,7 +54,7 @@ LIGHTEST = 25.0
 """1/(kg m^2): no load is taken for lighter than 1/25 kg m^2."""
 SWINGS = 3.0
 """1/(kg m^2), of theta_2: a load that follows so much may be a pendulum near its own frequency. It is no
-inertia there, and its theta_1 is negative: -12 at 2 Hz for one of 1.3 Hz. By noise a locked bench has 0.3."""
+inertia there, and its theta_1 is negative: -12 at 2 Hz for one of 1.3 Hz. Noise: 0.3 on a locked bench."""
 
 
 class Learning:
@@ -147,9 +147,9 @@ class Learning:
 
 def _within(matrix: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Return the solution of matrix x = right within bounds: what exceeds one is set to it, the rest anew."""
-    found = np.linalg.solve(matrix, right)
-    inside: FloatArray = np.clip(found, low, high)
-    free = inside == found
+    solution = np.linalg.solve(matrix, right)
+    inside: FloatArray = np.clip(solution, low, high)
+    free = inside == solution
     if free.all():
         return inside
     known = matrix[np.ix_(free, ~free)] @ inside[~free]

@@ -95,21 +95,21 @@ def link_share(
     hz = grid(design.rate, 60)
     f = family(loads, corners(tuple(loads), u), u, design.rate, hz)
     still = moved(rig, design.rate, hz)
-    own, alone = returns(law, f.plant, hz, f.path, f.current)
-    before = _peaks(own, alone)
+    memory, alone = returns(law, f.plant, hz, f.path, f.current)
+    before = _peaks(memory, alone)
     allowed = np.maximum(MORE * np.where(f.nominal, demand.sensitivity, demand.robust), before)
     best, softest = LinkShare(), math.inf
     for share in (LinkShare(*parts) for parts in product(INERTIAS, DAMPINGS, CORNERS)):
         on_link = linked(law, share.inertia, share.damping, share.corner, hz)
         whole, ratio = alone - f.path * on_link * f.plant[LINK], still.ratio(law, on_link)
         soft = float(np.mean(np.log(np.interp(SOFTEST, hz, ratio))))
-        robust = (_peaks(own, whole) <= allowed).all() and (encirclements(whole) < 0.5).all()
+        robust = (_peaks(memory, whole) <= allowed).all() and (encirclements(whole) < 0.5).all()
         if robust and soft < softest and ratio.max() <= MORE * demand.impedance:
             best, softest = share, soft
     return best
 
 
-def _peaks(own: ComplexArray, whole: ComplexArray) -> FloatArray:
+def _peaks(memory: ComplexArray, whole: ComplexArray) -> FloatArray:
     """Return the largest sensitivity of each bench, shape (m,)."""
-    peaks: FloatArray = (np.maximum(np.abs(own), 1.0) / np.abs(whole)).max(axis=1)
+    peaks: FloatArray = (np.maximum(np.abs(memory), 1.0) / np.abs(whole)).max(axis=1)
     return peaks

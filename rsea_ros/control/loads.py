@@ -53,5 +53,5 @@ def with_ends(rig: Rig, other: Rig) -> Rig:
     """Return the rig with the ends and loads of another one."""
     prefixes = (*(f"{end}." for end in END_NAMES), "housing.", "proximal_spring.")
     ends = {name: q for name, q in other.quantities.items() if name.startswith(prefixes)}
-    own = {name: q for name, q in rig.quantities.items() if not name.startswith(prefixes)}
-    return replace(rig, quantities={**own, **ends}, clamped=other.clamped)
+    rest = {name: q for name, q in rig.quantities.items() if not name.startswith(prefixes)}
+    return replace(rig, quantities={**rest, **ends}, clamped=other.clamped)

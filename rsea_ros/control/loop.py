@@ -49,15 +49,15 @@ def returns(
     """
     on_ft, on_velocity, memory = actions(law, hz)
     back = 1.0 / z_of(law.period, hz)
-    own = 1.0 - back * current * memory
-    whole = own + back * path * (on_ft * plant[FT] + on_velocity * plant[VELOCITY])
-    return np.broadcast_to(own, whole.shape), whole
+    fed_back = 1.0 - back * current * memory
+    whole = fed_back + back * path * (on_ft * plant[FT] + on_velocity * plant[VELOCITY])
+    return np.broadcast_to(fed_back, whole.shape), whole
 
 
 def open_loop(law: FeedbackLaw, plant: ComplexArray, hz: FloatArray) -> ComplexArray:
     """Return L, the loop broken at the motor torque behind its current, shape (…, n)."""
-    own, whole = returns(law, plant, hz)
-    return whole / own - 1.0
+    memory, whole = returns(law, plant, hz)
+    return whole / memory - 1.0
 
 
 def closed_loop_matrix(law: FeedbackLaw, plant: Sampled, share: float = 1.0) -> FloatArray:

@@ -32,19 +32,23 @@ class Robustness:
 
 
 def robustness(
-    rig: Rig, loads: Mapping[str, Rig], found: ControllerDesign, steps: int = 5, u: Uncertainty | None = None
+    rig: Rig,
+    loads: Mapping[str, Rig],
+    designed: ControllerDesign,
+    steps: int = 5,
+    u: Uncertainty | None = None,
 ) -> Robustness:
     """Sweep the set, by default that of the design. steps: values of K_s and of b_m, each."""
-    u, hz, law = u or Uncertainty(), grid(found.rate), law_of(rig, found.rate, found.gains)
+    u, hz, law = u or Uncertainty(), grid(designed.rate), law_of(rig, designed.rate, designed.gains)
     total = unstable = 0
     worst, where, every = 0.0, BenchVariant(""), []
     for name in loads:
-        f = family(loads, dense((name,), u, steps), u, found.rate, hz)
-        own, whole = returns(law, f.plant, hz, f.path, f.current)
+        f = family(loads, dense((name,), u, steps), u, designed.rate, hz)
+        memory, whole = returns(law, f.plant, hz, f.path, f.current)
         wound = encirclements(whole)
         total, unstable = total + len(f.cases), unstable + int(np.count_nonzero(wound > 0.5))
-        peaks = (np.maximum(np.abs(own), 1.0) / np.abs(whole)).max(axis=1)
+        peaks = (np.maximum(np.abs(memory), 1.0) / np.abs(whole)).max(axis=1)
         if peaks.max() > worst:
             worst, where = float(peaks.max()), f.cases[int(np.argmax(peaks))]
-        every += [margins(row, hz, 1.0 / found.rate) for row in whole / own - 1.0]
+        every += [margins(row, hz, 1.0 / designed.rate) for row in whole / memory - 1.0]
     return Robustness(total, unstable, worst, where, least(every))

@@ -85,8 +85,8 @@ def study(
     done = []
     for k, rate in enumerate(rates):
         progress(f"{rate:g} Hz", k / len(rates))
-        found = design(rig, loads, rate, demand)
-        done.append(_at_rate(clamped, light, loads, found))
+        designed = design(rig, loads, rate, demand)
+        done.append(_at_rate(clamped, light, loads, designed))
     reaches = {motor: tuple(_reaches(clamped, light, a, motor) for a in AMPLITUDES) for motor in motors}
     return Study(clamped, light, resonance, tuple(done), reaches)
 
@@ -97,22 +97,22 @@ def natural_frequency(rig: Rig) -> float:
     return float(np.abs(poles[np.abs(poles) > 0.0]).min()) / (2.0 * math.pi)
 
 
-def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], found: ControllerDesign) -> AtRate:
-    swept = robustness(clamped, loads, found, steps=3)
-    grid = np.geomspace(0.1, 0.45 * found.rate, 300)
-    near = following(clamped, clamped, found)
-    far = following(hard(loads), clamped, found, late=1)
-    apart, softest = spread(clamped, loads, found, (LOCKED,)), softness(clamped, found, grid)
+def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], designed: ControllerDesign) -> AtRate:
+    swept = robustness(clamped, loads, designed, steps=3)
+    grid = np.geomspace(0.1, 0.45 * designed.rate, 300)
+    near = following(clamped, clamped, designed)
+    far = following(hard(loads), clamped, designed, late=1)
+    apart, softest = spread(clamped, loads, designed, (LOCKED,)), softness(clamped, designed, grid)
     return AtRate(
-        found,
+        designed,
         swept,
-        tuple(trials(clamped, loads, found, swept, near, far, apart, softest.worst)),
-        tuple(compensations(clamped, found)),
+        tuple(trials(clamped, loads, designed, swept, near, far, apart, softest.worst)),
+        tuple(compensations(clamped, designed)),
         near,
-        following(light, clamped, found),
+        following(light, clamped, designed),
         apart,
-        spread(clamped, loads, found),
-        impedance(clamped, found.rate, found.gains, grid),
+        spread(clamped, loads, designed),
+        impedance(clamped, designed.rate, designed.gains, grid),
         softest,
     )
 

@@ -120,10 +120,10 @@ def design(
 
     gains = _gains(_search(cost, np.log(_START)), rate)
     if _lacking(problem, _score(problem, gains), demand) > _SHORT:
-        found = _design(problem, gains)
+        nearest = _design(problem, gains)
         raise ParameterError(
             f"rig {rig.name}: no gains keep the whole set of benches stable with its margins at {rate:g} Hz: "
-            f"largest sensitivity {found.sensitivity:.2f}, expected {demand.robust:g}"
+            f"largest sensitivity {nearest.sensitivity:.2f}, expected {demand.robust:g}"
         )
     return check(rig, loads, rate, gains)
 
@@ -150,9 +150,9 @@ def check(rig: Rig, loads: Mapping[str, Rig], rate: float, gains: Gains) -> Cont
     return _design(problem, gains)
 
 
-def worst(found: ControllerDesign) -> str:
+def worst(designed: ControllerDesign) -> str:
     """Return the least margins in words."""
-    name, least = min(found.margins.items(), key=lambda item: item[1].phase)
+    name, least = min(designed.margins.items(), key=lambda item: item[1].phase)
     return (
         f"phase margin {least.phase:.1f} deg, gain margin {least.gain:.1f} dB, "
         f"delay margin {least.delay:.2f} samples with load {name!r}"
@@ -177,11 +177,11 @@ def _problem(rig: Rig, loads: Mapping[str, Rig], rate: float, hz: FloatArray) ->
 
 def _score(problem: SynthesisProblem, gains: Gains) -> RobustnessScore:
     law, f = law_of(problem.rig, problem.rate, gains), problem.family
-    own, whole = returns(law, f.plant, f.hz, f.path, f.current)
-    sensitivity = (np.maximum(np.abs(own), 1.0) / np.abs(whole)).max(axis=1)
+    memory, whole = returns(law, f.plant, f.hz, f.path, f.current)
+    sensitivity = (np.maximum(np.abs(memory), 1.0) / np.abs(whole)).max(axis=1)
     return RobustnessScore(
         sensitivity,
-        friction_left(f.plant[FT] * own / whole, f.hz),
+        friction_left(f.plant[FT] * memory / whole, f.hz),
         encirclements(whole),
         problem.moved.ratio(law),
     )
@@ -198,16 +198,16 @@ def friction_left(response: FloatArray, hz: FloatArray) -> FloatArray:
 
 def _design(problem: SynthesisProblem, gains: Gains) -> ControllerDesign:
     law, f, score = law_of(problem.rig, problem.rate, gains), problem.family, _score(problem, gains)
-    own, whole = returns(law, f.plant, f.hz, f.path, f.current)
-    found = {
-        case.load: margins(whole[k] / own[k] - 1.0, f.hz, 1.0 / problem.rate)
+    memory, whole = returns(law, f.plant, f.hz, f.path, f.current)
+    by_load = {
+        case.load: margins(whole[k] / memory[k] - 1.0, f.hz, 1.0 / problem.rate)
         for k, case in enumerate(f.cases)
         if case.nominal
     }
     return ControllerDesign(
         gains,
         problem.rate,
-        MappingProxyType(found),
+        MappingProxyType(by_load),
         float(score.friction.max()),
         float(score.sensitivity.max()),
         float(score.softness.max()),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,9 +26,17 @@ from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench
 from rsea_ros.model.rig import EffectSetting, Rig
 
 HZ, AMPLITUDE = 5.0, 10.0
-SECONDS, SETTLE = 3.0, 1.0
-LONG, LEARNED = 4.0, 3.0
-"""s: duration of a trial with another load than the stated one, and the time from which it counts."""
+
+
+class Span(NamedTuple):
+    """Duration of a trial and the time from which it counts, s."""
+
+    seconds: float
+    counted_from: float
+
+
+BRIEF, LEARNED = Span(3.0, 1.0), Span(4.0, 3.0)
+"""A trial with the stated load; one with another load, once that is learned."""
 ARCMIN = math.pi / 180.0 / 60.0
 EFFECTS = (
     EffectSetting("coulomb_friction", {"torque": 3.0}),
@@ -198,7 +207,7 @@ def amplitude_of(load: Rig) -> float:
 def tracked(rig: Rig, loads: Mapping[str, Rig], case: BenchVariant, design: ControllerDesign) -> float:
     """Return the error of the sine on a bench of the set, once it has been learned."""
     true, amplitude = disturbed(loads, case), amplitude_of(bench(loads[case.load], case))
-    return sine(true, locked(rig), design, amplitude, seconds=LONG, settle=LEARNED, late=case.samples)
+    return sine(true, locked(rig), design, amplitude, span=LEARNED, late=case.samples)
 
 
 def compensations(rig: Rig, design: ControllerDesign) -> Iterator[Compensated]:
@@ -218,17 +227,16 @@ def sine(
     hz: float = HZ,
     limits: TorqueLimits | None = None,
     *,
-    seconds: float = SECONDS,
-    settle: float = SETTLE,
+    span: Span = BRIEF,
     late: int = 0,
     link: LinkShare | None = None,
 ) -> float:
-    """Return the RMS error of a sine (N m, Hz), over its own RMS, from `settle` s on."""
-    t = np.arange(round(seconds * design.rate)) / design.rate
+    """Return the RMS error of a sine (N m, Hz), over its own RMS, as it counts."""
+    t = np.arange(round(span.seconds * design.rate)) / design.rate
     rise = np.minimum(1.0, 4.0 * t) ** 2
     controller = TorqueController(model, design.rate, design.gains, limits=limits, link=link)
     wanted = amplitude * rise * np.sin(2.0 * np.pi * hz * t)
-    return closed_loop(true, design.rate, controller, wanted, late=late).error(settle)
+    return closed_loop(true, design.rate, controller, wanted, late=late).error(span.counted_from)
 
 
 def restlessness(rig: Rig, design: ControllerDesign, gap: float = 5.0 * ARCMIN) -> float:
@@ -248,8 +256,8 @@ def restlessness(rig: Rig, design: ControllerDesign, gap: float = 5.0 * ARCMIN) 
 
 
 def _held(true: Rig, model: Rig, design: ControllerDesign, torque: float) -> float:
-    t = np.arange(round(LONG * design.rate)) / design.rate
-    wanted = np.where(t < SETTLE, AMPLITUDE * np.sin(2.0 * np.pi * HZ * t), torque)
+    t = np.arange(round(LEARNED.seconds * design.rate)) / design.rate
+    wanted = np.where(t < BRIEF.counted_from, AMPLITUDE * np.sin(2.0 * np.pi * HZ * t), torque)
     controller = TorqueController(model, design.rate, design.gains, compensate=())
-    ft = closed_loop(true, design.rate, controller, wanted).ft[t >= LEARNED]
+    ft = closed_loop(true, design.rate, controller, wanted).ft[t >= LEARNED.counted_from]
     return float(np.std(ft))

@@ -6,7 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from rsea_ros.diagnosis.candidate import Candidate, FitSetup, effect_size, fit_candidate
+from rsea_ros.diagnosis.candidate import (
+    Candidate,
+    FitSetup,
+    effect_size,
+    fit_candidate,
+    is_within_clocks,
+)
 from rsea_ros.diagnosis.criteria import costs_priors_less, is_far_from_floor, preference
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.problem_variants import without_effect
@@ -112,11 +118,12 @@ class ReducedModels:
 
 
 def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
-    """Remove every accepted cause without which the others do as well."""
+    """Remove every accepted cause without which the others do as well, or that a clock's error may make."""
     last = selection.last
     for name, rest in models.without(last).items() if len(last.causes) > 1 else ():
-        if not models.is_needed(last, rest):
-            trial = trial_of(last, name, rest, "redundant")
+        is_nothing = is_within_clocks(last.solution, name)
+        if is_nothing or not models.is_needed(last, rest):
+            trial = trial_of(last, name, rest, "at_bound" if is_nothing else "redundant")
             return without_redundant(_replaced(selection, rest, trial), models)
     return selection
 

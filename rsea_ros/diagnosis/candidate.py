@@ -12,6 +12,8 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
+from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 
 
@@ -154,10 +156,26 @@ def prior_cost(problem: Problem, theta: FloatArray) -> float:
 
 
 def is_at_bound(solution: Solution, name: str, near: float) -> bool:
-    """Return whether an effect's main parameter lies at a bound, within a share `near` of its span."""
+    """Return whether an effect's main parameter lies at a bound, within a share `near` of its span.
+
+    A time within the clocks' error is at its bound too.
+    """
+    unknown, at = _main(solution, name)
+    return is_within_clocks(solution, name) or unknown.is_near_bound(at, near)
+
+
+def is_within_clocks(solution: Solution, name: str) -> bool:
+    """Return whether an effect is a time that a clock's error may make, which no record tells from zero."""
+    unknown, at = _main(solution, name)
+    error = Z95 * min(solution.problem.rig.clock_doubt(n) for n in solution.problem.channels)
+    return unknown.unit == "s" and abs(unknown.outer(at) - effect_named(name).main.null) < error
+
+
+def _main(solution: Solution, name: str) -> tuple[Unknown, float]:
+    """Return the unknown that is an effect's main parameter, and where the fit ended."""
     main = f"{name}.{effect_named(name).main.name}"
     unknowns = zip(solution.problem.unknowns, solution.theta, strict=True)
-    return next(u.is_near_bound(float(t), near) for u, t in unknowns if u.name == main)
+    return next((u, float(t)) for u, t in unknowns if u.name == main)
 
 
 def _distance(weights: Score | None, farthest: float) -> float:

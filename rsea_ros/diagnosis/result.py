@@ -33,9 +33,10 @@ Reason = Literal[
 ]
 """Why an effect is no cause.
 
-far_behind: of the best, on the data of the fit. at_bound: its main parameter ran to its bound. not_sure,
-too_small: the gain on the validation blocks. leaves_priors: needs values of the rig so far outside their
-stated doubt that the gain does not pay for it. explains_less, no_better_than_…: than the accepted rival.
+far_behind: of the best, on the data of the fit. at_bound: its main parameter ran to its bound, or is a time
+that a clock's error may make. not_sure, too_small: the gain on the validation blocks. leaves_priors: needs
+values of the rig so far outside their stated doubt that the gain does not pay for it. explains_less,
+no_better_than_…: than the accepted rival.
 redundant: beside the other causes. replaced: it was accepted, and gave way later. improbable: it was
 accepted, but its law does not fit what it takes away. leaves_too_much: it was, but does not surely help.
 """

@@ -2,7 +2,8 @@
 
 From each initial guess one simulation and one derivative for each of the effect's parameters; the nominal
 values move along with the derivatives that they already have. Two such steps show what a full fit would gain.
-A mode is too sharp for that: near it the nominal values need new derivatives.
+A mode is too sharp for that, and so is a guess that moves the nominal values: these need new derivatives, and
+more steps.
 """
 
 from __future__ import annotations
@@ -28,12 +29,17 @@ _DAMPING = 1e-6
 
 @dataclass(frozen=True)
 class ScreenedEffect:
-    """An effect beside the present model, with the start of a full fit and the cost already reached."""
+    """An effect beside the present model, with the start of a full fit and the cost already reached.
+
+    unsure: the best of its guesses whose derivatives change on the way, as far as two steps led, which does
+    not show where a fit leads.
+    """
 
     effect: Effect
     problem: Problem
     theta: FloatArray
     cost: float
+    unsure: tuple[ScreenedEffect, ...] = ()
 
     @property
     def name(self) -> str:
@@ -75,19 +81,31 @@ def _other_guesses(
 def _best_of(
     present: Solution, effect: Effect, guesses: Iterable[Mapping[str, float]], rule: ForwardSettings
 ) -> ScreenedEffect | None:
-    best: ScreenedEffect | None = None
+    """Return the best of some guesses."""
+    tried_all, unsure = [], []
     for guess in guesses:
         parameters = {name: value for name, value in guess.items() if "." not in name}
         base = with_values(present, {name: value for name, value in guess.items() if "." in name})
-        needs_derivatives = "mode" in effect.tags or base is not present
-        try_guess = _with_new_derivatives if needs_derivatives else _with_present_derivatives
+        is_bent = "mode" in effect.tags or base is not present
+        try_guess = _with_new_derivatives if is_bent else _with_present_derivatives
         try:
             tried = try_guess(base, effect, parameters, rule)
         except RseaError:
             continue
-        if tried is not None and (best is None or tried.cost < best.cost):
-            best = tried
-    return best
+        if tried is not None:
+            tried_all.append(tried)
+            unsure += [tried] if is_bent and 0.0 < tried.cost < math.inf else []
+    best = min(tried_all, key=lambda s: s.cost, default=None)
+    apart = {round(math.log(s.cost), 3): s for s in reversed(unsure)}
+    least = tuple(apart[k] for k in sorted(apart)[: rule.bent_guesses])
+    return None if best is None else replace(best, unsure=least)
+
+
+def fitted_on(screened: ScreenedEffect, rule: ForwardSettings) -> ScreenedEffect:
+    """Return the best of an effect's guesses after more steps of those that were unsure."""
+    longer = [solve(s.problem, s.theta, iterations=rule.bent_steps) for s in screened.unsure]
+    ends = [ScreenedEffect(screened.effect, s.problem, s.theta, s.cost) for s in longer]
+    return min([screened, *ends], key=lambda s: s.cost)
 
 
 def with_values(present: Solution, values: Mapping[str, float]) -> Solution:

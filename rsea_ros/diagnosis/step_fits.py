@@ -24,7 +24,7 @@ from rsea_ros.diagnosis.problem_variants import (
     without_clocks,
 )
 from rsea_ros.diagnosis.score import score_on
-from rsea_ros.diagnosis.screening import ScreenedEffect, screen
+from rsea_ros.diagnosis.screening import ScreenedEffect, fitted_on, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
@@ -57,13 +57,17 @@ class StepFits:
 
     @cached_property
     def on_pieces(self) -> Solution:
-        """The present model fitted to short pieces, with clocks taken as right."""
+        """The present model fitted to short pieces; far from the floor with clocks taken as right.
+
+        Near it the clocks stay: without them whatever shifts the response beats the effect that is missing.
+        """
         runs = zip(self.present.cases, self.present.outputs, strict=True)
         pieces = (p for case, out in runs for p in short_pieces_of(case, out, self.settings))
         cases = tuple(with_misfit_as_noise(p, self.present.validation.ratios) for p in pieces)
         solution = self.present.solution
-        problem, theta = without_clocks(replace(solution.problem, cases=cases), solution.theta)
-        problem = with_doubled_step(problem) if self.is_far else problem
+        problem, theta = replace(solution.problem, cases=cases), solution.theta
+        if self.is_far:
+            problem, theta = without_clocks(with_doubled_step(problem), theta)
         return solve(problem, theta, iterations=self.settings.fits.present_iterations)
 
     @cached_property
@@ -85,8 +89,11 @@ class StepFits:
             self.say(effects[i].name, 0.4 * i / len(effects))
             return screen(solution, effects[i], guesses[effects[i].name], self.settings.forward)
 
-        screened = self.pools.fits.map(tried, range(len(effects)))
-        return sorted((s for s in screened if s is not None), key=lambda s: s.cost)
+        screened = [s for s in self.pools.fits.map(tried, range(len(effects))) if s is not None]
+        rule = self.settings.forward
+        if all(s.cost > rule.clear * solution.cost for s in screened):
+            screened = list(self.pools.fits.map(lambda s: fitted_on(s, rule), screened))
+        return sorted(screened, key=lambda s: s.cost)
 
     def with_typical(self, effect: Effect) -> Solution:
         """Return the present model on the pieces with an effect of typical size, not fitted."""
@@ -127,6 +134,8 @@ class StepFits:
     def complete(self, screened: ScreenedEffect) -> tuple[Problem, FloatArray]:
         """Return the problem of a screened effect on every sample, clocks included, and its theta."""
         problem = replace(screened.problem, cases=self.present.cases)
+        if not self.is_far:
+            return problem, screened.theta
         return with_clocks(problem, screened.theta, self.present.problem)
 
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:

@@ -1,7 +1,7 @@
 """The spring chassis between the two flanks of the gear's play: free motion, contact, inelastic impact.
 
 Angles are relative to the distal side. Over a step the gear goes along the cubic through its angles and
-speeds at both ends (d_0, w_0, d_1, w_1). The chassis y, with the inertia j, the spring k and its damper b,
+speeds at both ends. The chassis y, with the inertia j, the spring k and its damper b,
 
     j y'' + b y' + k y = C,   |d - y| <= half the gap,   C pushes only, at a flank
 
@@ -10,13 +10,33 @@ it meets a flank.
 """
 
 import math
+from typing import NamedTuple
 
 from rsea_ros.compiler import njit
 
 
+class SprungChassis(NamedTuple):
+    """Stiffness k (N m/rad) and damping b (N m s/rad) of the spring, inertia j (kg m^2)."""
+
+    k: float
+    b: float
+    j: float
+
+
+class GearPath(NamedTuple):
+    """Angle (rad) and speed (rad/s) of the gear at the beginning and at the end of a step of h seconds."""
+
+    d_0: float
+    w_0: float
+    d_1: float
+    w_1: float
+    h: float
+
+
 @njit(inline="always")
-def swing(y, v, t, k, b, j):  # type: ignore[no-untyped-def]
+def swing(y, v, t, chassis):  # type: ignore[no-untyped-def]
     """Return y and v after a time t of free motion: exact, under- and overdamped."""
+    k, b, j = chassis
     decay = 0.5 * b / j
     square = k / j - decay * decay
     turn = math.sqrt(abs(square))
@@ -30,8 +50,9 @@ def swing(y, v, t, k, b, j):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def path(d_0, w_0, d_1, w_1, h, t):  # type: ignore[no-untyped-def]
+def along(path, t):  # type: ignore[no-untyped-def]
     """Return angle, speed and integral of the angle of the gear at a time t of the step."""
+    d_0, w_0, d_1, w_1, h = path
     mean = (d_1 - d_0) / h
     square, cube = (3.0 * mean - 2.0 * w_0 - w_1) / h, (w_0 + w_1 - 2.0 * mean) / (h * h)
     angle = d_0 + t * (w_0 + t * (square + t * cube))
@@ -40,10 +61,12 @@ def path(d_0, w_0, d_1, w_1, h, t):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def release(side, half, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
+def release(side, half, path, chassis):  # type: ignore[no-untyped-def]
     """Return when in the step the flank stops pushing: 0 without contact, h when it pushes throughout."""
     if side == 0.0:
         return 0.0
+    d_0, w_0, d_1, w_1, h = path
+    k, b, j = chassis
     inertia = j * (w_1 - w_0) / h
     c_0 = side * (inertia + b * w_0 + k * (d_0 - side * half))
     c_1 = side * (inertia + b * w_1 + k * (d_1 - side * half))
@@ -53,19 +76,19 @@ def release(side, half, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-unty
 
 
 @njit(inline="always")
-def impact(side, half, y, v, start, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
+def impact(side, half, y, v, start, path, chassis):  # type: ignore[no-untyped-def]
     """Return when a chassis free since `start` meets the flank that it is behind at h, by regula falsi."""
-    low, high = start, h
-    angle, _, _ = path(d_0, w_0, d_1, w_1, h, start)
+    low, high = start, path.h
+    angle, _, _ = along(path, start)
     f_low = side * (angle - y) - half
-    end, _ = swing(y, v, h - start, k, b, j)
-    f_high, t = side * (d_1 - end) - half, start
+    end, _ = swing(y, v, path.h - start, chassis)
+    f_high, t = side * (path.d_1 - end) - half, start
     for _ in range(12):
         if f_low >= 0.0:
             return low
         t = low + (high - low) * f_low / (f_low - f_high)
-        angle, _, _ = path(d_0, w_0, d_1, w_1, h, t)
-        at, _ = swing(y, v, t - start, k, b, j)
+        angle, _, _ = along(path, t)
+        at, _ = swing(y, v, t - start, chassis)
         f = side * (angle - at) - half
         if abs(f) < 1e-12:
             break
@@ -77,22 +100,24 @@ def impact(side, half, y, v, start, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ig
 
 
 @njit(inline="always")
-def over_step(y_0, v_0, side, half, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
+def over_step(y_0, v_0, side, half, path, chassis):  # type: ignore[no-untyped-def]
     """Return y, v, the flank (-1, 0, 1) at the end of a step, and the integral of y over it."""
-    leaves = release(side, half, d_0, w_0, d_1, w_1, h, k, b, j)
-    _, _, whole = path(d_0, w_0, d_1, w_1, h, h)
+    d_1, w_1, h = path.d_1, path.w_1, path.h
+    k, b, j = chassis
+    leaves = release(side, half, path, chassis)
+    _, _, whole = along(path, h)
     if leaves == h:
         return d_1 - side * half, w_1, side, whole - side * half * h
     area, y, v = 0.0, y_0, v_0
     if leaves > 0.0:
-        angle, v, area = path(d_0, w_0, d_1, w_1, h, leaves)
+        angle, v, area = along(path, leaves)
         y, area = angle - side * half, area - side * half * leaves
-    end, speed = swing(y, v, h - leaves, k, b, j)
+    end, speed = swing(y, v, h - leaves, chassis)
     if abs(d_1 - end) <= half:
         return end, speed, 0.0, area - (j * (speed - v) + b * (end - y)) / k
     side = math.copysign(1.0, d_1 - end)
-    meets = impact(side, half, y, v, leaves, d_0, w_0, d_1, w_1, h, k, b, j)
-    end, speed = swing(y, v, meets - leaves, k, b, j)
+    meets = impact(side, half, y, v, leaves, path, chassis)
+    end, speed = swing(y, v, meets - leaves, chassis)
     area -= (j * (speed - v) + b * (end - y)) / k
-    _, _, before = path(d_0, w_0, d_1, w_1, h, meets)
+    _, _, before = along(path, meets)
     return d_1 - side * half, w_1, side, area + whole - before - side * half * (h - meets)

@@ -13,7 +13,7 @@ Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft w
 
 from collections.abc import Sequence
 
-from rsea_ros.effects._chassis import over_step, path
+from rsea_ros.effects._chassis import GearPath, SprungChassis, along, over_step
 from rsea_ros.effects.compensable import Gap
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.equation import equation_of
@@ -51,8 +51,9 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
         x[Y] = min(max(0.0, x[D] - half), x[D] + half)
     if s[COMMIT] == 0.0:
         w = 2.0 * w - x[W]
-    y, v, side, area = over_step(x[Y], x[V], x[SIDE], half, x[D], x[W], d, w, h, k, b, j)
-    _, _, whole = path(x[D], x[W], d, w, h, h)
+    path, chassis = GearPath(x[D], x[W], d, w, h), SprungChassis(k, b, j)
+    y, v, side, area = over_step(x[Y], x[V], x[SIDE], half, path, chassis)
+    _, _, whole = along(path, h)
     spring = (k * (area - whole) + b * ((y - x[Y]) - (d - x[D]))) / h
     inertia = j * ((v - x[V]) - (w - x[W])) / h + x[OWED]
     if s[COMMIT] == 0.0:

@@ -44,19 +44,18 @@ _STIFFER = (4.0, 9.0, 20.0)
 def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
     """Begin with the base's mode at the highest peak of each channel.
 
-    The rig's spring is stiffer then: the fit without the effect sees both in series.
+    The rig's spring is stiffer then: the fit without the effect sees both in series. A mode above all that
+    the command excites makes no peak, so the default inertias are tried as well.
     """
     if view.rigid_spring:
         return list(defaults)
     channels = sorted(set(view.channels) & view.measured - {"motor_torque"})
-    modes = {round(f): f for n in channels for f in view.lines(n, is_sharp=False)[:1]}
+    modes = {round(4.0 * math.log2(f)): f for n in channels for f in view.lines(n, is_sharp=False)[:1]}
     k = view.value(STIFFNESS)
-    made: list[Guess] = []
-    for f in modes.values():
-        for base, spring in ((ratio * k, k / (1.0 - 1.0 / ratio)) for ratio in _STIFFER):
-            inertia = (base + spring) / (2.0 * math.pi * f) ** 2
-            made.append({**defaults[0], "stiffness": base, STIFFNESS: spring, "inertia": inertia})
-    return made or list(defaults)
+    series = [(ratio * k, k / (1.0 - 1.0 / ratio)) for ratio in _STIFFER]
+    bases = [(b, s, (b + s) / (2.0 * math.pi * f) ** 2) for f in modes.values() for b, s in series]
+    bases += [(*series[0], inertia) for inertia in sorted({guess["inertia"] for guess in defaults})]
+    return [{**defaults[0], "stiffness": b, STIFFNESS: s, "inertia": inertia} for b, s, inertia in bases]
 
 
 EFFECT = Effect(

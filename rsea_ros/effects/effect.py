@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from numba import types
 
@@ -38,12 +38,6 @@ that depends on how it moves. limit: its main parameter is the largest torque, N
 Response = Callable[[Sequence[float], Any], Any]
 """Parameters in order and s = 2 pi i f, shape (n,), to the factor on the effect's signal, shape (n,)."""
 
-
-class RigLike(Protocol):
-    """The part of a rig that a structural effect uses (effects do not import the model)."""
-
-    def __getitem__(self, name: str) -> float: ...
-    def with_values(self, values: Mapping[str, float]) -> Any: ...
 
 
 @dataclass(frozen=True)

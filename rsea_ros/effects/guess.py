@@ -78,7 +78,10 @@ Guesses = Callable[[Sequence[Guess], ResidualView], list[Guess]]
 
 
 def at_lines(channel: str, frequency: str = "frequency", sine: Sequence[str] = ()) -> Guesses:
-    """Return guesses at the peaks of a channel's spectrum. sine: parameters that amplitude and phase set."""
+    """Return guesses at the peaks of a channel's spectrum. sine: parameters that amplitude and phase set.
+
+    A mode above all that the command excites makes no peak, so its typical parameters are tried as well.
+    """
 
     def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
         shown = channel if channel in view.channels else view.channels[0]
@@ -86,13 +89,13 @@ def at_lines(channel: str, frequency: str = "frequency", sine: Sequence[str] = (
         for f in view.lines(shown, is_sharp="amplitude" in sine):
             fitted = view.sine(shown, f) if sine else {}
             made.append({**defaults[0], frequency: f, **{n: fitted[n] for n in sine}})
-        return made or list(defaults)
+        return made if sine and made else [*made, defaults[0]]
 
     return guesses
 
 
 _LIMITS = (0.95, 0.85, 0.7, 0.5)
-"""Of the largest command: limits below it that still leave most of the run."""
+"""Of the largest command or travel: limits below it that still leave most of the run."""
 
 
 def at_limits(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
@@ -105,6 +108,13 @@ def at_limits(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
     if measured is not None:
         limits.insert(0, measured)
     return [{**defaults[0], "limit": limit} for limit in limits]
+
+
+def at_ends_of_travel(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
+    """Return guesses at shares of the largest angle that the record shows."""
+    travel = view.travel()
+    ends = [] if travel is None else [{**defaults[0], "angle": 0.5 * share * travel} for share in _LIMITS]
+    return ends or beside_softer_rotor(defaults, view)
 
 
 def beside_softer_rotor(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:

@@ -10,7 +10,7 @@ import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.equation import equation_of
-from rsea_ros.effects.guess import beside_softer_rotor
+from rsea_ros.effects.guess import at_ends_of_travel
 from rsea_ros.effects.signal_table import DEFLECTION, SPRING_TORQUE, Port
 
 
@@ -42,7 +42,7 @@ EFFECT = Effect(
     ),
     function=apply,
     reads=(DEFLECTION,),
-    guesses=beside_softer_rotor,
+    guesses=at_ends_of_travel,
     about="a stop that the spring meets beyond an angle",
     equation=equation_of(__doc__),
 )

@@ -80,14 +80,14 @@ def _ends(hypothesis: Hypothesis, z: float) -> list[Rig]:
 
 def _corners(hypothesis: Hypothesis, z: float) -> list[Rig]:
     """Return rigs with the cause's own parameters moved together: a near stop is worst where it is stiff."""
-    own, sd = hypothesis.own[:3], hypothesis.sd()
-    if len(own) < 2:
+    positions, sd = hypothesis.own[:3], hypothesis.sd()
+    if len(positions) < 2:
         return []
-    others = [(-1.0, 0.0, 1.0)] * (len(own) - 1)
+    others = [(-1.0, 0.0, 1.0)] * (len(positions) - 1)
     rigs = []
     for corner in product(np.linspace(-1.0, 1.0, _LEVELS), *others):
         moved = hypothesis.theta.copy()
-        moved[own] += z * np.array(corner) * sd[own]
+        moved[positions] += z * np.array(corner) * sd[positions]
         rigs.append(hypothesis.rig_at(moved))
     return rigs
 
@@ -115,6 +115,6 @@ def at_ends(values: FloatArray) -> float:
     return float(values[0] + np.sqrt(np.sum(increases**2)))
 
 
-def share_used(found: Peaks, limits: RunLimits) -> float:
+def share_used(peaks: Peaks, limits: RunLimits) -> float:
     """Return the largest share of a limit that is used at LEVEL."""
-    return used(found.at_level, limits)
+    return used(peaks.at_level, limits)

@@ -109,7 +109,7 @@ def identified(result: Identification) -> dict[str, Any]:
 
 def _parameter(p: ParameterEstimate) -> dict[str, Any]:
     low, high = map(finite, p.ci95)
-    identifiable = p.is_told
+    identifiable = p.is_identifiable
     return {"name": p.name, "value": finite(p.value), "low": low, "high": high, "unit": p.unit,
             "identifiable": identifiable}  # fmt: skip
 
@@ -143,9 +143,9 @@ def excitation(record: Record) -> list[dict[str, Any]]:
     return [{"name": n, "value": finite(v), "unit": u} for n, v, u in figures]
 
 
-def faults(found: Iterable[Fault]) -> list[dict[str, Any]]:
+def faults(listed: Iterable[Fault]) -> list[dict[str, Any]]:
     """Return faults of the data by kind, with how many of them and the first one's place."""
-    every = list(dict.fromkeys(found))
+    every = list(dict.fromkeys(listed))
     counts = Counter(f.kind for f in every)
     first: Mapping[str, Fault] = {f.kind: f for f in reversed(every)}
     return [{"kind": kind, "count": n, "detail": _place(first[kind])} for kind, n in sorted(counts.items())]

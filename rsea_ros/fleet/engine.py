@@ -21,6 +21,7 @@ from rsea_ros.fleet.sources import Bag
 from rsea_ros.fleet.store import Store, TaskOutcome
 from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.task import Changed, Task, read_fingerprint, reason
+from rsea_ros.fleet.time_limit import TIME_LIMIT
 from rsea_ros.progress import Progress
 from rsea_ros.version import version
 
@@ -37,10 +38,12 @@ class EngineLimits:
     """memory: bytes that a worker may have, None for no limit.
 
     back_off: s before the second attempt of a task whose worker was lost; twice as long before each further.
+    time: s that a task may take.
     """
 
     memory: int | None = None
     back_off: float = 0.5
+    time: float = TIME_LIMIT
 
 
 class Engine:
@@ -115,7 +118,7 @@ class Engine:
     def _plan(self, bag: Bag, recording: str) -> None:
         """Make the tasks of a recording that are new; one too large for any worker is a row at once."""
         for joint in self._joints[bag.url]:
-            task = Task(bag, joint, recording, version())
+            task = Task(bag, joint, recording, version(), self._limits.time)
             if task.key in self._keys:
                 self._summary.before += 1
                 self._rate.over(1, worked=False)

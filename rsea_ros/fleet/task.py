@@ -5,6 +5,7 @@ It needs only the recording: rig and topics are included, row and artefacts are 
 
 from __future__ import annotations
 
+import math
 import os
 import resource
 import time
@@ -18,6 +19,7 @@ from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.row import Row, analysis_of, empty
 from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relisted
 from rsea_ros.fleet.store import TaskOutcome
+from rsea_ros.fleet.time_limit import OutOfTime, limited
 from rsea_ros.identification.workers import on_cores
 from rsea_ros.wording import brief
 
@@ -31,12 +33,16 @@ class Changed(Exception):
 
 @dataclass(frozen=True)
 class Task:
-    """A recording of one joint. recording: the hash of its content. model_version: of this software."""
+    """A recording of one joint. recording: the hash of its content. model_version: of this software.
+
+    time_limit: s that it may take.
+    """
 
     bag: Bag
     joint: MappedJoint
     recording: str
     model_version: str
+    time_limit: float = math.inf
 
     @property
     def key(self) -> str:
@@ -82,11 +88,13 @@ def work(task: Task) -> TaskOutcome:
     _forget_peak()
     with on_cores(1):
         try:
-            with local_copy(task.bag) as path:
+            with limited(task.time_limit), local_copy(task.bag) as path:
                 files = analyse(row, path, task.bag.url, task.joint)
             row["outcome"] = "done"
         except RseaError as error:
             row |= {"outcome": "refused", "reason": reason(str(error))}
+        except OutOfTime:
+            row |= {"outcome": "quarantined", "reason": _too_slow(task.time_limit)}
         except Exception as error:
             row |= {"outcome": "quarantined", "reason": reason(_fault(error))}
     if _now(task.bag) != task.bag:
@@ -97,6 +105,10 @@ def work(task: Task) -> TaskOutcome:
 def reason(text: str) -> str:
     """Return the text of an error as one line of a row."""
     return brief(" ".join(text.split()), _LONGEST)
+
+
+def _too_slow(limit: float) -> str:
+    return f"took more than {limit / 60.0:g} min: a larger --time-limit, then --again"
 
 
 def _now(bag: Bag) -> Bag | None:

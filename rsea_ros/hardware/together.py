@@ -35,16 +35,16 @@ def cycle(
     and holds up no other.
     """
     with ExitStack() as kept:
-        here = [joint.taken(kept) for joint in joints]
+        taken = [joint.taken(kept) for joint in joints]
         before = [joint.fault for joint in joints]
-        for joint, there, (torque, age) in zip(joints, here, wanted, strict=True):
-            if there:
+        for joint, is_taken, (torque, age) in zip(joints, taken, wanted, strict=True):
+            if is_taken:
                 joint.write(torque, age)
         for bus in buses:
             bus.exchange()
-        states = [joint.read() if there else None for joint, there in zip(joints, here, strict=True)]
-        for joint, there, fault, (_, age) in zip(joints, here, before, wanted, strict=True):
-            if there and joint.fault is not fault:
+        states = [joint.read() if is_taken else None for joint, is_taken in zip(joints, taken, strict=True)]
+        for joint, is_taken, fault, (_, age) in zip(joints, taken, before, wanted, strict=True):
+            if is_taken and joint.fault is not fault:
                 joint.write(0.0, age)
         for bus in buses:
             bus.send()

@@ -19,7 +19,7 @@ from rsea_ros.health.cusum import Cusum, threshold
 from rsea_ros.health.estimates import Estimates
 from rsea_ros.health.finding import UNEXPLAINED, HealthFinding, unexplained
 from rsea_ros.health.hypotheses import ChangeHypothesis
-from rsea_ros.health.look import SETTLE, Look
+from rsea_ros.health.look import FILTER_SETTLING, Look
 from rsea_ros.health.scatter import Scatter
 from rsea_ros.health.settings import WatchSettings
 from rsea_ros.health.single_cause import ChangeCause, Fitter
@@ -114,7 +114,7 @@ class Changes:
         """Request a fit of each cause: to the newest looks, and to the first ones of this change."""
         since = min(max(self._cusum.since, 1), len(self._looks))
         recent = list(self._looks)[-since:]
-        self._began = recent[0].t[0] + SETTLE
+        self._began = recent[0].t[0] + FILTER_SETTLING
         looks = _spread(recent, self._settings.fitted)
         first = [look for look in self._looks if self._base.since <= look.t[0] < recent[0].t[0]][:2]
         base, before = self._base, self._before
@@ -181,7 +181,7 @@ class Changes:
             del self.found[name]
         changed = _is_change(h, finding.size)
         self._before = replace(self._base, last=h.name) if changed else None
-        self._begin(_Base(h.changed(self._base.rig, cause.change), hypotheses, self._began - SETTLE))
+        self._begin(_Base(h.changed(self._base.rig, cause.change), hypotheses, self._began - FILTER_SETTLING))
         if not changed:
             self.found.pop(h.name, None)
             return None

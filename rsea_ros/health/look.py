@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.model.observer.log import COMMAND, FT, STATE
 from rsea_ros.signals import FloatArray, IntArray, Record
 
-SETTLE, LENGTH = 0.25, 1.0
+FILTER_SETTLING, LENGTH = 0.25, 1.0
 """s. Ten time constants of the disturbance's filter; long beside them, short beside a movement."""
 FEWEST = 20
 """Measurements of a look that can be judged."""
@@ -64,7 +64,7 @@ class Cutter:
         while len(self._t):
             if not np.isfinite(self._begin):
                 self._begin = float(self._t[0])
-            end = self._begin + SETTLE + LENGTH
+            end = self._begin + FILTER_SETTLING + LENGTH
             if self._t[-1] <= end:
                 break
             look = self._cut(self._begin, end)
@@ -78,7 +78,7 @@ class Cutter:
         before = np.flatnonzero(self._kind[:first] == COMMAND)[-1:]
         part = np.concatenate([before, np.arange(first, last)])
         t, kind = self._t[part], self._kind[part]
-        judged = (t > begin + SETTLE) & (kind != COMMAND)
+        judged = (t > begin + FILTER_SETTLING) & (kind != COMMAND)
         return Look(t, kind, self._values[part], judged) if judged.sum() >= FEWEST else None
 
     def _drop(self) -> None:

@@ -49,13 +49,13 @@ def tuned(
 
 
 def _change(
-    found: Sequence[LookEvidence], hypotheses: Sequence[ChangeHypothesis], before: FloatArray
+    evidence: Sequence[LookEvidence], hypotheses: Sequence[ChangeHypothesis], before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the change of each parameter in all and its sigma, (p,). before: as the looks were judged."""
     from scipy.optimize import lsq_linear  # takes 0.2 s that only this needs
 
-    scatter = scatter_of(found)
-    both = [e.scaled(scatter.scale) for e in found]
+    scatter = scatter_of(evidence)
+    both = [e.scaled(scatter.scale) for e in evidence]
     score, information = np.sum([c for c, _ in both], axis=0), np.sum([a for _, a in both], axis=0)
     doubt = np.array([max(h.doubt, _CERTAIN * h.least) for h in hypotheses])
     information, score = information * np.outer(doubt, doubt), score * doubt

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.identification.determined import shares_told
+from rsea_ros.identification.determined import shares_from_data
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Solution, central_jacobian
@@ -40,12 +40,13 @@ _ALIKE = 0.8
 class Confidence:
     """Covariance in the fit's coordinates, shape (n, n), and by unknown the share determined by the data.
 
-    told: by determined.shares_told. information: J'J, shape (n, n). theta: where the fit ended, shape (n,).
+    data_share: by determined.shares_from_data. information: J'J, shape (n, n). theta: where the fit
+    ended, shape (n,).
     """
 
     theta: FloatArray
     covariance: FloatArray
-    told: FloatArray
+    data_share: FloatArray
     information: FloatArray
 
     @property
@@ -71,7 +72,7 @@ def confidence_of(solution: Solution) -> Confidence:
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
     larger = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
-    return Confidence(solution.theta, covariance, shares_told(information, doubt), information)
+    return Confidence(solution.theta, covariance, shares_from_data(information, doubt), information)
 
 
 def inverse_of(matrix: FloatArray) -> FloatArray:
@@ -158,11 +159,11 @@ def torque_scale(problem: Problem) -> tuple[Remark, ...]:
 def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArray:
     """Return the information on `index` with all other unknowns free (Schur complement)."""
     rest = [i for i in range(len(information)) if i not in index]
-    own, cross = information[np.ix_(index, index)], information[np.ix_(index, rest)]
+    chosen, cross = information[np.ix_(index, index)], information[np.ix_(index, rest)]
     if not rest:
-        return own
+        return chosen
     result: FloatArray = (
-        own - cross @ np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True) @ cross.T
+        chosen - cross @ np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True) @ cross.T
     )
     return result
 

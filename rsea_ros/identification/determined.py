@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.signals import FloatArray
 
 Determined = Literal["yes", "in part", "no"]
-TOLD = 0.5
+IDENTIFIABLE_SHARE = 0.5
 """Share of what is known of a value that the data must have brought for it to be identified."""
 _WELL = 0.9
 """The same for a value that the data determine whole."""
@@ -18,18 +18,27 @@ _NULL = 1e-9
 """Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
 
 
-def shares_told(information: FloatArray, doubt: FloatArray) -> FloatArray:
+def shares_from_data(information: FloatArray, doubt: FloatArray) -> FloatArray:
     """Return by unknown the share of what is known of it that the data alone brought, 0 … 1, shape (n,).
 
     d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other unknowns
     free: 0 where only a ratio with others is determined. information: J'J, shape (n, n).
     """
     scaled = information * np.outer(doubt, doubt) + _NULL * np.eye(len(doubt))
-    told: FloatArray = 1.0 / (1.0 + np.diag(np.linalg.inv(scaled)))
-    return told
+    return np.asarray(1.0 / (1.0 + _variances(scaled)))
 
 
-def how_determined(name: str, value: float, ci95: tuple[float, float], told: float) -> Determined:
+def _variances(information: FloatArray) -> FloatArray:
+    """Return the variance that an information leaves of each unknown; where rounding leaves it singular,
+    directions below the rounding count as unknown."""
+    try:
+        return np.diag(np.linalg.inv(information))
+    except np.linalg.LinAlgError:
+        size, vectors = np.linalg.eigh(information)
+        return np.asarray(vectors**2 @ (1.0 / np.maximum(size, _NULL)))
+
+
+def how_determined(name: str, value: float, ci95: tuple[float, float], share: float) -> Determined:
     """Return how well data determine a value, relative to what was known before and to its size.
 
     "no" where the interval reaches as far as the value is large, or where the fit ended at a bound.
@@ -37,6 +46,6 @@ def how_determined(name: str, value: float, ci95: tuple[float, float], told: flo
     low, high = ci95
     at_bound = value in ci95 and low < high
     size = math.pi if name.endswith(".phase") else abs(value)
-    if told < TOLD or at_bound or not max(high - value, value - low) < size:
+    if share < IDENTIFIABLE_SHARE or at_bound or not max(high - value, value - low) < size:
         return "no"
-    return "yes" if told >= _WELL else "in part"
+    return "yes" if share >= _WELL else "in part"

@@ -42,11 +42,11 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
             ci95=interval(u, float(theta), float(s)),
             start=u.start,
             spread=u.spread,
-            told_by_data=float(told),
+            told_by_data=float(share),
             spreads_off=u.sigmas(float(theta)),
         )
-        for u, theta, s, told in zip(
-            solution.problem.unknowns, solution.theta, sd, confidence.told, strict=True
+        for u, theta, s, share in zip(
+            solution.problem.unknowns, solution.theta, sd, confidence.data_share, strict=True
         )
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rsea_ros.identification.determined import TOLD
+from rsea_ros.identification.determined import IDENTIFIABLE_SHARE
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import CLOCKS, ParameterEstimate
 
@@ -14,7 +14,7 @@ FAR = 3.0
 
 def is_off(spreads: float, told_by_data: float) -> bool:
     """Return whether a value is surely not the rig's: far from it, and determined by the data."""
-    return abs(spreads) > FAR and told_by_data >= TOLD
+    return abs(spreads) > FAR and told_by_data >= IDENTIFIABLE_SHARE
 
 
 def off_rig(parameters: Iterable[ParameterEstimate]) -> tuple[Remark, ...]:

@@ -15,7 +15,7 @@ from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.position_loop import commanded
-from rsea_ros.model.prediction import SETTLE
+from rsea_ros.model.prediction import SKIPPED_START
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
@@ -74,7 +74,7 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     floating = frozenset(n for n in channels if rig.zero_unknown(n))
     sensors = {n: rig.sensors.get(n, Sensor()) for n in channels}
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
-    start = float(record["command"].t[0]) + SETTLE
+    start = float(record["command"].t[0]) + SKIPPED_START
     return Case(
         drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
@@ -101,7 +101,7 @@ def channels_that_tell(record: Record, rig: Rig) -> list[str]:
             f"{record.source}: no ft, deflection, position or velocity channel for rig {rig.name}, "
             "expected one: record it, or name its topic with --topic"
         )
-    start = float(record["command"].t[0]) + SETTLE
+    start = float(record["command"].t[0]) + SKIPPED_START
     counts = {n: int(np.sum((record[n].t >= start) & np.isfinite(record[n].y))) for n in channels}
     alive = [n for n in channels if counts[n] >= FEWEST and not record[n].is_still]
     if set(alive) - {"motor_torque"}:
@@ -111,7 +111,7 @@ def channels_that_tell(record: Record, rig: Rig) -> list[str]:
     )
     raise IdentificationError(
         f"{record.source}: {have}; expected ft, deflection, position or velocity with motion in it and "
-        f"{FEWEST} samples or more later than {SETTLE:g} s after the first command"
+        f"{FEWEST} samples or more later than {SKIPPED_START:g} s after the first command"
     )
 
 
@@ -131,7 +131,7 @@ def _inverse_case(record: Record, rig: Rig) -> Case:
     level, is_flat = top_of_band(torque.y)
     stated = 0.0 if is_flat else rig.sensors.get("motor_torque", Sensor()).noise
     noise = max(level, stated) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
-    edges = (motion.t < motion.t[0] + SETTLE) | (motion.t > motion.t[-1] - SETTLE)
+    edges = (motion.t < motion.t[0] + SKIPPED_START) | (motion.t > motion.t[-1] - SKIPPED_START)
     return Case(
         drive=motion,
         t={"motor_torque": motion.t},

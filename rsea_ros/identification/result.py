@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from rsea_ros.identification.determined import TOLD, Determined, how_determined
+from rsea_ros.identification.determined import IDENTIFIABLE_SHARE, Determined, how_determined
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.identification.statics import Statics
@@ -64,9 +64,9 @@ class ParameterEstimate:
     spreads_off: float = 0.0
 
     @property
-    def is_told(self) -> bool:
+    def is_identifiable(self) -> bool:
         """Return whether the data determine the value, rather than the rig's prior."""
-        return self.told_by_data >= TOLD
+        return self.told_by_data >= IDENTIFIABLE_SHARE
 
     @property
     def determined(self) -> Determined:
@@ -143,5 +143,5 @@ class Identification:
         if not self.at_noise or self.silent:
             return "misfit"
         physical = [p for p in self.parameters if not p.name.startswith(CLOCKS)]
-        is_any_determined = any(p.is_told for p in physical)
+        is_any_determined = any(p.is_identifiable for p in physical)
         return "adequate" if is_any_determined or not physical else "not_identifiable"

@@ -69,17 +69,17 @@ def _misfit(measured: FrequencyResponse, rig: Rig) -> FloatArray:
 
 def _least_squares(residual: Callable[[FloatArray], FloatArray], theta: FloatArray) -> FloatArray:
     """Return theta at the least sum of squares: Gauss-Newton, the step halved until it helps."""
-    here = residual(theta)
+    misfit = residual(theta)
     for _ in range(_ITERATIONS):
         steps = _DIFFERENCE * np.eye(len(theta))
-        slope = np.column_stack([(residual(theta + s) - here) / _DIFFERENCE for s in steps])
-        step = -np.linalg.lstsq(slope, here, rcond=None)[0]
+        slope = np.column_stack([(residual(theta + s) - misfit) / _DIFFERENCE for s in steps])
+        step = -np.linalg.lstsq(slope, misfit, rcond=None)[0]
         trials = ((theta + f * step, residual(theta + f * step)) for f in (1.0, 0.5, 0.25, 0.1, 0.03))
-        better = next((t for t in trials if t[1] @ t[1] < here @ here), None)
+        better = next((t for t in trials if t[1] @ t[1] < misfit @ misfit), None)
         if better is None:
             break
-        done = here @ here - better[1] @ better[1] < 1e-3 * (here @ here)
-        theta, here = better
+        done = misfit @ misfit - better[1] @ better[1] < 1e-3 * (misfit @ misfit)
+        theta, misfit = better
         if done:
             break
     return theta

@@ -100,10 +100,10 @@ def _on_grid(case: Case, values: FloatArray, channel: str, at: FloatArray) -> Fl
     return np.asarray(np.interp(at, case.t[channel][keep], values[keep], left=0.0, right=0.0))
 
 
-def _prior(right: FloatArray, told: FloatArray, count: int) -> FloatArray:
+def _prior(right: FloatArray, information: FloatArray, count: int) -> FloatArray:
     """Return the spectrum of the torque, per bin: the power of the plain estimate above its noise."""
-    told = np.maximum(told, 1e-12 * np.max(told))
-    power = np.abs(right / told) ** 2 / count
+    information = np.maximum(information, 1e-12 * np.max(information))
+    power = np.abs(right / information) ** 2 / count
     width = max(2.0, len(power) / 400.0)
-    excess = gaussian_filter1d(power, width) - 1.0 / told
-    return np.asarray(np.maximum(excess, 1e-2 / told))
+    excess = gaussian_filter1d(power, width) - 1.0 / information
+    return np.asarray(np.maximum(excess, 1e-2 / information))

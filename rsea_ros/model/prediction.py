@@ -19,7 +19,7 @@ from rsea_ros.model.simulation import simulate
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
 
-SETTLE = 0.3
+SKIPPED_START = 0.3
 """s at the start of a record that no comparison or fit uses, because the bench may not have been at rest."""
 
 
@@ -93,6 +93,6 @@ def _on_measured_zero(c: Comparison) -> Comparison:
 def _comparison(
     t: FloatArray, measured: FloatArray, predicted: FloatArray, edges: bool = False
 ) -> Comparison:
-    last = t[-1] - SETTLE if edges else t[-1]
-    counts = np.isfinite(measured) & np.isfinite(t) & (t >= t[0] + SETTLE) & (t <= last)
+    last = t[-1] - SKIPPED_START if edges else t[-1]
+    counts = np.isfinite(measured) & np.isfinite(t) & (t >= t[0] + SKIPPED_START) & (t <= last)
     return Comparison(t, measured, predicted, counts)

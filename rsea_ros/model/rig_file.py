@@ -46,12 +46,12 @@ def rig_names() -> list[str]:
 
 def rig_folders() -> list[Path]:
     """Return where rigs lie: beside the source, or in the share of the installed package."""
-    here = Path(__file__).resolve()
+    source = Path(__file__).resolve()
     candidates = [
-        here.parents[2] / "config" / "rigs",
+        source.parents[2] / "config" / "rigs",
         Path(sysconfig.get_path("data")) / "share/rsea_ros/config/rigs",
     ]
-    candidates += [parent / "share/rsea_ros/config/rigs" for parent in here.parents[3:7]]
+    candidates += [parent / "share/rsea_ros/config/rigs" for parent in source.parents[3:7]]
     return [folder for folder in candidates if folder.is_dir()]
 
 

@@ -25,7 +25,7 @@ from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.sampling import sample
-from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
+from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
 from rsea_ros.model.structure import structured
 from rsea_ros.signals import Channel, FloatArray, Record
 
@@ -141,8 +141,8 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
     """Advance a machine over the steps of `command`, in place; `out` gets OUTPUTS of every step."""
     empty = np.empty(0)
     reference, ridden = (empty if v is None else v for v in (reference, ridden))
-    advance(machine.linear, machine.calls, command, reference, ridden, start,
-            machine.x, machine.table, machine.own, out)  # fmt: skip
+    inputs = StepInputs(command, reference, ridden, start)
+    advance(machine.linear, machine.calls, inputs, StepState(machine.x, machine.table, machine.own), out)
 
 
 def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> Machine:

@@ -63,6 +63,27 @@ class Calls(NamedTuple):
     nonlinear: bool
 
 
+class StepInputs(NamedTuple):
+    """What drives a run of steps.
+
+    command: N m, held over each step. reference: rad, target of a position loop; ridden: rad, measured rotor
+    angle at the middle of each step; both may be empty. start: time of the first step, s.
+    """
+
+    command: FloatArray
+    reference: FloatArray
+    ridden: FloatArray
+    start: float
+
+
+class StepState(NamedTuple):
+    """What a run of steps changes in place: state x of the mechanics, signal table, states of the effects."""
+
+    x: FloatArray
+    table: FloatArray
+    own: FloatArray
+
+
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def call_port(port, calls, s_at, p_at, own_at):  # type: ignore[no-untyped-def]
     for i in range(calls.first[port], calls.first[port + 1]):
@@ -140,15 +161,14 @@ def _read_outputs(linear, x, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
-def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  # type: ignore[no-untyped-def]
-    """Run the steps of `command` (N m, held over each), in place.
+def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
+    """Run the steps of `inputs.command`, in place; out (steps, 5): OUTPUTS at the end of each step.
 
-    x, s, own: state of the mechanics, signal table, states of the effects; they go in and come out.
-    reference (rad) and ridden (rad, measured rotor angle at the middle of each step) may be empty.
-    out (steps, 5): OUTPUTS at the end of each step. start: s, of the first step.
     Without numba's counted references (_nrt): a count is an atomic addition, and took half of a step.
     """
-    h, state = s[st.STEP], _state(x, linear.rest)
+    command, reference, ridden, start = inputs
+    s, own = state.table, state.own
+    h, x = s[st.STEP], _state(state.x, linear.rest)
     s_at, p_at, own_at = s.ctypes.data, calls.p.ctypes.data, own.ctypes.data
     for k in range(len(command)):
         s[st.TIME], s[st.COMMAND], s[st.CURRENT] = start + k * h, command[k], command[k]
@@ -156,29 +176,29 @@ def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  
             s[st.REFERENCE] = reference[k]
         call_port(_COMMAND, calls, s_at, p_at, own_at)
         call_port(_MOTOR, calls, s_at, p_at, own_at)
-        free = end = _free(linear, s[st.COMMAND], state)
+        free = end = _free(linear, s[st.COMMAND], x)
         if calls.nonlinear:
             s[st.TIME], s[st.COMMIT] = start + (k + 0.5) * h, 0.0
             end = _with_torques(linear, s, free)
-            s[st.GEAR_VELOCITY_SPAN] = _dot(linear.spans, 0, end) - _dot(linear.spans, 0, state)
-            s[st.DEFLECTION_SPAN] = _dot(linear.spans, 1, end) - _dot(linear.spans, 1, state)
-            _read(linear, _middle(state, end), s)
+            s[st.GEAR_VELOCITY_SPAN] = _dot(linear.spans, 0, end) - _dot(linear.spans, 0, x)
+            s[st.DEFLECTION_SPAN] = _dot(linear.spans, 1, end) - _dot(linear.spans, 1, x)
+            _read(linear, _middle(x, end), s)
             if len(ridden) > 0:
                 s[st.ROTOR_ANGLE] = ridden[k]
             call_port(_GEAR, calls, s_at, p_at, own_at)
             call_port(_SPRING, calls, s_at, p_at, own_at)
             end = _with_torques(linear, s, free)
-        state = end
+        x = end
         s[st.TIME] = start + (k + 1) * h
         if calls.first[_SPRING] < calls.first[_SPRING + 1]:
             held = s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE]
             s[st.COMMIT], s[st.DEFLECTION_SPAN] = 1.0, 0.0
-            _read(linear, state, s)
+            _read(linear, x, s)
             call_port(_SPRING, calls, s_at, p_at, own_at)
             s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE] = held
-        _read_outputs(linear, state, s)
+        _read_outputs(linear, x, s)
         call_port(_SENSOR, calls, s_at, p_at, own_at)
         out[k, 0], out[k, 1], out[k, 2] = s[st.POSITION], s[st.VELOCITY], s[st.CURRENT]
         out[k, 3], out[k, 4] = s[st.FT], s[st.SPRING_ANGLE]
-    for i in range(len(state)):
-        x[i] = state[i]
+    for i in range(len(x)):
+        state.x[i] = x[i]

@@ -75,14 +75,14 @@ def design_of(values: Values) -> ControllerDesign:
     return design(rig, loads, values["rate"], DesignLimits(*(values[name] for name in names)))
 
 
-def controller_of(values: Values, found: ControllerDesign, link: LinkShare) -> TorqueController:
+def controller_of(values: Values, designed: ControllerDesign, link: LinkShare) -> TorqueController:
     """Return the controller for the parameters. link: what of the link's motion it feeds forward."""
     limits = TorqueLimits(values["torque_limit"], values["slew_limit"], values["ramp"])
     options: dict[str, Any] = {} if values["compensate"] else {"compensate": ()}
     return TorqueController(
         load_rig(values["rig"]),
         values["rate"],
-        found.gains,
+        designed.gains,
         limits=limits,
         preview=values["preview"],
         learn=values["learn"],
@@ -92,16 +92,16 @@ def controller_of(values: Values, found: ControllerDesign, link: LinkShare) -> T
     )
 
 
-def summary(found: ControllerDesign) -> list[str]:
+def summary(designed: ControllerDesign) -> list[str]:
     """Return gains and margins as lines for the log."""
-    g = found.gains
+    g = designed.gains
     head = (
         f"k_p {g.k_p:.3f}, k_d {1e3 * g.k_d:.2f} ms, k_i {g.k_i:.2f}, Q {g.q_frequency:.1f} Hz, "
-        f"k_w {g.k_w:.1f} N m s/rad at {found.rate:g} Hz; "
-        f"largest sensitivity of the set {found.sensitivity:.2f}"
+        f"k_w {g.k_w:.1f} N m s/rad at {designed.rate:g} Hz; "
+        f"largest sensitivity of the set {designed.sensitivity:.2f}"
     )
     return [head] + [
         f"{name}: crossover {m.crossover:.1f} Hz, phase margin {m.phase:.1f} deg, "
         f"gain margin {m.gain:.1f} dB, delay margin {m.delay:.2f} samples"
-        for name, m in found.margins.items()
+        for name, m in designed.margins.items()
     ]

@@ -42,16 +42,16 @@ class FindingsPublisher:
         rows = [self._row(code.name, [f for f in findings if f.code == code.name]) for code in TABLE]
         self._publisher.publish(statuses_message(time.time_ns(), rows, self._joint))
 
-    def _row(self, code: str, found: Sequence[HealthFinding]) -> Row:
+    def _row(self, code: str, findings: Sequence[HealthFinding]) -> Row:
         name = f"{self._name}: {code}"
-        if not found:
+        if not findings:
             return name, OK, "no", {"code": code}
         level = ERROR if code in SEVERE else WARN
         values: dict[str, object] = {"code": code}
-        for finding in found:
-            prefix = f"{finding.name}." if len(found) > 1 else ""
+        for finding in findings:
+            prefix = f"{finding.name}." if len(findings) > 1 else ""
             values |= {f"{prefix}{key}": value for key, value in self._values(finding).items()}
-        return name, level, "; ".join(sentence(f) for f in found), values
+        return name, level, "; ".join(sentence(f) for f in findings), values
 
     def _values(self, finding: HealthFinding) -> dict[str, object]:
         values: dict[str, object] = {"name": finding.name, "confidence": f"{finding.confidence:.3f}"}

@@ -31,20 +31,20 @@ class LinkFeedforward(NamedTuple):
     reason: str
 
 
-def link_of(values: Mapping[str, Any], found: ControllerDesign) -> LinkFeedforward:
+def link_of(values: Mapping[str, Any], designed: ControllerDesign) -> LinkFeedforward:
     """Return what the link's motion is used for."""
     rig = load_rig(values["rig"])
     if reason := _unusable(values, rig):
         return LinkFeedforward(LinkShare(), None, reason)
     demand = DesignLimits(*(values[name] for name in ("sensitivity", "robust", "impedance")))
-    share = link_share(rig, load_range(rig, lightest(rig, values["free"])), found, demand)
+    share = link_share(rig, load_range(rig, lightest(rig, values["free"])), designed, demand)
     if share == LinkShare():
         return LinkFeedforward(share, None, "no part of it keeps the demands")
-    loud, most = _noise(rig, found, share), LOUD * values["torque_limit"]
+    loud, most = _noise(rig, designed, share), LOUD * values["torque_limit"]
     if loud > most:
         reason = f"noise of {loud:.2g} N m of motor torque, expected at most {most:.2g}"
         return LinkFeedforward(LinkShare(), None, reason)
-    return LinkFeedforward(share, SpringEncoder(rig, found.rate), "")
+    return LinkFeedforward(share, SpringEncoder(rig, designed.rate), "")
 
 
 def link_words(link: LinkFeedforward) -> str:
@@ -81,9 +81,9 @@ def _unusable(values: Mapping[str, Any], rig: Rig) -> str:
     return ""
 
 
-def _noise(rig: Rig, found: ControllerDesign, share: LinkShare) -> float:
+def _noise(rig: Rig, designed: ControllerDesign, share: LinkShare) -> float:
     """Return the RMS of the torque of a link that stands still, N m."""
     angle = math.hypot(spread(rig, "deflection"), spread(rig, "position"))
-    motion = LinkMotion(law_of(rig, found.rate, found.gains), share)
+    motion = LinkMotion(law_of(rig, designed.rate, designed.gains), share)
     torques = [motion.torque(angle * x, 0.0) for x in np.random.default_rng(0).normal(size=HEARD)]
     return math.sqrt(sum(torque**2 for torque in torques) / HEARD)

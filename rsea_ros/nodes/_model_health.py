@@ -77,8 +77,8 @@ class ModelHealth:
 
     def _band(self) -> dict[str, object]:
         reading = self._flag.reading()
-        here = math.isfinite(reading.occupied)
-        gain, phase = self._flag.error_at(reading.occupied) if here else (math.nan, math.nan)
+        is_known = math.isfinite(reading.occupied)
+        gain, phase = self._flag.error_at(reading.occupied) if is_known else (math.nan, math.nan)
         return {
             "verdict": self._error.verdict,
             "tolerance": f"{self._error.settings.tolerance:g}",

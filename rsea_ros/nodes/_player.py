@@ -11,10 +11,9 @@ from rclpy.publisher import Publisher
 
 from msg_adapters.ros import JointState, stamp_of, torque_command_message
 from rsea_ros.nodes._cycle import SECOND, Cycle
-from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, await_arrival
+from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, MEASUREMENT, await_arrival
 from rsea_ros.signals import FloatArray
 
-SETTLE = SECOND // 2
 CLOSING_ZEROS = 3
 MARGIN = SECOND // 100
 """A command that has less than this left until it takes effect is left out: its stamp would not be true."""
@@ -101,7 +100,7 @@ class Player:
 
     def _first(self, measured: int) -> int:
         """Return when the first command takes effect, ns."""
-        earliest = time.time_ns() + self._lead + SETTLE
+        earliest = time.time_ns() + self._lead + DISCOVERY_TIME
         periods = math.ceil((earliest - measured) * self.rate / SECOND)
         first: int = measured + round(periods * SECOND / self.rate)
         return first

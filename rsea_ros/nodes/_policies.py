@@ -137,7 +137,7 @@ def document(profiles: Profiles) -> str:
 
 def _asked(node: Any, name: str) -> Interfaces:
     def names(ask: Callable[[str, str], Iterable[tuple[str, Any]]]) -> set[str]:
-        return {found for found, _ in ask(name, f"/{NAMESPACE}")}
+        return {topic for topic, _ in ask(name, f"/{NAMESPACE}")}
 
     return {
         ("topics", "publish"): names(node.get_publisher_names_and_types_by_node),

@@ -9,6 +9,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
+from rsea_ros.nodes._cycle import SECOND
+
 COMMAND = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
 MEASURED = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
 MEASUREMENT = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -23,6 +25,8 @@ RECORD_RELIABLE = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
 OVERRIDES = QoSOverridingOptions.with_default_policies()
 """Depth, history and reliability by parameter: qos_overrides./rsea/ft.publisher.reliability and so on."""
 
+DISCOVERY_TIME = SECOND // 2
+"""ns. A publisher knows of a subscriber before that knows of it."""
 ARRIVAL = Duration(seconds=1)
 """Usual are 5 to 11 ms; a subscriber that hangs is waited for so long."""
 

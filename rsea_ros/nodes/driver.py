@@ -62,17 +62,19 @@ class DriverNode(ManagedEntity):
         if node.get_parameter("use_sim_time").value:
             raise ParameterError("parameter use_sim_time = true, expected false: the device keeps real time")
         named = [
-            (name, own | {"device_options": options_of(own["device_options"])})
-            for name, own in joint_values(values)
+            (name, joint | {"device_options": options_of(joint["device_options"])})
+            for name, joint in joint_values(values)
         ]
-        if any(own["device"] not in DEVICES for _, own in named) and (files := os.environ.get(EXTRA_PATH)):
+        if any(joint["device"] not in DEVICES for _, joint in named) and (
+            files := os.environ.get(EXTRA_PATH)
+        ):
             text = f"{EXTRA_PATH}={printable(files)}: code from there runs in this node"
             node.get_logger().warning(text)
-        devices, self._buses = devices_of([own for _, own in named], DEVICES)
+        devices, self._buses = devices_of([joint for _, joint in named], DEVICES)
         self._jobs, self._alarm = Jobs(node), SignalListener(self._halt)
         self.joints = [
-            DrivenJoint(node, self._jobs, name, own, device)
-            for (name, own), device in zip(named, devices, strict=True)
+            DrivenJoint(node, self._jobs, name, joint, device)
+            for (name, joint), device in zip(named, devices, strict=True)
         ]
         if named[0][0]:
             for service, work in (("stop", self._stop), ("clear_fault", self._clear_faults)):

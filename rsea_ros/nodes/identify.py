@@ -165,8 +165,8 @@ class IdentifyNode:
             return self._identified
         lost = sum(tap.lost for tap in self._taps.values())
         counts = {role: tap.count for role, tap in self._taps.items()}
-        if (told := self._diagnosing.report()) is not None:
-            return NodeHealth(told.level, told.summary, {**counts, **told.values})
+        if (diagnosis := self._diagnosing.report()) is not None:
+            return NodeHealth(diagnosis.level, diagnosis.summary, {**counts, **diagnosis.values})
         return NodeHealth(WARN if lost else OK, f"{lost} messages lost" if lost else "gathering", counts)
 
 

@@ -18,7 +18,7 @@ from rsea_ros.errors import BagError, ParameterError
 from rsea_ros.nodes._cycle import SECOND, wait_until
 from rsea_ros.nodes._health import OK, STEADY, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter
-from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE
+from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, LATCHED, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
@@ -38,8 +38,6 @@ TABLE = (
 WAIT_FOR = ("torque_command", "joint_states", "ft")
 NEVER = {"/diagnostics", "/clock", "/rosout", "/parameter_events"}
 CLOCK_PERIOD = SECOND // 100
-SETTLE = SECOND // 2
-"""A publisher knows of a subscriber before that knows of it."""
 HEARTBEAT = Duration(seconds=4)
 """Longer than the middleware takes to learn that a reliable subscriber has everything."""
 
@@ -88,7 +86,7 @@ class ReplayNode:
         while self._awaited():
             if self._stop.wait(0.05):
                 return
-        begin, first, ticked = time.monotonic_ns() + SETTLE, self._rows[0][2], 0
+        begin, first, ticked = time.monotonic_ns() + DISCOVERY_TIME, self._rows[0][2], 0
         for topic, _, logged, raw in self._rows:
             if self._stop.is_set():
                 return

@@ -17,7 +17,8 @@ def fault(*alike: Fault) -> str:
     if f.kind == "missing_topic":
         return f"{names} {'are' if len(alike) > 1 else 'is'} missing"
     detail = f" ({f.detail})" if f.detail else ""
-    return f"{_kind(f)} in {names}{_size(f)}{detail}"
+    place = f" in {names}" if f.channel else ""
+    return f"{_kind(f)}{place}{_size(f)}{detail}"
 
 
 def fault_lines(items: Sequence[Fault]) -> list[str]:
@@ -44,7 +45,7 @@ def _by_channel(items: Sequence[Fault]) -> str:
     kinds: dict[str, list[str]] = {}
     for f in items:
         kinds.setdefault(f.channel, []).append(_kind(f))
-    return "; ".join(f"{listed(k)} in {words.channel(n)}" for n, k in kinds.items())
+    return "; ".join(f"{listed(k)} in {words.channel(n)}" if n else listed(k) for n, k in kinds.items())
 
 
 def _size(f: Fault) -> str:

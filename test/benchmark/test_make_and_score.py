@@ -209,6 +209,12 @@ def test_a_data_set_is_never_replaced(folder, capsys):
     assert (folder / "set" / "manifest.json").read_text() == before
 
 
+@pytest.mark.parametrize("name", ["mine.jsonl", "random.jsonl"])
+def test_two_rows_of_one_name_are_refused(folder, name, capsys):
+    files = [answered(folder, perfect(folder)), answered(folder, perfect(folder), name)]
+    assert f"a second row {name[:-6]!r}" in refused(capsys, "score", folder / "set", *files)
+
+
 def test_an_answer_is_written_as_it_is_read(made):
     line = Answer({"backlash": 0.25}, 3.0).line("r0001")
     expected = {"record": "r0001", "causes": [{"name": "backlash", "probability": 0.25}], "seconds": 3.0}

@@ -8,13 +8,13 @@ import pytest
 
 from rsea_ros.benchmark.answers import Answer
 from rsea_ros.benchmark.scoring import score
-from rsea_ros.benchmark.truth import Truth, truth_hash
+from rsea_ros.benchmark.truth import RecordTruth, truth_hash
 
 EFFECTS = ("a", "b", "c", "d")
 
 
 def hiding(*names, outside=""):
-    return Truth({n: {"size": 1.0} for n in names}, outside, dict.fromkeys(names, 2.0), "salt")
+    return RecordTruth({n: {"size": 1.0} for n in names}, outside, dict.fromkeys(names, 2.0), "salt")
 
 
 def test_scores_by_hand():
@@ -59,6 +59,7 @@ def test_the_interval_narrows_with_the_records():
 
 def test_a_hash_depends_on_every_part_of_the_truth():
     truth = hiding("a")
-    others = (hiding("b"), hiding("a", outside="x"), Truth(truth.causes, "", truth.times_noise, "pepper"))
+    salted = RecordTruth(truth.causes, "", truth.times_noise, "pepper")
+    others = (hiding("b"), hiding("a", outside="x"), salted)
     hashes = [truth_hash("r0001", t) for t in (truth, *others)] + [truth_hash("r0002", truth)]
     assert len(set(hashes)) == 5

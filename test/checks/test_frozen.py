@@ -68,3 +68,14 @@ def test_a_machine_that_sticks_while_the_command_goes_on_is_not_frozen(noise):
     t = np.arange(int(20.0 * RATE)) / RATE
     record = synthesize(rig, Channel(t, 20.0 * np.sin(2.0 * np.pi * 0.1 * t)), noise=noise)
     assert named(record) == set()
+
+
+def test_a_velocity_that_is_the_rate_of_the_position_is_steady():
+    """A drive under a constant torque reaches its speed, which a coarse sensor shows as one value."""
+    rig = load_rig("bare_drive")
+    t = np.arange(int(10.0 * RATE)) / RATE
+    record = synthesize(rig, Channel(t, 10.0 * np.sign(np.sin(2.0 * np.pi * t / 4.0))), noise=False)
+    noise = Channel(t, np.random.default_rng(5).standard_normal(len(t)))
+    assert {f.channel for f in check(record.with_channels(ft=noise), rig).faults} == set()
+    stopped = record.with_channels(velocity=frozen(record, ("velocity",), 4.0)["velocity"], ft=noise)
+    assert {f.channel for f in check(stopped, rig).faults} == {"velocity"}

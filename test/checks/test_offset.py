@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -25,3 +27,15 @@ def test_an_offset_that_no_torque_explains_is_a_finding_and_a_fault(offset, ligh
     for f in findings.of("offset"):
         assert f.value == pytest.approx(offset, abs=2.0)
     assert [f.channel for f in findings.faults if f.kind == "offset"] == (["ft"] if light else [])
+
+
+@pytest.mark.parametrize(("zero", "said"), [(0.0, False), (100.0, True), (-0.5, True)])
+def test_an_angle_whose_zero_is_elsewhere_is_told_from_a_wrong_rig(zero, said):
+    """A count of turns in the position made the whole simulation wild: three sensors of a wrong rig."""
+    moved = RUN.with_channels(position=Channel(RUN["position"].t, RUN["position"].y + zero))
+    findings = check_record(moved, RIG)
+    assert [(f.channel, f.light) for f in findings.of("offset")] == ([("position", "red")] if said else [])
+    assert [f.channel for f in findings.of("wrong_rig") if f.light != "green"] == []
+    unknown = replace(RIG.sensors["position"], zero_unknown=True)
+    knowing = replace(RIG, sensors={**RIG.sensors, "position": unknown})
+    assert check_record(moved, knowing).of("offset") == ()

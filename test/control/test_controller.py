@@ -14,7 +14,7 @@ from rsea_ros.control.law import Gains
 from rsea_ros.control.prediction import AHEAD, Prediction, prediction_response
 from rsea_ros.control.sampled import sampled
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.trials import EFFECTS, restlessness, sine
+from rsea_ros.control.trials import EFFECTS, Span, restlessness, sine
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
 
@@ -33,7 +33,7 @@ def test_a_limited_slew_leaves_the_torque_of_the_model_alone():
     """At 1 kHz the limited slew disturbed the model under a command that moves a free load: 150 % off."""
     gains = Gains(0.2446, 0.00087, 0.612, 29.97, 53.6)
     design = ControllerDesign(gains, 1000.0, {}, math.nan)
-    assert sine(FREE, RIG, design, 4.6, seconds=1.6, settle=1.2) < 0.03
+    assert sine(FREE, RIG, design, 4.6, span=Span(1.6, 1.2)) < 0.03
 
 
 @pytest.mark.parametrize("times", [0.5, 2.0])
@@ -47,7 +47,7 @@ def test_a_sine_is_followed_with_half_and_twice_the_load(times):
 def test_a_slow_sine_is_followed_on_an_unknown_pendulum(times):
     """Its weight outweighs the inertia: at 2 Hz that was 34 % off, because theta_1 could not be negative."""
     load = FREE.with_values({"housing_end.inertia": times * FREE["housing_end.inertia"]})
-    assert sine(load, RIG, DESIGN, 1.4 * times, 2.0, seconds=4.0, settle=2.5) < 0.05
+    assert sine(load, RIG, DESIGN, 1.4 * times, 2.0, span=Span(4.0, 2.5)) < 0.05
 
 
 @pytest.mark.parametrize(

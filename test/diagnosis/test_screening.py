@@ -12,7 +12,7 @@ from independent.hidden import hide
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.model.rig_file import load_rig
 
 RATE, DURATION = 280.0, 20.0
@@ -48,6 +48,24 @@ def test_a_guess_far_too_large_does_not_lose_the_effect(name, parameters, comman
     rng = np.random.default_rng(5)
     record = record_command(hide(drawn_bench(rng), name, parameters), command(rng), rng)
     others = tuple(other for other in catalogue() if other != name)
+    found = diagnose([record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(without=others))
+    assert [cause.name for cause in found.causes] == [name]
+    assert found.verdict == "explained"
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "command"),
+    [
+        ("hard_stop", {"angle": 0.0135, "stiffness": 3900.0}, slow_sweep),
+        ("base_compliance", {"stiffness": 9080.0, "inertia": 1.13}, slow_sweep),
+    ],
+)
+def test_the_better_of_two_guesses_shows_after_a_fit(name, parameters, command):
+    """The guess that was best after two steps ended in another minimum, and a look-alike won or none."""
+    rng = np.random.default_rng(5)
+    record = record_command(hide(drawn_bench(rng), name, parameters), command(rng), rng)
+    tried = (name, *effect_named(name).claims.confusable_with, "command_delay")
+    others = tuple(other for other in catalogue() if other not in tried)
     found = diagnose([record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(without=others))
     assert [cause.name for cause in found.causes] == [name]
     assert found.verdict == "explained"

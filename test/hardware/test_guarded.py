@@ -1,60 +1,20 @@
-"""A device behind its limits: which calls reach it, in which order, and how its failures end."""
+"""A device behind its limits: the calls of each cycle in their order, and the end of its failures."""
 
 from __future__ import annotations
 
 import math
-from contextlib import ExitStack
 
 import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
-from rsea_ros.hardware.device import NoReply, State
+from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import DeviceFault, Limits
-from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, Protection
+from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE
 from rsea_ros.hardware.spring import Spring
+from test.hardware.logged_device import LOST, Device, guarded
 
 WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 7.0)
-
-
-class Log(Protection):
-    """A protection that writes its beats to a log."""
-
-    def __init__(self, kind, log):
-        super().__init__(kind)
-        self.log = log
-
-    def beat(self, armed=None):
-        self.log.append("beat" if armed is None else f"beat {armed}")
-
-
-class Device:
-    """A device that logs its calls. broken: by method, the errors of the next calls."""
-
-    def __init__(self, kind=BUS_WATCHDOG):
-        self.log, self.broken, self.during = [], {}, {}
-        self.protection = Log(kind, self.log)
-        self.reading = {}
-
-    def _did(self, what):
-        self.log.append(what)
-        if self.broken.get(what.split()[0]):
-            error = self.broken[what.split()[0]].pop(0)
-            if error is not None:
-                raise error
-        self.during.get(what.split()[0], lambda: None)()
-
-    def read(self):
-        self._did("read")
-        return State(1, **{"position": 0.0, "velocity": 0.0, "motor_torque": 0.0, **self.reading})
-
-    def write(self, torque):
-        self._did(f"write {torque:g}")
-
-    def __getattr__(self, name):
-        if name not in {"open", "enable", "disable", "zero_ft", "recover", "reboot", "close"}:
-            raise AttributeError(name)
-        return lambda: self._did(name)
 
 
 @pytest.fixture
@@ -64,12 +24,7 @@ def device():
 
 @pytest.fixture
 def joint(device):
-    """A guarded device, open and enabled, with nothing in its log; 4 N m a cycle of soft start."""
-    made = GuardedDevice(device, Limits(64.0, slew=1e9, soft_start=256.0), 64.0)
-    made.open()
-    made.enable()
-    device.log.clear()
-    return made
+    return guarded(device)
 
 
 def test_nothing_is_enabled_counted_or_read_before_it_is_asked_for(device):
@@ -140,9 +95,6 @@ def test_a_reading_beyond_a_limit_ends_the_torque_in_the_same_cycle(joint, devic
     assert device.log == ["beat True", "write 8", "beat", "read", "beat False", "write 0"]
 
 
-LOST = NoReply("no reply")
-
-
 @pytest.mark.parametrize(("method", "what"), [("read", "failed_reads"), ("write", "failed_writes")])
 @pytest.mark.parametrize(
     ("answers", "fault"),
@@ -206,140 +158,6 @@ def test_an_answer_that_is_late_while_another_is_lost_makes_no_fault_of_both(joi
     assert joint.fault is None and joint.cycles == {"failed_reads": 2, "failed_writes": 2}
 
 
-def test_enabling_needs_no_fault_and_begins_softly(joint, device):
-    joint.write(9.0, 0.0)
-    joint.enable()
-    assert joint.write(9.0, 0.0) == 4.0 and device.log.count("enable") == 1
-    joint.guard.trip(DeviceFault("ft", detail="saturation"))
-    with pytest.raises(DeviceError, match="fault ft: saturation, expected clear_fault first"):
-        joint.enable()
-    assert device.log.count("enable") == 1
-
-
-def test_a_device_that_does_not_enable_gets_no_torque(device):
-    joint = GuardedDevice(device, Limits(64.0), 64.0)
-    device.broken = {"enable": [NoReply("no reply")]}
-    with pytest.raises(NoReply):
-        joint.enable()
-    assert not joint.enabled
-
-
-def test_disabling_makes_the_torque_zero_and_informs_the_protection(joint, device):
-    joint.write(9.0, 0.0)
-    device.log.clear()
-    joint.disable()
-    assert device.log == ["disable", "beat False"]
-    assert (joint.enabled, joint.guard.torque) == (False, 0.0)
-
-
-def test_a_device_that_another_thread_uses_is_left_alone(joint, device):
-    joint.away = True
-    assert joint.cycle(9.0, 0.0) is None
-    for refused in (joint.enable, joint.reboot):
-        with pytest.raises(DeviceError, match=r"^clear_fault or reboot is under way"):
-            refused()
-    joint.guard.torque = 4.0
-    joint.disable()
-    assert device.log == [] and joint.guard.torque == 0.0 and not joint.enabled
-    assert joint.away, "it is still the other's"
-
-
-def test_a_cycle_does_not_wait_for_another_user_of_the_device(joint):
-    with ExitStack() as first:
-        assert joint.taken(first) is True
-        with ExitStack() as second:
-            assert joint.taken(second) is False
-    with ExitStack() as third:
-        assert joint.taken(third) is True, "it was let go"
-
-
-def test_the_sensor_is_tared_only_without_torque_and_none_is_made_meanwhile(joint, device):
-    written = []
-    device.during = {"zero_ft": lambda: written.append(joint.write(9.0, 0.0))}
-    joint.zero_ft()
-    assert written == [0.0]
-    assert joint.write(9.0, 0.0) == 4.0, "a soft start begins anew"
-    with pytest.raises(DeviceError, match="zero_ft: 4 N m is commanded, expected 0 N m"):
-        joint.zero_ft()
-    assert device.log.count("zero_ft") == 1
-
-
-def test_a_sensor_that_does_not_tare_does_not_keep_the_torque_off(joint, device):
-    device.broken = {"zero_ft": [NoReply("no reply")]}
-    with pytest.raises(NoReply):
-        joint.zero_ft()
-    assert joint.write(9.0, 0.0) == 4.0
-
-
-def test_without_a_fault_there_is_nothing_to_clear(joint, device):
-    assert joint.clear() is False
-    assert device.log == []
-
-
-def test_a_fault_is_cleared_by_a_reading_without_it(joint, device):
-    joint.write(9.0, 0.0)
-    joint.guard.trip(DeviceFault("ft"))
-    device.log.clear()
-    assert joint.clear() is True
-    assert device.log == ["recover", "read", "enable"]
-    assert joint.fault is None and joint.write(9.0, 0.0) == 4.0 and not joint.away
-
-
-def test_a_fault_is_not_cleared_while_a_reading_has_it(joint, device):
-    joint.guard.trip(DeviceFault("temperature"))
-    device.reading = {"temperature": 99.0}
-    with pytest.raises(DeviceError, match="temperature: 99 °C, limit 70 °C is still there"):
-        joint.clear()
-    assert joint.fault is not None and not joint.away and joint.enabled
-    assert "enable" not in device.log and "disable" not in device.log
-
-
-def test_lost_answers_are_counted_anew_after_a_fault_was_cleared(joint, device):
-    for method in ("read", "write"):
-        device.broken = {method: [LOST] * 3}
-        for _ in range(3):
-            joint.cycle(1.0, 0.0)
-        assert joint.fault.cause == "no_reply"
-        joint.clear()
-        device.broken = {method: [LOST] * 2}
-        for _ in range(2):
-            joint.cycle(1.0, 0.0)
-        assert joint.fault is None
-        joint.cycle(1.0, 0.0)
-
-
-def test_a_reboot_ends_the_torque_first_and_restores_it_afterwards(joint, device):
-    joint.write(9.0, 0.0)
-    device.log.clear()
-    seen = []
-    device.during = {"disable": lambda: seen.append((joint.guard.torque, joint.away))}
-    joint.guard.trip(DeviceFault("ft"))
-    joint.reboot()
-    assert device.log == ["disable", "beat False", "reboot", "enable"]
-    assert seen == [(0.0, True)]
-    assert joint.fault is None and joint.enabled and not joint.away
-    assert joint.write(9.0, 0.0) == 4.0
-
-
-@pytest.mark.parametrize("refusal", [None, NoReply("no reply")])
-def test_a_disabled_device_stays_disabled_over_a_reboot(joint, device, refusal):
-    joint.disable()
-    device.log.clear()
-    device.broken = {"disable": [None, refusal]}
-    joint.reboot()
-    end = ["disable", "beat False"] if refusal is None else ["disable"]
-    assert device.log == ["disable", "beat False", "reboot", *end]
-    assert not joint.away and not joint.enabled
-
-
-def test_a_failed_reboot_lets_go_of_the_device(joint, device):
-    device.broken = {"reboot": [NoReply("no reply")]}
-    joint.guard.trip(DeviceFault("ft"))
-    with pytest.raises(NoReply):
-        joint.reboot()
-    assert not joint.away and joint.fault.cause == "ft"
-
-
 SPRING = Spring(1500.0)
 
 
@@ -380,10 +198,3 @@ def test_a_deflection_that_was_measured_must_go_on(device, before, now, fault):
     device.reading = now
     joint.read()
     assert (None if joint.fault is None else str(joint.fault)) == fault
-
-
-def test_a_device_disabled_during_a_reboot_stays_without_torque(joint, device):
-    device.during = {"reboot": joint.disable}
-    joint.reboot()
-    assert device.log == ["disable", "beat False", "reboot", "disable", "beat False"]
-    assert not joint.enabled and not joint.away

@@ -32,6 +32,8 @@ class Signature:
 
     scale: lambda of all test blocks together. spread: over the test blocks; over all blocks `overall`.
     chance: value of `overall` for a residual unrelated to the cause.
+    carried: how surely the misfit of lambda lasts from block to block, in standard deviations: near 0 where
+    only noise is left, also coloured noise shorter than a block, and large where a sensor wanders.
     amplitude, time, frequency: over parts of these. share: c.c / r.r. kept: the share of c.c that no other
     unknown imitates.
     """
@@ -45,6 +47,7 @@ class Signature:
     frequency: float
     share: float
     kept: float
+    carried: float = 0.0
 
 
 def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence) -> Signature:
@@ -64,6 +67,7 @@ def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence)
         frequency=_over_frequency(rows, c, r, rule.bands),
         share=total / max(float(r @ r), 1e-300),
         kept=total / max(float(rows.contribution @ rows.contribution), 1e-300),
+        carried=_carried(*every),
     )
 
 
@@ -79,6 +83,15 @@ def _spread(cc: FloatArray, cr: FloatArray) -> float:
         return 0.0
     mean = cr.sum() / cc.sum()
     return float(np.sqrt(np.sum(cc * (cr / cc - mean) ** 2) / cc.sum()))
+
+
+def _carried(cc: FloatArray, cr: FloatArray) -> float:
+    """Return the correlation of (cr - mean cc) / sqrt(cc) of neighbouring blocks over its standard error."""
+    used = cc > 1e-12 * max(float(cc.sum()), 1e-300)
+    cc, cr = cc[used], cr[used]
+    off = (cr - cr.sum() / max(float(cc.sum()), 1e-300) * cc) / np.sqrt(cc)
+    power = float(off @ off)
+    return float(off[1:] @ off[:-1]) / power * float(np.sqrt(len(off))) if power > 0.0 else 0.0
 
 
 def _parts_by(values: FloatArray, cc: FloatArray, parts: int) -> IntArray:

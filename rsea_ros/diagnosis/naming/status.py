@@ -65,7 +65,9 @@ def probabilities_and_status(
     likely = [p / max(1.0, sum(likely)) for p in likely]
     rivals = [p for p in likely[1:] if p >= settings.naming.rival]
     is_named = at_floor or takes_most or _helps(likely[0] + sum(rivals), evidence[0], settings)
-    return likely, status_of(likely[0], rivals, at_floor, settings.naming) if is_named else None
+    status = status_of(likely[0], rivals, at_floor, settings.naming) if is_named else None
+    wanders = at_floor and evidence[0].signature.carried > settings.naming.carried
+    return likely, "leading" if wanders and status == "confirmed" else status
 
 
 def _helps(mass: float, evidence: Evidence, settings: DiagnosisSettings) -> bool:

@@ -74,6 +74,14 @@ class ForwardSettings:
     screening_part: float = number(
         0.3, "1", "share of such a step that is tried where the whole one does not lower the cost"
     )
+    bent_guesses: int = number(
+        2, "1", "guesses that are fitted on after those steps, where derivatives change on the way",
+        "the better of two after the steps is not always the better in the end (effect_coverage.py)",
+    )  # fmt: skip
+    bent_steps: int = number(4, "1", "steps of that fit")
+    clear: float = number(
+        0.5, "1", "of the present cost on pieces: where an effect leaves less, none is fitted on"
+    )
     causes_beside_a_pair: int = number(
         1, "1", "causes beside which pairs are tried", "beside more, pairs bend to whatever is left"
     )

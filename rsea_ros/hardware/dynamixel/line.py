@@ -178,7 +178,7 @@ def _joint(packet: bytes, size: int) -> dict[int, tuple[int, bytes]]:
     parts, step = packet[8:], size + 4
     if packet[4] != BROADCAST or len(parts) % step:
         return {}
-    found = {}
+    replies = {}
     for at in range(0, len(parts), step):
-        found[parts[at + 1]] = (parts[at], parts[at + 2 : at + 2 + size])
-    return found
+        replies[parts[at + 1]] = (parts[at], parts[at + 2 : at + 2 + size])
+    return replies

@@ -72,9 +72,9 @@ class Motor:
             self.bus.set(table.operating_mode, TORQUE_MODE)
         self._supervise()
 
-    def _protection(self, table: ControlTable, own: OwnLimits) -> Protection | Supervised:
+    def _protection(self, table: ControlTable, limits: OwnLimits) -> Protection | Supervised:
         """Return the motor's own watchdog where model and firmware have one, else a supervisor."""
-        if "bus_watchdog" in table.items and own.firmware >= table.watchdog_firmware:
+        if "bus_watchdog" in table.items and limits.firmware >= table.watchdog_firmware:
             return Protection(BUS_WATCHDOG, self._settings.watchdog)
         if isinstance(self.protection, Supervised):
             return self.protection

@@ -39,11 +39,11 @@ class StatusFrameParser:
         self._buffer += data
         frames = []
         while (size := self._size()) is not None:
-            found = self._checked(bytes(self._buffer[:size]), raw)
-            if found is None:
+            frame = self._checked(bytes(self._buffer[:size]), raw)
+            if frame is None:
                 del self._buffer[:1]  # search for a header inside the rejected frame
             else:
-                frames.append(found)
+                frames.append(frame)
                 del self._buffer[:size]
         return frames
 

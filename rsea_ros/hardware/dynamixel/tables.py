@@ -96,13 +96,13 @@ def error_names(status: int) -> str:
 
 
 def _tables() -> dict[int, ControlTable]:
-    found = {}
+    tables = {}
     for path in sorted(FOLDER.glob("*.yaml")):
         series = strict_yaml.read(path).content
         items = {name: Item(at[0], at[1], at[2:] == ["signed"]) for name, at in series["items"].items()}
         for number, body in series["models"].items():
-            found[int(number)] = _table(int(number), path.stem, items, {**series, **body})
-    return dict(sorted(found.items()))
+            tables[int(number)] = _table(int(number), path.stem, items, {**series, **body})
+    return dict(sorted(tables.items()))
 
 
 def _table(number: int, series: str, items: Mapping[str, Item], body: Mapping[str, Any]) -> ControlTable:

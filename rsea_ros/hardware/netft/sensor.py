@@ -15,7 +15,7 @@ from rsea_ros.hardware.netft.calibration import Calibration, fetch
 from rsea_ros.hardware.netft.receiver import Arrival, DatagramReceiver
 from rsea_ros.hardware.netft.records import SET_BIAS, trouble
 
-SETTLE, FIRST = 0.1, 3.0
+AVERAGING_TIME, FIRST = 0.1, 3.0
 """s over which noise and tare are measured; s that the first record may take."""
 QUIET_CYCLES = 3
 TARED = 6.0
@@ -110,13 +110,13 @@ class ForceTorqueSensor:
         self._receiver.close()
 
     def _collect(self) -> Values:
-        """Return the wrenches of the next SETTLE seconds, one a row. Raises DeviceError without any."""
+        """Return the wrenches of the next AVERAGING_TIME, one a row. Raises DeviceError without any."""
         deadline = time.monotonic() + FIRST
         while not self._receiver.collect(0.005):
             if time.monotonic() > deadline:
                 where = f"{self._settings.host}:{self._settings.port}"
                 raise DeviceError(f"F/T sensor {where}: no record within {FIRST:g} s, expected a stream")
-        arrivals = self._receiver.collect(SETTLE)
+        arrivals = self._receiver.collect(AVERAGING_TIME)
         if not arrivals:
             raise DeviceError(f"F/T sensor {self._settings.host}: the stream has ended, expected it to go on")
         return np.array([self._calibration.wrench(a.record.counts) for a in arrivals])

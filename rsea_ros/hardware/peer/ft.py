@@ -122,9 +122,9 @@ def _serve_page(host: str, page: str) -> int:
 
     class Page(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
-            found = self.path == "/netftapi2.xml"
-            body = page.encode() if found else b""
-            self.send_response(200 if found else 404)
+            is_page = self.path == "/netftapi2.xml"
+            body = page.encode() if is_page else b""
+            self.send_response(200 if is_page else 404)
             self.send_header("Content-Length", str(len(body)))
             self.end_headers()
             self.wfile.write(body)

@@ -19,7 +19,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.effect import compiled
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.observer.transition import exponential, transition
-from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
+from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
 from rsea_ros.signals import FloatArray
 
 POSITION, WRENCH, TORQUE = range(3)
@@ -115,8 +115,8 @@ def _propagate(model, state, t):  # type: ignore[no-untyped-def]
         model.held[1] = dt
     model.calls.p[0] = state.extra[0] + state.clock[ERROR]
     command, out, none = np.full(count, state.clock[FORCED]), np.empty((count, len(OUTPUTS))), np.empty(0)
-    advance(model.linear, model.calls, command, none, none, state.clock[NOW],
-            state.x, state.table, state.own, out)  # fmt: skip
+    inputs = StepInputs(command, none, none, state.clock[NOW])
+    advance(model.linear, model.calls, inputs, StepState(state.x, state.table, state.own), out)
     n = len(state.x)
     for i in range(n):
         state.reach[i] = model.f[i, n]

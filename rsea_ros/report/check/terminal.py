@@ -53,10 +53,10 @@ def _said(f: Finding) -> str:
 
 def warnings(findings: Findings) -> list[str]:
     """Return a line for each amber or red finding that a fit's results would not repeat; rig first."""
-    told = [f for f in findings.findings if f.light != "green" and f.kind not in SAID_ELSEWHERE]
+    chosen = [f for f in findings.findings if f.light != "green" and f.kind not in SAID_ELSEWHERE]
     reported = {(f.kind, f.channel) for f in findings.faults}
-    told = [f for f in told if f.kind == "wrong_rig" or (f.kind, f.channel) not in reported]
-    return [sentence(f) for f in _each_remedy_once(sorted(told, key=lambda f: f.kind != "wrong_rig"))]
+    chosen = [f for f in chosen if f.kind == "wrong_rig" or (f.kind, f.channel) not in reported]
+    return [sentence(f) for f in _each_remedy_once(sorted(chosen, key=lambda f: f.kind != "wrong_rig"))]
 
 
 def _each_remedy_once(findings: Iterable[Finding]) -> Iterator[Finding]:

@@ -81,8 +81,8 @@ def _kicker(d: Diagnosis) -> str:
 
 
 def _undetermined(d: Diagnosis) -> str:
-    told = [*say.confusions(d), *remark_sentences(split_off_rig(d.remarks)[1])]
-    body = bullets(told) if told else paragraph("The data determine every free value.")
+    sentences = [*say.confusions(d), *remark_sentences(split_off_rig(d.remarks)[1])]
+    body = bullets(sentences) if sentences else paragraph("The data determine every free value.")
     return section("What these data cannot determine", body)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.identification.residual_bins import edges_of, rms_in
 from rsea_ros.identification.result import Overlay
-from rsea_ros.model.prediction import SETTLE
+from rsea_ros.model.prediction import SKIPPED_START
 from rsea_ros.signals import UNITS, FloatArray
 
 BINS = 16
@@ -41,13 +41,13 @@ def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
     before, after = ({o.channel: o for o in overlays} for overlays in (diagnosis.before, diagnosis.after))
     if channel not in before:
         return ()
-    here, noise = before[channel], diagnosis.noise_rms[channel]
-    counted = _counted(diagnosis, here)
+    overlay, noise = before[channel], diagnosis.noise_rms[channel]
+    counted = _counted(diagnosis, overlay)
     residuals = [((o[channel].measured - o[channel].simulated) / noise)[counted] for o in (before, after)]
     if counted.sum() < _FEWEST:
         return ()
     shown = []
-    for what, unit, values, equal in _respects(diagnosis, before, here):
+    for what, unit, values, equal in _respects(diagnosis, before, overlay):
         edges = edges_of(values[counted], BINS, equal=equal)
         shown.append(Profile(what, unit, edges, *(rms_in(edges, values[counted], r) for r in residuals)))
     return tuple(shown)
@@ -56,23 +56,23 @@ def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
 def _counted(diagnosis: Diagnosis, overlay: Overlay) -> FloatArray:
     """Return which samples count: neither those before the bench has settled nor faulty ones."""
     out = np.asarray(diagnosis.masked.get(overlay.channel, np.zeros(len(overlay.t), bool)))
-    good: FloatArray = (overlay.t >= overlay.t[0] + SETTLE) & ~out
+    good: FloatArray = (overlay.t >= overlay.t[0] + SKIPPED_START) & ~out
     return good
 
 
 def _respects(
-    diagnosis: Diagnosis, measured: Mapping[str, Overlay], here: Overlay
+    diagnosis: Diagnosis, measured: Mapping[str, Overlay], overlay: Overlay
 ) -> Iterator[tuple[str, str, FloatArray, bool]]:
     """Yield name, unit, value at each sample, and whether bins are equally wide (else equally full)."""
     load = "ft" if "ft" in measured else "motor_torque"
     if load in measured:
-        yield "amplitude", UNITS[load], np.abs(_at(here.t, measured[load])), False
+        yield "amplitude", UNITS[load], np.abs(_at(overlay.t, measured[load])), False
     if "velocity" in measured:
-        yield "velocity", UNITS["velocity"], _at(here.t, measured["velocity"]), False
+        yield "velocity", UNITS["velocity"], _at(overlay.t, measured["velocity"]), False
     ratio = diagnosis.extended_rig["gear.ratio"]
     if "position" in measured and ratio > 1.0:
-        yield "angle", "rad", np.mod(_at(here.t, measured["position"]) * ratio, 2.0 * np.pi), True
-    yield "time", "s", here.t - here.t[0], True
+        yield "angle", "rad", np.mod(_at(overlay.t, measured["position"]) * ratio, 2.0 * np.pi), True
+    yield "time", "s", overlay.t - overlay.t[0], True
 
 
 def _at(t: FloatArray, overlay: Overlay) -> FloatArray:

@@ -16,7 +16,7 @@ from rsea_ros.wording import listed
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
 _REASONS: Mapping[Reason, str] = {
     "far_behind": "much worse than the best effect on the training data",
-    "at_bound": "its fitted size is at the bound of the effect",
+    "at_bound": "its fitted size is at the bound of the effect, or within a clock's error of nothing",
     "not_sure": "does not certainly lower the residual of held-out data",
     "too_small": "lowers the residual of held-out data, but by too little",
     "leaves_priors": "gains less than it costs to leave the rig's values so far outside their stated doubt",

@@ -71,8 +71,8 @@ def _mapped(fleet: FleetTrends) -> list[str]:
     courses = {**fleet.trends, **fleet.sizes}
 
     def moved(parameter: str) -> float:
-        here = [t for (_, p), t in courses.items() if p == parameter and t.changes]
-        return -max((abs(t.relative) for t in here), default=0.0)
+        changed = [t for (_, p), t in courses.items() if p == parameter and t.changes]
+        return -max((abs(t.relative) for t in changed), default=0.0)
 
     return sorted([*dict.fromkeys(p for _, p in fleet.trends), *usual], key=moved)
 

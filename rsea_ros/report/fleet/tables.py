@@ -60,14 +60,14 @@ def joint_table(
     for joint in joints:
         trends = [t for (j, _), t in fleet.trends.items() if j == joint]
         determined = [t for t in trends if t.state != "undetermined"]
-        here = of == joint
+        rows_of_joint = of == joint
         moved = max((t.relative for t in determined if t.changes), key=abs, default=float("nan"))
         rows.append(
             (
                 links.joint(joint),
                 escape(_state(alarmed.get(joint, ()), determined, latest.get(joint, ""))),
-                str(int(np.sum(here))),
-                str(int(np.sum(here & ~done))),
+                str(int(np.sum(rows_of_joint))),
+                str(int(np.sum(rows_of_joint & ~done))),
                 f"{len(determined)} of {len(trends)}",
                 percent(moved) if moved == moved else "–",
             )

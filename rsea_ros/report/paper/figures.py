@@ -118,9 +118,11 @@ def figure_18_as_printed() -> Figure:
         values = frequency_response(model, outputs.end_torque(model, "spring_end"), _HZ)
         curves.append(ResponseCurve(name.replace(", ", ",<br>"), colour, _HZ, values, dash=dash))
     unlumped, moving, grounded = models.values()
-    own, other = resonance_hz(unlumped), resonance_hz(moving)
+    resonance, other = resonance_hz(unlumped), resonance_hz(moving)
     hz, gap = largest_gap(unlumped, grounded)
-    title = f"Fig. 18 with Table 2 as printed: resonance at {own:.1f} Hz unlumped, at {other:.1f} Hz lumped"
+    title = (
+        f"Fig. 18 with Table 2 as printed: resonance at {resonance:.1f} Hz unlumped, at {other:.1f} Hz lumped"
+    )
     caption = (
         "“Lumped” has two readings: its loads moving (Fig. 16), or the motor pushing against the ground "
         "(Fig. "
@@ -129,7 +131,7 @@ def figure_18_as_printed() -> Figure:
         "the pendulum swings by itself and holds no torque: none reaches the spring. In both readings the "
         "resonance is elsewhere."
     )
-    marks = [Mark(other, f"{other:.1f} Hz", "right"), Mark(own, f"{own:.1f} Hz", "left")]
+    marks = [Mark(other, f"{other:.1f} Hz", "right"), Mark(resonance, f"{resonance:.1f} Hz", "left")]
     return response_figure(title, curves, marks, caption, decibel=(-72, 16))
 
 

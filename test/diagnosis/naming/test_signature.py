@@ -67,3 +67,11 @@ def test_an_unrelated_residual_counts_as_chance():
     s = signature(rows(other))
     assert s.chance > 0.02
     assert s.overall < 2.0 * s.chance
+
+
+def test_a_residual_that_wanders_is_carried_from_block_to_block_and_noise_is_not():
+    """A wandering zero beside a drift left as small a residual as noise, and the drift was confirmed."""
+    walk = np.cumsum(np.random.default_rng(6).normal(size=len(TIME))) * 0.02
+    drift = replace(rows(np.zeros(len(TIME))), contribution=TIME - 30.0)
+    assert abs(signature(drift).carried) < 2.6
+    assert signature(replace(drift, residual=drift.residual + walk)).carried > 2.6

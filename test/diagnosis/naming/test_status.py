@@ -106,3 +106,10 @@ def test_an_unchanged_channel_does_not_take_a_cause_away():
     before = score(ft=40.0, position=1.53)
     assert takes_most(before, score(ft=1.2, position=1.5301))
     assert not takes_most(before, score(ft=1.2, position=1.6))
+
+
+def test_a_cause_whose_misfit_lasts_from_block_to_block_is_not_confirmed():
+    wandering = replace(RIGHT, signature=replace(RIGHT.signature, carried=4.0))
+    _, right = probabilities_and_status([RIGHT], at_floor=True, takes_most=True)
+    _, status = probabilities_and_status([wandering], at_floor=True, takes_most=True)
+    assert (right, status) == ("confirmed", "leading")

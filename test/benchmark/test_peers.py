@@ -1,0 +1,65 @@
+"""The comparison with peers: what a peer's script gets to see, and how its result becomes a row."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+BENCH = Path(__file__).resolve().parents[2] / "bench"
+
+
+@pytest.fixture(scope="module")
+def peers():
+    spec = importlib.util.spec_from_file_location("peers", BENCH / "peers.py")
+    module = importlib.util.module_from_spec(spec)
+    before = list(sys.path)
+    spec.loader.exec_module(module)
+    sys.path[:] = before
+    return module
+
+
+@pytest.fixture(scope="module")
+def case(peers):
+    y = np.sin(np.arange(40.0))
+    truth = {"inertia": 2.0, "damping": 4.0}
+    return peers.PeerRecord(
+        "a case", np.ones(40), y, 10.0, 30, "joint", {"inertia": 1.0}, 0.5, y, np.zeros(0), truth
+    )
+
+
+def test_a_peer_gets_no_measurement_that_is_held_out(case):
+    arrays = case.arrays
+    for name in ("y", "position"):
+        assert np.isnan(arrays[name][30:]).all() and np.isfinite(arrays[name][:30]).all()
+    assert np.isfinite(case.y).all() and arrays["velocity"].size == 0
+    assert "truth" not in str(case.meta) and "cause" not in case.meta
+
+
+def test_a_result_becomes_a_row(peers, case):
+    parameters = {"inertia": 2.2, "damping": 4.0}
+    result = {
+        "prediction": list(case.y[30:] + 1.0), "parameters": parameters, "cause": "", "note": "a|b",
+        "seconds": 1.24,
+    }  # fmt: skip
+    cells = [cell.strip() for cell in peers._row("gp", case, result).split("|")[1:-1]]
+    fit = 100.0 * (1.0 - 1.0 / case.y[30:].std())
+    off = f"{10.0 / math.sqrt(2.0):.3g}"
+    assert cells == ["a case", "gp", "2", f"{fit:.3g}", off, "none named", "1.2", "a/b"]
+
+
+def test_a_peer_that_did_not_run_is_a_row_with_the_reason(peers, case):
+    assert "not run: no | wheel" not in peers._row("gp", case, {"not_run": "no | wheel"})
+    assert "not run: no / wheel" in peers._row("gp", case, {"not_run": "no | wheel"})
+
+
+def test_every_peer_has_a_script_and_pinned_requirements(peers):
+    for peer in peers.PEERS:
+        assert (BENCH / "peers" / f"with_{peer}.py").is_file()
+        if peer != "rsea":
+            lines = (BENCH / "peers" / f"{peer}.txt").read_text().split()
+            assert lines and all("==" in line for line in lines)

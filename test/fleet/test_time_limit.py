@@ -1,0 +1,114 @@
+"""A task that never ends: its recording is quarantined with the reason, and its worker goes on."""
+
+from __future__ import annotations
+
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from fleet_stubs import KNEE, stub_work
+
+from rsea_ros.cli.main import main
+from rsea_ros.fleet import analysis, time_limit
+from rsea_ros.fleet.engine import Engine, EngineLimits
+from rsea_ros.fleet.executor import Serial
+from rsea_ros.fleet.query import answer
+from rsea_ros.fleet.sources import bags_of
+from rsea_ros.fleet.store import TaskOutcome
+from rsea_ros.fleet.task import Task, work
+from rsea_ros.fleet.time_limit import TIME_LIMIT, OutOfTime, limited
+
+MAP = "joints:\n  knee: {rig: paper_high_impedance}\n"
+
+
+def endless(*_: object) -> dict[str, str]:
+    """Work for ever, and let no ordinary error end it."""
+    while True:
+        try:
+            time.sleep(0.001)
+        except Exception:
+            continue
+
+
+def ended() -> bool:
+    try:
+        with limited(0.05):
+            endless()
+    except OutOfTime:
+        return True
+    return False
+
+
+def test_a_block_that_never_ends_is_ended_in_any_thread():
+    assert ended()
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(ended).result(10.0)
+
+
+def test_a_block_in_time_hears_nothing_of_its_limit():
+    with limited(0.02):
+        pass
+    until = time.monotonic() + 0.05
+    while time.monotonic() < until:
+        pass
+
+
+def test_a_worker_whose_call_never_returns_ends_itself(monkeypatch):
+    ends: list[int] = []
+    monkeypatch.setattr(time_limit, "GRACE", 0.02)
+    monkeypatch.setattr(os, "_exit", ends.append)
+
+    def stuck() -> None:
+        with pytest.raises(OutOfTime), limited(0.02):
+            time.sleep(0.3)  # one call: the exception waits for its end
+
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(stuck).result(10.0)
+    assert ends == [70]
+
+
+def test_an_endless_recording_is_quarantined_and_tried_again(folder, tmp_path, monkeypatch, capsys):
+    (tmp_path / "joints.yaml").write_text(MAP)
+    run = ["fleet", "run", str(folder / "run0.mcap"), "--map", str(tmp_path / "joints.yaml"), "--serial"]
+    run += ["--out", str(tmp_path / "store"), "--time-limit", "0.001"]
+    monkeypatch.setattr(analysis, "analyse", endless)
+    assert main([*run, "--fail-on", "quarantined"]) == 1
+    said = capsys.readouterr().out
+    assert "run0.mcap: took more than 0.001 min: a larger --time-limit, then --again" in said
+    assert main(run) == 0 and "nothing new, 1 in the store before" in capsys.readouterr().out
+    monkeypatch.setattr(analysis, "analyse", lambda *_: {})
+    assert main([*run, "--again"]) == 0 and "1 done" in capsys.readouterr().out
+
+
+def test_the_others_of_a_run_go_on(store, folder, monkeypatch):
+    def stub(row: object, path: Path, *_: object) -> dict[str, str]:
+        return endless() if path.name == "run2.mcap" else {}
+
+    monkeypatch.setattr(analysis, "analyse", stub)
+    held = bags_of([str(folder)], [KNEE])
+    summary = Engine(store, Serial(), work, lambda step, share: None, EngineLimits(time=0.3)).run(held)
+    assert summary.outcomes == {"done": 4, "quarantined": 1}
+    ((reason,),) = answer(store, "SELECT reason FROM recordings WHERE outcome = 'quarantined'")[1]
+    assert reason.startswith("took more than 0.005 min")
+
+
+def test_an_hour_is_the_limit_unless_another_is_stated(store, folder):
+    limits = []
+    held = bags_of([str(folder)], [KNEE])
+
+    def stub(task: Task) -> TaskOutcome:
+        limits.append(task.time_limit)
+        return stub_work(task)
+
+    Engine(store, Serial(), stub, lambda step, share: None).run(held)
+    assert set(limits) == {TIME_LIMIT} == {3600.0}
+
+
+def test_a_limit_of_nothing_is_refused(folder, tmp_path, capsys):
+    (tmp_path / "joints.yaml").write_text(MAP)
+    run = ["fleet", "run", str(folder), "--map", str(tmp_path / "joints.yaml"), "--time-limit", "0"]
+    assert main([*run, "--out", str(tmp_path / "store")]) == 2
+    assert "--time-limit 0 min, expected more than 0" in capsys.readouterr().err
+    assert not (tmp_path / "store").exists()
