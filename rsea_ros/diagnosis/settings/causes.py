@@ -50,8 +50,8 @@ class NamingSettings:
     )  # fmt: skip
     rival: float = number(0.05, "1", "probability from which a rival is an alternative", "one in twenty")
     carried: float = number(
-        2.6, "1", "standard deviations by which a cause's misfit lasts from block to block, above which it is "
-        "not confirmed although only noise is left (naming/signature.py)",
+        2.6, "1", "standard deviations by which a cause's misfit lasts from block to block, above which it "
+        "is not confirmed although only noise is left (naming/signature.py)",
         "one right cause in 200; 0 of 88 played exceeded it, 6 of 8 drifts told of a wandering sensor did",
     )  # fmt: skip
     clear: float = number(
