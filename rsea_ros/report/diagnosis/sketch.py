@@ -8,6 +8,7 @@ from html import escape
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
+from rsea_ros.report.diagnosis import words
 
 _PARTS = ("command", "motor", "gear", "encoder", "spring", "F/T sensor", "support")
 _OF_PORT = {
@@ -46,7 +47,7 @@ def part_of(effect: Effect) -> str:
 def _box(index: int, part: str, culprit: str) -> str:
     """Return a part with the line to the next one, in orange with the cause beneath where it is to blame."""
     x, middle = index * _STEP + 2, _HEIGHT // 2 + 4
-    centre, name = f"{x + _BOX / 2:g}", escape(culprit.replace("_", " "))
+    centre, name = f"{x + _BOX / 2:g}", escape(words.effect(culprit) if culprit else "")
     is_last = part == _PARTS[-1]
     link = "" if is_last else f'<line x1="{x + _BOX}" x2="{x + _STEP}" y1="{middle}" y2="{middle}"/>'
     anchor, at = _ANCHORS.get(part, ("middle", _BOX / 2))

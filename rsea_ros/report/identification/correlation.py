@@ -31,7 +31,7 @@ def correlation_section(names: Sequence[str], matrix: FloatArray) -> str:
         f"<div class='scroll'><table class='matrix'><thead><tr><th></th>{heads}</tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"
     )
-    return folded("How the parameters hang together", paragraph(finding(names, matrix)), table)
+    return folded("Correlation of the parameters", paragraph(finding(names, matrix)), table)
 
 
 def finding(names: Sequence[str], matrix: FloatArray) -> str:
@@ -42,7 +42,7 @@ def finding(names: Sequence[str], matrix: FloatArray) -> str:
     value = words.minus(f"{matrix[i, k]:.2f}")
     if apart[i, k] < STRONG:
         return f"No two are strongly correlated; the strongest pair is {pair} ({value})."
-    return f"Strongly correlated: {pair} ({value}). An error of one is made good by the other."
+    return f"Strongly correlated: {pair} ({value}). An error in one is compensated by the other."
 
 
 def _cell(value: float) -> str:

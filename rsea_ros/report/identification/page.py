@@ -99,7 +99,7 @@ def _parameter_finding(identification: Identification) -> str:
     settled = [p for p in physical if p.determined == "yes"]
     if len(settled) == len(physical):
         return f"The data determine all {len(physical)} parameters"
-    return f"The data determine {len(settled)} of {len(physical)} parameters, the others not, or only in part"
+    return f"The data determine {len(settled)} of {len(physical)} parameters"
 
 
 def _shown(identification: Identification) -> list[Overlay]:

@@ -91,3 +91,7 @@ def test_the_name_of_a_culprit_stays_within_the_drawing(name):
 
 def test_nothing_is_marked_without_a_cause():
     assert sketch([]) == ""
+
+
+def test_the_sketch_writes_coulomb_with_a_capital():
+    assert ">Coulomb friction<" in sketch(["coulomb_friction"])
