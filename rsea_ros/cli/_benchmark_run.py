@@ -57,15 +57,13 @@ def _lines(dataset: Dataset, entry: str, partial: Path, tell: Progress) -> Itera
     partial: keeps the answers as they come; a run that was stopped goes on from there.
     """
     known = _kept(dataset, entry, partial)
-    with partial.open("a", encoding="utf-8") as file:
-        for number, name in enumerate(dataset.hashes):
-            tell(name, number / len(dataset.hashes))
-            if name not in known:
-                known[name] = _answered(dataset, entry, name)
-                kept = {**known[name], "entry": entry, "truth": dataset.hashes[name]}
-                file.write(f"\n{json.dumps(kept)}")
-                file.flush()
-            yield known[name]
+    for number, name in enumerate(dataset.hashes):
+        tell(name, number / len(dataset.hashes))
+        if name not in known:
+            known[name] = _answered(dataset, entry, name)
+            marked = ({**line, "entry": entry, "truth": dataset.hashes[n]} for n, line in known.items())
+            write_text(partial, "".join(f"{json.dumps(line)}\n" for line in marked), force=True)
+        yield known[name]
 
 
 def _kept(dataset: Dataset, entry: str, partial: Path) -> dict[str, dict[str, Any]]:
@@ -74,7 +72,7 @@ def _kept(dataset: Dataset, entry: str, partial: Path) -> dict[str, dict[str, An
     for text in partial.read_text(encoding="utf-8").splitlines() if partial.exists() else ():
         try:
             line = json.loads(text)
-        except ValueError:  # empty, or cut off when the run was stopped
+        except ValueError:  # empty, or cut off by hand
             continue
         if line.pop("entry") == entry and dataset.hashes.get(line["record"]) == line.pop("truth"):
             kept[line["record"]] = line

@@ -10,6 +10,7 @@ from rsea_ros.checks.finding import Findings
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.cli._lines import say
+from rsea_ros.model.inverse import is_inverse, require_position
 from rsea_ros.model.rig import Rig
 from rsea_ros.report.check.terminal import warnings
 from rsea_ros.signals import Record
@@ -19,10 +20,12 @@ def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, mask
     """Return the records, each with the faults that the checks found; a dead channel is left out.
 
     Prints a line for each warning unless quiet. masks: see with_faults.
-    Raises IdentificationError if nothing moves.
+    Raises IdentificationError if nothing moves, or a position is lacking that the rig is judged by.
     """
     for record in records:
         require_motion(record)
+        if is_inverse(rig):
+            require_position(record)
     checks = [check_record(record, rig, axis) for record in records]
     if not quiet:
         print_warnings(checks, rig)

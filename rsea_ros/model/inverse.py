@@ -69,13 +69,18 @@ def is_inverse(rig: Rig) -> bool:
     return rig.rigid_spring and rig.loop is None
 
 
-def motion_from(record: Record) -> Motion:
-    """Return the filtered motion and the torque that acted. Raises IdentificationError without a position."""
+def require_position(record: Record) -> None:
+    """Raise IdentificationError for a record without a position."""
     if "position" not in record:
         raise IdentificationError(
             f"{record.source}: no position channel, expected one: "
             "a rig without a spring is judged by its motion"
         )
+
+
+def motion_from(record: Record) -> Motion:
+    """Return the filtered motion and the torque that acted. Raises IdentificationError without a position."""
+    require_position(record)
     from scipy.interpolate import CubicSpline  # with its like in `smoothed`, 0.4 s that a spring saves
 
     record = _finite(record)

@@ -55,7 +55,7 @@ def test_an_effect_grows_with_the_amplitude_as_stated(effect: Effect):
 def test_a_passive_effect_only_takes_energy(effect: Effect):
     rig = RIG.with_values({"rotor.reflected_damping": 0.0, "spring.damping": 0.0})
     silence = replace(command(280.0, 5.0), y=np.zeros(1400))
-    thrown = drive_from(record_of(silence, start=(0.0, 0.6)))
+    thrown = drive_from(record_of(silence, start=(0.6 / 280.0, 0.6)))  # a period after it began at 0
     free = simulate(thrown, rig=rig)
     inertia = rig["rotor.reflected_inertia"] + rig["chassis.inertia"]
     at_start = inertia * 0.6**2 / 2
