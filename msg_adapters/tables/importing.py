@@ -14,7 +14,7 @@ from msg_adapters.tables.files import read_columns
 from msg_adapters.tables.import_map import ImportMap, RowFilter
 from msg_adapters.tables.table import Table
 from msg_adapters.tables.terms import ChannelTerm
-from msg_adapters.tables.units import LINEAR, unit
+from msg_adapters.tables.units import LINEAR, canonical, unit
 from rsea_ros.errors import ImportMapError
 from rsea_ros.signals import UNITS, BoolArray, Channel, Fault, FloatArray, Record
 from rsea_ros.units import in_motion, plain
@@ -153,11 +153,16 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
     """Return a summary of the import, for a person to compare with the machine."""
     lines = list(record.notes)
     for name, channel in record.channels.items():
-        columns = " + ".join(f"{term.column} [{plain(term.unit)}]" for term in mapping.channels[name])
+        columns = " + ".join(_described(term) for term in mapping.channels[name])
         low, high = channel.y.min(), channel.y.max()
         si = plain(in_motion(UNITS[name], linear=_is_linear(mapping)))
         lines.append(f"{name}: {len(channel)} samples of {columns}, {low:.6g} to {high:.6g} {si}")
     return lines
+
+
+def _described(term: ChannelTerm) -> str:
+    """Return `tau [N·m]`, however the map writes the unit."""
+    return f"{term.column} [{plain(canonical(term.unit)) or 1}]"
 
 
 def _is_linear(mapping: ImportMap) -> bool:

@@ -49,13 +49,19 @@ CHANNELS: Mapping[str, str] = {
 
 
 def unit(text: object) -> tuple[str, float]:
-    """Return dimension and SI factor of a unit, however it is written: `Nm`, `N*m` and `N·m` are `N m`.
+    """Return dimension and SI factor of a unit, however it is written; raises as canonical does."""
+    name = canonical(text)
+    return next((dimension, factors[name]) for dimension, factors in FACTORS.items() if name in factors)
+
+
+def canonical(text: object) -> str:
+    """Return the name of a unit in FACTORS: `Nm`, `N*m` and `N·m` are `N m`.
 
     Raises ValueError for an unknown one.
     """
-    for dimension, factors in FACTORS.items():
-        for name, factor in factors.items():
+    for factors in FACTORS.values():
+        for name in factors:
             if same_unit(text, name):
-                return dimension, factor
+                return name
     known = ", ".join(name for factors in FACTORS.values() for name in factors)
     raise ValueError(f"unit {shown(text)} unknown, expected one of {known}")

@@ -6,6 +6,7 @@ import argparse
 import ast
 import importlib
 import os
+import re
 import sys
 import traceback
 from collections.abc import Sequence
@@ -120,6 +121,7 @@ def _run(name: str, arguments: Sequence[str]) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     verb.add_arguments(parser)
+    parser.words = arguments
     args, rest = parser.parse_known_args(attached(arguments))
     if "pass_on" in args:
         args.pass_on = rest
@@ -143,7 +145,9 @@ def attached(arguments: Sequence[str]) -> list[str]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that reports an error in one line."""
+    """A parser that reports an error in one line. words: the arguments, for the nearest option or action."""
+
+    words: Sequence[str] = ()
 
     @property
     def options(self) -> list[str]:
@@ -152,7 +156,16 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Leave with status 2."""
-        sys.exit(_fail(self.prog, f"{message} (see {self.prog} --help)"))
+        near = "" if "did you mean" in message else self._nearest(message)
+        sys.exit(_fail(self.prog, f"{message}{near} (see {self.prog} --help)"))
+
+    def _nearest(self, message: str) -> str:
+        """Return which action or option a wrong one may stand for; nothing if none is near."""
+        if choice := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message):
+            return did_you_mean(choice[1], re.findall(r"[\w-]+", choice[2]))
+        given = [word.partition("=")[0] for word in self.words if word.startswith("--")]
+        wrong = [word for word in given if not any(option.startswith(word) for option in self.options)]
+        return did_you_mean(wrong[0], self.options) if wrong else ""
 
 
 def _describe(error: OSError) -> str:

@@ -12,6 +12,7 @@ from rclpy.node import Node
 from msg_adapters.ros import parameter_descriptor
 from msg_adapters.topics import AXES
 from rsea_ros.errors import ParameterError
+from rsea_ros.wording import did_you_mean
 
 Value = bool | int | float | str | list[str]
 
@@ -102,8 +103,8 @@ def _refuse_unknown(given: Mapping[str, Any], table: Sequence[NodeParameter]) ->
     names = [p.name for p in table]
     for name in given:
         if name not in names and name not in _ROS_OWN and not name.startswith("qos_overrides."):
-            known = ", ".join(each for each in names if "." not in each)
-            raise ParameterError(f"parameter {name}: no such parameter, expected one of {known}")
+            known, near = ", ".join(each for each in names if "." not in each), did_you_mean(name, names)
+            raise ParameterError(f"parameter {name}: no such parameter, expected one of {known}{near}")
 
 
 def _descriptor(parameter: NodeParameter) -> Any:

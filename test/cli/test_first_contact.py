@@ -44,6 +44,9 @@ def test_an_empty_name_is_no_folder(words, capsys):
         (["run", "plnt"], "plant"),
         (["launch", "simulaton"], "simulation"),
         (["launch", "replay", "bagg:=x"], "bag"),
+        (["topics", "eco"], "echo"),
+        (["rig", "nwe", "x"], "new"),
+        (["export", "--mjcff", "x"], "--mjcf"),
     ],
 )
 def test_a_name_that_is_nearly_right_is_answered_with_the_right_one(

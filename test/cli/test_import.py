@@ -16,7 +16,7 @@ from rsea_ros.cli.main import main
 MAP = """
 time: {column: t, unit: ms}
 channels:
-  command: {column: u, unit: N m}
+  command: {column: u, unit: N*m}
   position: {column: x, unit: deg}
 """
 

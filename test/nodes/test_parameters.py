@@ -12,7 +12,7 @@ import yaml
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.interrupts import STOPPING
-from rsea_ros.nodes._parameters import NodeParameter
+from rsea_ros.nodes._parameters import NodeParameter, _refuse_unknown
 from test.nodes.conftest import written
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
@@ -117,3 +117,8 @@ def test_a_node_that_is_interrupted_while_it_imports_says_so_in_one_line():
     code = "import rsea_ros.nodes\nraise KeyboardInterrupt"
     done = subprocess.run([sys.executable, "-c", code], cwd=CONFIG.parents[1], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (-signal.SIGINT, "interrupted before it began\n")
+
+
+def test_a_mistyped_parameter_is_answered_with_the_right_one():
+    with pytest.raises(ParameterError, match="parameter amplitud: .*, did you mean amplitude[?]"):
+        _refuse_unknown({"amplitud": 3.0}, [NodeParameter("amplitude", 20.0, "peak", "N m", 0.0, 1e4)])
