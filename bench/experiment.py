@@ -32,7 +32,7 @@ from bench.json_log import append_to_log, read_log  # noqa: E402
 from bench.sections import parser_of  # noqa: E402
 from msg_adapters import write_record  # noqa: E402
 from rsea_ros.cli._processes import Processes  # noqa: E402
-from rsea_ros.cli.demo import EXCITED, PATIENT  # noqa: E402
+from rsea_ros.cli.demo import EXCITED, patience  # noqa: E402
 from rsea_ros.experiment.campaign import Budget, Campaign  # noqa: E402
 from rsea_ros.experiment.causes import USUAL  # noqa: E402
 from rsea_ros.experiment.design import propose  # noqa: E402
@@ -257,7 +257,7 @@ def wire(out):
     values = {"bag": out / "slow.mcap", "out": out / "session", "limits": "torque=15", "ask": False}
     values |= {"causes": "current_loop_lag,command_delay", "longest": 4.0, "rig": "paper_high_impedance"}
     with Processes(out / "log", 77) as nodes, RemoteBench(out / "tty", "--rig", out / "bench.yaml") as bench:
-        nodes.start("driver", {**bench.parameters(), **PATIENT, **EXCITED, "autostart": True})
+        nodes.start("driver", {**bench.parameters(), **patience(), **EXCITED, "autostart": True})
         nodes.start("experiment", values)
         deadline = time.monotonic() + 120.0
         while not (abs(bench.torque()[0]) > 5) and time.monotonic() < deadline:

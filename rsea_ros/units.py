@@ -35,6 +35,11 @@ def in_motion(unit: str, *, linear: bool) -> str:
     return _ALONG_A_LINE.get(unit, unit) if linear else unit
 
 
+def plain(unit: str) -> str:
+    """Return a unit with its signs, `kg m^2` as `kg·m²`, `deg` as `°`; the unit of a bare number is empty."""
+    return "" if unit == "1" else "°" if unit == "deg" else unit.replace("^2", "²").replace(" ", "·")
+
+
 def same_unit(text: object, unit: str) -> bool:
     """Return whether a text means a unit, which is written as in `N m s/rad`.
 

@@ -14,8 +14,10 @@ from msg_adapters.tables.files import read_columns
 from msg_adapters.tables.import_map import ImportMap, RowFilter
 from msg_adapters.tables.table import Table
 from msg_adapters.tables.terms import ChannelTerm
+from msg_adapters.tables.units import LINEAR, unit
 from rsea_ros.errors import ImportMapError
-from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.signals import UNITS, BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.units import in_motion, plain
 
 UNDATED = 1e8
 """Stamps below this (s, three years after 1970) have no date: the file's clock starts near zero."""
@@ -151,10 +153,17 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
     """Return a summary of the import, for a person to compare with the machine."""
     lines = list(record.notes)
     for name, channel in record.channels.items():
-        columns = " + ".join(f"{term.column} [{term.unit}]" for term in mapping.channels[name])
+        columns = " + ".join(f"{term.column} [{plain(term.unit)}]" for term in mapping.channels[name])
         low, high = channel.y.min(), channel.y.max()
-        lines.append(f"{name}: {len(channel)} samples of {columns}, {low:.6g} to {high:.6g} in SI units")
+        si = plain(in_motion(UNITS[name], linear=_is_linear(mapping)))
+        lines.append(f"{name}: {len(channel)} samples of {columns}, {low:.6g} to {high:.6g} {si}")
     return lines
+
+
+def _is_linear(mapping: ImportMap) -> bool:
+    """Return whether a column is in a unit along a line, as those of a linear machine are."""
+    terms = [term for channel in mapping.channels.values() for term in channel]
+    return any(unit(term.unit)[0] in LINEAR for term in terms)
 
 
 def _rows_kept(table: Table, mapping: ImportMap, run: float | None) -> tuple[BoolArray, int]:

@@ -51,7 +51,16 @@ TERM = (
     Key("constant", "number, SI unit of the channel", "0", "added after scale and sign"),
     Key("held", "`true`, `false`", "false", "rows repeat a value until the next one arrives: keep the first"),
 )
-CHANNEL = tuple(Key(name, dimension, "not measured") for name, dimension in CHANNELS.items())
+_MEANINGS = {
+    "command": "commanded motor torque at the gear output; it takes effect at its stamp",
+    "motor_torque": "motor torque from the measured current, at the gear output",
+    "ft": "F/T sensor about the joint's axis, positive when the spring pushes the distal side forward",
+    "deflection": "angle of the spring from its own encoder, with the sign of `ft`",
+    "position": "angle of the gear output relative to the housing",
+    "velocity": "rate of `position`",
+    "reference": "target position of a controller that was active during the record",
+}
+CHANNEL = tuple(Key(name, dimension, "not measured", _MEANINGS[name]) for name, dimension in CHANNELS.items())
 SECTIONS: Mapping[str, Sequence[Key]] = {
     "map": MAP,
     "time": TIME,

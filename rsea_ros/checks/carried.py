@@ -11,6 +11,7 @@ from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
+from rsea_ros.wording import listed
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
           "clipping", "nan", "coarse_steps")  # fmt: skip
@@ -43,13 +44,20 @@ def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     dead = {f.channel for f in findings.faults if f.kind == "dead_channel"}
     channels = {n: c for n, c in record.channels.items() if n not in dead}
     if not set(channels) - {"command", "reference"}:
-        reasons = "; ".join(
-            f"{f.channel}: {f.detail or f.kind}" for f in findings.faults if f.channel in dead
-        )
         raise IdentificationError(
-            f"{record.source}: no sensor answers to the machine ({reasons}), expected one that does: "
-            "rsea check shows each"
+            f"{record.source}: no sensor answers to the machine ({_reasons(record, findings)}), expected one "
+            "that does: rsea check shows each"
         )
     again = _AGAIN if masks else ()
     kept = (*record.faults, *(f for f in findings.faults if f.kind not in again and f not in record.faults))
     return replace(record, channels=channels, faults=kept)
+
+
+def _reasons(record: Record, findings: Findings) -> str:
+    """Return why nothing answers: faults of the driver, then the channels of each reason."""
+    channels: dict[str, list[str]] = {}
+    for f in findings.faults:
+        if f.kind == "dead_channel":
+            channels.setdefault(f.detail or f.kind, []).append(f.channel)
+    driver = [f"{f.channel} latched a fault, {f.detail}" for f in record.faults if f.kind == "device_fault"]
+    return "; ".join([*driver, *(f"{listed(names)}: {why}" for why, names in channels.items())])

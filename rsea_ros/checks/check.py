@@ -94,7 +94,7 @@ def _of_targets(f: Finding) -> Finding:
     """Return a finding about the command as one about the target positions that it is."""
     if f.channel != "command":
         return f
-    unit, detail = ("rad" if f.unit == "N m" else f.unit), f.detail.replace("N m", "rad")
+    unit, detail = ("rad" if f.unit == "N m" else f.unit), f.detail.replace("N·m", "rad")
     return replace(f, channel="reference", unit=unit, detail=detail)
 
 

@@ -42,7 +42,7 @@ def excitation(record: Record, rig: Rig) -> list[Finding]:
         ]
     low, high = band(record)
     rms, peak = float(np.std(command.y)), float(np.max(np.abs(command.y)))
-    detail = f"{low:.3g} to {high:.3g} Hz, peak {peak:.3g} N m"
+    detail = f"{low:.3g} to {high:.3g} Hz, peak {peak:.3g} N·m"
     natural = natural_frequency(rig)
     if natural is not None and high < 0.5 * natural:
         first = Finding(

@@ -14,6 +14,7 @@ from rsea_ros.cli._runs import RIG
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
+from rsea_ros.report import words
 
 HIDDEN = (
     ("hard_stop", {"angle": 0.011, "stiffness": 5000.0}),
@@ -71,5 +72,5 @@ def hidden(bench: Rig) -> str:
     """Return the hidden cause in words."""
     cause = bench.effects[-1]
     main = effect_named(cause.name).main
-    size = f"{main.name.replace('_', ' ')} {cause.parameters[main.name]:g} {main.unit}"
-    return f"{cause.name.replace('_', ' ')}, {size}"
+    size = f"{main.name.replace('_', ' ')} {cause.parameters[main.name]:g} {words.unit(main.unit)}"
+    return f"{words.effect(cause.name)}, {size}"

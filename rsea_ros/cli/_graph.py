@@ -94,6 +94,11 @@ def _config() -> Path:
     return _share() / "config" / "nodes"
 
 
+def parameters_of_bench() -> Path:
+    """Return the file of the parameters that a driver needs on `rsea bench`."""
+    return _share() / "config" / "simulated_bench.yaml"
+
+
 def _share() -> Path:
     """Return the folder of config/ and launch/: the clone, or the share of the installed package."""
     return next(folder.parents[1] for folder in rig_folders())

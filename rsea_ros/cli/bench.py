@@ -10,7 +10,9 @@ import signal
 import sys
 import time
 from pathlib import Path
+from shlex import quote
 
+from rsea_ros.cli._graph import parameters_of_bench
 from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._output import path
 from rsea_ros.cli._runs import RIG
@@ -80,8 +82,9 @@ def run(args: argparse.Namespace) -> int:
 def _place(args: argparse.Namespace, sensor: ForceSensor) -> dict[str, object]:
     """Return where the bench is, and the command that starts the driver on it."""
     launch = (
-        f"rsea launch hardware rig:={args.rig} port:={args.port} ft_host:=127.0.0.1 "
-        f"ft_port:={sensor.port} ft_page_port:={sensor.page}"
+        f"rsea launch hardware rig:={quote(args.rig)} port:={quote(str(args.port))} ft_host:=127.0.0.1 "
+        f"ft_port:={sensor.port} ft_page_port:={sensor.page} params:={quote(str(parameters_of_bench()))} "
+        "identify:=false"
     )
     return {
         "port": str(args.port), "model": args.model[0], "ft_port": sensor.port, "page_port": sensor.page,

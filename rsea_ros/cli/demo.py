@@ -7,15 +7,18 @@ import os
 import random
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from msg_adapters import read_record
 from msg_adapters.bags import read_contents
+from rsea_ros import strict_yaml
 from rsea_ros.cli._columns import columns
+from rsea_ros.cli._graph import parameters_of_bench
 from rsea_ros.cli._lines import say
 from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._output import path
@@ -40,8 +43,6 @@ DISTURBANCES = {"commands_left_out", "late_commands", "lost_messages", "watchdog
 SHORT, FULL = 20.0, 160.0
 SPREAD = 0.1
 PACE = 10.0
-PATIENT = {"latency": 0.02, "lost_cycles": 30, "ft_timeout": 0.5, "command_timeout": 0.5, "watchdog": 1.0}
-"""The bench on a wire is a process, which a busy machine can delay for longer than a motor."""
 EXCITED = {"slew_limit": 25_000.0, "effort_limit": 0.0}
 """The paper's excitation changes by 23 000 N m/s."""
 START_UP = 60.0
@@ -137,11 +138,17 @@ def source(nodes: Processes, out: Path, args: argparse.Namespace) -> Iterator[st
         yield "plant"
         return
     with RemoteBench(out / "tty", "--rig", rig, "--seed", args.seed) as bench:
-        nodes.start("driver", {**bench.parameters(), **PATIENT, **EXCITED, "rig": RIG, "autostart": True})
+        nodes.start("driver", {**bench.parameters(), **patience(), **EXCITED, "rig": RIG, "autostart": True})
         yield "driver"
     faults = [line for line in nodes.log("driver").read_text().splitlines() if "[ERROR]" in line]
     if faults:
         raise RseaError(f"driver: {faults[0].partition(']: ')[2]} (log: {nodes.log('driver')})")
+
+
+def patience() -> Mapping[str, float]:
+    """Return the parameters of a driver on the simulated bench, which answers later than hardware."""
+    content = strict_yaml.read(parameters_of_bench()).content
+    return cast(Mapping[str, float], content["/**"]["ros__parameters"])
 
 
 def measure(nodes: Processes, bag: Path, duration: float, seed: int, first: str) -> None:

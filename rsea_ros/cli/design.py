@@ -112,25 +112,25 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
 
     say(verdict(asked))
     for check in asked.checks:
-        value = "not possible" if math.isnan(check.value) else f"{check.value:.4g} {check.unit}"
+        value = "not possible" if math.isnan(check.value) else f"{check.value:.4g} {words.unit(check.unit)}"
         sign = ">=" if check.least else "<="
         say(
             f"  {'yes' if check.met else 'NO '}  {check.name}: {value}, asked {sign} {check.limit:.4g} "
-            f"{check.unit}",
+            f"{words.unit(check.unit)}",
             indent=7,
         )
     say(
-        f"smallest stiffness that meets all demands on the spring: {least.stiffness:.0f} N m/rad, springs of "
+        f"smallest stiffness that meets all demands on the spring: {least.stiffness:.0f} N·m/rad, springs of "
         f"{least.rate:.0f} N/m"
     )
     for row in by_train(asked.requirement, asked.unit, asked.stiffness):
         low, high = row.band_range
         say(
             f"  {words.train(row.train)}, n = {row.turns:+.0f}: {row.band:.4g} Hz "
-            f"({low:.4g} to {high:.4g} Hz over 90 % of the rotor's inertia), {row.for_band:.0f} N m/rad for "
-            f"{asked.requirement.bandwidth:g} Hz, {row.least:.0f} N m/rad for all demands",
+            f"({low:.4g} to {high:.4g} Hz over 90 % of the rotor's inertia), {row.for_band:.0f} N·m/rad for "
+            f"{asked.requirement.bandwidth:g} Hz, {row.least:.0f} N·m/rad for all demands",
             indent=4,
         )
     if robust:
-        print(f"with 95 % of all parts within tolerance: {robust.stiffness:.0f} N m/rad")
+        print(f"with 95 % of all parts within tolerance: {robust.stiffness:.0f} N·m/rad")
     print(f"report: {report}")

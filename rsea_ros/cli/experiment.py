@@ -139,6 +139,7 @@ def written(advice: Advice, place: Destination, args: argparse.Namespace) -> Pat
 def _print(advice: Advice, report: Path) -> None:
     from rsea_ros.report.experiment.words import limit_rows, plain_name, proof_words, verdict
     from rsea_ros.report.lines import LABEL
+    from rsea_ros.units import plain
 
     say(verdict(advice))
     for h in advice.hypotheses:
@@ -153,7 +154,7 @@ def _print(advice: Advice, report: Path) -> None:
                     rivals = f"{plain_name(a)} over {plain_name(b)}"
                     say(f"separates   {rivals}: S = {p.table[i, j]:.3g}", indent=LABEL)
         for name, expected, level, limit, unit in limit_rows(p, advice.asked.limits.stated()):
-            allowed = f"of {limit} {unit}" if limit != "none" else f"{unit} (no limit stated)"
+            allowed = f"of {limit} {plain(unit)}" if limit != "none" else f"{plain(unit)} (no limit stated)"
             say(f"asks        {name} {expected}, at most {level} {allowed}", indent=LABEL)
         print(f"run         {report.parent / COMMANDS}")
     for proof in advice.proofs:

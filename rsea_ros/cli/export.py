@@ -144,12 +144,13 @@ def _lines(
 ) -> list[str]:
     """Return the report as text: file, content, omissions, differences."""
     from rsea_ros.exports.coverage import coverage_lines
+    from rsea_ros.units import plain
 
     lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]
     lines += [f"  {line}" for line in coverage_lines(made.said, made.unsaid)]
     lines += [
         f"played in both: {one.channel} differs by {one.times_noise:.3g} times the sensor's noise "
-        f"({one.rms:.3g} {one.unit} of {one.signal:.3g})"
+        f"({one.rms:.3g} {plain(one.unit)} of {one.signal:.3g})"
         for one in differences
     ]
     return [*lines, f"not played: {not_played}"] if not_played else lines

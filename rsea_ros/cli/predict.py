@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -26,17 +27,32 @@ EXAMPLE = "rsea predict results/model.yaml other_run.mcap"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("model", help="model.yaml, or any rig")
+    parser.add_argument("model", help="model.yaml, or the name or file of any rig")
     parser.add_argument("bag", help="rosbag2 directory, .mcap or .db3")
     parser.add_argument(
         "--out",
         metavar="CSV",
         help="file for the predicted channels: t in s, then one column per channel in SI units",
     )
+    parser.add_argument("--rig", action=_RigComesFirst, help=argparse.SUPPRESS)
     add_force(parser)
     parser.add_argument("--json", action="store_true", help="no effect: this verb always prints JSON")
     add_topic_options(parser)
     add_window_options(parser)
+
+
+class _RigComesFirst(argparse.Action):
+    """Refuses the option that other verbs have, and says what stands in its place."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> NoReturn:
+        """Leave with status 2."""
+        parser.error(f"no --rig here: a model or a rig is the first argument, `{parser.prog} {values} BAG`")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -19,6 +19,7 @@ from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.structure import structured
+from rsea_ros.units import plain
 
 GRAVITY = 9.80665
 WORLD = "world"
@@ -158,7 +159,7 @@ def _left_out(rig: Rig) -> dict[str, str]:
     for end in far if not (rig.rigid_spring and free == ["spring_end"]) else ():
         for name, unit in (("stiffness", "N m/rad"), ("damping", "N m s/rad")):
             if rig[f"{end}.{name}"]:
-                size = f"{rig[f'{end}.{name}']:g} {unit}"
+                size = f"{rig[f'{end}.{name}']:g} {plain(unit)}"
                 left[f"{end}.{name}"] = f"{size} to the world, from the chain's far end"
     for part in ("gear", "proximal_spring"):
         if math.isfinite(rig[f"{part}.stiffness"]):

@@ -81,8 +81,8 @@ _EFFECTS = {
 def _how(joint: Joint, has_springs: bool) -> str:
     if joint.mimics:
         return f"mimics {joint.mimics}, {joint.multiplier:g} turns for one"
-    spring = f", spring {joint.stiffness:g} N m/rad" if has_springs and joint.stiffness else ""
-    return f"damping {joint.damping:g} N m s/rad{spring}"
+    spring = f", spring {joint.stiffness:g} N·m/rad" if has_springs and joint.stiffness else ""
+    return f"damping {joint.damping:g} N·m·s/rad{spring}"
 
 
 def _parameters(rig: Rig, name: str) -> dict[str, float]:

@@ -78,7 +78,7 @@ def _torque_saturation(root: xml.Element, rig: Rig, p: Parameters) -> str:
     name = "forcerange" if motor(root).tag == "pid" else "ctrlrange"
     limit = min(p["limit"], float(motor(root).get(name, "0 inf").split()[1]))
     motor(root).set(name, f"{-limit!r} {limit!r}")
-    return f"actuator {name} {limit:g} N m"
+    return f"actuator {name} {limit:g} N·m"
 
 
 def _torque_constant_error(root: xml.Element, rig: Rig, p: Parameters) -> str:
@@ -96,7 +96,7 @@ def _coulomb_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
         ("solimpfriction", SOLIMP),
     ):
         losses.set(name, value)
-    return f"tendon frictionloss {p['torque']:g} N m; it sticks where the rig's creeps"
+    return f"tendon frictionloss {p['torque']:g} N·m; it sticks where the rig's creeps"
 
 
 def _stribeck_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
@@ -124,7 +124,7 @@ def _asymmetric_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
     assert actuator is not None
     bias = {"gainprm": "0", "biastype": "affine", "biasprm": f"{-p['offset']!r} 0 0"}
     xml.SubElement(actuator, "general", {"name": "offset", "tendon": "motor", **bias})
-    return f"a second actuator with the constant bias {-p['offset']:g} N m"
+    return f"a second actuator with the constant bias {-p['offset']:g} N·m"
 
 
 def _quadratic_drag(root: xml.Element, rig: Rig, p: Parameters) -> str:
@@ -155,7 +155,7 @@ def _hard_stop(root: xml.Element, rig: Rig, p: Parameters) -> str:
     stop = beside(root, "hard_stop", "spring")
     stop.set("stiffness", repr(p["stiffness"]))
     stop.set("springlength", f"{-p['angle']!r} {p['angle']!r}")
-    return f"tendon of {p['stiffness']:g} N m/rad with a dead band of {p['angle']:g} rad in springlength"
+    return f"tendon of {p['stiffness']:g} N·m/rad with a dead band of {p['angle']:g} rad in springlength"
 
 
 def _spring_hysteresis(root: xml.Element, rig: Rig, p: Parameters) -> str:

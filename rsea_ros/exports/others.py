@@ -34,7 +34,7 @@ def unsaid_effects(rig: Rig, said: Sequence[Said], why: str) -> list[Unsaid]:
 def unsaid_parts(rig: Rig, why: str) -> Iterator[Unsaid]:
     """Yield the springs, loads and sensors that a target of one rigid joint leaves out."""
     if not rig.rigid_spring:
-        yield Unsaid("spring", f"{rig['spring.stiffness']:g} N m/rad; {why}")
+        yield Unsaid("spring", f"{rig['spring.stiffness']:g} N·m/rad; {why}")
     for name in ("gear", "proximal_spring"):
         if math.isfinite(rig[f"{name}.stiffness"]):
             yield Unsaid(f"{name}.stiffness", why)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rsea_ros import units
 from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.library.frames import parameter_frame, plain
 from rsea_ros.model.rig import Rig
@@ -78,7 +79,7 @@ class Fit:
         """Return rig, fit and parameters in one line."""
         fits = ", ".join(f"{n} {v:.2f} %" for n, v in self.result.fit_percent.items())
         values = ", ".join(
-            f"{p.name} {p.value:.5g} {p.unit}"
+            f"{p.name} {p.value:.5g} {units.plain(p.unit)}"
             for p in self.result.parameters
             if not p.name.startswith("clock.")
         )
@@ -100,8 +101,8 @@ def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progr
     """
     from rsea_ros.checks.carried import held_against
     from rsea_ros.identification.identify import identify as identify_records
-    from rsea_ros.library.inputs import records_of
+    from rsea_ros.library.inputs import records_of, without_missing
 
     rig = load_rig(rig)
-    records = [held_against(record, rig, masks=False) for record in records_of(data)]
+    records = [without_missing(held_against(r, rig, masks=False)) for r in records_of(data)]
     return Fit(identify_records(records, rig, progress))

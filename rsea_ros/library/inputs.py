@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from rsea_ros.errors import ParameterError
-from rsea_ros.signals import Record
+from rsea_ros.signals import MEASURED, Channel, Record
 
 
 def records_of(data: Record | Sequence[Record]) -> list[Record]:
@@ -20,3 +22,12 @@ def records_of(data: Record | Sequence[Record]) -> list[Record]:
     if not records:
         raise ParameterError("data: no record, expected one or more")
     return records
+
+
+def without_missing(record: Record) -> Record:
+    """Return a record without the samples that from_arrays holds as NaN: measurements that are missing."""
+    channels = {name: channel for name, channel in record.channels.items() if name in MEASURED}
+    missing = {name: np.isnan(channel.y) for name, channel in channels.items()}
+    return record.with_channels(
+        **{n: Channel(c.t[~missing[n]], c.y[~missing[n]]) for n, c in channels.items() if missing[n].any()}
+    )

@@ -158,7 +158,11 @@ class IdentifyNode:
         )
 
     def _tell(self) -> None:
-        self._node.get_logger().info(self._gathered() if self._commanded else "waiting for torque_command")
+        log = self._node.get_logger()
+        if self._commanded:
+            log.info(self._gathered())
+        else:
+            log.info("waiting for torque_command", throttle_duration_sec=10.0)
 
     def _report(self) -> NodeHealth:
         if self._identified is not None:

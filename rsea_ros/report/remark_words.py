@@ -64,7 +64,7 @@ def _clocks_taken_as_right(remark: Remark) -> str:
 
 def _at_bound(remark: Remark) -> str:
     return (
-        f"{remark.names[0]} ran to its bound, {remark.values[0]:.3g} {remark.unit}: "
+        f"{remark.names[0]} ran to its bound, {remark.values[0]:.3g} {words.unit(remark.unit)}: "
         "these data show nothing of it, or something that the rig lacks stands in for it."
     )
 
@@ -96,7 +96,7 @@ def _play_undetermined(remark: Remark) -> str:
 
 
 def _also_in_model(remark: Remark) -> str:
-    effects = listed([n.replace("_", " ") for n in remark.names])
+    effects = listed([words.effect(n) for n in remark.names])
     return (
         f"The extended model also has {effects}: it predicts better with it, but the data speak for another "
         "law than that."

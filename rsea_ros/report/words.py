@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from rsea_ros.units import plain
+
 CHANNELS = {
     "command": "commanded motor torque",
     "motor_torque": "motor torque",
@@ -34,6 +36,9 @@ SYMBOLS = {
 }
 """As in the paper; what stands after _ is an index."""
 
+_PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
+unit = plain
+
 _PIECES = {"housing_end": "Housing", "spring_end": "Spring end", "clock": "Clock"}
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
@@ -51,14 +56,14 @@ def parameter(name: str) -> str:
     return PARAMETERS.get(name, f"{_PIECES.get(group, group.replace('_', ' ').capitalize())}: {plain}")
 
 
+def effect(name: str) -> str:
+    """Return the plain name of an effect for use within a sentence, `Coulomb friction`."""
+    return " ".join(_PROPER.get(word, word) for word in name.split("_"))
+
+
 def channel(name: str) -> str:
     """Return the plain name of a channel."""
     return CHANNELS.get(name, name)
-
-
-def unit(name: str) -> str:
-    """Return a unit with its signs, `kg m^2` as `kg·m²`, `deg` as `°`; the unit of a bare number is empty."""
-    return "" if name == "1" else "°" if name == "deg" else name.replace("^2", "²").replace(" ", "·")
 
 
 def sentence(text: str) -> str:

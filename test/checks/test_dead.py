@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from independent.excitations import chirp_noise
 from independent.hidden import hide
 from scipy.signal import lfilter
 
+from rsea_ros.checks.carried import held_against
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side
@@ -18,7 +20,7 @@ from rsea_ros.checks.faults import clipping
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel
+from rsea_ros.signals import Channel, Fault
 
 RIG = load_rig("paper_high_impedance")
 BENCH = drawn_bench(np.random.default_rng(2))
@@ -123,3 +125,13 @@ def test_a_servo_that_stands_still_is_not_clipped(repeats):
     assert not clipping(Channel(t, angle), "position").any()
     swing = np.repeat(np.clip(0.8 * np.sin(3.0 * t) + 0.3 * np.sin(7.1 * t), -0.8, 0.8)[::repeats], repeats)
     assert clipping(Channel(t, swing), "position").sum() == np.count_nonzero(np.abs(swing) == 0.8)
+
+
+def test_where_the_driver_had_a_fault_it_is_named_before_the_dead_sensors():
+    """A run that a fault had kept at zero torque was described by its sensors' noise alone."""
+    still = {n: Channel(good()[n].t, 1e-3 * RNG.normal(size=N)) for n in good().channels if n != "command"}
+    fault = Fault("device_fault", "/rsea/driver", np.nan, "no_reply: 3 cycles")
+    record = replace(good().with_channels(**still), faults=(fault,))
+    with pytest.raises(IdentificationError, match="driver latched a fault, no_reply: 3 cycles; ") as refused:
+        held_against(record, RIG, masks=True)
+    assert str(refused.value).count("noise that has nothing to do with the command") == 1

@@ -41,6 +41,7 @@ def test_a_good_bag_is_green_and_says_its_rig(bag, capsys):
     printed, errors = capsys.readouterr()
     assert errors == ""
     assert "red" not in printed.split("checked against")[0]
+    assert "N·m" in printed and "N m" not in printed, "one spelling of a unit"
     assert "checked against default rig paper_high_impedance: 0 red, 0 amber" in printed
 
 

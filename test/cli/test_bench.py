@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import yaml
 
 from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli.main import main
@@ -31,7 +32,10 @@ def test_it_prints_its_addresses_and_a_signal_removes_the_port(tmp_path, number)
     assert place["port"] == str(tmp_path / "tty") and place["model"] == 2020
     assert (tmp_path / "tty").is_char_device() and place["ft_port"] != place["page_port"]
     words = place["launch"].split()
-    driver = node_calls(words[2], words[3:])[0]
+    driver, *others = node_calls(words[2], words[3:])
+    patience = yaml.safe_load(driver.file.read_text())["/**"]["ros__parameters"]
+    assert patience["lost_cycles"] > 3, "a busy machine delays the process that stands for a motor"
+    assert "identify" not in [node.name for node in others], "it ends the graph when it cannot fit"
     assert words[:2] == ["rsea", "launch"] and driver.parameters["ft_page_port"] == str(place["page_port"])
     process.send_signal(number)
     _, errors = process.communicate(timeout=30)

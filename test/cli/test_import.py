@@ -44,7 +44,7 @@ def test_a_table_becomes_a_bag_with_its_measurement(inputs, capsys, storage):
     assert np.allclose(record["position"].t, np.arange(20) * 1e-3)
     assert record.notes == ("imported from run.csv, map.yaml",)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1] == "command: 20 samples of u [N m], 0 to 9.5 in SI units"
+    assert lines[1] == "command: 20 samples of u [N·m], 0 to 9.5 N·m"
     assert lines[-1] == f"{out}: 0.019 s at 1000.0 Hz"
 
 

@@ -85,3 +85,10 @@ def _files(folder, name):
 def _assert_plain(text, said):
     assert said in text
     assert not [word for word in PARSERS if word in text]
+
+
+def test_predict_says_where_the_rig_goes(capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["predict", "run.mcap", "--rig", "my_bench.yaml"])
+    assert left.value.code == 2
+    assert "first argument, `rsea predict my_bench.yaml BAG`" in capsys.readouterr().err

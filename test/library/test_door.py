@@ -133,6 +133,14 @@ def test_a_masked_measurement_is_missing():
     np.testing.assert_array_equal(record["position"].y, [1.0, np.nan, 3.0])
 
 
+def test_a_missing_measurement_is_left_out_of_a_fit_and_reported(record, fit):
+    """The tutorial promised NaN for a missing measurement, and identify refused it."""
+    ft = np.where(np.arange(len(record["ft"])) % 100 == 7, np.nan, record["ft"].y)
+    holed = rsea.identify(record.with_channels(ft=Channel(record["ft"].t, ft)), "paper_high_impedance")
+    assert holed.rig["spring.stiffness"] == pytest.approx(fit.rig["spring.stiffness"], rel=2e-3)
+    assert ("nan", "ft") in {(fault.kind, fault.channel) for fault in holed.result.faults}
+
+
 def test_a_table_gives_its_columns():
     table = {"time": [0.0, 0.1, 0.2], "tau cmd": [1.0, 2.0, 3.0]}
     record = rsea.Record.from_dataframe(table, {"command": "tau cmd"}, time="time")

@@ -21,7 +21,7 @@ SAID = {
     Remark("only_together", ("a", "b", "c")): "a, b and c are identifiable from these data only together",
     Remark("play_undetermined", values=(4e-3, 0.012)): "with 4 mrad, which fits best, the residual of data "
     "that took no part changes by -1.2 %.",
-    Remark("also_in_model", ("ft_bias",)): "The extended model also has ft bias:",
+    Remark("also_in_model", ("ft_bias",)): "The extended model also has F/T bias:",
     Remark("coherence_lost", ("ft",), (83.2,), "Hz"): "Above 83.2 Hz the coherence of the F/T torque",
     Remark("on_measured_angle"): "on the measured rotor angle:",
     Remark("coloured_noise", ("ft", "position")): "The noise of the F/T torque and position is coloured:",
@@ -46,3 +46,8 @@ def test_the_suggested_measurements_differ_for_loop_gains_and_springs():
         Remark("only_ratios", ("controller.k_p", "rotor.reflected_inertia")),
     ])  # fmt: skip
     assert "A measured spring stiffness" in spring and "a gain known from the firmware" in loop
+
+
+def test_effects_are_written_as_proper_names():
+    (sentence,) = remark_sentences([Remark("also_in_model", ("coulomb_friction",))])
+    assert "has Coulomb friction:" in sentence

@@ -10,6 +10,7 @@ from rsea_ros.experiment.campaign import CampaignOutcome
 from rsea_ros.experiment.hypothesis import NOTHING
 from rsea_ros.experiment.weighing import RunWeighing
 from rsea_ros.model.rig import CLOCK_DOUBT
+from rsea_ros.report import words
 from rsea_ros.report.experiment.words import plain_name
 from rsea_ros.wording import listed
 
@@ -35,7 +36,7 @@ def size(weighing: RunWeighing, name: str) -> str:
     noise = abs(unknown.outer(at + sd) - unknown.outer(at - sd)) / 2.0
     clock = CLOCK_DOUBT if main.unit == "s" else 0.0
     spread = math.hypot(noise, DEFAULT.sizes.model_error * value, clock)
-    unit = "" if main.unit == "1" else f" {main.unit}"
+    unit = "" if main.unit == "1" else f" {words.unit(main.unit)}"
     return f"{main.name.replace('_', ' ')} {value:.4g} ± {spread:.2g}{unit}"
 
 

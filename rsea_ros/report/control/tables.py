@@ -55,7 +55,7 @@ def compensation_rows(study: Study) -> Rows:
     """Return effect, sine, and at each rate the error without and with its compensation, and the gain."""
     return [
         [
-            words.sentence(cells[0].effect.name.replace("_", " ")),
+            words.sentence(words.effect(cells[0].effect.name)),
             f"{cells[0].hz:g} Hz",
             *(f"{100 * c.without:.2f} → {100 * c.with_model:.2f} %, gain {c.gain:.2f}" for c in cells),
         ]

@@ -28,7 +28,7 @@ def cause_section(cause: Cause, diagnosis: Diagnosis) -> str:
     body = [_sizes(cause), paragraph(words.sentence(f"{say.prose(how_sure)}."))]
     body += [equation(cause.equation) if cause.equation else "", paragraph(evidence(cause))]
     body += [paragraph(_gain(cause)), _rivals(cause)]
-    return section(words.sentence(f"{say.effect(cause.name)}: {share}"), *body)
+    return section(words.sentence(f"{words.effect(cause.name)}: {share}"), *body)
 
 
 def _gain(cause: Cause) -> str:
@@ -58,7 +58,7 @@ def _model_share(estimate: CauseParameter) -> str:
 def _rivals(cause: Cause) -> str:
     if not cause.confusable_with:
         return ""
-    rivals = listed([say.effect(n) for n in cause.confusable_with])
+    rivals = listed([words.effect(n) for n in cause.confusable_with])
     return paragraph(f"These data do not distinguish it from {rivals}.")
 
 
@@ -87,12 +87,12 @@ def _tried_title(diagnosis: Diagnosis) -> str:
 def _by_reason(rejected: Sequence[Rejected]) -> list[str]:
     names: dict[str, list[str]] = {}
     for r in rejected:
-        names.setdefault(say.rejection(r), []).append(say.effect(r.name))
+        names.setdefault(say.rejection(r), []).append(words.effect(r.name))
     return [f"{words.sentence(say.prose(why))}: {listed(sorted(n))}." for why, n in names.items()]
 
 
 def _row(name: str, gain: float, outcome: str, strong: bool = False) -> str:
-    plain = escape(words.sentence(say.effect(name)))
+    plain = escape(words.sentence(words.effect(name)))
     shown = f"<b>{plain}</b>" if strong else plain
     bar = _bar(gain, AFTER if strong else faint(MEASURED, 0.6))
     return (

@@ -10,7 +10,6 @@ import numpy as np
 from rsea_ros.diagnosis.result import Diagnosis, Spectrum
 from rsea_ros.identification.result import Overlay
 from rsea_ros.report import words
-from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.figures.figure import Figure, band
 from rsea_ros.report.figures.overlay import Simulated, overlay_figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
@@ -43,7 +42,7 @@ def _gained(spectrum: Spectrum) -> dict[str, object]:
 
 
 def _before_and_after(diagnosis: Diagnosis, s: Spectrum) -> str:
-    causes = listed([say.effect(c.name) for c in diagnosis.causes])
+    causes = listed([words.effect(c.name) for c in diagnosis.causes])
     f, before = in_bands(s.frequency, s.before / s.noise)
     _, after = in_bands(s.frequency, s.after / s.noise)
     k, left = int(np.argmax(before)), int(np.argmax(after))

@@ -15,7 +15,7 @@ from rsea_ros.report.diagnosis.causes import cause_section, tried_section
 from rsea_ros.report.diagnosis.figures import spectrum_figure, time_figure
 from rsea_ros.report.diagnosis.profile import profiles
 from rsea_ros.report.diagnosis.settings import settings_section
-from rsea_ros.report.diagnosis.sketch import sketch
+from rsea_ros.report.diagnosis.sketch import sketch, upright_sketch
 from rsea_ros.report.diagnosis.tables import channel_section, experiment_section
 from rsea_ros.report.diagnosis.where import where_figure
 from rsea_ros.report.fault_words import fault_lines, faults
@@ -44,7 +44,8 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
     yield right_rig_block(d.remarks, command("identify", d.sources, d.rig_name, d.rig_choice))
     if d.faults:
         yield f'<p class="next">{escape(faults(d.faults))}</p>'
-    yield sketch([c.name for c in d.causes])
+    names = [c.name for c in d.causes]
+    yield sketch(names) + upright_sketch(names)
     yield from (spectrum_figure(d, s) for s in d.spectra if s.channel == main)
     if any(o.channel == main for o in d.before):
         yield time_figure(d, main)

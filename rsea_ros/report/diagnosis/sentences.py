@@ -34,7 +34,7 @@ def verdict_sentence(
     off: how many values are not the rig's, empty for none.
     """
     name, data = words.channel(channel), (f" {off}." if off else "") + _data(faults)
-    named = listed([c.name.replace("_", " ") for c in causes])
+    named = words.sentence(listed([words.effect(c.name) for c in causes]))
     them = "them" if len(causes) > 1 else "it"
     fall = f"with {them} the {name} residual falls from {before:.1f} to"
     silent = [words.channel(n) for n in silent_channels(faults)]
@@ -54,10 +54,10 @@ def verdict_sentence(
         return f"The {name} residual is {size} times the noise; no known effect explains it.{data}"
     if verdict == "partly_explained" and at_floor:
         doubt = "but another law may do the same"
-        return f"{named.capitalize()}, probably: {fall} {after:.2f} times the noise, {doubt}.{data}"
+        return f"{named}, probably: {fall} {after:.2f} times the noise, {doubt}.{data}"
     if verdict == "explained":
-        return f"{named.capitalize()}: {fall} {after:.2f} times the noise, which is the floor.{data}"
-    return f"{named.capitalize()}, a part of it: {fall} {after:.1f} times the noise; the rest is open.{data}"
+        return f"{named}: {fall} {after:.2f} times the noise, which is the floor.{data}"
+    return f"{named}, a part of it: {fall} {after:.1f} times the noise; the rest is open.{data}"
 
 
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:

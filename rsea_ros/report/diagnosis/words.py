@@ -13,7 +13,6 @@ from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.rig.words import values_off
 from rsea_ros.wording import listed
 
-_PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
 _REASONS: Mapping[Reason, str] = {
     "far_behind": "much worse than the best effect on the training data",
     "at_bound": "its fitted size is at the bound of the effect, or within a clock's error of nothing",
@@ -37,11 +36,6 @@ _RESPECTS = {
 }
 
 
-def effect(name: str) -> str:
-    """Return the plain name of an effect for use within a sentence."""
-    return " ".join(_PROPER.get(word, word) for word in name.split("_"))
-
-
 def rejection(rejected: Rejected) -> str:
     """Return the reason for a rejection, as part of a sentence."""
     probability = rejected.probability or 0.0
@@ -55,7 +49,7 @@ def respect(what: str) -> str:
 
 def prose(text: str) -> str:
     """Return a sentence with plain names of effects, `coulomb_friction` as `Coulomb friction`."""
-    return re.sub(r"[a-z]+(?:_[a-z]+)+", lambda match: effect(match[0]), text)
+    return re.sub(r"[a-z]+(?:_[a-z]+)+", lambda match: words.effect(match[0]), text)
 
 
 def size(cause: Cause) -> str:
@@ -67,7 +61,7 @@ def size(cause: Cause) -> str:
 
 def named(causes: Sequence[Cause]) -> str:
     """Return causes with their sizes: `Coulomb friction (3.00 N·m) and backlash (1.20 mrad)`."""
-    return listed([f"{effect(c.name)} ({size(c)})" for c in causes])
+    return listed([f"{words.effect(c.name)} ({size(c)})" for c in causes])
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -108,7 +102,7 @@ def confusions(diagnosis: Diagnosis) -> list[str]:
     """Return a sentence for each cause that these data do not distinguish from others."""
     return [
         words.sentence(
-            f"{effect(c.name)}: these data do not distinguish it from {_either(c.confusable_with)}."
+            f"{words.effect(c.name)}: these data do not distinguish it from {_either(c.confusable_with)}."
         )
         for c in diagnosis.causes
         if c.confusable_with
@@ -132,7 +126,7 @@ def excitation(settings: Mapping[str, float | str]) -> str:
 
 
 def _either(names: Sequence[str]) -> str:
-    return listed([effect(n) for n in names], "or")
+    return listed([words.effect(n) for n in names], "or")
 
 
 def _times(ratio: float) -> str:

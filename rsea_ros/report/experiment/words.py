@@ -9,12 +9,13 @@ from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.limits import UNITS
 from rsea_ros.experiment.margins import LEVEL
 from rsea_ros.experiment.proposal import Proposal
+from rsea_ros.report import words
 from rsea_ros.wording import listed
 
 
 def plain_name(name: str) -> str:
     """Return the name of a cause for a sentence."""
-    return "no cause at all" if name == NOTHING else name.replace("_", " ")
+    return "no cause at all" if name == NOTHING else words.effect(name)
 
 
 def shape_words(p: Proposal) -> str:

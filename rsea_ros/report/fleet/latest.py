@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rsea_ros.report.diagnosis.words import effect
+from rsea_ros.report import words
 from rsea_ros.trends.series import Table
 from rsea_ros.wording import listed
 
@@ -30,4 +30,4 @@ def latest_causes(joints: Sequence[str], recordings: Table) -> Mapping[str, str]
 
 def _sure(causes: object) -> list[str]:
     held = causes if isinstance(causes, (list, tuple, np.ndarray)) else []
-    return [effect(str(c["name"])) for c in held if c.get("status") in _SURE]
+    return [words.effect(str(c["name"])) for c in held if c.get("status") in _SURE]

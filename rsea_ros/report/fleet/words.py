@@ -9,7 +9,6 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.report import words
-from rsea_ros.report.diagnosis.words import effect
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import Change, Interval, Trend
@@ -44,10 +43,10 @@ def name(about: str) -> str:
     """Return the plain name of a parameter, a cause, or the size of one: `Coulomb friction torque`."""
     group, _, key = about.partition(".")
     if not key:
-        return words.sentence(effect(about))
+        return words.sentence(words.effect(about))
     if about in words.PARAMETERS or group not in catalogue():
         return words.parameter(about)
-    plain, size = effect(group), key.replace("_", " ")
+    plain, size = words.effect(group), key.replace("_", " ")
     return words.sentence(plain if size in plain else f"{plain} {size}")
 
 

@@ -86,7 +86,8 @@ def _interval(p: ParameterEstimate) -> str:
         return _WIDTH / 2.0 * (1.0 + max(-1.0, min(1.0, (value - p.start) / reach)))
 
     middle = _HEIGHT / 2.0
-    spoken = escape(f"rig {p.start - side:.4g} to {p.start + side:.4g}, result {p.value:.4g} {p.unit}")
+    rig = f"rig {p.start - side:.4g} to {p.start + side:.4g}"
+    spoken = escape(f"{rig}, result {p.value:.4g} {words.unit(p.unit)}".rstrip())
     return (
         f'<svg class="interval" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{spoken}">'
         f"<title>{spoken}</title>"

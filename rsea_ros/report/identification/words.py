@@ -60,5 +60,5 @@ def _misfit_sentence(identification: Identification) -> str:
             "The intervals hold only if what the model lacks does not move its values: "
             "nothing simple that was tried explains the misfit."
         )
-    names = " or ".join(n.replace("_", " ") for n in identification.alternatives)
+    names = " or ".join(words.effect(n) for n in identification.alternatives)
     return f"The intervals also span what {names} would make of the values: it explains a part of the misfit."

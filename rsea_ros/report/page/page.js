@@ -78,11 +78,6 @@ async function overlay(node, figure) {
 /* In the dark the colours of text, grid and background change places; those with a meaning stay. */
 const DARK = { "#1f2933": "#e4e7eb", "#66717d": "#9aa5b1", "#e6e9ec": "#323f4b", "#ffffff": "#1b232b", "#1864ab": "#4dabf7" };
 
-function inTheDark(text) {
-  return matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches
-    ? text.replace(/#[0-9a-f]{6}/g, (colour) => DARK[colour] || colour) : text;
-}
-
 function button(text, about, act) {
   const made = document.createElement("button");
   made.type = "button"; made.textContent = text; made.title = about;
@@ -134,8 +129,17 @@ function tools(node, figure) {
   node.after(bar);
 }
 
+const LOOKS = [matchMedia("(prefers-color-scheme: dark)"), matchMedia("print")];
+
+function inTheDark(text) {
+  const [dark, print] = LOOKS;
+  return dark.matches && !print.matches ? text.replace(/#[0-9a-f]{6}/g, (colour) => DARK[colour] || colour) : text;
+}
+
+/* Draws all figures; once more in other colours when the scheme changes, or the page is printed in the dark. */
 function draw() {
   for (const node of document.querySelectorAll(".figure")) {
+    if (node.dataset.drawn) { Plotly.purge(node); node.nextElementSibling.remove(); delete node.dataset.drawn; }
     const figure = JSON.parse(inTheDark(document.getElementById(node.id + "-data").textContent));
     const done = figure.kind === "overlay" ? overlay(node, figure) : Plotly.newPlot(node, figure.data, figure.layout, CONFIG);
     done.then(() => { tools(node, figure); node.dataset.drawn = "yes"; });
@@ -159,6 +163,9 @@ async function unpackPlotly() {
 
 labelCells();
 addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
-if (document.querySelector(".figure")) unpackPlotly().then(draw, (error) => {
+if (document.querySelector(".figure")) unpackPlotly().then(() => {
+  draw();
+  LOOKS.forEach((look) => look.addEventListener("change", draw));
+}, (error) => {
   document.querySelectorAll(".figure").forEach((node) => { node.textContent = "This browser is too old to draw the figures: " + error; });
 });

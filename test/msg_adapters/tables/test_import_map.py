@@ -10,7 +10,7 @@ import pytest
 from map_files import CSV, MAP
 
 from msg_adapters.tables import import_record, load_map
-from msg_adapters.tables.keys import tables
+from msg_adapters.tables.keys import SECTIONS, tables
 from rsea_ros.errors import ImportMapError
 
 
@@ -204,3 +204,9 @@ def test_of_a_value_that_the_log_repeats_the_first_row_is_kept(files):
         files("time: {column: t, unit: s}\n" + held, "t;phi;load\n0;1;1\n1;1;2\n2;1;3\n")
     with pytest.raises(ImportMapError, match="held is 'yes', expected true or false"):
         files("time: {column: t, unit: s}\n" + held.replace("true", "'yes'"), csv)
+
+
+@pytest.mark.parametrize("keys", SECTIONS.values(), ids=SECTIONS)
+def test_every_key_of_a_map_says_what_it_means(keys):
+    """The seven channels had none."""
+    assert all(key.meaning for key in keys)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rsea_ros.identification.result import Identification
 from rsea_ros.report.identification.page import identification_report
-from rsea_ros.report.identification.words import next_command, verdict_sentence
+from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 
 Browser = Callable[[str, Path], tuple[str, str]]
 LARGEST = 1_500_000
@@ -61,3 +61,9 @@ def test_the_verdict_names_the_channel_above_its_noise(identification: Identific
     assert verdict_sentence(poor).startswith("The model does not fit: F/T torque 3 times the noise (rig ")
     assert next_command(poor) == "rsea diagnose 'runs/bench & <friends>' --rig paper_high_impedance"
     assert escape(next_command(poor)) in identification_report(poor)
+
+
+def test_an_alternative_is_written_as_a_proper_name(identification):
+    missed = replace(identification, residual_rms={"ft": 1.0}, alternatives=("coulomb_friction", "backlash"))
+    (said,) = doubt_sentences(missed)
+    assert "what Coulomb friction or backlash would make" in said
