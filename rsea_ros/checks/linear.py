@@ -5,7 +5,7 @@ Gauss-Newton on output errors: linear_rows.py has the rows, linear_step.py the s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from rsea_ros.checks.linear_rows import LinearisedRows, LinearSetting, LinearState, left_of, on_time, rows_of
 from rsea_ros.checks.linear_step import gauss_newton_step
 from rsea_ros.checks.shape import FittedShape
+from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.problem import Problem, case_from, channels_that_tell
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
@@ -66,7 +67,7 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
     """Return the linearised fit from where the quick fit of the shape ended.
 
     Only the LONGEST of the record in which the command changes most is looked at. Raises IdentificationError
-    where the record has no channel of the rig's.
+    where the record has no channel of the rig's, or all their samples are masked.
     """
     setting, state = _setting(record, masked, rig, shape)
     state, rows, sd, settled = _descended(setting, state)
@@ -82,12 +83,18 @@ def _setting(
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
     record, masked = _cut(record, masked, begin, end)
     informative = channels_that_tell(record, rig)
-    timed = tuple(n for n in SENSED if n in informative)  # a held motor torque shows no clock
+    sensed = [n for n in SENSED if n in informative]  # a held motor torque shows no clock
     values = unknowns_of_rig(rig)
     theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
-    state = LinearState(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
-    case = case_from(on_time(record, start, timed, state), rig, masked)
-    return LinearSetting(record, start, case, rig, timed, values), state
+
+    def begun(timed: Sequence[str]) -> LinearState:
+        return LinearState(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
+
+    case = case_from(on_time(record, start, sensed, begun(sensed)), rig, masked)
+    timed = tuple(n for n in sensed if case.mask[n].any())
+    if not timed:
+        raise IdentificationError(f"{record.source}: no sample of {rig.name}'s sensors is left to compare")
+    return LinearSetting(record, start, case, rig, timed, values), begun(timed)
 
 
 def _descended(

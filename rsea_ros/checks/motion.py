@@ -64,6 +64,7 @@ def _is_noise(channel: Channel) -> bool:
     y = channel.y[np.isfinite(channel.y)]
     if len(y) < 64:
         return False
+    y = y / max(float(np.abs(y).max()), np.finfo(float).tiny)  # the squares of 1e300 are infinite
     white = float(np.std(np.diff(y, 4))) / math.sqrt(70.0)
     return float(np.std(y)) <= 1.5 * white
 

@@ -11,6 +11,8 @@ import pytest
 from rsea_ros import simulate
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.linear import linear_of
+from rsea_ros.checks.motion import is_still
+from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record
 
@@ -58,6 +60,26 @@ def test_a_sensor_of_too_few_samples_is_left_out_of_the_clocks():
     rig = load_rig("cycloidal")
     shape = SimpleNamespace(values={}, delay={})
     assert set(linear_of(record, {}, rig, shape).offset) == {"ft"}
+
+
+def test_a_sensor_whose_every_sample_is_masked_is_left_out_of_the_clocks():
+    """Its misfit was the mean of nothing: a warning."""
+    run = simulate(RIG, 15.0 * np.random.default_rng(0).standard_normal(len(T)), 280.0)
+    shape, all_of = SimpleNamespace(values={}, delay={}), np.ones(len(T), bool)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "ft" not in linear_of(run, {"ft": all_of}, RIG, shape).offset
+    with pytest.raises(IdentificationError, match="no sample of"):
+        linear_of(run, dict.fromkeys(("ft", "position", "velocity"), all_of), RIG, shape)
+
+
+@pytest.mark.parametrize("dead", [1e300, -1e308])
+def test_a_sensor_of_excessive_readings_is_still_without_a_warning(dead):
+    """Their squares are infinite, and the check before every verb warned of it."""
+    readings = {"position": np.full(len(T), dead), "ft": dead * np.where(np.arange(len(T)) % 2, 1.0, 0.9)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert is_still(Record({n: Channel(T, y) for n, y in readings.items()}))
 
 
 def test_another_axis_is_tried_on_stamps_put_right():
