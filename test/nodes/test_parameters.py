@@ -120,5 +120,5 @@ def test_a_node_that_is_interrupted_while_it_imports_says_so_in_one_line():
 
 
 def test_a_mistyped_parameter_is_answered_with_the_right_one():
-    with pytest.raises(ParameterError, match="parameter amplitud: .*, did you mean amplitude[?]"):
+    with pytest.raises(ParameterError, match=r"parameter amplitud: .*, did you mean amplitude\?"):
         _refuse_unknown({"amplitud": 3.0}, [NodeParameter("amplitude", 20.0, "peak", "N m", 0.0, 1e4)])
