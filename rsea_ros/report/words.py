@@ -36,7 +36,7 @@ SYMBOLS = {
 }
 """As in the paper; what stands after _ is an index."""
 
-_PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
+_PROPER = {"coulomb": "Coulomb", "lugre": "LuGre", "stribeck": "Stribeck", "ft": "F/T"}
 unit = plain
 
 _PIECES = {"housing_end": "Housing", "spring_end": "Spring end", "clock": "Clock"}
