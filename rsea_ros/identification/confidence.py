@@ -67,7 +67,8 @@ def confidence_of(solution: Solution) -> Confidence:
         solution = replace(solution, jacobian=central_jacobian(solution.problem, solution.theta))
         information = solution.jacobian.T @ solution.jacobian
     inverse = inverse_of(information + prior)
-    covariance = inverse @ (_block_scores(solution) + prior) @ inverse
+    spread = inverse @ np.hstack([_block_scores(solution).T, np.sqrt(prior)])
+    covariance = spread @ spread.T  # no rounding makes a variance of this product negative
     least = np.diag(inverse) * max(_alike(case) for case in solution.problem.cases)
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
     larger = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
@@ -96,13 +97,14 @@ def _alike(case: Case) -> float:
 
 
 def _block_scores(solution: Solution) -> FloatArray:
+    """Return the score of each block, shape (blocks, unknowns): S'S is the scatter of their sum."""
     blocks = sample_blocks(solution.problem, BLOCK)
     scores = np.zeros((blocks.max() + 1, solution.jacobian.shape[1]))
     for column, derivative in zip(scores.T, solution.jacobian.T, strict=True):
         column[:] = np.bincount(blocks, derivative * solution.residual, minlength=len(scores))
     counted = len(np.unique(blocks))
     free = max(counted - len(solution.theta), counted / _MOST_CORRECTED)
-    result: FloatArray = scores.T @ scores * (counted / free)
+    result: FloatArray = scores * np.sqrt(counted / free)
     return result
 
 

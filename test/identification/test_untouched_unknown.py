@@ -19,13 +19,18 @@ from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 
 
-def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_reported(monkeypatch):
-    """A bound of 2e4 beside priors of 0.01 was cut off as a singular direction: its doubt came out as 0."""
+@pytest.fixture(scope="module")
+def solution():
+    """The fit of a rig with a hardening spring to 4 s."""
     rig = load_rig("paper_high_impedance")
     command = excitation("multisine", ExcitationSettings(rate=280.0, duration=4.0, period=4.0))
     record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=3)
     spring = EffectSetting("nonlinear_spring", effect_named("nonlinear_spring").typical)
-    solution = fit((case_from(record, rig),), rig.with_effects(spring))[0]
+    return fit((case_from(record, rig),), rig.with_effects(spring))[0]
+
+
+def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_reported(monkeypatch, solution):
+    """A bound of 2e4 beside priors of 0.01 was cut off as a singular direction: its doubt came out as 0."""
     names = [u.name for u in solution.problem.unknowns]
     i = names.index("nonlinear_spring.cubic")
     matrix = solution.jacobian.copy()
@@ -35,3 +40,13 @@ def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_reported(
     assert np.sqrt(doubt.covariance[i, i]) == pytest.approx(solution.problem.unknowns[i].reach, rel=1e-6)
     remarks = confidence.undetermined(solution.problem.unknowns, doubt)
     assert Remark("not_shown", ("nonlinear_spring.cubic",)) in remarks
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_variance_of_indistinguishable_unknowns_is_negative(monkeypatch, solution, seed):
+    """Rounding left a variance below zero, and its root was a warning and no interval."""
+    rng = np.random.default_rng(seed)
+    matrix = 1e9 * np.outer(rng.normal(size=len(solution.residual)), rng.normal(size=len(solution.theta)))
+    monkeypatch.setattr(confidence, "central_jacobian", lambda *_: matrix)
+    doubt = confidence.confidence_of(replace(solution, jacobian=matrix))
+    assert np.all(np.diag(doubt.covariance) > 0.0)
