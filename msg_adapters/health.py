@@ -66,7 +66,7 @@ class _States:
             self.counters[node, key] = _Counter(int(text), int(text) if late else 0)
 
 
-def tell_health(contents: Contents, told: Contents) -> None:
+def tell_health(contents: Contents, report: Contents) -> None:
     """Add the faults that the nodes of the run have reported."""
     messages = contents.topics.get(DIAGNOSTICS)
     if messages is None or messages.msgtype != TYPE or not messages.raw:
@@ -76,13 +76,13 @@ def tell_health(contents: Contents, told: Contents) -> None:
     for (node, key), counter in states.counters.items():
         if counter.grown:
             kind, unit = COUNTERS[key]
-            told.tell(kind, brief(node), f"{key} on {DIAGNOSTICS}", counter.grown, unit)
+            report.tell(kind, brief(node), f"{key} on {DIAGNOSTICS}", counter.grown, unit)
     for node, text in states.faults.items():
-        told.tell("device_fault", brief(node), brief(text))
+        report.tell("device_fault", brief(node), brief(text))
     if states.damaged:
         detail = "left out: not a DiagnosticArray"
         share = states.damaged / len(messages.raw)
-        told.tell("damaged_messages", DIAGNOSTICS, detail, states.damaged, "messages", share)
+        report.tell("damaged_messages", DIAGNOSTICS, detail, states.damaged, "messages", share)
 
 
 def _followed(messages: Messages, begin: int) -> _States:

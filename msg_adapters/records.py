@@ -73,8 +73,8 @@ def _check_apart(series: Sequence[_Series]) -> None:
     """Refuse two roles on one topic: no reader could distinguish them. Raises BagError."""
     roles: dict[str, tuple[TopicMap, str]] = {}
     for one in series:
-        topic, this = one.topics.topic(one.role), (one.topics, one.role)
-        if (other := roles.setdefault(topic, this)) != this:
+        topic, role = one.topics.topic(one.role), (one.topics, one.role)
+        if (other := roles.setdefault(topic, role)) != role:
             raise BagError(f"topic {topic}: is both {other[1]} and {one.role}, expected a topic for each")
 
 

@@ -67,12 +67,13 @@ def term_of(field: str, value: object, dimension: str) -> ChannelTerm:
     """Return a term. A unit of another dimension than the channel's needs a scale that converts it."""
     body = checked_keys(value, field, TERM)
     try:
-        found, factor = unit(body["unit"])
+        stated_dimension, factor = unit(body["unit"])
     except ValueError as error:
         raise FieldError(f"{field}: {error}", f"{field}.unit") from None
-    if LINEAR.get(found, found) != dimension and "scale" not in body:
+    if LINEAR.get(stated_dimension, stated_dimension) != dimension and "scale" not in body:
         raise FieldError(
-            f"{field}: unit {body['unit']!r} is a {found}, expected a {dimension}, or a scale to it",
+            f"{field}: unit {body['unit']!r} is a {stated_dimension}, expected a {dimension}, "
+            "or a scale to it",
             f"{field}.unit",
         )
     sign = number(body.get("sign", 1), f"{field}.sign")

@@ -102,12 +102,12 @@ class ShapeFit:
         def cost_of(r: FloatArray, at: FloatArray) -> float:
             return float(np.sum(np.log1p(r**2)) + np.sum(((at - centre) / doubt) ** 2))
 
-        here = self._residual(theta, sign)
-        cost = cost_of(here, theta)
+        residual = self._residual(theta, sign)
+        cost = cost_of(residual, theta)
         for _ in range(_ITERATIONS):
-            slope, weight = self._slope(theta, here, sign), 1.0 / (1.0 + here**2)
+            slope, weight = self._slope(theta, residual, sign), 1.0 / (1.0 + residual**2)
             normal = (slope * weight[:, None]).T @ slope + np.diag(doubt**-2.0)
-            right = slope.T @ (weight * here) + (theta - centre) / doubt**2
+            right = slope.T @ (weight * residual) + (theta - centre) / doubt**2
             step = -np.linalg.lstsq(normal, right, rcond=None)[0]
             trials = [(theta + share * step) for share in (1.0, 0.3, 0.1)]
             trial = ((at, r, cost_of(r, at)) for at in trials for r in [self._residual(at, sign)])
@@ -115,10 +115,10 @@ class ShapeFit:
             if better is None:
                 break
             done = cost - better[2] < max(1e-3 * cost, 0.01)
-            theta, here, cost = better
+            theta, residual, cost = better
             if done:
                 break
-        return theta, here, cost
+        return theta, residual, cost
 
     def _residual(self, theta: FloatArray, sign: FloatArray) -> FloatArray:
         """Return the residual of ln R over its doubt: of the size of all lines, then of their phase."""

@@ -147,7 +147,7 @@ def _lines(
     from rsea_ros.units import plain
 
     lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]
-    lines += [f"  {line}" for line in coverage_lines(made.said, made.unsaid)]
+    lines += [f"  {line}" for line in coverage_lines(made.represented, made.omitted)]
     lines += [
         f"played in both: {one.channel} differs by {one.times_noise:.3g} times the sensor's noise "
         f"({one.rms:.3g} {plain(one.unit)} of {one.signal:.3g})"
@@ -164,8 +164,8 @@ def _document(
         "rig": rig.name,
         "target": made.target,
         "file": str(out),
-        "says": {one.name: one.how for one in made.said},
-        "leaves_out": {one.name: one.why for one in made.unsaid},
+        "says": {one.name: one.how for one in made.represented},
+        "leaves_out": {one.name: one.why for one in made.omitted},
         "not_played": not_played or None,
         "difference": {
             one.channel: {

@@ -44,9 +44,9 @@ def hypotheses_from(models: Sequence[ModelFile]) -> list[Hypothesis]:
     for name in names:
         if names.count(name) > 1:
             raise ParameterError(f"two models with {name}, expected each cause once")
-    said = sum(m.probability or 0.0 for m in models)
-    silent = sum(m.probability is None for m in models)
-    rest = max(1.0 - said, 0.05) / silent if silent else 0.0
+    total = sum(m.probability or 0.0 for m in models)
+    unstated = sum(m.probability is None for m in models)
+    rest = max(1.0 - total, 0.05) / unstated if unstated else 0.0
     shares = np.array([rest if m.probability is None else m.probability for m in models])
     return [_hypothesis(m, float(p)) for m, p in zip(models, shares / shares.sum(), strict=True)]
 

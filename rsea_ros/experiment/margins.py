@@ -80,7 +80,7 @@ def _ends(hypothesis: Hypothesis, z: float) -> list[Rig]:
 
 def _corners(hypothesis: Hypothesis, z: float) -> list[Rig]:
     """Return rigs with the cause's own parameters moved together: a near stop is worst where it is stiff."""
-    positions, sd = hypothesis.own[:3], hypothesis.sd()
+    positions, sd = hypothesis.cause_indices[:3], hypothesis.sd()
     if len(positions) < 2:
         return []
     others = [(-1.0, 0.0, 1.0)] * (len(positions) - 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Said:
+class Represented:
     """Something of a rig that the target has. how: in the target's terms."""
 
     name: str
@@ -15,14 +15,14 @@ class Said:
 
 
 @dataclass(frozen=True)
-class Unsaid:
+class Omitted:
     """A part of a rig that the file leaves out. why: the feature that the target lacks."""
 
     name: str
     why: str
 
 
-class CannotSay(Exception):
+class Unrepresentable(Exception):
     """Raised by the translation of an effect that the target has no words for; the text says why."""
 
 
@@ -33,11 +33,11 @@ class Export:
     target: str
     suffix: str
     content: str | bytes
-    said: tuple[Said, ...]
-    unsaid: tuple[Unsaid, ...]
+    represented: tuple[Represented, ...]
+    omitted: tuple[Omitted, ...]
 
 
-def coverage_lines(said: Iterable[Said], unsaid: Iterable[Unsaid]) -> list[str]:
+def coverage_lines(represented: Iterable[Represented], omitted: Iterable[Omitted]) -> list[str]:
     """Return both lists for people, a line each."""
-    lines = [f"says {one.name}: {one.how}" for one in said]
-    return [*lines, *(f"leaves out {one.name}: {one.why}" for one in unsaid)]
+    lines = [f"says {one.name}: {one.how}" for one in represented]
+    return [*lines, *(f"leaves out {one.name}: {one.why}" for one in omitted)]

@@ -27,14 +27,14 @@ FOLDER = "alarms"
 
 
 @dataclass(frozen=True)
-class Told:
+class AlarmFile:
     """A new alarm. file: its path. text: the event in a sentence."""
 
     file: Path
     text: str
 
 
-def tell_alarms(store: Store) -> list[Told]:
+def write_alarms(store: Store) -> list[AlarmFile]:
     """Write a file for each alarm that the store has not reported before, and return those.
 
     Two processes at once write each alarm once. Raises OSError where the store cannot be written.
@@ -44,7 +44,7 @@ def tell_alarms(store: Store) -> list[Told]:
     return list(_new(store, folder))
 
 
-def _new(store: Store, folder: Path) -> Iterator[Told]:
+def _new(store: Store, folder: Path) -> Iterator[AlarmFile]:
     try:
         present = alarms(history(store.path), recordings(store.path))
     except FleetError:  # no row yet
@@ -53,7 +53,7 @@ def _new(store: Store, folder: Path) -> Iterator[Told]:
         file = folder / f"{alarm.joint}-{hashlib.sha256(alarm.key.encode()).hexdigest()[:12]}.json"
         with suppress(OutputError):
             write_text(file, json.dumps(webhook(alarm), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
-            yield Told(file, sentence(alarm))
+            yield AlarmFile(file, sentence(alarm))
 
 
 def webhook(alarm: Alarm) -> dict[str, Any]:

@@ -47,7 +47,7 @@ def finished(
 ) -> list[WrittenLaw]:  # fmt: skip
     """Return the laws as they were fitted, with their files."""
     where = provenance or _NO_PROVENANCE
-    said = (
+    held_out_gain = (
         f"Gain on blocks of time that took part in no fit and no choice: {100 * gain:.1f} % "
         f"(95 %: {100 * ci95[0]:.1f} to {100 * ci95[1]:.1f} %)."
     )
@@ -67,7 +67,7 @@ def finished(
         with lent(effect):
             claims = claims_of(law, effect, rig, cases[0])
         written.append(
-            WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=said)), claims, shown)
+            WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=held_out_gain)), claims, shown)
         )
     return written
 

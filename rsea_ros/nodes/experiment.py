@@ -154,9 +154,9 @@ class ExperimentNode:
             if waits:
                 assert self._proposal is not None
                 self._answer = answer
-                said = f"{'plays' if answer else 'does not play'}: {shape_words(self._proposal)}"
+                outcome = f"{'plays' if answer else 'does not play'}: {shape_words(self._proposal)}"
                 self._changed.notify_all()
-            response.success, response.message = waits, said if waits else "no run waits for an answer"
+            response.success, response.message = waits, outcome if waits else "no run waits for an answer"
         return response
 
     def _cancel(self, request: Any, response: Any) -> Any:

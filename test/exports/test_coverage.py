@@ -39,10 +39,10 @@ def test_every_effect_is_exported_or_reported_as_left_out(target):
     for name in catalogue():
         for rig in rigs_with(name):
             made = EXPORTS[target](rig)
-            said, unsaid = [one.name for one in made.said], [one.name for one in made.unsaid]
-            assert (name in said) != (name in unsaid), (name, rig.name)
+            represented, omitted = [one.name for one in made.represented], [one.name for one in made.omitted]
+            assert (name in represented) != (name in omitted), (name, rig.name)
             assert name in made.content
-            said_effects |= {name} & set(said)
+            said_effects |= {name} & set(represented)
     assert len(said_effects) >= FEWEST[target], sorted(said_effects)
 
 
@@ -146,4 +146,4 @@ def test_an_effect_at_its_null_value_is_not_exported(target):
     assert EXPORTS[target](idle).content == EXPORTS[target](rig).content
     half = rig.with_effects(EffectSetting("voltage_sag", {"limit": 10.0, "no_load_speed": math.inf}))
     made = EXPORTS[target](half)
-    assert [one.name for one in made.unsaid if "inf" in one.why] == ["voltage_sag"]
+    assert [one.name for one in made.omitted if "inf" in one.why] == ["voltage_sag"]

@@ -27,14 +27,14 @@ def worn(store, folder, monkeypatch):
 
 
 def test_an_alarm_is_sent_once(worn):
-    (first,) = told.tell_alarms(worn)
+    (first,) = told.write_alarms(worn)
     assert "knee: spring.stiffness" in first.text and "-250 to -150 N m/rad" in first.text
-    assert told.tell_alarms(worn) == []
+    assert told.write_alarms(worn) == []
     assert [file.name for file in (worn.path / "alarms").iterdir()] == [first.file.name]
 
 
 def test_an_alarm_has_the_form_that_a_webhook_accepts(worn):
-    (first,) = told.tell_alarms(worn)
+    (first,) = told.write_alarms(worn)
     body = json.loads(first.file.read_text(encoding="utf-8"))
     (alert,) = body["alerts"]
     assert (body["version"], body["status"], alert["status"]) == ("4", "firing", "firing")
@@ -43,4 +43,4 @@ def test_an_alarm_has_the_form_that_a_webhook_accepts(worn):
 
 
 def test_an_empty_store_has_no_alarm(store):
-    assert told.tell_alarms(store) == []
+    assert told.write_alarms(store) == []

@@ -63,18 +63,19 @@ def own_limits(bus: Bus, table: ControlTable) -> OwnLimits:
     )
 
 
-def check_own_limits(limits: Limits, own: OwnLimits, name: str) -> None:
+def check_own_limits(limits: Limits, motor_limits: OwnLimits, name: str) -> None:
     """Compare the driver's limits with the motor's. Raises ParameterError that names all that do not fit."""
     wrong = []
-    if limits.temperature > own.temperature:
+    if limits.temperature > motor_limits.temperature:
         wrong.append(
-            f"temperature_limit = {limits.temperature:g} °C, expected at most {own.temperature:g} °C, where"
-            " the motor switches itself off"
+            f"temperature_limit = {limits.temperature:g} °C, expected at most"
+            f" {motor_limits.temperature:g} °C, where the motor switches itself off"
         )
-    if limits.voltage >= own.highest_voltage:
+    if limits.voltage >= motor_limits.highest_voltage:
         wrong.append(
-            f"voltage_limit = {limits.voltage:g} V, expected less than {own.highest_voltage:.4g} V, the most"
-            f" that the motor takes (it takes {own.lowest_voltage:.4g} V or more)"
+            f"voltage_limit = {limits.voltage:g} V, expected less than"
+            f" {motor_limits.highest_voltage:.4g} V, the most that the motor takes"
+            f" (it takes {motor_limits.lowest_voltage:.4g} V or more)"
         )
     if wrong:
         raise ParameterError(f"parameter {'; '.join(wrong)} ({name})")

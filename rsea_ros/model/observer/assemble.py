@@ -80,7 +80,7 @@ def _with_disturbance(calls: Calls) -> Calls:
 
 def _state(n: int, size: int, machine: Machine) -> FilterState:
     """Return a state of zeros, all its parts views of one array."""
-    states = len(machine.own)
+    states = len(machine.effect_x)
     sizes = (n, size - n, size * size, st.SIZE, states, n, 3, SIGMA + 3, CLOCK, 9)
     whole = np.zeros(sum(sizes))
     parts = np.split(whole, np.cumsum(sizes)[:-1])

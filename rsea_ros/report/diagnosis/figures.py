@@ -49,8 +49,8 @@ def _before_and_after(diagnosis: Diagnosis, s: Spectrum) -> str:
     peak = f"{words.number(before[k], 2)} times the noise floor at {words.number(f[k], 2)} Hz"
     rest = f"at most {words.number(after[left], 2)} times at {words.number(f[left], 2)} Hz"
     end = "it is at the floor" if after[left] < ABOVE_FLOOR else rest
-    them = "it" if len(diagnosis.causes) == 1 else "them"
-    return f"Without {causes} the residual is up to {peak}; with {them}, {end}"
+    pronoun = "it" if len(diagnosis.causes) == 1 else "them"
+    return f"Without {causes} the residual is up to {peak}; with {pronoun}, {end}"
 
 
 def time_figure(diagnosis: Diagnosis, channel: str) -> Figure:

@@ -42,7 +42,7 @@ def _narrowed(hypothesis: Hypothesis, p: Proposal) -> str:
     """Return how much a run narrows each interval where one cause is left: the geometric mean over them."""
     if hypothesis.name == NOTHING:
         return "No cause is in doubt; a run can only narrow the intervals of the rig, and this one does most"
-    count = len(hypothesis.own) or len(hypothesis.theta)
+    count = len(hypothesis.cause_indices) or len(hypothesis.theta)
     times = f"{math.exp(p.sharpened / count):.3g} times"
     if count == 1:
         return f"The next run narrows the interval of {plain_name(hypothesis.name)} {times}"

@@ -113,10 +113,9 @@ def _picture(
     for i, joint in enumerate(joints):
         for j in np.flatnonzero(np.isfinite(depth[i]) | undetermined[i]):
             blank = bool(undetermined[i, j])
-            said = "cannot be determined" if blank else text(i, int(j))
-            cells.append(
-                _cell(i, int(j), "n" if blank else _class(float(depth[i, j])), f"{joint}, {weeks[j]}: {said}")
-            )
+            change = "cannot be determined" if blank else text(i, int(j))
+            shade = "n" if blank else _class(float(depth[i, j]))
+            cells.append(_cell(i, int(j), shade, f"{joint}, {weeks[j]}: {change}"))
     height = _ROW * len(joints)
     labels = "".join(f"<li>{links.joint(j)}</li>" for j in joints)
     return (

@@ -132,8 +132,8 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
 def _undetermined(identification: Identification) -> str:
     title = "What these data cannot determine"
     others = split_off_rig(identification.remarks)[1]
-    said = (*doubt_sentences(identification), *remark_sentences(others))
-    body = bullets(said) if said else paragraph("The data determine every free value.")
+    sentences = (*doubt_sentences(identification), *remark_sentences(others))
+    body = bullets(sentences) if sentences else paragraph("The data determine every free value.")
     return section(title, body)
 
 
