@@ -20,7 +20,7 @@ from statistics import median
 from bench.controller_node import HOLD, MARK
 from bench.torque_control_nodes import ROOT, Outside
 from msg_adapters.ros import torque_command_message
-from msg_adapters.topics import JOINT_STATE
+from msg_adapters.topic_map import JOINT_STATE
 from rsea_ros.nodes._mailbox import Mailbox
 from rsea_ros.nodes._qos import MEASUREMENT
 

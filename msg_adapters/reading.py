@@ -12,9 +12,9 @@ from msg_adapters.cdr import Block
 from msg_adapters.checks import FieldSamples, check_finite, note_repeats, on_the_clock_of_the_command
 from msg_adapters.contents import Contents, Messages
 from msg_adapters.decoding import Decoded
-from msg_adapters.health import DIAGNOSTICS, tell_health
 from msg_adapters.inferred import is_inferred
-from msg_adapters.topics import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
+from msg_adapters.reported_faults import DIAGNOSTICS, tell_health
+from msg_adapters.topic_map import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel, FloatArray, IntArray, Record
 from rsea_ros.stamp_order import far_apart, in_order, stray_fault

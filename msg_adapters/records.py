@@ -10,7 +10,7 @@ import numpy as np
 
 from msg_adapters import encoding
 from msg_adapters.remarks import Remarks
-from msg_adapters.topics import AXES, FIELDS, TYPES, TopicMap, sign_and_index
+from msg_adapters.topic_map import AXES, FIELDS, TYPES, TopicMap, sign_and_index
 from msg_adapters.writing import BagWriter
 from rsea_ros.errors import BagError
 from rsea_ros.signals import FloatArray, IntArray, Record

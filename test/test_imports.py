@@ -97,7 +97,7 @@ NAMING = (
     {"rivals", "probability"},
     {"weighing"},
     {"status"},
-    {"causes"},
+    {"cause_facts"},
     {"outcome"},
     {"conclusion"},
 )

@@ -45,7 +45,7 @@ def _look(args: argparse.Namespace, held: list[Held], at_first: bool) -> int:
 
     held: recordings unchanged since the previous look, so that none is still being recorded.
     """
-    from rsea_ros.fleet.alarms import write_alarms
+    from rsea_ros.fleet.alarm_files import write_alarms
     from rsea_ros.fleet.store import open_store
 
     summary = worked(args, args.store, held)

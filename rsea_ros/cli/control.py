@@ -68,7 +68,7 @@ def motors(rig: Rig) -> list[MotorLimits]:
     """Return the limit of the driver, and those of the catalogue unit with the gear ratio of the rig."""
     from rsea_ros.control.controller import TorqueLimits
     from rsea_ros.control.study import MotorLimits
-    from rsea_ros.design.catalogue import catalogue
+    from rsea_ros.design.motor_gear_units import catalogue
 
     limit, where = TorqueLimits().torque, "torque_limit of config/nodes/driver.yaml"
     limits = [MotorLimits("driver's limit", limit, float("inf"), where)]

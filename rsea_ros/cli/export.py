@@ -14,8 +14,8 @@ from rsea_ros.cli._output import FOUND, add_force, path
 from rsea_ros.new_files import check_free, write_file
 
 if TYPE_CHECKING:
-    from rsea_ros.exports.coverage import Export
     from rsea_ros.exports.difference import Difference
+    from rsea_ros.exports.represented import Export
     from rsea_ros.model.rig import Rig
 
 HELP = "convert a rig to MuJoCo, FMI, URDF, SDF, Isaac Lab or BAM, and list the parts left out"
@@ -143,7 +143,7 @@ def _lines(
     made: Export, rig: Rig, out: Path, differences: tuple[Difference, ...], not_played: str
 ) -> list[str]:
     """Return the report as text: file, content, omissions, differences."""
-    from rsea_ros.exports.coverage import coverage_lines
+    from rsea_ros.exports.represented import coverage_lines
     from rsea_ros.units import plain
 
     lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]

@@ -13,8 +13,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from rsea_ros.exports.coverage import Export, Omitted, Represented
 from rsea_ros.exports.others import acting, omitted_effects, omitted_parts, sized
+from rsea_ros.exports.represented import Export, Omitted, Represented
 from rsea_ros.model.rig import Rig
 
 ALPHA = 2.0

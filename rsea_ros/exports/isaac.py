@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from rsea_ros.exports.coverage import Export, Omitted, Represented, coverage_lines
 from rsea_ros.exports.others import acting, omitted_effects, omitted_parts, sized
+from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.rig import Rig
 
 PHYSICS_STEP = 0.005

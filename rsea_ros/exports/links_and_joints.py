@@ -13,8 +13,8 @@ from xml.etree import ElementTree as xml
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import Chain, Joint, Link, chain_of
-from rsea_ros.exports.coverage import Export, Omitted, Represented, coverage_lines
 from rsea_ros.exports.others import acting, sized
+from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.rig import Rig
 
 Frame = Callable[[str], tuple[xml.Element, xml.Element]]

@@ -1,4 +1,4 @@
-"""A rig with its effects for MuJoCo 4: the bodies of design/mjcf.py, and each effect in MuJoCo's own terms.
+"""A rig with its effects for MuJoCo 4: bodies of design/mujoco_model.py, each effect in MuJoCo's own terms.
 
 Source: MuJoCo 4.0 XML reference (actuator delay, filterexact, dcmotor; tendon stiffness and damping as
 polynomials, springlength, springyield, frictionloss).
@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from xml.etree import ElementTree as xml
 
-from rsea_ros.design.mjcf import model_element, text
+from rsea_ros.design.mujoco_model import model_element, text
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import check_rotary
-from rsea_ros.exports.coverage import Export, Omitted, Represented, Unrepresentable, coverage_lines
 from rsea_ros.exports.mjcf_effects import EFFECTS, STRUCTURES
 from rsea_ros.exports.mjcf_loop import say_loop
 from rsea_ros.exports.others import acting, sized
+from rsea_ros.exports.represented import Export, Omitted, Represented, Unrepresentable, coverage_lines
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.structure import structured
 
@@ -22,7 +22,7 @@ from rsea_ros.model.structure import structured
 def export_mjcf(rig: Rig) -> Export:
     """Return the model of a rig.
 
-    Raises RigError for a rig that MJCF cannot represent (see design/mjcf.py).
+    Raises RigError for a rig that MJCF cannot represent (see design/mujoco_model.py).
     """
     check_rotary(rig)
     rig = acting(rig)

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 from xml.etree import ElementTree as xml
 
-from rsea_ros.exports.coverage import Omitted, Represented
 from rsea_ros.exports.mjcf_effects import motor
+from rsea_ros.exports.represented import Omitted, Represented
 from rsea_ros.model.rig import Rig
 
 

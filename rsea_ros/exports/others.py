@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.exports.coverage import Omitted, Represented
+from rsea_ros.exports.represented import Omitted, Represented
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 

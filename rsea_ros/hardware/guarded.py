@@ -14,7 +14,7 @@ from rsea_ros.hardware.device import Device, NoReply, State
 from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, complaint
 from rsea_ros.hardware.losses import Losses
 from rsea_ros.hardware.protection import NONE
-from rsea_ros.hardware.spring import Spring
+from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.hardware.together import cycle
 
 BUSY = "clear_fault or reboot is under way, expected it to be over"

@@ -11,13 +11,13 @@ from rsea_ros.effects.catalogue import lent
 from rsea_ros.effects.effect import Claims, Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.unknowns import apply
-from rsea_ros.laws.claims import claims_of
 from rsea_ros.laws.columns import bench_of
+from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import Law
-from rsea_ros.laws.reading import letters_of
+from rsea_ros.laws.measured_claims import claims_of
 from rsea_ros.laws.refinement import Refined, effect_from
 from rsea_ros.laws.result import FigurePoints, WrittenLaw
-from rsea_ros.laws.writing import LawProvenance, source_of
+from rsea_ros.laws.variable_places import letters_of
 from rsea_ros.model.rig import EffectSetting
 
 _POINTS = 4000

@@ -19,7 +19,7 @@ from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
-from rsea_ros.model.loop import STATES, control
+from rsea_ros.model.firmware_loop import STATES, control
 from rsea_ros.model.position_loop import commanded, loop_parameters
 from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import Rig

@@ -18,7 +18,7 @@ from msg_adapters.ros import (
     joint_state_message,
     wrench_message,
 )
-from msg_adapters.topics import JOINT_STATE, TYPES
+from msg_adapters.topic_map import JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import HORIZON, CommandQueue

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from rclpy.node import Node
 
-from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
+from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading
 from rsea_ros.nodes._anchor import Anchor

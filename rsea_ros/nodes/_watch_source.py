@@ -14,7 +14,7 @@ from typing import Any
 from rclpy.node import Node
 
 from msg_adapters.ros import Bool, DiagnosticArray
-from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
+from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.nodes._anchor import SECOND

@@ -12,7 +12,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from rsea_ros.health.finding import HealthFinding
+from rsea_ros.health.health_finding import HealthFinding
 from rsea_ros.health.monitor import Monitor
 from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.rig_file import load_rig

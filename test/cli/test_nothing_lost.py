@@ -20,11 +20,11 @@ from rsea_ros.checks.finding import Findings
 from rsea_ros.cli import _checks, experiment, paper
 from rsea_ros.cli.main import main
 from rsea_ros.control import study
-from rsea_ros.design import judge, margins
+from rsea_ros.design import judge, tolerance
 from rsea_ros.diagnosis import diagnose
 from rsea_ros.errors import OutputError
 from rsea_ros.experiment import advice, run_file
-from rsea_ros.fleet import columns
+from rsea_ros.fleet import store_columns
 from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.laws import learn
@@ -122,7 +122,7 @@ def folder(record, tmp_path, monkeypatch) -> Path:
     found = Found()
     for module, names, value in (
         (identify, "identify", found), (diagnose, "diagnose", found), (study, "study", found),
-        (judge, "judge", found), (judge, "least_stiffness", 1.0), (margins, "robust_stiffness", np.inf),
+        (judge, "judge", found), (judge, "least_stiffness", 1.0), (tolerance, "robust_stiffness", np.inf),
         (usable, "check_diagnosable", None), (_checks, "check_record", Findings("run.mcap", RIG, (), ())),
         (results, "identification_json", JSON), (results, "identification_report", "page"),
         (diagnosis_files, "diagnosis_json", JSON), (diagnosis_files, "diagnosis_report", "page"),
@@ -134,7 +134,8 @@ def folder(record, tmp_path, monkeypatch) -> Path:
         (learn, "learn", found), (law_files, "law_json", JSON), (law_files, "law_report", "page"),
         (law_files, "rig_text", "rig"), (experiment, "_possible", ((), {}, {})), (advice, "advise", found),
         (run_file, "run_text", "t,u"), (experiment_json, "advice_json", JSON),
-        (experiment_page, "advice_page", "page"), (columns, "history", {}), (columns, "recordings", {}),
+        (experiment_page, "advice_page", "page"), (store_columns, "history", {}),
+        (store_columns, "recordings", {}),
         (fleet_files, "fleet_trends", found), (fleet_files, "alarms_of", []), (fleet_files, "_steps", None),
         (fleet_files, "joint_page", "page"), (fleet_files, "fleet_page", "page"),
     ):  # fmt: skip

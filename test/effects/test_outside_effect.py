@@ -17,7 +17,7 @@ from rsea_ros.control.compensation import compensation
 from rsea_ros.control.lags import lagging
 from rsea_ros.control.sampled import responses, sampled
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.naming.causes import undetermined_play
+from rsea_ros.diagnosis.naming.cause_facts import undetermined_play
 from rsea_ros.diagnosis.problem_variants import with_common_clock_in_delay
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named

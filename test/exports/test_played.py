@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main
-from rsea_ros.design.mjcf import STEP
+from rsea_ros.design.mujoco_model import STEP
 from rsea_ros.exports import mujoco_play
 from rsea_ros.exports.difference import RATE, differences, ours
 from rsea_ros.exports.fmu import export_fmu

@@ -10,9 +10,9 @@ from typing import TypeVar
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS
 
 from rsea_ros.hardware.device import NoReply, Refused
+from rsea_ros.hardware.dynamixel.control_tables import Item
 from rsea_ros.hardware.dynamixel.handler import PacketHandler
 from rsea_ros.hardware.dynamixel.port import SerialPort
-from rsea_ros.hardware.dynamixel.tables import Item
 
 T = TypeVar("T")
 ATTEMPTS, PATIENCE = 5, 0.02

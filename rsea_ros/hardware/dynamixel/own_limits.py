@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.dynamixel.bus import Bus
-from rsea_ros.hardware.dynamixel.tables import ControlTable
+from rsea_ros.hardware.dynamixel.control_tables import ControlTable
 from rsea_ros.hardware.limits import Limits
 
 REVERSED, ENABLED_BY_GOAL = 0x01, 0x08

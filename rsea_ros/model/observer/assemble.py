@@ -11,7 +11,7 @@ from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.equations import PORTS
 from rsea_ros.model.observer.filter import CLOCK, SIGMA, FilterModel, FilterState, disturbance
 from rsea_ros.model.observer.linear import linear_model
-from rsea_ros.model.observer.noise import Noise
+from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls

@@ -9,8 +9,8 @@ from rich.text import Text
 
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.report import words
-from rsea_ros.report.lines import WIDTH, wrapped
 from rsea_ros.report.rig.words import rig_in_brackets
+from rsea_ros.report.wrapped_lines import WIDTH, wrapped
 
 _LIGHT, _KIND, _CHANNEL = 7, 14, 25
 """Columns."""

@@ -16,7 +16,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.report.control.tables import control_tables, gains_words
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
-from rsea_ros.report.figures.response import Band, Mark, ResponseCurve, response_figure
+from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
 

@@ -25,7 +25,7 @@ from rsea_ros.report.design.tables import (
 )
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, QUIET, TRUTH
-from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure
+from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import equation, key_numbers, section
 from rsea_ros.signals import FloatArray

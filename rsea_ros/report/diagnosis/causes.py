@@ -14,7 +14,7 @@ from rsea_ros.report.diagnosis.sentences import evidence
 from rsea_ros.report.diagnosis.standing import STATUS, standing
 from rsea_ros.report.figures.palette import AFTER, GRID, MEASURED, QUIET, faint
 from rsea_ros.report.page.html import bullets, equation, paragraph, section
-from rsea_ros.report.page.table import table_of_rows
+from rsea_ros.report.page.html_table import table_of_rows
 from rsea_ros.wording import listed
 
 _WIDTH, _HEIGHT = 180.0, 18.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from rsea_ros.experiment.advice import Advice, Proof
+from rsea_ros.experiment.chance_constraint import LEVEL
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
-from rsea_ros.experiment.limits import UNITS
-from rsea_ros.experiment.margins import LEVEL
 from rsea_ros.experiment.proposal import Proposal
+from rsea_ros.experiment.run_limits import UNITS
 from rsea_ros.report import words
 from rsea_ros.wording import listed
 

@@ -12,7 +12,7 @@ from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import name, percent, short_day
 from rsea_ros.report.page.html import section
 from rsea_ros.signals import FloatArray
-from rsea_ros.trends.causes import Naming
+from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.series import BoolArray
 from rsea_ros.trends.weeks import Steps, binned

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.identification.identify import identify
-from rsea_ros.model.prediction import Comparison, predict
+from rsea_ros.model.prediction_errors import Comparison, predict
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
 

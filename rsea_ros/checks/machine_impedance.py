@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.checks.channel_spectra import Quotient, quotient
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.gain_findings import RIGHT_RIG
 from rsea_ros.checks.gains import inertia_spread
-from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig import Rig

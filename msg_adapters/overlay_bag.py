@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from msg_adapters.records import write_records
-from msg_adapters.topics import TopicMap
+from msg_adapters.topic_map import TopicMap
 from rsea_ros.signals import Record
 
 

@@ -2,7 +2,8 @@
 
 Shapes of every kind are tried, the best is refined by Nelder and Mead's method (scipy), which needs no smooth
 objective: gear friction and stops give none. Shapes are rated by simulation with the compiled step;
-separation.py has the measure. The final amplitude is the largest at which margins.py keeps all limits.
+separation.py has the measure. The final amplitude is the largest with which chance_constraint.py keeps all
+limits.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from itertools import combinations
 import numpy as np
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.experiment.chance_constraint import Group, Peaks, ends_of, peaks, share_used
 from rsea_ros.experiment.hypothesis import Hypothesis
-from rsea_ros.experiment.margins import Group, Peaks, ends_of, peaks, share_used
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.refine import refined
+from rsea_ros.experiment.run_shape import Shape
 from rsea_ros.experiment.separation import decided, refitted, separations, sharpened
-from rsea_ros.experiment.shape import Shape
 from rsea_ros.experiment.shape_rater import INSIDE, ShapeRater, noise_by_channel
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig

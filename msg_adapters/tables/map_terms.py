@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from msg_adapters.tables.column_units import CHANNELS, LINEAR, unit
 from msg_adapters.tables.elements import chosen
 from msg_adapters.tables.expression import Expression, parse
-from msg_adapters.tables.keys import TERM
-from msg_adapters.tables.units import CHANNELS, LINEAR, unit
+from msg_adapters.tables.map_keys import TERM
 from rsea_ros.errors import FieldError
 from rsea_ros.keys import NEEDED, Key
 from rsea_ros.wording import shown

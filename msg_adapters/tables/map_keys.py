@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from msg_adapters.tables.column_units import CHANNELS, FACTORS
 from msg_adapters.tables.expression import FUNCTIONS
-from msg_adapters.tables.units import CHANNELS, FACTORS
 from rsea_ros.keys import NEEDED, Key, table
 
 RATES = (1e-3, 1e6)

@@ -12,7 +12,7 @@ import numpy as np
 
 from rsea_ros.checks.linear_rows import LinearisedRows, LinearSetting, LinearState, left_of, on_time, rows_of
 from rsea_ros.checks.linear_step import gauss_newton_step
-from rsea_ros.checks.shape import FittedShape
+from rsea_ros.checks.response_shape import FittedShape
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.problem import Problem, case_from, channels_that_tell
 from rsea_ros.identification.unknowns import unknowns_of_rig

@@ -9,11 +9,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from msg_adapters.tables import json_file
+from msg_adapters.tables.column_table import Table
 from msg_adapters.tables.json_file import read_json
 from msg_adapters.tables.mat_file import read_mat
 from msg_adapters.tables.npz_file import read_npy, read_npz
 from msg_adapters.tables.parquet_file import read_parquet
-from msg_adapters.tables.table import Table
 from msg_adapters.tables.text_file import read_text
 from msg_adapters.tables.zarr_file import read_zarr
 from msg_adapters.tables.zarr_store import is_group

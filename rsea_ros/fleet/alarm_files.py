@@ -17,9 +17,9 @@ from typing import Any
 
 from rsea_ros.errors import OutputError
 from rsea_ros.files import make_folder
-from rsea_ros.fleet.columns import history, recordings
-from rsea_ros.fleet.errors import FleetError
+from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.store import Store
+from rsea_ros.fleet.store_columns import history, recordings
 from rsea_ros.new_files import write_text
 from rsea_ros.trends import Alarm, alarms
 

@@ -13,8 +13,8 @@ from hypothesis import assume, given, settings
 
 from rsea_ros.cli.main import main
 from rsea_ros.design import mesh
-from rsea_ros.design import mjcf as mjcf_module
-from rsea_ros.design.mjcf import GRAVITY, mjcf
+from rsea_ros.design import mujoco_model as mjcf_module
+from rsea_ros.design.mujoco_model import GRAVITY, mjcf
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.lumped import lumped

@@ -7,7 +7,7 @@ import json
 import pytest
 from fleet_stubs import KNEE, stub_work
 
-from rsea_ros.fleet import alarms as told
+from rsea_ros.fleet import alarm_files
 from rsea_ros.fleet.engine import Engine
 from rsea_ros.fleet.executor import Serial
 from rsea_ros.fleet.sources import bags_of
@@ -22,19 +22,19 @@ STEP = Alarm("knee/spring.stiffness/down", "knee", "spring.stiffness", "change",
 def worn(store, folder, monkeypatch):
     """Return a store whose trends show a change of one joint."""
     Engine(store, Serial(), stub_work, lambda step, share: None).run(bags_of([str(folder)], [KNEE]))
-    monkeypatch.setattr(told, "alarms", lambda history, recordings: (STEP,))
+    monkeypatch.setattr(alarm_files, "alarms", lambda history, recordings: (STEP,))
     return store
 
 
 def test_an_alarm_is_sent_once(worn):
-    (first,) = told.write_alarms(worn)
+    (first,) = alarm_files.write_alarms(worn)
     assert "knee: spring.stiffness" in first.text and "-250 to -150 N m/rad" in first.text
-    assert told.write_alarms(worn) == []
+    assert alarm_files.write_alarms(worn) == []
     assert [file.name for file in (worn.path / "alarms").iterdir()] == [first.file.name]
 
 
 def test_an_alarm_has_the_form_that_a_webhook_accepts(worn):
-    (first,) = told.write_alarms(worn)
+    (first,) = alarm_files.write_alarms(worn)
     body = json.loads(first.file.read_text(encoding="utf-8"))
     (alert,) = body["alerts"]
     assert (body["version"], body["status"], alert["status"]) == ("4", "firing", "firing")
@@ -43,4 +43,4 @@ def test_an_alarm_has_the_form_that_a_webhook_accepts(worn):
 
 
 def test_an_empty_store_has_no_alarm(store):
-    assert told.write_alarms(store) == []
+    assert alarm_files.write_alarms(store) == []

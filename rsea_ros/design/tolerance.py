@@ -9,8 +9,8 @@ from types import MappingProxyType
 import numpy as np
 
 from rsea_ros.design import mechanism
-from rsea_ros.design.catalogue import MotorGear
 from rsea_ros.design.judge import SpringDesign, judge, least_stiffness
+from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.signals import FloatArray
@@ -19,7 +19,7 @@ SPREADS: Mapping[str, float] = MappingProxyType(
     {"rate": 0.05, "arm": 0.005, "spring_radius": 0.04, "inertia": 0.05, "motor": 0.05}
 )
 """Relative, one sigma. rate: the paper's springs were 9.5 % below the maker's number. The rotor's spread is
-the unit's (catalogue.py)."""
+the unit's (motor_gear_units.py)."""
 SAMPLES = 20_000
 
 

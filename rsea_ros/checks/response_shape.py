@@ -2,8 +2,8 @@
 
     ln R(f) = ln(G(f; theta) / G(f; theta_0)) + g - i 2 pi f tau
 
-with R measured over predicted (spectra.py) at the rig's values theta_0. Priors: theta by the rig's spread,
-widened because a rig is a guess; g and tau by the caller. Lines that do not fit count less (Cauchy).
+with R measured over predicted (channel_spectra.py) at the rig's values theta_0. Priors: theta by the rig's
+spread, widened because a rig is a guess; g and tau by the caller. Lines that do not fit count less (Cauchy).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.checks.spectra import Quotient, usable
+from rsea_ros.checks.channel_spectra import Quotient, usable
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.responses import model_responses
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector, unknowns_of_rig

@@ -10,15 +10,15 @@ from independent.hidden import hide
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.advice import advise
 from rsea_ros.experiment.bound import bound
-from rsea_ros.experiment.design import propose
-from rsea_ros.experiment.files import hypotheses_from, model_of
+from rsea_ros.experiment.chance_constraint import at_ends
 from rsea_ros.experiment.hypothesis import motion, run_case
-from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used
-from rsea_ros.experiment.margins import at_ends
+from rsea_ros.experiment.joint_weighing import cases_of
 from rsea_ros.experiment.proposal import DesignRequest
+from rsea_ros.experiment.run_design import propose
+from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used
+from rsea_ros.experiment.run_shape import Shape, at_rest_around, command_of
 from rsea_ros.experiment.separation import Refit, refitted
-from rsea_ros.experiment.shape import Shape, at_rest_around, command_of
-from rsea_ros.experiment.weighing import cases_of
+from rsea_ros.experiment.stored_models import hypotheses_from, model_of
 from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.identification.solver import power, solve
 from rsea_ros.model.rig_file import load_rig

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.limits import RunLimits, limits_from, of_command, used
 from rsea_ros.experiment.run_file import read_run, run_text
-from rsea_ros.experiment.shape import KINDS, LEAD, Shape, command_of
+from rsea_ros.experiment.run_limits import RunLimits, limits_from, of_command, used
+from rsea_ros.experiment.run_shape import KINDS, LEAD, Shape, command_of
 
 RATE = 280.0
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rsea_ros import units
 from rsea_ros.identification.result import Identification, ParameterEstimate
-from rsea_ros.library.frames import parameter_frame, plain
+from rsea_ros.library.data_frames import parameter_frame, plain
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.progress import Progress
@@ -61,7 +61,7 @@ class Fit:
 
     def plot(self, response: int = 0) -> Figure:
         """Return a plotly figure of the measured and fitted frequency response, or of the record."""
-        from rsea_ros.library.figures import fit_figure
+        from rsea_ros.library.result_figures import fit_figure
 
         return fit_figure(self.result, response)
 

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import norm
 
 from rsea_ros.experiment.hypothesis import Hypothesis, motion
-from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used
+from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
