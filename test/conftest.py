@@ -65,7 +65,8 @@ COMPUTING = (
     "cli/test_paper", "report/", "diagnosis/test_detents", "cli/test_diagnose",
     "test_inputs", "identification/test_identify", "control/test_verb", "model/test_pure_torque",
     "cli/test_nothing_lost", "cli/test_output_names", "cli/test_bad_", "test_launcher",
-    "laws/test_hidden_laws", "diagnosis/test_joint", "fleet/test_task", "test_readme", "test_docs", "independent/test_bench",
+    "laws/test_hidden_laws", "diagnosis/test_joint", "fleet/test_task", "test_readme", "test_docs",
+    "independent/test_bench",
 )  # fmt: skip
 """Files that compute longest, in this order, so that no worker is left with one of them at the end."""
 
