@@ -72,10 +72,10 @@ class TopicMap:
     required: frozenset[str] = field(default=frozenset(), init=False)
 
     def __post_init__(self) -> None:
-        for what in ("namespace", *ROLES, "joint"):
-            name = getattr(self, what) or ""
-            if not name.isprintable():
-                raise ParameterError(f"{what} {name!r}: cannot be printed, expected a name of ROS")
+        for name in ("namespace", *ROLES, "joint"):
+            value = getattr(self, name) or ""
+            if not value.isprintable():
+                raise ParameterError(f"{name} {value!r}: cannot be printed, expected a name of ROS")
         if self.axis.removeprefix("-") not in AXES:
             raise ParameterError(
                 f"axis {self.axis!r}: expected one of {', '.join(AXES)}, with or without a minus"

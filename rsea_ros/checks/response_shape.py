@@ -69,8 +69,8 @@ class ShapeFit:
         self.channels = tuple(kept)
         self._of = np.repeat(np.arange(len(kept)), [int(keep.sum()) for _, keep in kept.values()])
         self._frequency, self._value, sd = (
-            np.concatenate([getattr(q, what)[keep] for q, keep in kept.values()] or [np.empty(0)])
-            for what in ("frequency", "value", "sd")
+            np.concatenate([getattr(q, name)[keep] for q, keep in kept.values()] or [np.empty(0)])
+            for name in ("frequency", "value", "sd")
         )
         self._sd = np.hypot(sd, MODEL_ERROR)
         self._share = np.concatenate([q.weight[keep] for q, keep in kept.values()] or [np.empty(0)])

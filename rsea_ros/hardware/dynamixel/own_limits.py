@@ -43,13 +43,13 @@ def own_limits(bus: Bus, table: ControlTable) -> OwnLimits:
     start, size = table.span(READ)
     data = bus.patiently(lambda: bus.read(start, size))
     value = {name: table.items[name].value(data, start) for name in READ if name in table.items}
-    for name, bit, what in (
+    for name, bit, reason in (
         ("drive_mode", ENABLED_BY_GOAL, "a goal that is written switches its torque on"),
         ("startup", ENABLED_AT_START, "its torque is on when the power comes"),
     ):
         if value.get(name, 0) & bit:
             without = value[name] & ~bit
-            raise DeviceError(f"motor: {name} {value[name]}: {what}, expected {without}, set in the motor")
+            raise DeviceError(f"motor: {name} {value[name]}: {reason}, expected {without}, set in the motor")
     return OwnLimits(
         firmware=value["firmware"],
         return_delay=value["return_delay"],

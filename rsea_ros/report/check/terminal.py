@@ -69,9 +69,9 @@ def _each_remedy_once(findings: Iterable[Finding]) -> Iterator[Finding]:
 
 def sentence(f: Finding) -> str:
     """Return a finding as one line."""
-    what = " ".join(filter(None, (f"{f.light}:", kind(f), _channel(f))))
+    subject = " ".join(filter(None, (f"{f.light}:", kind(f), _channel(f))))
     text = " ".join(filter(None, (number(f), f.detail))) or "none"
-    parts = (f"{what}: {text}", f"expected {f.expected}" if f.expected else "", f.remedy)
+    parts = (f"{subject}: {text}", f"expected {f.expected}" if f.expected else "", f.remedy)
     return "; ".join(filter(None, parts))
 
 

@@ -42,8 +42,8 @@ def _sizes(cause: Cause) -> str:
     for name, p in cause.parameters.items():
         value, doubt, unit = num.estimate(p)
         doubt = f" <small>{doubt.strip()}</small>" if doubt else ""
-        what = f"{escape(name.replace('_', ' '))}, 95 % interval{escape(_model_share(p))}"
-        cells.append(f"<div><b>{value}{doubt} {escape(unit)}</b><span>{what}</span></div>")
+        label = f"{escape(name.replace('_', ' '))}, 95 % interval{escape(_model_share(p))}"
+        cells.append(f"<div><b>{value}{doubt} {escape(unit)}</b><span>{label}</span></div>")
     return f'<div class="keys">{"".join(cells)}</div>'
 
 

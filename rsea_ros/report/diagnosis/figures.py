@@ -23,13 +23,13 @@ _FIRST_VIEW = 3.0
 
 def spectrum_figure(diagnosis: Diagnosis, spectrum: Spectrum) -> Figure:
     """Return the residual's density before and after against the noise floor."""
-    s, what = spectrum, words.channel(spectrum.channel)
+    s, channel = spectrum, words.channel(spectrum.channel)
     if not diagnosis.causes:
         curves = [SpectrumLine("residual", AFTER if diagnosis.at_noise_floor else BEFORE, s.before)]
-        title = finding(s.frequency, s.before, s.noise, what)
+        title = finding(s.frequency, s.before, s.noise, channel)
         return residual_figure(title, s.channel, s.frequency, curves, s.noise)
     curves = [SpectrumLine("before", BEFORE, s.before), SpectrumLine("after", AFTER, s.after)]
-    title, caption = _before_and_after(diagnosis, s), f"Residual of the {what}: measured minus simulated."
+    title, caption = _before_and_after(diagnosis, s), f"Residual of the {channel}: measured minus simulated."
     figure = residual_figure(title, s.channel, s.frequency, curves, s.noise, caption)
     return replace(figure, data=[_gained(s), *figure.data])
 

@@ -41,8 +41,8 @@ def gain_section(result: LawResult) -> str:
     rows = [
         f"<tr><td>{escape(words.channel(n))}</td>"
         + "".join(
-            f"<td class='number' data-label='{what}'>{words.quantity(rms, CHANNEL_UNITS[n], 3)}</td>"
-            for what, rms in (
+            f"<td class='number' data-label='{case}'>{words.quantity(rms, CHANNEL_UNITS[n], 3)}</td>"
+            for case, rms in (
                 ("without", result.before[n]), ("with the law", result.after[n]), ("noise", result.noise[n])
             )
         )
