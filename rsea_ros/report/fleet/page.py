@@ -57,8 +57,8 @@ def _blocks(
         yield section("Worst joints first", alarm_table(ranked, links))
     for parameter in _mapped(fleet):
         yield heat_map(parameter, joints[:_ROWS], fleet, steps, links)
-    for kind, name in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
-        yield naming_map(name, kind, _naming(fleet, kind, name, joints)[:_ROWS], fleet, steps, links)
+    for kind, subject in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
+        yield naming_map(subject, kind, _naming(fleet, kind, subject, joints)[:_ROWS], fleet, steps, links)
     yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
     yield _undetermined(fleet, links)
     yield folded("Certainty of these findings", bullets(_sure(fleet)))
@@ -110,8 +110,8 @@ def _grouped(number: int) -> str:
     return f"{number:,}".replace(",", " ")
 
 
-def _naming(fleet: FleetTrends, kind: str, name: str, joints: Sequence[str]) -> list[str]:
-    naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, name)}
+def _naming(fleet: FleetTrends, kind: str, subject: str, joints: Sequence[str]) -> list[str]:
+    naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, subject)}
     return [j for j in joints if j in naming]
 
 
