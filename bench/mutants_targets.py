@@ -23,6 +23,7 @@ TARGETS: dict[str, tuple[str, ...]] = {
         "identification/test_coloured_measures.py",
     ),
     "identification/clocks": ("identification/test_clock_tables.py",),
+    "diagnosis/score": ("diagnosis/test_score_tables.py", "diagnosis/test_tempering.py"),
     "diagnosis/criteria": (
         "diagnosis/test_criteria_edges.py",
         "diagnosis/test_known_values.py",
