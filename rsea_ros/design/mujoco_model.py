@@ -180,7 +180,7 @@ def _joined(
         flanks.set("solreflimit", SOLREF)
         flanks.set("solimplimit", SOLIMP)
     else:
-        tie("gear", _sum(output, {"chassis": -1.0}), rig["gear.stiffness"])
+        tie("gear", _sum(output, {"chassis": -1.0}), *_spring(rig, "gear"))
         tie("encoder", {"chassis": 1.0, "housing": -1.0})
     if math.isfinite(rig["proximal_spring.stiffness"]):
         tie("proximal_spring", {"proximal": 1.0, "housing": -1.0}, *_spring(rig, "proximal_spring"))

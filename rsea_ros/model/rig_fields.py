@@ -59,6 +59,7 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "rotor.reflected_damping": Field("N m s/rad"),
         "gear.ratio": Field("1", low=1.0, default=1.0),
         "gear.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
+        "gear.damping": Field("N m s/rad", default=0.0),
         "chassis.inertia": Field("kg m^2", default=0.0),
         "spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
         "spring.damping": Field("N m s/rad", default=0.0),

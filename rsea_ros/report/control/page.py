@@ -61,7 +61,7 @@ def _crossover(at: AtRate) -> float:
 
 def _keys(study: Study) -> list[tuple[str, str]]:
     at = study.rates[0]
-    value = {trial.name: trial for trial in at.trials}
+    value = {trial.what: trial for trial in at.trials}
     errors = [(f"{t.value:.1f} %", name) for name, t in value.items() if t.unit == "%"][:1]
     return [
         (f"{study.resonance:.1f} Hz", "open-loop resonance"),
