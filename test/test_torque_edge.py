@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.checks.check import check_record
-from rsea_ros.model.prediction import predict
+from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel, Record

@@ -1,4 +1,4 @@
-"""Effects in MuJoCo's terms: each a function that changes the model and returns how it is said."""
+"""Effects in MuJoCo's terms: each a function that changes the model and returns how it is represented."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def sized(rig: Rig) -> dict[str, dict[str, float]]:
 
 
 def omitted_effects(rig: Rig, represented: Sequence[Represented], why: str) -> list[Omitted]:
-    """Return the rig's effects that are not said."""
+    """Return the rig's effects that the target does not represent."""
     names, finite = {one.name for one in represented}, sized(rig)
     endless = "a parameter of it is infinite"
     effects = (one.name for one in rig.effects if one.name not in names)

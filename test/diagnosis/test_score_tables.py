@@ -58,6 +58,11 @@ def test_residuals_count_over_the_noise_by_block_without_faulty_samples():
     assert list(result.sums) == ["ft"], "a channel that nobody measured has no score"
 
 
+def test_a_short_record_has_shorter_blocks():
+    result = scored(case([1, 2, 3, 4]), rule=BlockSettings(longest=0.5, shortest=0.5))
+    assert result.sums["ft"].tolist() == [1.0, 4.0, 9.0, 16.0]
+
+
 def test_a_block_without_a_sound_sample_is_none():
     result = scored(case([1, 1, np.nan, np.nan, 2, 2]))
     assert result.sums["ft"].tolist() == [2.0, 8.0]
@@ -100,7 +105,12 @@ def test_each_sample_is_in_training_validation_or_test():
 )
 def test_the_largest_missed_response_of_all_records_counts(monkeypatch, shares, names, missed):
     left = iter(shares)
-    monkeypatch.setattr(scores, "missed_response", lambda run, output, name, blocks, rule: next(left))
+
+    def coherence(run, output, channel, blocks, rule):
+        assert channel == "ft"
+        return next(left)
+
+    monkeypatch.setattr(scores, "missed_response", coherence)
     assert scored(*(case([1, 1], names) for _ in shares)).missed == missed
 
 
@@ -148,6 +158,14 @@ def test_the_interval_of_a_gain_is_that_of_blocks_drawn_anew():
     width = 1.96 * 0.5 * 0.1 / np.sqrt(BLOCKS)
     assert value == pytest.approx(0.0, abs=1e-12)
     assert -low == pytest.approx(width, rel=0.06) and high == pytest.approx(width, rel=0.06)
+
+
+def test_an_interval_leaves_out_what_happens_less_than_once_in_forty():
+    """Two of ten blocks hold all the residual. Five of them or more are drawn once in 30, six once in 157."""
+    two = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    value, interval = gain_of(two, np.ones(10))
+    assert value == 1.0 - np.sqrt(0.2)
+    assert interval == (1.0 - np.sqrt(0.5), 1.0)
 
 
 def test_means_of_resampled_blocks_have_the_scatter_of_a_mean():
