@@ -122,10 +122,10 @@ class ForwardStep:
         for first in firsts[: rule.paired]:
             seconds = fits.screened(fits.with_typical(first.effect))[: rule.paired]
             pairs += fits.fit_pieces(seconds)
-        hopeful = sorted(
+        promising = sorted(
             (p for p in pairs if p.cost < rule.hope_two * fits.on_pieces.cost), key=lambda p: p.cost
         )
-        return self._acceptable(fits.fit_all(hopeful[: rule.paired_fits]))
+        return self._acceptable(fits.fit_all(promising[: rule.paired_fits]))
 
     def _far_behind(self, screened: ScreenedEffect) -> Trial:
         problem, theta = self.fits.complete(screened)

@@ -64,8 +64,8 @@ def fit(
         ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < _MISFIT:
             break
-        heavier = tuple(reweighted(c, ratios) for c in solution.problem.cases)
-        solution = solve(replace(problem, cases=heavier), solution.theta, run=run)
+        cases = tuple(reweighted(c, ratios) for c in solution.problem.cases)
+        solution = solve(replace(problem, cases=cases), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
     return solution, known, asked
 

@@ -45,7 +45,7 @@ LOOP_FIELDS: Mapping[str, Mapping[str, Field]] = {
         "k_vi": Field("N m/rad", default=0.0),
     },
 }
-"""Gains of the kinds of position loop (model/loop.py)."""
+"""Gains of the kinds of position loop (model/firmware_loop.py)."""
 _LIMIT_FIELDS = {
     "torque_limit": Field("N m", low_allowed=False, default=math.inf),
     "velocity_limit": Field("rad/s", low_allowed=False, default=math.inf),
