@@ -7,7 +7,7 @@ import pytest
 
 from rsea_ros.checks.carried import held_against
 from rsea_ros.checks.check import check_record
-from rsea_ros.model.prediction import predict
+from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel, Record

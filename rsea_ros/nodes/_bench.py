@@ -18,13 +18,13 @@ from msg_adapters.ros import (
     joint_state_message,
     wrench_message,
 )
-from msg_adapters.topics import JOINT_STATE, TYPES
+from msg_adapters.topic_map import JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import HORIZON, CommandQueue
 from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
-from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import JOINT, NodeParameter
 from rsea_ros.nodes._publishers import Obeyed
 from rsea_ros.nodes._qos import COMMAND, MEASURED, OVERRIDES
@@ -89,9 +89,8 @@ class Bench:
         )  # fmt: skip
         self._deflections = _publisher(node, JointState, f"{within}deflection") if deflects else None
         self._wanted = Mailbox(
-            node, JOINT_STATE, f"{within}torque_command", COMMAND, self.commands.refuse, ("effort", 0),
-            joint=joint,
-            admit=self._admit if strict else None,
+            node, f"{within}torque_command", MessageFields(JOINT_STATE, (("effort", 0),), joint),
+            COMMAND, self.commands.refuse, admit=self._admit if strict else None,
         )  # fmt: skip
 
     def poll(self, anchor: Anchor) -> None:

@@ -10,12 +10,12 @@ from statistics import median
 
 from rclpy.node import Node
 
-from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
+from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.observer import Observer, TorqueEstimate
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._frozen import Frozen
-from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 
 PERIODS = 64
@@ -45,7 +45,11 @@ class ModelInputs:
         deep = RECORD_RELIABLE if reliable else None
         self._commands, self._states, self.ft = (
             Mailbox(
-                node, kind, topic, deep or usual, self._refuse, *fields, joint="" if topic == "ft" else joint
+                node,
+                topic,
+                MessageFields(kind, tuple(fields), "" if topic == "ft" else joint),
+                deep or usual,
+                self._refuse,
             )
             for kind, topic, usual, *fields in (
                 (JOINT_STATE, "torque_command", COMMAND, ("effort", 0)),

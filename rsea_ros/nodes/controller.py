@@ -13,7 +13,7 @@ from rclpy.serialization import serialize_message
 
 from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, Trigger, torque_command_message
-from msg_adapters.topics import TYPES
+from msg_adapters.topic_map import TYPES
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.grid import Grid
 from rsea_ros.nodes._anchor import Anchor
