@@ -76,7 +76,7 @@ def check_record(
         every += _other_axes(checked, rig, axis, wrench)
     faults = (*checked.faults, *(_fault(f) for f in every if f.kind in FAULTY and f.light != "green"))
     findings = tuple(_of_targets(f) for f in every) if rig.loop is not None else tuple(every)
-    return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults)
+    return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults, masked=checked.masked)
 
 
 def _no_targets(record: Record) -> Finding:

@@ -97,3 +97,17 @@ def test_a_symbolic_link_as_out_is_refused_before_any_work(exists, record, tmp_p
     said = capsys.readouterr()
     assert f"--out {link}: is a symbolic link, expected a directory or a new name" in said.err
     assert not said.out
+
+
+def clipped(record):
+    return record.with_channels(ft=Channel(record["ft"].t, np.clip(record["ft"].y, -4.0, 4.0)))
+
+
+@pytest.mark.parametrize(("damage", "kind"), [(frozen, "frozen_samples"), (clipped, "clipping")])
+def test_identify_fits_no_sample_that_it_reports(damage, kind, record):
+    fit = rsea.identify(damage(record), RIG)
+    assert kind in {fault.kind for fault in fit.result.faults}
+    assert fit.result.verdict == "adequate"
+    low, high = next(p.ci95 for p in fit.result.parameters if p.name == "spring.stiffness")
+    assert low < rsea.load_rig(RIG)["spring.stiffness"] < high
+    assert high - low < 2.0
