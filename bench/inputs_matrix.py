@@ -86,7 +86,7 @@ def expense(case: Case) -> tuple[bool, float]:
 def play_bag(case: Case, folder: Path) -> Outcome:
     """Make the bag of a case and run its verb on it."""
     bag, rig = bag_of(case, folder)
-    limit_child()
+    limit_child(case["verb"])
     verb, out = case["verb"], folder / "results"
     arguments = [verb, *([str(rig), str(bag)] if verb == "predict" else [str(bag), "--rig", str(rig)])]
     if verb in ("identify", "diagnose"):

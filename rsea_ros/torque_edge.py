@@ -1,9 +1,9 @@
 """On which side of a new command the motor torque was read, where both have one stamp.
 
 A command takes effect at its stamp and holds. A torque that is read at that instant is, by convention, of the
-command that just ended; a log that commands first and then reads holds the one that just began. White commands
-make the other one wrong by all of its size, so the data decide; a torque of the commands that begin moves
-into the time in which they hold.
+command that just ended; a log that commands first and then reads holds the one that just began. Under white
+commands the other one is wrong by all of its size, so the data decide; a torque of the commands that begin
+moves into the time in which they hold.
 """
 
 from __future__ import annotations

@@ -11,10 +11,11 @@ from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
+from rsea_ros.torque_edge import behind_the_edge
 from rsea_ros.wording import listed
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
-          "clipping", "nan", "coarse_steps")  # fmt: skip
+          "clipping", "nan", "coarse_steps", "early_torque")  # fmt: skip
 """Faults that the diagnosis finds and masks itself."""
 
 
@@ -37,7 +38,7 @@ def noted(record: Record, rig: Rig) -> Record:
 def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     """Return a record with the faults that were found; a dead channel is left out.
 
-    masks: the next stage finds, masks and reports faulty samples itself.
+    masks: the next stage finds, masks and reports faulty samples itself, and moves an early torque.
 
     Raises IdentificationError where no channel is left that measures anything.
     """
@@ -50,7 +51,8 @@ def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
         )
     again = _AGAIN if masks else ()
     kept = (*record.faults, *(f for f in findings.faults if f.kind not in again and f not in record.faults))
-    return replace(record, channels=channels, faults=kept)
+    record = replace(record, channels=channels, faults=kept)
+    return record if masks else behind_the_edge(record)[0]
 
 
 def _reasons(record: Record, findings: Findings) -> str:

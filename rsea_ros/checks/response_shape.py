@@ -46,7 +46,9 @@ class Prior:
 class FittedShape:
     """A fit of the shape. gain: logarithm, delay: s, both by channel.
 
-    error: weighted median of the residual of ln R by channel, weights the power. values: of the rig, by name.
+    error: weighted median of the residual of ln R by channel, weights the predicted power. error_measured:
+    weights the measured power, which shows what a channel has beside the prediction. values: of the rig, by
+    name.
     reach: how many of the rig's stated spreads each has moved; data_share: the share of its information
     that the response provides.
     """
@@ -57,6 +59,7 @@ class FittedShape:
     gain: Mapping[str, float]
     delay: Mapping[str, float]
     error: Mapping[str, float]
+    error_measured: Mapping[str, float]
     cost: float
 
 
@@ -177,11 +180,11 @@ class ShapeFit:
             response[rows[name]] = values
         return response
 
-    def _middle(self, left: FloatArray, k: int) -> float:
-        """Return the weighted median of a channel's residual, weights the share of the predicted power."""
+    def _middle(self, left: FloatArray, k: int, weight: FloatArray) -> float:
+        """Return the weighted median of a channel's residual."""
         of = self._of == k
         rising = np.argsort(left[of])
-        share = np.cumsum(self._share[of][rising])
+        share = np.cumsum(weight[of][rising])
         return float(left[of][rising][int(np.searchsorted(share, 0.5 * share[-1]))])
 
     def _data_shares(
@@ -196,6 +199,7 @@ class ShapeFit:
     def _shape(self, theta: FloatArray, residual: FloatArray, cost: float, shares: FloatArray) -> FittedShape:
         n, m, lines = len(self._start), len(self.channels), len(self._of)
         left = np.hypot(residual[:lines], residual[lines:]) * self._sd
+        measured = self._share * np.abs(self._value) ** 2
         known = zip(self.unknowns, theta[:n], strict=True)
         return FittedShape(
             values={u.name: u.outer(float(v)) for u, v in known},
@@ -206,7 +210,8 @@ class ShapeFit:
             data_share={u.name: float(share) for u, share in zip(self.unknowns, shares, strict=False)},
             gain=dict(zip(self.channels, theta[n : n + m].tolist(), strict=True)),
             delay=dict(zip(self.channels, theta[n + m :].tolist(), strict=True)),
-            error={c: self._middle(left, k) for k, c in enumerate(self.channels)},
+            error={c: self._middle(left, k, self._share) for k, c in enumerate(self.channels)},
+            error_measured={c: self._middle(left, k, measured) for k, c in enumerate(self.channels)},
             cost=cost,
         )
 

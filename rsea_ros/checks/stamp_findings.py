@@ -26,6 +26,8 @@ _REPEATED, _REGULAR = 3.0, 1.6
 """Samples that a value lasts, at least, and times as long that nine of ten last at most."""
 _MANY_STEPS = 4.0
 """Times the smallest step: a sensor that goes on by one step or two is coarse, not slow."""
+_OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "clock_jump", "partly_recorded", "early_torque")
+"""Faults of a whole channel, whose share of its samples means nothing."""
 _MENDED = ("early_torque",)
 """Faults that leave no doubt in a result once they are mended."""
 _REMEDIES = {
@@ -49,8 +51,8 @@ _REMEDIES = {
 
 def fault_finding(fault: Fault) -> Finding:
     """Return the finding of a fault of the data."""
-    bad = fault.kind == "dead_channel" or (fault.kind not in ("missing_topic", *_MENDED) and fault.share > _RED_SHARE)
-    whole = fault.kind in ("missing_topic", "coarse_steps", "coarse_stamps", "clock_jump", "partly_recorded")
+    bad = fault.kind == "dead_channel" or (fault.kind != "missing_topic" and fault.share > _RED_SHARE)
+    whole = fault.kind in _OF_ALL
     light: Light = "red" if bad and not whole else "green" if fault.kind in _MENDED else "amber"
     share = None if whole or not math.isfinite(fault.share) else 100.0 * fault.share
     value, unit = (fault.size, fault.unit) if fault.size is not None else (share, "%" if share else "")

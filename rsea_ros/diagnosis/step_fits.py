@@ -14,7 +14,7 @@ from rsea_ros.diagnosis.candidate import (
     fit_candidate,
     refit,
 )
-from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, preference
+from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, loss_excess, preference
 from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.problem_variants import (
@@ -23,7 +23,7 @@ from rsea_ros.diagnosis.problem_variants import (
     with_misfit_as_noise,
     without_clocks,
 )
-from rsea_ros.diagnosis.score import score_on
+from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.screening import ScreenedEffect, fitted_on, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.effect import Effect
@@ -116,6 +116,17 @@ class StepFits:
         helps = self.pools.fits.map(self._surely_helps, left_out)
         return [s for s, is_sure in zip(left_out, helps, strict=True) if is_sure]
 
+    def nearly_as_good(self, left_out: Sequence[ScreenedEffect], chosen: Candidate) -> list[ScreenedEffect]:
+        """Return those of the effects left out that bring nearly what the chosen one brings.
+
+        On the validation blocks, as fitted so far. In a part of the band many laws are one; which of them was
+        fitted on is then chance.
+        """
+        gained = loss_excess(self.present, chosen)
+        least = self.settings.forward.undecided * gained
+        left = self.pools.fits.map(lambda s: self._least_loss(s, chosen), left_out)
+        return [s for s, excess in zip(left_out, left, strict=True) if excess < least]
+
     def on_measured_angle(self) -> list[Candidate]:
         """Return models with an effect of the rotor's angle, simulated on the measured angle.
 
@@ -165,12 +176,23 @@ class StepFits:
 
     def _surely_helps(self, screened: ScreenedEffect) -> bool:
         """Return whether an effect with its fit to the pieces does better on the validation blocks."""
+        scores = self._scores(screened)
+        _, theta = self.complete(screened)
+        extra, rule = len(theta) - self.present.parameters, self.settings.acceptance
+        return any(preference(s, self.present.validation, extra, rule).sure for s in scores)
+
+    def _least_loss(self, screened: ScreenedEffect, chosen: Candidate) -> float:
+        """Return how much more an effect with its fit to the pieces loses than the chosen model."""
+        against = chosen.validation
+        losses = [float(s.loss(against).sum()) for s in self._scores(screened)]
+        return min(losses) - float(against.loss(against).sum())
+
+    def _scores(self, screened: ScreenedEffect) -> list[Score]:
+        """Return the scores on the validation blocks of an effect with its fit to the pieces."""
         problem, theta = self.complete(screened)
         outputs = [problem.outputs(start) for start in self._starts(problem, theta)]
         cases, blocks = self.present.cases, self.settings.blocks
-        scores = [score_on(problem, cases, VALIDATION, simulated, blocks) for simulated in outputs]
-        extra, rule = len(theta) - self.present.parameters, self.settings.acceptance
-        return any(preference(s, self.present.validation, extra, rule).sure for s in scores)
+        return [score_on(problem, cases, VALIDATION, simulated, blocks) for simulated in outputs]
 
     def _starts(self, problem: Problem, theta: FloatArray) -> list[FloatArray]:
         """Return the starts of a full fit: from the pieces, or from the present model beside the effect.

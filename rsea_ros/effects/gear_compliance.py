@@ -1,11 +1,11 @@
 """Gear train that gives between the rotor and the spring chassis.
 
-    T = stiffness · (q_gear - q_chassis) + 2 · damping_ratio · √(stiffness · J_c) · (ω_gear - ω_chassis)
+    T = stiffness · (q_gear - q_chassis) + 2 · damping_ratio · √(stiffness · J_c) · (ω_gear - ω_chassis),
+    J_c = chassis_share · J_m where the rig states no inertia of the chassis
 
 The chassis then moves on its own, with its own inertia J_c (on a rigid spring with what hangs on it). A rig
-that states none counts it to the rotor: chassis_share of the rotor's inertia goes over to it then. Source:
-Spong, Modeling and control of elastic joint robots, J. Dyn. Syst. Meas. Control 109, 1987; damping: Ewins,
-Modal Testing, 2000.
+that states none counts it to the rotor's J_m, from which it is taken then. Source: Spong, Modeling and
+control of elastic joint robots, J. Dyn. Syst. Meas. Control 109, 1987; damping: Ewins, Modal Testing, 2000.
 """
 
 import math
@@ -22,6 +22,7 @@ _SHARE = "chassis_share"
 
 def change(rig: Any, parameters: Mapping[str, float]) -> Any:
     """Return the rig with a gear of that stiffness and damping."""
+    parameters = EFFECT.complete(parameters)
     stiffness = parameters["stiffness"]
     if math.isinf(stiffness):
         return rig

@@ -24,6 +24,10 @@ class EvidenceSettings:
         0.02, "1", "weight among all that was tried in a cause's place, from which an effect is a rival",
         CALIBRATED,
     )  # fmt: skip
+    close_weight: float = number(
+        1e-6, "1", "the same, from which an effect is fitted to the end before it is weighed",
+        "27 of twice the log likelihood: what the end of a long fit was seen to bring",
+    )  # fmt: skip
     most_rivals: int = number(3, "1", "rivals of a cause that are weighed", CALIBRATED)
 
 

@@ -27,7 +27,7 @@ _KINDS = {
 _DOUBTED = {"wrong_rig": "wrong rig?", "identifiability": "undetermined"}
 """Names of kinds whose plain name would say the opposite of an amber or red light."""
 SAID_ELSEWHERE = ("identifiability", "rig_value", "noise", "excitation", "rest")
-"""Kinds that identify and diagnose speak of in their results anyway."""
+"""Kinds that identify and diagnose speak of in their results anyway; not a command that never changes."""
 
 
 def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
@@ -53,10 +53,14 @@ def _finding_text(f: Finding) -> str:
 
 def warnings(findings: Findings) -> list[str]:
     """Return a line for each amber or red finding that a fit's results would not repeat; rig first."""
-    chosen = [f for f in findings.findings if f.light != "green" and f.kind not in SAID_ELSEWHERE]
+    chosen = [f for f in findings.findings if f.light != "green" and not _said_elsewhere(f)]
     reported = {(f.kind, f.channel) for f in findings.faults}
     chosen = [f for f in chosen if f.kind == "wrong_rig" or (f.kind, f.channel) not in reported]
     return [sentence(f) for f in _each_remedy_once(sorted(chosen, key=lambda f: f.kind != "wrong_rig"))]
+
+
+def _said_elsewhere(f: Finding) -> bool:
+    return f.kind in SAID_ELSEWHERE and (f.kind, f.light) != ("excitation", "red")
 
 
 def _each_remedy_once(findings: Iterable[Finding]) -> Iterator[Finding]:
