@@ -62,8 +62,8 @@ def results_place(
 ) -> Destination:
     """Return the folder of the results: --out, else a free name (NAME, NAME-2, …).
 
-    Raises OutputError, before any work, if --out is a file or a symbolic link, holds results, or is the folder
-    of an input.
+    Raises OutputError, before any work, if --out is a file or a symbolic link, holds results, or is the
+    folder of an input.
     """
     if args.out is None:
         check_free([unused(Path(default))], inputs=list(filter(None, inputs)))
