@@ -152,9 +152,9 @@ class ForwardStep:
 
 def _look_alikes(effect: Effect, effects: Sequence[Effect]) -> set[str]:
     """Return the effects that one is said to be confused with, and no larger ones that say so of it."""
-    said, size = effect.claims.confusable_with, effect_size(effect.name)
+    confusable, size = effect.claims.confusable_with, effect_size(effect.name)
     alike = look_alikes(effect.name, effects)
-    return {e.name for e in alike if e.name in said or effect_size(e.name) <= size}
+    return {e.name for e in alike if e.name in confusable or effect_size(e.name) <= size}
 
 
 def _others(screened: Sequence[ScreenedEffect], chosen: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:

@@ -92,7 +92,7 @@ class Monitor:
 
     def findings(self) -> list[HealthFinding]:
         """Return the present findings."""
-        changed = [] if self.changes is None else list(self.changes.found.values())
+        changed = [] if self.changes is None else list(self.changes.findings.values())
         return [*changed, *sensor_findings(self.sensors, self.jumps, self.late)]
 
     def estimates(self) -> list[ChangeEstimate]:

@@ -67,7 +67,7 @@ class Bench:
         within = f"{part}/" if part else ""
         self._node, self._every_record, self._strict = node, every_record, strict
         self.commands, self._obeyed = CommandQueue(strict=strict), Obeyed()
-        self._told: Mapping[str, int] = {}
+        self._reported: Mapping[str, int] = {}
         self._polled = 0
         self._states = _publisher(node, JointState, f"{within}joint_states")
         self._ft = _publisher(node, WrenchStamped, f"{within}ft")
@@ -133,8 +133,8 @@ class Bench:
             "steps of the system clock": cycle.anchor.steps,
             **(more or {}),
         }
-        new = {kind: count - self._told.get(kind, 0) for kind, count in counts.items()}
-        self._told = {**self._told, **counts}
+        new = {kind: count - self._reported.get(kind, 0) for kind, count in counts.items()}
+        self._reported = {**self._reported, **counts}
         troubles = [f"{count} {kind}" for kind, count in new.items() if count > 0]
         values = {
             **timing.values(),

@@ -38,7 +38,7 @@ class ModelInputs:
         self._sign, along = sign_and_index(axis)
         self._timeout = round(ft_timeout * SECOND)
         self._epoch: int | None = None
-        self._state_stamp = self._ft_stamp = self._told = 0
+        self._state_stamp = self._ft_stamp = self._estimate_stamp = 0
         self._periods: deque[float] = deque(maxlen=PERIODS)
         self.refused = self.unstamped = 0
         self._still, self._numb = Frozen(max(MOVED * ft_noise, LEAST)), Frozen()
@@ -114,9 +114,9 @@ class ModelInputs:
         return self._observer.state(self.seconds(stamp), a, b)
 
     def _note_period(self, stamp: int) -> None:
-        if 0 < stamp - self._told < SECOND:
-            self._periods.append((stamp - self._told) / SECOND)
-        self._told = stamp
+        if 0 < stamp - self._estimate_stamp < SECOND:
+            self._periods.append((stamp - self._estimate_stamp) / SECOND)
+        self._estimate_stamp = stamp
 
     def _command(self, stamp: int, torque: float) -> None:
         newest = max(self._state_stamp, self._ft_stamp)
