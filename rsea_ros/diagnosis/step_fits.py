@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -26,13 +27,14 @@ from rsea_ros.diagnosis.problem_variants import (
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.screening import ScreenedEffect, fitted_on, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
 from rsea_ros.identification.alternatives import extended
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, power, solve
-from rsea_ros.identification.unknowns import apply
+from rsea_ros.identification.unknowns import apply, idle, start_vector, unknowns_of_effect
 from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
 
@@ -87,7 +89,7 @@ class StepFits:
 
         def tried(i: int) -> ScreenedEffect | None:
             self.say(effects[i].name, 0.4 * i / len(effects))
-            return screen(solution, effects[i], guesses[effects[i].name], self.settings.forward)
+            return screen(solution, _rough(effects[i]), guesses[effects[i].name], self.settings.forward)
 
         screened = [s for s in self.pools.fits.map(tried, range(len(effects))) if s is not None]
         rule = self.settings.forward
@@ -145,9 +147,10 @@ class StepFits:
     def complete(self, screened: ScreenedEffect) -> tuple[Problem, FloatArray]:
         """Return the problem of a screened effect on every sample, clocks included, and its theta."""
         problem = replace(screened.problem, cases=self.present.cases)
-        if not self.is_far:
-            return problem, screened.theta
-        return with_clocks(problem, screened.theta, self.present.problem)
+        theta = screened.theta
+        if self.is_far:
+            problem, theta = with_clocks(problem, theta, self.present.problem)
+        return _refined(problem, theta, screened.effect)
 
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
         self.say(f"fitting {screened.name}", 0.5)
@@ -209,3 +212,17 @@ class StepFits:
         scores, channels = (model.validation, self.present.validation), model.validation.sums
         now, before = (np.array([max(s.ratio(n), 1.0) for n in channels]) for s in scores)
         return bool(np.any(np.abs(now / before - 1.0) > self.settings.forward.moved))
+
+
+def _rough(effect: Effect) -> Effect:
+    """Return an effect whose parameters with a prior stay there: from afar they lead a fit astray."""
+    held = tuple(p.name for p in effect.parameters if math.isfinite(p.spread))
+    return replace(effect, idle=lambda rig: held) if held else effect
+
+
+def _refined(problem: Problem, theta: FloatArray, effect: Effect) -> tuple[Problem, FloatArray]:
+    """Return a problem with all parameters of a rough effect free that its rig has, and its theta."""
+    known = {u.name for u in problem.unknowns} | idle(effect_named(effect.name), problem.rig)
+    more = unknowns_of_effect(effect, effect.typical, known)
+    larger = replace(problem, unknowns=(*problem.unknowns, *more))
+    return larger, np.concatenate([theta, start_vector(more)])

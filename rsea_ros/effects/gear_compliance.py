@@ -54,8 +54,8 @@ EFFECT = Effect(
             reason="a third of the spring's to thousands of times it, where it does not show",
         ),
         Parameter(
-            "damping_ratio", "1", null=0.0, low=0.0, high=1.0, typical=0.0, optional=True, spread=0.05,
-            reason="0.001 to 0.1 of metal structures (Ewins), so 0.05 is one sigma around none",
+            "damping_ratio", "1", null=0.0, low=0.0, high=0.1, typical=0.0, optional=True, spread=0.02,
+            reason="0.001 to 0.1 of metal structures (Ewins); 0.02 is usual, and one sigma around none",
         ),
         Parameter(
             _SHARE, "1", null=0.02, low=1e-3, high=0.5, typical=0.02, logarithmic=True, optional=True,

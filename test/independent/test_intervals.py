@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from independent.bench import drawn_bench, record_run
 from independent.hidden import hide
 from independent.severities import drawn_parameters
@@ -46,9 +45,9 @@ def z_scores(effect: str, rig, seed: int) -> dict[str, float]:
     return {u.name: (t - u.inner(truth[u.name])) / s for u, t, s in unknowns if u.name in truth}
 
 
-@pytest.mark.parametrize(("rig", "seeds"), CASES, ids=["chassis known", "chassis unknown"])
-def test_intervals_hold_the_truth_of_a_gear_that_gives(rig, seeds: tuple[int, ...]):
-    scores = [z_scores("gear_compliance", rig, seed) for seed in seeds]
-    z = np.array([list(s.values()) for s in scores])
+def test_intervals_hold_the_truth_of_a_gear_that_gives():
+    """The values of a record share few directions, so the RMS is that over all records."""
+    scores = [z_scores("gear_compliance", rig, seed) for rig, seeds in CASES for seed in seeds]
+    z = np.concatenate([list(s.values()) for s in scores])
     assert np.abs(z).max() < 4.0, scores
     assert np.sqrt(np.mean(z**2)) < 1.6, scores
