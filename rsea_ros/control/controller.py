@@ -148,21 +148,22 @@ class TorqueController:
         ahead, model = self._ahead(desired, desired_offset), self._reference
         largest, most = self._largest(), self._limits.slew * self._law.period
         forward = min(max(model.torque(ahead), -largest), largest)
-        more, learned = model.more(forward)
+        more, lead, learned = model.more(forward)
         more = min(max(more, -largest - forward), largest - forward)
         error, slowness, reading = self._compare(reading, offset)
         self._hear(reading, missed, error, slowness, in_time=trust == 1.0 and not late)
         back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
         back += self._link.torque(reading.link, model.yielding, missed, offset)
         back = 0.0 if late else trust * back
-        known, crossing = learned + self._compensated(reading, forward), self._crossing(ahead)
-        asked = forward + more + back + known + crossing
+        compensated, crossing = self._compensated(reading, forward), self._crossing(ahead)
+        known = learned + compensated
+        asked = forward + more + back + lead + compensated + crossing
         torque = min(max(asked, self._sent - most, -largest), self._sent + most, largest)
         if (asked - torque) * error > 0.0:
             state = state._replace(slow=self._state.slow, integral=self._state.integral)
         self._remember(hold(state, torque - known), torque, known, learned)
         self.share = Share(
-            float(model.now[0]), forward + more, back, known + crossing, torque, torque != asked
+            float(model.now[0]), forward + more, back, lead + compensated + crossing, torque, torque != asked
         )
         model.advance(forward, float(ahead[0]))
         return torque
@@ -206,21 +207,19 @@ class TorqueController:
         After lost samples, those between are read on a straight line.
         """
         s, turned = self._state, reading.velocity - self._state.velocity
+        share, timely = missed / (missed + 1), in_time and not missed
+        acted = self._acted.over_sample(reading.motor_torque, self._sent_before, self._sent, sure=timely)
+        acted = acted - self._known[0] if math.isfinite(acted) else s.applied
         for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist() if missed else (1.0,):
             ft, velocity = s.ft + part * (reading.ft - s.ft), s.velocity + part * turned
-            torque = s.applied + self._learned[0]
-            self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=self._learn and in_time)
-        share = missed / (missed + 1)
-        acted = self._acted.over_sample(
-            reading.motor_torque, self._sent_before, self._sent, sure=in_time and not missed
-        )
-        acted -= self._known[0]
+            torques = s.applied + self._learned[0], acted + self._learned[0]
+            self.learned.hear(ft, velocity, *torques, gap=self._crossed, sure=self._learn and in_time)
         self._state = s._replace(
             error=s.error + share * (error - s.error),
             slowness=s.slowness + share * (slowness - s.slowness),
             ft=s.ft + share * (reading.ft - s.ft),
             velocity=s.velocity + share * turned,
-            applied=acted if math.isfinite(acted) else s.applied,
+            applied=acted,
         )
 
     def _compensated(self, reading: Measurement, forward: float) -> float:

@@ -1,16 +1,19 @@
 """Learning of load, inertia, damping and friction while the bench runs.
 
     w            = theta . (stretch of the spring, two parts of what follows the load)      motion.py
-    u - T        = J w' + b w + c tanh(w / creep)
+    u - T        = J w' + b w + c tanh(w / creep)          u: torque that was commanded
+    m - T        = J w' + b w + c tanh(w / creep)          m: torque that acted, by the measured current
 
-Two least-squares fits with forgetting over the same samples, every signal through the same band pass, weighed
-against the rig's values:
+Three least-squares fits with forgetting over the same samples, every signal through the same band pass,
+weighed against the rig's values:
 
     (R + s^2 P) x = r + s^2 P x_0,     s^2 = the larger of the floor and what the fit leaves
 
 R, r are means of the last MEMORY s in which the gear moved. What is learned shapes the feed-forward of the
 desired torque alone: it is bounded and has stable poles, so no error in it can make the loop unstable, and
-the margins of the design hold whatever has been learned. Recursive least squares with forgetting: Astrom,
+the margins of the design hold whatever has been learned. On a path that is later than the design's, the
+second fit makes the feed-forward lead; the third says what of the measured torque that explains, which is no
+disturbance. Recursive least squares with forgetting: Astrom,
 Wittenmark, Adaptive Control, 1995, ch. 2; an inverse from it: Widrow, Walach, Adaptive Inverse Control, 1996.
 """
 
@@ -58,7 +61,8 @@ inertia there, and its theta_1 is negative: -12 at 2 Hz for one of 1.3 Hz. Noise
 
 
 class Learning:
-    """load: theta. drive: J (kg m^2), b (N m s/rad), c (N m)."""
+    """load: theta. drive: J (kg m^2), b (N m s/rad), c (N m) for the commands; acting: for the torque that
+    acted."""
 
     def __init__(self, rig: Rig, law: FeedbackLaw) -> None:
         h = law.period
@@ -74,8 +78,8 @@ class Learning:
             (np.array([0.8, 0.0, -LIGHTEST]), np.array([1.25, LIGHTEST, 3.0 * LIGHTEST])),
             (np.array([0.5, 0.0, 0.0]) * [*known[:2], 0.0], np.array([2.0, 3.0, 10.0]) * [*known[:2], 1.0]),
         ]
-        self.load, self.drive = LOCKED, known
-        self._moments, self._turn = np.zeros((2, 4, 4)), 0
+        self.load, self.drive, self.acting = LOCKED, known, known
+        self._moments, self._turn = np.zeros((3, 4, 4)), 0
         self.start(0.0, 0.0)
 
     def start(self, ft: float, velocity: float) -> None:
@@ -83,12 +87,23 @@ class Learning:
         self._stretch.start(ft)
         self._yielding.start(ft)
         self._ft, self._velocity = ft, velocity
-        self._filtered = np.zeros((4, 2, 4))
+        self._filtered = np.zeros((4, 3, 4))
         self._parts = np.zeros(2)
         self._followed = self._expected = self._power = 0.0
 
-    def hear(self, ft: float, velocity: float, torque: float, *, gap: float = 0.0, sure: bool = True) -> None:
+    def hear(
+        self,
+        ft: float,
+        velocity: float,
+        torque: float,
+        acted: float,
+        *,
+        gap: float = 0.0,
+        sure: bool = True,
+    ) -> None:
         """Process a sample: N m, rad/s; torque: N m, mean of the command over the hold that it ends.
+
+        acted: N m, mean of the measured torque over that hold.
 
         gap: rad/s, the part of that velocity that crosses backlash and is not the load's. sure: whether that
         is surely the torque that acted; else nothing is learned from it.
@@ -96,9 +111,11 @@ class Learning:
         speed, mean = 0.5 * (velocity + self._velocity), 0.5 * (ft + self._ft)
         parts = self._yielding.advance(mean)
         first, second = 0.5 * (parts + self._parts)
+        moved = [(velocity - self._velocity) / self._period, speed, math.tanh(speed / CREEP)]
         rows = np.array([
             [self._stretch.rate(ft), first, second, speed - gap],
-            [(velocity - self._velocity) / self._period, speed, math.tanh(speed / CREEP), torque - mean],
+            [*moved, torque - mean],
+            [*moved, acted - mean],
         ])  # fmt: skip
         self._ft, self._velocity, self._parts = ft, velocity, parts
         seen = self._band(rows)
@@ -112,6 +129,8 @@ class Learning:
                 self.load = self._solve(0, self.load)
             elif self._turn == EVERY // 2:
                 self.drive = self._solve(1, self.drive)
+                in_time = self._left(2, self.drive) < FLOORS[1] ** 2
+                self.acting = self.drive if in_time else self._solve(2, self.acting)
 
     def _band(self, rows: FloatArray) -> FloatArray:
         """Return signals between SLOWEST and CORNER."""
@@ -132,13 +151,18 @@ class Learning:
         self._followed += quick * (expected * float(seen[3] - self.load[0] * seen[0]) - self._followed)
         return self._expected > FOLLOWS**2 and self._followed < STOPPED * self._expected
 
+    def _left(self, which: int, x: FloatArray) -> float:
+        """Return the mean square that a solution leaves of a fit."""
+        m = self._moments[which]
+        return float(m[3, 3] - 2.0 * x @ m[:3, 3] + x @ m[:3, :3] @ x)
+
     def _solve(self, which: int, before: FloatArray) -> FloatArray:
         """Return the least squares of a fit, within its bounds."""
-        m, (known, precision) = self._moments[which], self._priors[which]
-        left = m[3, 3] - 2.0 * before @ m[:3, 3] + before @ m[:3, :3] @ before
-        weight = max(FLOORS[which] ** 2, left) / INDEPENDENT * precision
+        m, kind = self._moments[which], min(which, 1)
+        known, precision = self._priors[kind]
+        weight = max(FLOORS[kind] ** 2, self._left(which, before)) / INDEPENDENT * precision
         matrix, right = m[:3, :3] + np.diag(weight), m[:3, 3] + weight * known
-        low, high = self._bounds[which]
+        low, high = self._bounds[kind]
         inside = _within(matrix, right, low, high)
         if which == 0 and inside[1] == 0.0 and inside[2] > SWINGS:
             return _within(matrix, right, low - [0.0, LIGHTEST, 0.0], high)

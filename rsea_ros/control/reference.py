@@ -62,18 +62,19 @@ class Reference:
         begin = float(self.next[POSITION]) + float(self._angles[1])
         return speeds, (begin, begin + 0.5 * self._law.period * sum(speeds))
 
-    def more(self, torque: float) -> tuple[float, float]:
-        """Return the torque that the load needs beyond the held rig, and the learned drive beyond the
-        rig's for all of the motion: N m, means over the hold."""
+    def more(self, torque: float) -> tuple[float, float, float]:
+        """Return the torque that the load needs beyond the held rig, and beyond the rig's for all of the
+        motion the learned drive, as it is commanded and as it acts: N m, means over the hold."""
         after = self._plant.c @ (self._plant.a @ self._x + self._plant.b * torque)
         (start, stop), _ = self.motion(torque)
         rise, mean = (stop - start) / self._law.period, 0.5 * (stop + start)
         held_rise = float(after[VELOCITY] - self.next[VELOCITY]) / self._law.period
         held_mean = 0.5 * float(after[VELOCITY] + self.next[VELOCITY])
         inertia, damping = self._law.inertia, self._law.damping
-        j, b, c = (float(value) for value in self._learned.drive)
-        learned = (j - inertia) * rise + (b - damping) * mean + c * mean_friction(start / CREEP, stop / CREEP)
-        return inertia * (rise - held_rise) + damping * (mean - held_mean), learned
+        moved = np.array([rise, mean, mean_friction(start / CREEP, stop / CREEP)])
+        nominal = inertia * rise + damping * mean
+        commanded, acting = (float(d @ moved) - nominal for d in (self._learned.drive, self._learned.acting))
+        return inertia * (rise - held_rise) + damping * (mean - held_mean), commanded, acting
 
     def advance(self, torque: float, promised: float) -> None:
         """Go on by a sample with a torque (N m) that was to lead to the promised one."""

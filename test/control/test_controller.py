@@ -11,10 +11,12 @@ from rsea_ros.control.feedforward import inverse, inverse_poles
 from rsea_ros.control.following import following
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.law import Gains
+from rsea_ros.control.loads import load_range
 from rsea_ros.control.prediction import AHEAD, Prediction, prediction_response
 from rsea_ros.control.sampled import sampled
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.trials import EFFECTS, Span, restlessness, sine
+from rsea_ros.control.trials import EFFECTS, Span, restlessness, sine, tracked
+from rsea_ros.control.uncertainty import BenchVariant
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
 
@@ -41,6 +43,13 @@ def test_a_sine_is_followed_with_half_and_twice_the_load(times):
     """A controller that was given the load's inertia, wrong by that factor, was 240 % off."""
     load = FREE.with_values({"housing_end.inertia": times * FREE["housing_end.inertia"]})
     assert sine(load, FREE, DESIGN, 4.6 * times) < 0.05
+
+
+@pytest.mark.parametrize("load", ["locked", "free x 1", "free x 30"])
+def test_a_late_path_costs_nothing_once_it_is_learned(load):
+    """A sample and 2 ms: 8 to 10 % off, because the observer took the learned lead for a disturbance."""
+    loads = load_range(RIG, FREE)
+    assert tracked(RIG, loads, BenchVariant(load, 1.1, 1.5, 1, 2e-3), DESIGN) < 0.03
 
 
 @pytest.mark.parametrize("times", [1.0, 2.0])
@@ -189,7 +198,7 @@ def test_lost_and_late_samples_do_no_harm(known):
         acting, pending = (acting, command)
     quiet, disturbed = np.array(errors[200:300]), np.array(errors[300:])
     assert np.abs(disturbed).max() < 6.0
-    assert np.std(disturbed[-100:]) == pytest.approx(np.std(quiet), rel=0.2)
+    assert np.std(disturbed[-100:]) < 1.2 * np.std(quiet) < 0.2
 
 
 def test_commands_that_come_far_too_late_are_feed_forward_alone_and_stay_stable():
