@@ -13,7 +13,7 @@ from independent.hidden import BESIDE_THE_CONTRACT, MAIN_PARAMETER
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.model.prediction import predict
+from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.remark_words import remark_sentences

@@ -10,8 +10,8 @@ import random
 import struct
 from pathlib import Path
 
-from rsea_ros.hardware.dynamixel.receiver import StatusFrameParser
-from rsea_ros.hardware.netft.records import Sequence, decode
+from rsea_ros.hardware.dynamixel.frame_stream import StatusFrameParser
+from rsea_ros.hardware.netft.rdt import Sequence, decode
 from rsea_ros.hardware.peer import protocol2
 
 

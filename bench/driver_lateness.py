@@ -20,8 +20,8 @@ from statistics import median
 from bench.controller_node import HOLD, MARK
 from bench.torque_control_nodes import ROOT, Outside
 from msg_adapters.ros import torque_command_message
-from msg_adapters.topics import JOINT_STATE
-from rsea_ros.nodes._mailbox import Mailbox
+from msg_adapters.topic_map import JOINT_STATE
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import MEASUREMENT
 
 LONGEST = 8.0
@@ -36,9 +36,8 @@ class Torques:
     """The motor torque that the driver measures, by its stamps."""
 
     def __init__(self, outside: Outside) -> None:
-        self._mailbox = Mailbox(
-            outside.node, JOINT_STATE, "joint_states", MEASUREMENT, lambda: None, ("effort", 0)
-        )
+        torque = MessageFields(JOINT_STATE, (("effort", 0),))
+        self._mailbox = Mailbox(outside.node, "joint_states", torque, MEASUREMENT, lambda: None)
         self.heard: list[tuple[int, float]] = []
 
     def newest(self) -> float:

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from bench.driver_loop import Loop
-from rsea_ros.hardware.dynamixel.tables import TABLES
+from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 RATE, SHARE, SECONDS = 280.0, 0.01, 60.0

@@ -9,7 +9,7 @@ Truth is the second bench of test/independent. Every policy starts from the same
 at 0.5 N m, weighs the same causes by the same rule, and stops at the same probability; what differs is the
 run: designed; a piece of the paper's chirp, 20 s long, of the same peak as the limit; a random multisine of
 the designed run's power in 0.5 to 100 Hz. Causes are those that a
-session weighs (experiment/causes.py).
+session weighs (experiment/weighed_causes.py).
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from msg_adapters import write_record  # noqa: E402
 from rsea_ros.cli._processes import Processes  # noqa: E402
 from rsea_ros.cli.demo import EXCITED, patience  # noqa: E402
 from rsea_ros.experiment.campaign import Budget, Campaign  # noqa: E402
-from rsea_ros.experiment.causes import USUAL  # noqa: E402
-from rsea_ros.experiment.design import propose  # noqa: E402
 from rsea_ros.experiment.hypothesis import motion  # noqa: E402
-from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used  # noqa: E402
+from rsea_ros.experiment.joint_weighing import weigh  # noqa: E402
 from rsea_ros.experiment.proposal import DesignRequest  # noqa: E402
-from rsea_ros.experiment.shape import at_rest_around  # noqa: E402
-from rsea_ros.experiment.weighing import weigh  # noqa: E402
+from rsea_ros.experiment.run_design import propose  # noqa: E402
+from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used  # noqa: E402
+from rsea_ros.experiment.run_shape import at_rest_around  # noqa: E402
+from rsea_ros.experiment.weighed_causes import USUAL  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
 from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramped  # noqa: E402
 from rsea_ros.identification.workers import worker_pools  # noqa: E402

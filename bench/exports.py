@@ -63,9 +63,9 @@ def words() -> None:
         "mjcf": export_mjcf, "sdf": export_sdf, "urdf": export_urdf, "isaac": export_isaac, "bam": export_bam,
     }  # fmt: skip
     for target, export in targets.items():
-        left = [name for name in catalogue() if name in {one.name for one in _made(export, name).unsaid}]
-        said = f"{len(catalogue()) - len(left)} of {len(catalogue())} effects"
-        print(f"{target}: says {said}; leaves out {', '.join(left)}")
+        left = [name for name in catalogue() if name in {one.name for one in _made(export, name).omitted}]
+        count = f"{len(catalogue()) - len(left)} of {len(catalogue())} effects"
+        print(f"{target}: says {count}; leaves out {', '.join(left)}")
 
 
 def _made(export: Callable[[Rig], object], name: str) -> object:

@@ -31,7 +31,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RseaError
 from rsea_ros.library.diagnosed import diagnose
-from rsea_ros.library.fit import identify
+from rsea_ros.library.identified import identify
 from rsea_ros.report.diagnosis.page import final_values
 from rsea_ros.signals import Record
 

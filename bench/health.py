@@ -111,7 +111,7 @@ def faults(args: argparse.Namespace) -> Iterator[str]:
             monitor = monitor_of(rig)
             early = list(watch(monitor, pieces(bench, CLEAN, rng)))
             found = list(watch(monitor, pieces(faulty(bench, fault), WORN, rng, START)))
-            names = [f.code for f in monitor.changes.found.values()] if monitor.changes else []
+            names = [f.code for f in monitor.changes.findings.values()] if monitor.changes else []
             times = [at - START for at, f in found if f.code == fault.code]
             sizes = [f.size for _, f in found if f.code == fault.code]
             right = set(names) == {fault.code}

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 
 from independent.bench import Bench, record_command
 
-from rsea_ros.health.finding import HealthFinding
+from rsea_ros.health.health_finding import HealthFinding
 from rsea_ros.health.look import events_of
 from rsea_ros.health.monitor import Monitor
 from rsea_ros.health.settings import WatchSettings

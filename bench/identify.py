@@ -1,11 +1,13 @@
 """Time of `rsea identify` on 160 s, three topics at 280 Hz, beside a plain scipy response of the same arrays.
 
-Run: python bench/identify.py [--repeat 7]. Medians; ratios do not depend on the machine, milliseconds do.
+Run: python bench/identify.py [--repeat 7] [--duration 60]. Medians; ratios do not depend on the machine,
+milliseconds do. The verb starts with modules compiled before, as on a user's machine.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
 import subprocess
 import sys
@@ -32,11 +34,11 @@ OFF = 1.08
 """True values over those of the rig: a fit that starts at the truth would be too quick."""
 
 
-def bench_record() -> Record:
+def bench_record(duration: float = DURATION) -> Record:
     """Return the paper's run on a bench whose values differ from the rig's."""
     rig = load_rig("paper_high_impedance")
     true = rig.with_values({n: rig[n] * OFF for n in rig.free()})
-    u = excitation("chirp", ExcitationSettings(rate=RATE, duration=DURATION))
+    u = excitation("chirp", ExcitationSettings(rate=RATE, duration=duration))
     return synthesize(true, Channel(np.arange(len(u)) / RATE, u), seed=1)
 
 
@@ -64,25 +66,29 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeat", type=int, default=7, help="runs of each, of which the median counts")
-    repeat = parser.parse_args().repeat
-    record, rig = bench_record(), load_rig("paper_high_impedance")
+    parser.add_argument("--duration", type=float, default=DURATION, help="of the record, s (default 160)")
+    args = parser.parse_args()
+    record, rig = bench_record(args.duration), load_rig("paper_high_impedance")
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
         write_record(record, bag)
-        command = [sys.executable, "-m", "rsea_ros", "identify", str(bag), "--out", f"{folder}/out"]
+        verb = [sys.executable, "-m", "rsea_ros", "identify"]
+        command = [*verb, str(bag), "--out", f"{folder}/out", "--force"]
+        kept = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+        environment = {**kept, "PYTHONPYCACHEPREFIX": f"{folder}/compiled"}
         rows: dict[str, Callable[[], object]] = {
             "scipy: csd and welch, two channels": lambda: plain_response(record),
             "read the bag": lambda: read_record(bag),
             "responses and fit (identify)": lambda: identify([record], rig),
             "rsea identify, start to end": lambda: subprocess.run(
-                command, cwd=ROOT, check=True, capture_output=True
+                command, cwd=ROOT, check=True, capture_output=True, env=environment
             ),
         }
-        print(f"{DURATION:g} s, {len(record['command'])} samples a topic, three topics")
+        print(f"{args.duration:g} s, {len(record['command'])} samples a topic, three topics")
         print(f"{'':36}{'median ms':>10}{'least ms':>10}{'/ scipy':>9}")
         plain = 0.0
         for name, work in rows.items():
-            median, least = times_ms(work, repeat)
+            median, least = times_ms(work, args.repeat)
             plain = plain or median
             print(f"{name:36}{median:10.0f}{least:10.0f}{median / plain:9.1f}")
 

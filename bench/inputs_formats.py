@@ -35,7 +35,7 @@ from inputs_tables import (
 
 from msg_adapters import iterate, read_record, write_record
 from rsea_ros.cli.simulate import parse_effect
-from rsea_ros.design.catalogue import catalogue
+from rsea_ros.design.motor_gear_units import catalogue
 from rsea_ros.effects.catalogue import catalogue as effects
 from rsea_ros.errors import RseaError
 from rsea_ros.hardware.netft.calibration import parse

@@ -86,7 +86,7 @@ def expense(case: Case) -> tuple[bool, float]:
 def play_bag(case: Case, folder: Path) -> Outcome:
     """Make the bag of a case and run its verb on it."""
     bag, rig = bag_of(case, folder)
-    limit_child()
+    limit_child(case["verb"])
     verb, out = case["verb"], folder / "results"
     arguments = [verb, *([str(rig), str(bag)] if verb == "predict" else [str(bag), "--rig", str(rig)])]
     if verb in ("identify", "diagnose"):
@@ -110,7 +110,7 @@ def other_cases(seed: int, quick: bool) -> list[Case]:
          "amplitude": [20.0, 0.0, -5.0, 1e-300],
          "period": [4.0, 0.001, 10.0, 1e9], "low": [0.05, 1e-9, 100.0], "high": [100.0, 1e-3, 1e9],
          "no_noise": [False, True]}, rng)[0]  # fmt: skip
-    control = covering({"verb": ["control"], "rig": names, "rate": [280.0, 1000.0, 50.0, 10000.0],
+    control = covering({"verb": ["control"], "rig": names, "rate": [280.0, 1000.0, 50.0, 2000.0, 10000.0],
                         "free": [None, *names]}, rng)[0]  # fmt: skip
     export = [{"verb": "export", "rig": r} for r in names]
     odd = [1e-300, 1e-3, 1.0, 1e3, 1e300, 0.0, -1.0, "nan", "inf"]

@@ -21,7 +21,9 @@ MEMORY = 1_500 * 1024**2
 """Bytes of private writable memory (RLIMIT_DATA): address space alone says nothing with compiled code."""
 SPARE = 256 * 1024**2
 SECONDS = 60
-"""s of processor time, all threads together: a busy machine does not change it."""
+"""s on a machine of two cores that does nothing else, counted in processor time: others do not change it."""
+TWO_CORES = ("diagnose",)
+"""Verbs that keep both cores busy: their time is twice as long in processor time."""
 RESULT, REFUSED = "result", "refused"
 TOLERATED = (0, 1)
 """Exit statuses of a result: done, and a finding that was asked for by status."""
@@ -49,9 +51,9 @@ Play = Callable[[Path, bytes, int], Outcome]
 """Reads the bytes of a file in a folder, the n-th of its format."""
 
 
-def limit_child(seconds: int = SECONDS) -> None:
-    """Put the ceilings on this process, counted from now."""
-    limit_seconds(seconds)
+def limit_child(verb: str = "") -> None:
+    """Put the ceilings on this process, counted from now. verb: the one that it runs."""
+    limit_seconds(SECONDS * (2 if verb in TWO_CORES else 1))
     limit_memory()
 
 

@@ -1,7 +1,7 @@
 """The same swept sine through MuJoCo and through our plant: the prototype in a knee, open loop.
 
-The engine gets bodies, bearings and one pair of teeth (design/mjcf.py); the direction of the rotor, and so
-whether T_d/T_p resonates, is a result of the engine.
+The engine gets bodies, bearings and one pair of teeth (design/mujoco_model.py); the direction of the rotor,
+and so whether T_d/T_p resonates, is a result of the engine.
 
 MuJoCo is among the packages of the tests, for Python 3.11 or later.
 Run: .venv/bin/python bench/mujoco_second_opinion.py [RIG] [--train TRAIN] [--seconds 20]
@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from rsea_ros.design.mjcf import STEP, mjcf
+from rsea_ros.design.mujoco_model import STEP, mjcf
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import train_ratio

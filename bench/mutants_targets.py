@@ -23,8 +23,16 @@ TARGETS: dict[str, tuple[str, ...]] = {
         "identification/test_coloured_measures.py",
     ),
     "identification/clocks": ("identification/test_clock_tables.py",),
-    "diagnosis/criteria": ("diagnosis/test_criteria_edges.py", "diagnosis/test_criteria.py"),
+    "diagnosis/score": ("diagnosis/test_score_tables.py", "diagnosis/test_tempering.py"),
+    "diagnosis/criteria": (
+        "diagnosis/test_criteria_edges.py",
+        "diagnosis/test_known_values.py",
+        "diagnosis/test_criteria.py",
+    ),
     "diagnosis/stepwise": ("diagnosis/test_stepwise_tables.py",),
-    "diagnosis/backward_elimination": ("diagnosis/test_elimination_tables.py",),
+    "diagnosis/backward_elimination": (
+        "diagnosis/test_elimination_tables.py",
+        "diagnosis/test_rival_guesses.py",
+    ),
 }
 """By module below rsea_ros: files below test."""

@@ -1,6 +1,6 @@
-"""Four small effects at once on a plant that shares no code with the project: named, missed, and false.
+"""Several small effects at once on a plant that shares no code with the project: named, missed, and false.
 
-    python bench/overlap.py play --log overlap.jsonl [--records 10]     resumes
+    python bench/overlap.py play --log overlap.jsonl [--records 10] [--hidden 4]     resumes
     python bench/overlap.py score --log overlap.jsonl
 
 Each effect is mild to medium (test/independent/severities.py), of another mechanism than the others: two
@@ -36,7 +36,9 @@ MECHANISMS = (
     ("ft_drift", "mains_interference", "structural_resonance"),
     ("torque_ripple", "damping_drift"),
 )
-HIDDEN, DURATION = 4, 25.0
+FURTHER = (("backlash",), ("torque_saturation",))
+"""Mechanisms of which records draw too that hide more than five effects."""
+DURATION = 25.0
 WORK = ("chirp", "multisine", "work")
 
 
@@ -48,28 +50,31 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("step", choices=("play", "score"))
     parser.add_argument("--log", type=Path, required=True, help="JSON lines, a record each")
     parser.add_argument("--records", type=int, default=10, help="seeds from 0 on (default %(default)s)")
+    parser.add_argument("--hidden", type=int, default=4, help="effects in a record (default %(default)s)")
     parser.add_argument("--max-causes", type=int, default=6, help="of the search (default %(default)s)")
     args = parser.parse_args(argv)
     if args.step == "play":
-        _play(args.log, args.records, args.max_causes)
+        _play(args.log, args.records, args.hidden, args.max_causes)
     else:
-        print(scored(read_log(args.log)))
+        entries = read_log(args.log)
+        print(table(entries), scored(entries), sep="\n\n")
     return 0
 
 
-def _play(log: Path, records: int, most: int) -> None:
+def _play(log: Path, records: int, hidden: int, most: int) -> None:
     done = {entry["seed"] for entry in read_log(log)}
     for seed in (s for s in range(records) if s not in done):
-        entry = _outcome(seed, most)
+        entry = _outcome(seed, hidden, most)
         append_to_log(log, entry)
         print(entry, flush=True)
 
 
-def made(seed: int) -> tuple[Record, Mapping[str, Mapping[str, float]], str]:
-    """Return a record, the parameters of what is hidden in it by effect, and its kind of work."""
+def made(seed: int, number: int) -> tuple[Record, Mapping[str, Mapping[str, float]], str]:
+    """Return a record, the parameters of a number of effects hidden in it by name, and its kind of work."""
     rng = np.random.default_rng([12, seed])
-    groups = rng.permutation(len(MECHANISMS))[:HIDDEN]
-    names = [str(rng.choice(MECHANISMS[k])) for k in sorted(groups)]
+    mechanisms = MECHANISMS if number <= len(MECHANISMS) else (*MECHANISMS, *FURTHER)
+    groups = rng.permutation(len(mechanisms))[:number]
+    names = [str(rng.choice(mechanisms[k])) for k in sorted(groups)]
     hidden = {n: drawn_parameters(n, str(rng.choice(("mild", "medium"))), rng) for n in names}
     bench = drawn_bench(rng)
     for name, parameters in hidden.items():
@@ -78,8 +83,8 @@ def made(seed: int) -> tuple[Record, Mapping[str, Mapping[str, float]], str]:
     return record_command(bench, COMMANDS[work](bench, DURATION, rng), rng), hidden, work
 
 
-def _outcome(seed: int, most: int) -> dict[str, Any]:
-    record, hidden, work = made(seed)
+def _outcome(seed: int, number: int, most: int) -> dict[str, Any]:
+    record, hidden, work = made(seed, number)
     start = time.process_time()
     result = diagnose([record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(most))
     rivals = [a.name for a in result.alternatives]
@@ -97,6 +102,22 @@ def _outcome(seed: int, most: int) -> dict[str, Any]:
         "verdict": result.verdict,
         "seconds": round(time.process_time() - start, 1),
     }
+
+
+def table(entries: Sequence[Mapping[str, Any]]) -> str:
+    """Return a row for each record: what is hidden in it with the status it got, and what else was said."""
+    rows = [
+        f"| {e['seed']} | {e['work']} | {', '.join(_named(n, e) for n in e['hidden'])} "
+        f"| {', '.join(_named(n, e) for n in e['causes'] if n not in e['hidden'])} | {e['verdict']} |"
+        for e in entries
+    ]
+    head = "| seed | work | hidden: status | other causes: status | verdict |\n|--:|---|---|---|---|"
+    return "\n".join([head, *rows])
+
+
+def _named(name: str, entry: Mapping[str, Any]) -> str:
+    as_rival = "rival" if name in entry["rivals"] else "missed"
+    return f"{name}: {entry['causes'].get(name, as_rival)}"
 
 
 def scored(entries: Sequence[Mapping[str, Any]]) -> str:

@@ -21,7 +21,7 @@ from scipy.io import loadmat
 from bench.public_fit import DATA, RIGS, Score, case_of, error_from, fitted, record_of, rig_of
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.identification.identify import identify
-from rsea_ros.model.prediction import predict
+from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record

@@ -29,12 +29,12 @@ import rclpy
 
 from bench.bare_loop import permitted
 from msg_adapters.ros import DiagnosticArray, JointState, torque_command_message
-from msg_adapters.topics import AXES, JOINT_STATE, WRENCH
+from msg_adapters.topic_map import AXES, JOINT_STATE, WRENCH
 from rsea_ros.control.controller import TorqueLimits
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._mailbox import Mailbox, Polled
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields, Polled
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -67,7 +67,7 @@ class Outside:
         self.health: dict[str, dict[str, str]] = {}
         self.desired = self.node.create_publisher(JointState, "desired_torque", COMMAND)
         self._ft, self._torques = (
-            Mailbox(self.node, kind, topic, qos, lambda: None, field)
+            Mailbox(self.node, topic, MessageFields(kind, (field,)), qos, lambda: None)
             for kind, topic, qos, field in (
                 (WRENCH, "ft", MEASUREMENT, ("wrench", AXES.index("torque.z"))),
                 (JOINT_STATE, "torque_command", COMMAND, ("effort", 0)),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msg_adapters.bags import iterate
 from msg_adapters.reading import read_record
-from msg_adapters.topics import TopicMap
+from msg_adapters.topic_map import TopicMap
 
 if TYPE_CHECKING:
     from msg_adapters.records import write_record, write_records

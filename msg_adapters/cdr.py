@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from msg_adapters.topics import WRENCH
+from msg_adapters.topic_map import WRENCH
 from rsea_ros.errors import BagError
 from rsea_ros.signals import FloatArray, IntArray
 

@@ -41,7 +41,7 @@ def note_repeats(series: FieldSamples, notes: list[str]) -> None:
 
 
 def on_the_clock_of_the_command(
-    series: Mapping[str, FieldSamples], told: Contents
+    series: Mapping[str, FieldSamples], report: Contents
 ) -> dict[str, FieldSamples]:
     """Leave out channels without a moment in common with the command: their stamps come from another clock.
 
@@ -55,7 +55,7 @@ def on_the_clock_of_the_command(
             kept[name] = one
         else:
             detail = "left out: no moment in common with the command, its stamps are from another clock"
-            told.faults.append(Fault("clock_offset", name, 1.0, detail, ahead * 1e-9, "s"))
+            report.faults.append(Fault("clock_offset", name, 1.0, detail, ahead * 1e-9, "s"))
     return kept
 
 

@@ -67,7 +67,7 @@ class Contents:
         detail = f"{got} read, {expected} expected from {witness}"
         self.tell(kind, topic, detail, abs(expected - got), "messages", share)
 
-    def told(self) -> str:
+    def remarks(self) -> str:
         """Return notes and faults for the text of a refusal, empty without any."""
         faults = (f"{f.kind.replace('_', ' ')}: {f.detail}" for f in self.faults)
         parts = dict.fromkeys([*self.notes, *faults])

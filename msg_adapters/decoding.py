@@ -29,7 +29,7 @@ class Decoded:
         self.values: dict[str, FloatArray] = {field: np.full(count, np.nan) for field in fields}
         self.filled: dict[str, BoolArray] = {field: np.zeros(count, bool) for field in fields}
 
-    def blocks(self, topic: str, where: str, told: Contents) -> list[Block]:
+    def blocks(self, topic: str, where: str, report: Contents) -> list[Block]:
         """Return the messages by layout, without the damaged ones, which are reported.
 
         Raises BagError where all are damaged.
@@ -44,7 +44,7 @@ class Decoded:
         if damaged:
             first, share = min(damaged), len(damaged) / len(self.stamps)
             detail = f"left out, the first is message {first}: {damaged[first]}"
-            told.tell("damaged_messages", topic, detail, len(damaged), "messages", share)
+            report.tell("damaged_messages", topic, detail, len(damaged), "messages", share)
         self.sound[:] = True
         self.sound[list(damaged)] = False
         return sorted_blocks
@@ -58,7 +58,7 @@ class Decoded:
                 self.values[field][rows] = column[sound]
                 self.filled[field][rows] = True
 
-    def tell_empty(self, topic: str, told: Contents) -> None:
+    def tell_empty(self, topic: str, report: Contents) -> None:
         """Report a field that some messages leave empty although they have the other fields."""
         for field, filled in self.filled.items():
             beside = [
@@ -69,12 +69,12 @@ class Decoded:
                 lacking |= other & ~filled
             if count := int(lacking.sum()):
                 detail = f"{field} is empty, first in message {int(np.argmax(lacking))}"
-                told.tell("empty_fields", topic, detail, count, "messages", count / len(filled))
+                report.tell("empty_fields", topic, detail, count, "messages", count / len(filled))
 
 
-def _mark_overlong(found: list[Block], damaged: dict[int, str]) -> None:
+def _mark_overlong(blocks_of_topic: list[Block], damaged: dict[int, str]) -> None:
     """Mark messages that go on behind their last field, unless those of the topic all do."""
-    surplus = [(block, block.matrix.shape[1] - block.layout.end) for block in found]
+    surplus = [(block, block.matrix.shape[1] - block.layout.end) for block in blocks_of_topic]
     if all(count >= _PADDING for _, count in surplus):
         return
     for block, count in surplus:

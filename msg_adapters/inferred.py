@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msg_adapters.cdr import Walk
 from msg_adapters.contents import Contents
-from msg_adapters.topics import TopicMap
+from msg_adapters.topic_map import TopicMap
 
 STAMP_SIZE = 8
 """Bytes of a header before its frame_id."""

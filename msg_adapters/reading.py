@@ -12,9 +12,9 @@ from msg_adapters.cdr import Block
 from msg_adapters.checks import FieldSamples, check_finite, note_repeats, on_the_clock_of_the_command
 from msg_adapters.contents import Contents, Messages
 from msg_adapters.decoding import Decoded
-from msg_adapters.health import DIAGNOSTICS, tell_health
 from msg_adapters.inferred import is_inferred
-from msg_adapters.topics import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
+from msg_adapters.reported_faults import DIAGNOSTICS, tell_health
+from msg_adapters.topic_map import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel, FloatArray, IntArray, Record
 from rsea_ros.stamp_order import far_apart, in_order, stray_fault
@@ -78,15 +78,15 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
     return _record(series, source, report, strict)
 
 
-def _record(series: Mapping[str, FieldSamples], source: str, told: Contents, strict: bool) -> Record:
+def _record(series: Mapping[str, FieldSamples], source: str, report: Contents, strict: bool) -> Record:
     """Put the series on one clock, in order."""
     epoch = min(int(one.stamps.min()) for one in series.values())
     channels: dict[str, Channel] = {}
     for name, one in series.items():
         ordered, faults = in_order(Channel(_seconds(one.stamps - epoch), one.values), name)
         channels[name] = ordered
-        told.faults += faults
-    record = Record(channels, source, epoch, tuple(dict.fromkeys(told.notes)), tuple(told.faults))
+        report.faults += faults
+    record = Record(channels, source, epoch, tuple(dict.fromkeys(report.notes)), tuple(report.faults))
     if not strict:
         return record
     repaired, faults = repair_stamps(record)
@@ -118,7 +118,7 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
         if not filled.intersection((*roles, *others)):
             wanted = " or ".join(topics.topic(role) for role in roles)
             raise BagError(
-                f"{source}: no message on {wanted}; the bag holds {_held(contents)}{contents.told()}; "
+                f"{source}: no message on {wanted}; the bag holds {_held(contents)}{contents.remarks()}; "
                 "record one, or name its topic with --topic or --namespace"
             )
 
@@ -129,49 +129,49 @@ def _held(contents: Contents) -> str:
     return ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics) or "no topic at all"
 
 
-def _require_values(source: str, series: Mapping[str, FieldSamples], strict: bool, told: Contents) -> None:
+def _require_values(source: str, series: Mapping[str, FieldSamples], strict: bool, report: Contents) -> None:
     """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
     if strict and "command" not in series and "reference" not in series:
         raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N m")
     if not set(series) - ({"command", "reference"} if strict else set()):
         raise BagError(
-            f"{source}: no measurement is left{told.told()}, expected joint states or F/T with values, "
+            f"{source}: no measurement is left{report.remarks()}, expected joint states or F/T with values, "
             "stamped by the command's clock"
         )
 
 
 def _series(
-    source: str, role: str, messages: Messages, topics: TopicMap, told: Contents
+    source: str, role: str, messages: Messages, topics: TopicMap, report: Contents
 ) -> dict[str, FieldSamples]:
     """Decode one topic: channel -> series. A field that no message fills is left out."""
     topic = topics.topic(role)
     where = f"{source}: {topic}"
     decoded = Decoded(messages, TYPES[role], tuple(FIELDS[role].values()))
-    found = decoded.blocks(topic, where, told)
-    _one_joint(where, found, topics.joint)
-    for block in found:
+    decoded_blocks = decoded.blocks(topic, where, report)
+    _one_joint(where, decoded_blocks, topics.joint)
+    for block in decoded_blocks:
         decoded.take(block, {field: _column(block, field, topics) for field in decoded.fields})
-    decoded.tell_empty(topic, told)
-    stamps = _with_log_times(topic, where, decoded, messages.log_times, told)
+    decoded.tell_empty(topic, report)
+    stamps = _with_log_times(topic, where, decoded, messages.log_times, report)
     series = {}
     for channel, field in FIELDS[role].items():
         filled = decoded.filled[field]
         one = FieldSamples(f"{where} {field}", stamps[filled], decoded.values[field][filled])
         if np.isnan(one.values).all():
             if one.values.size:
-                told.notes.append(f"{one.where}: not a number in every message, taken as not measured")
+                report.notes.append(f"{one.where}: not a number in every message, taken as not measured")
             continue
         stray = far_apart(one.stamps)
         if stray.any():
-            told.faults.append(stray_fault(stray, channel))
+            report.faults.append(stray_fault(stray, channel))
             one = FieldSamples(one.where, one.stamps[~stray], one.values[~stray])
         series[channel] = one
     return series
 
 
-def _one_joint(where: str, found: Sequence[Block], joint: str | None) -> None:
+def _one_joint(where: str, decoded_blocks: Sequence[Block], joint: str | None) -> None:
     """Refuse several joints where none is named, and a missing name."""
-    layouts = [block.layout for block in found if "wrench" not in block.layout.fields]
+    layouts = [block.layout for block in decoded_blocks if "wrench" not in block.layout.fields]
     names = tuple(dict.fromkeys(name for layout in layouts for name in layout.names))
     count = max([len(names), *(n for layout in layouts for _, n in layout.fields.values())])
     listed = ", ".join(map(brief, names[:_MOST_NAMED])) or "without names"
@@ -194,7 +194,7 @@ def _column(block: Block, field: str, topics: TopicMap) -> FloatArray | None:
 
 
 def _with_log_times(
-    topic: str, where: str, decoded: Decoded, log_times: Sequence[int], told: Contents
+    topic: str, where: str, decoded: Decoded, log_times: Sequence[int], report: Contents
 ) -> IntArray:
     """Put the log time where the header stamp is zero, which means that nobody set it."""
     stamps: IntArray = decoded.stamps.copy()
@@ -202,7 +202,7 @@ def _with_log_times(
     unset = [row for row in zero.tolist() if log_times[row]]
     if unset:
         detail = f"{len(unset)} of {len(stamps)} header stamps are zero, log time taken"
-        told.notes.append(f"{where}: {detail}")
-        told.tell("zero_stamps", topic, detail, len(unset), "messages", len(unset) / len(stamps))
+        report.notes.append(f"{where}: {detail}")
+        report.tell("zero_stamps", topic, detail, len(unset), "messages", len(unset) / len(stamps))
         stamps[unset] = [min(log_times[row], LATEST) for row in unset]
     return stamps

@@ -10,7 +10,7 @@ import numpy as np
 
 from msg_adapters import encoding
 from msg_adapters.remarks import Remarks
-from msg_adapters.topics import AXES, FIELDS, TYPES, TopicMap, sign_and_index
+from msg_adapters.topic_map import AXES, FIELDS, TYPES, TopicMap, sign_and_index
 from msg_adapters.writing import BagWriter
 from rsea_ros.errors import BagError
 from rsea_ros.signals import FloatArray, IntArray, Record
@@ -73,8 +73,8 @@ def _check_apart(series: Sequence[_Series]) -> None:
     """Refuse two roles on one topic: no reader could distinguish them. Raises BagError."""
     roles: dict[str, tuple[TopicMap, str]] = {}
     for one in series:
-        topic, this = one.topics.topic(one.role), (one.topics, one.role)
-        if (other := roles.setdefault(topic, this)) != this:
+        topic, role = one.topics.topic(one.role), (one.topics, one.role)
+        if (other := roles.setdefault(topic, role)) != role:
             raise BagError(f"topic {topic}: is both {other[1]} and {one.role}, expected a topic for each")
 
 

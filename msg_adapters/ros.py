@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from msg_adapters.topics import AXES, sign_and_index
+from msg_adapters.topic_map import AXES, sign_and_index
 from rsea_ros.errors import ParameterError
 
 __all__ = [

@@ -17,7 +17,7 @@ from msg_adapters.metadata import Topic
 from msg_adapters.remarks import Remarks
 from msg_adapters.sqlite_storage import SqliteStorage
 from msg_adapters.storage import Storage
-from msg_adapters.topics import check_topic
+from msg_adapters.topic_map import check_topic
 from rsea_ros import files
 from rsea_ros.errors import BagError, OutputError
 from rsea_ros.interrupts import undisturbed

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from rsea_ros.control.controller import TorqueController
     from rsea_ros.diagnosis.settings import DiagnosisSettings
     from rsea_ros.errors import RseaError
-    from rsea_ros.library.bags import read_bag
     from rsea_ros.library.checking import check
     from rsea_ros.library.diagnosed import diagnose
-    from rsea_ros.library.fit import identify
+    from rsea_ros.library.identified import identify
+    from rsea_ros.library.read_bag import read_bag
     from rsea_ros.library.simulating import simulate
     from rsea_ros.model.observer.observer import Observer
-    from rsea_ros.model.prediction import predict
+    from rsea_ros.model.prediction_errors import predict
     from rsea_ros.model.rig import Rig
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.signals import Record
@@ -38,10 +38,10 @@ DOOR = {
     "check": "library.checking",
     "diagnose": "library.diagnosed",
     "effects": "effects",
-    "identify": "library.fit",
+    "identify": "library.identified",
     "load_rig": "model.rig_file",
-    "predict": "model.prediction",
-    "read_bag": "library.bags",
+    "predict": "model.prediction_errors",
+    "read_bag": "library.read_bag",
     "simulate": "library.simulating",
 }
 """The names that `import rsea_ros` offers, and the module of each."""

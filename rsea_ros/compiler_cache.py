@@ -16,7 +16,7 @@ from pathlib import Path
 
 SHARED = (
     "effects/_*.py", "effects/effect.py", "effects/signal_table.py", "effects/spring_hysteresis.py",
-    "model/call.py", "model/drive.py", "model/step.py",
+    "model/compiled_call.py", "model/drive.py", "model/step.py",
     "model/observer/filter.py", "model/observer/log.py", "model/observer/transition.py",
 )  # fmt: skip
 """Files whose functions and constants are compiled into those of other files."""

@@ -27,6 +27,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "clock_jump": "the clock of the stamps jumped; the jump is removed",
         "clock_offset": "the clock of a channel differs from the command's",
         "clock_drift": "the clock of a channel runs faster or slower than the command's",
+        "early_torque": "each motor torque is of the command with its stamp, and is read behind that",
         "dropped_samples": "samples are missing: the stamps have gaps",
         "partly_recorded": "a channel starts later or ends earlier than the run",
         "duplicate_stamps": "stamps repeat; the first sample of each is kept",

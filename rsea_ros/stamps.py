@@ -1,7 +1,7 @@
 """Corrected stamps of a run: samples in order, clock jumps removed, gaps and repeats reported.
 
 A clock that jumped shifts all the samples after the jump: sorted, they would mix with those before it, so
-the jump is removed first.
+the jump is removed first. A motor torque that belongs behind the edge of its command goes there.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from rsea_ros.stamp_order import (
     sort_by_stamp,
     stray_fault,
 )
+from rsea_ros.torque_edge import behind_the_edge
 
 _SHORTEST_JUMP = 5.0
 """In sample periods: less than that a channel may well end later than the others, by chance."""
@@ -51,7 +52,8 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         _check_even(channel, f"{record.source}: {name}")
         faults += dropped_samples(channel, name, int(repeated.sum()))
         channels[name] = channel
-    repaired = record.with_channels(**channels)
+    repaired, early = behind_the_edge(record.with_channels(**channels))
+    faults += early
     explained = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}
     new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in explained]
     return repaired, [*new, *(fault for fault in absent_spans(repaired) if fault not in record.faults)]

@@ -182,8 +182,8 @@ def _scalar(event: yaml.ScalarEvent, key: str) -> Any:
     return decimal(text) if is_decimal(text) else text
 
 
-def _refusal(event: yaml.Event, what: str) -> FieldError:
-    return FieldError(f"line {_line(event)}: {what}")
+def _refusal(event: yaml.Event, reason: str) -> FieldError:
+    return FieldError(f"line {_line(event)}: {reason}")
 
 
 def _line(event: yaml.Event) -> int:

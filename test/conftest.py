@@ -18,6 +18,8 @@ from xdist.workermanage import WorkerController
 import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
 from rsea_ros.compiler_cache import trusted_cache
 
+sys.path.append(str(Path(__file__).parent))  # import_graph, which is no test
+
 BYTECODE = sys.dont_write_bytecode, sys.pycache_prefix
 if sys.dont_write_bytecode:  # then pytest would rewrite 3000 asserts anew in each worker, 10 s each
     sys.dont_write_bytecode, sys.pycache_prefix = False, str(trusted_cache("bytecode"))
@@ -62,8 +64,9 @@ COMPUTING = (
     "diagnosis/test_hidden_effects", "test_realdata", "diagnosis/test_two_causes", "diagnosis/test_puzzle",
     "cli/test_paper", "report/", "diagnosis/test_detents", "cli/test_diagnose",
     "test_inputs", "identification/test_identify", "control/test_verb", "model/test_pure_torque",
-    "cli/test_nothing_lost", "cli/test_bad_", "test_launcher", "laws/test_hidden_laws",
-    "diagnosis/test_joint", "fleet/test_task", "test_readme", "test_docs", "independent/test_bench",
+    "cli/test_nothing_lost", "cli/test_output_names", "cli/test_bad_", "test_launcher",
+    "laws/test_hidden_laws", "diagnosis/test_joint", "fleet/test_task", "test_readme", "test_docs",
+    "independent/test_bench",
 )  # fmt: skip
 """Files that compute longest, in this order, so that no worker is left with one of them at the end."""
 

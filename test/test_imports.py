@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import ast
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[1]
-MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
+from import_graph import MODULES, ROOT, imports, name_of
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-STAMPS = {"coverage", "stamps", "stamp_gaps", "stamp_order"}
+STAMPS = {"coverage", "stamps", "stamp_gaps", "stamp_order", "torque_edge"}
 FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -23,9 +19,10 @@ OWN = {
     "errors": set(),
     "signals": {"errors", "arrays"},
     "coverage": {"signals"},
-    "stamps": {"coverage", "errors", "signals", "stamp_gaps", "stamp_order"},
+    "stamps": {"coverage", "errors", "signals", "stamp_gaps", "stamp_order", "torque_edge"},
     "stamp_gaps": {"signals", "stamp_order"},
     "stamp_order": {"signals"},
+    "torque_edge": {"signals"},
     "fault_kinds": set(),
     "fast_length": set(),
     "normal": set(),
@@ -79,44 +76,6 @@ OWN = {
 }
 """Layers of this project that a layer may import beside itself."""
 
-DIAGNOSIS = (
-    {"settings", "residual_peaks"},
-    {"result", "data_split", "coherence", "screening"},
-    {"score", "problem_variants", "residual_analysis", "initial_guess"},
-    {"candidate", "criteria", "next_experiment"},
-    {"selection", "step_fits"},
-    {"forward_step", "backward_elimination", "evaluation"},
-    {"stepwise", "naming"},
-    {"diagnose"},
-)
-"""Layers of rsea_ros/diagnosis: a module imports those of the lines above its own only."""
-NAMING = (
-    {"coefficients", "contribution"},
-    {"signature", "flexible"},
-    {"evidence"},
-    {"rivals", "probability"},
-    {"weighing"},
-    {"status"},
-    {"causes"},
-    {"outcome"},
-    {"conclusion"},
-)
-"""Layers of its folder naming: how the selected causes are named."""
-
-REPORT = {
-    "figures": set(),
-    "page": {"figures"},
-    "diagnosis": {"figures", "page", "identification", "rig"},
-    "identification": {"figures", "page", "rig"},
-    "check": {"figures", "page", "rig"},
-    "law": {"figures", "page", "rig"},
-    "rig": {"page"},
-    "campaign": {"figures", "page", "experiment"},
-    "fleet": {"figures", "page", "diagnosis"},
-    "paper": {"figures", "page", "design"},
-}
-"""Folders of rsea_ros/report that a folder imports; one that is not listed has figures and page alone."""
-
 NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
 MESSAGES = {
     "builtin_interfaces",
@@ -156,6 +115,7 @@ FOREIGN = {
     "stamps": {"numpy"},
     "stamp_gaps": {"numpy"},
     "stamp_order": {"numpy"},
+    "torque_edge": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression", "asteval"}
     | {"pyarrow"}
@@ -173,32 +133,6 @@ def layer_of(module: str) -> str:
     fitting = [layer for layer in OWN if name == layer or name.startswith(layer + ".")]
     assert fitting, f"{module} lies in no layer of docs/architecture.md"
     return max(fitting, key=len)
-
-
-def name_of(path: Path) -> str:
-    """Return the dotted name of a module's file."""
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def imports(path: Path, source: str) -> Iterator[tuple[str, int]]:
-    """Yield every module that a source imports, at any depth, by its absolute name, with its line."""
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            yield from ((alias.name, node.lineno) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            module = absolute(path, node)
-            names = [f"{module}.{alias.name}" for alias in node.names] if module == "rsea_ros" else [module]
-            yield from ((name, node.lineno) for name in names)
-
-
-def absolute(path: Path, node: ast.ImportFrom) -> str:
-    """Return the absolute name of the module of a `from … import`."""
-    if not node.level:
-        return str(node.module)
-    ancestors = path.relative_to(ROOT).parent.parts
-    kept = ancestors[: len(ancestors) - node.level + 1]
-    return ".".join([*kept, node.module] if node.module else kept)
 
 
 def offences(path: Path, source: str) -> list[str]:
@@ -220,57 +154,6 @@ def may_import(layer: str, module: str) -> bool:
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_module_imports_only_what_its_layer_may(path):
     assert offences(path, path.read_text(encoding="utf-8")) == []
-
-
-FOLDERS = {"rsea_ros.diagnosis": DIAGNOSIS, "rsea_ros.diagnosis.naming": NAMING}
-"""Folders with layers of their own, by package."""
-
-
-@pytest.mark.parametrize("package", FOLDERS)
-def test_every_module_of_a_folder_has_a_layer(package):
-    modules = [p.stem for p in folder(package).iterdir() if p.suffix == ".py" or (p / "__init__.py").exists()]
-    assert sorted(name for layer in FOLDERS[package] for name in layer) == sorted(set(modules) - {"__init__"})
-
-
-@pytest.mark.parametrize(("package", "layer"), [(p, k) for p, ls in FOLDERS.items() for k in range(len(ls))])
-def test_a_module_imports_only_from_the_layers_above_it(package, layer):
-    allowed = set().union(*FOLDERS[package][:layer])
-    for name in FOLDERS[package][layer]:
-        assert used_by(package, name) <= allowed | {name}, name
-
-
-def test_only_the_conclusion_of_naming_is_imported_from_outside():
-    package = "rsea_ros.diagnosis.naming"
-    outside = [p for p in MODULES if folder(package) not in p.parents]
-    used = {m for p in outside for m, _ in imports(p, p.read_text(encoding="utf-8")) if m.startswith(package)}
-    assert used == {f"{package}.conclusion"}
-
-
-def folder(package: str) -> Path:
-    """Return the folder of a package."""
-    return ROOT.joinpath(*package.split("."))
-
-
-def used_by(package: str, name: str) -> set[str]:
-    """Return the modules of a package that one of them imports; of a folder, those that its modules do."""
-    file = folder(package) / f"{name}.py"
-    paths = [file] if file.exists() else sorted((folder(package) / name).glob("*.py"))
-    modules = (module for p in paths for module, _ in imports(p, p.read_text(encoding="utf-8")))
-    inside = (m.removeprefix(package + ".") for m in modules if m.startswith(package + "."))
-    return {m.split(".")[0] for m in inside}
-
-
-REPORT_FOLDER = ROOT / "rsea_ros" / "report"
-
-
-@pytest.mark.parametrize("folder", sorted(p.name for p in REPORT_FOLDER.iterdir() if list(p.glob("*.py"))))
-def test_a_folder_of_the_report_imports_only_what_it_may(folder):
-    folders = {p.name for p in REPORT_FOLDER.iterdir() if p.is_dir()}
-    used = set()
-    for path in (REPORT_FOLDER / folder).glob("*.py"):
-        modules = (module.split(".") for module, _ in imports(path, path.read_text(encoding="utf-8")))
-        used |= {parts[2] for parts in modules if parts[:2] == ["rsea_ros", "report"] and len(parts) > 2}
-    assert used & folders - {folder} <= REPORT.get(folder, {"figures", "page"})
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,9 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.statics import Statics, statics_of
-from rsea_ros.model.prediction import predict
+from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.report.identification.statics import statics_sentences
+from rsea_ros.report.identification.statics_sentences import statics_sentences
 from rsea_ros.signals import Record
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"

@@ -12,7 +12,7 @@ MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT 
 ALLOWED = {
     "rsea_ros/files.py",
     "rsea_ros/replaced.py",  # gives names back
-    "rsea_ros/hardware/peer/bus.py",  # names a link to its terminal
+    "rsea_ros/hardware/peer/serial_line.py",  # names a link to its terminal
     "msg_adapters/compression.py",  # unpacks into a temporary folder
 }
 WRITING = {"write_text", "write_bytes", "rename", "renames", "tofile", "savez", "save", "savetxt", "to_csv"}

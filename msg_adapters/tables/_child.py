@@ -45,6 +45,6 @@ def answer(words: dict[str, object]) -> None:
 
 
 if __name__ == "__main__":
-    found = runpy.run_path(sys.argv[1])
-    if "read" in found:  # a file without it gives no answer, which child.py says
-        main(found, sys.argv[2], int(sys.argv[3]), json.loads(sys.argv[4]))
+    reader = runpy.run_path(sys.argv[1])
+    if "read" in reader:  # a file without it gives no answer, which child.py says
+        main(reader, sys.argv[2], int(sys.argv[3]), json.loads(sys.argv[4]))

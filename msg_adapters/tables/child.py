@@ -22,8 +22,8 @@ from typing import IO, Any
 
 import numpy as np
 
+from msg_adapters.tables.column_table import Table, checked_lengths, index_of
 from msg_adapters.tables.elements import place_of
-from msg_adapters.tables.table import Table, checked_lengths, index_of
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import shown
 

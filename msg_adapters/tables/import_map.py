@@ -22,11 +22,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from msg_adapters.tables.column_units import CHANNELS, LINEAR, unit
 from msg_adapters.tables.elements import chosen, is_open
-from msg_adapters.tables.keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
 from msg_adapters.tables.layout import DELIMITERS
-from msg_adapters.tables.terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
-from msg_adapters.tables.units import CHANNELS, LINEAR, unit
+from msg_adapters.tables.map_keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
+from msg_adapters.tables.map_terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
 from rsea_ros import strict_yaml
 from rsea_ros.errors import FieldError, ImportMapError
 from rsea_ros.wording import shown

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters.tables.clock import repaired
-from msg_adapters.tables.files import read_columns
+from msg_adapters.tables.column_files import read_columns
+from msg_adapters.tables.column_table import Table
+from msg_adapters.tables.column_units import LINEAR, canonical, unit
 from msg_adapters.tables.import_map import ImportMap, RowFilter
-from msg_adapters.tables.table import Table
-from msg_adapters.tables.terms import ChannelTerm
-from msg_adapters.tables.units import LINEAR, canonical, unit
+from msg_adapters.tables.map_terms import ChannelTerm
 from rsea_ros.errors import ImportMapError
 from rsea_ros.signals import UNITS, BoolArray, Channel, Fault, FloatArray, Record
 from rsea_ros.units import in_motion, plain

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from msg_adapters.tables.child import finite_table
+from msg_adapters.tables.column_table import Table, check_size, index_of
 from msg_adapters.tables.elements import ElementAddress, place_of
-from msg_adapters.tables.table import Table, check_size, index_of
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import brief, no_utf_8, shown
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from msg_adapters.tables.column_table import index_of
 from msg_adapters.tables.elements import base_and_index
 from msg_adapters.tables.numerals import is_numeral
-from msg_adapters.tables.table import index_of
 
 COMMENT = "#"
 BLANKS = " "

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from msg_adapters.tables.child import Reader
-from msg_adapters.tables.table import LARGEST, Table
+from msg_adapters.tables.column_table import LARGEST, Table
 
 CHILD = Path(__file__).with_name("_mat_reader.py")
 TIME = 90.0

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.lib import format as npy
 
 from msg_adapters.tables.child import finite_table
+from msg_adapters.tables.column_table import LARGEST, Table, index_of
 from msg_adapters.tables.elements import ElementAddress, place_of
-from msg_adapters.tables.table import LARGEST, Table, index_of
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import brief
 

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from msg_adapters.tables.child import Reader
-from msg_adapters.tables.table import LARGEST, Table
+from msg_adapters.tables.column_table import LARGEST, Table
 
 CHILD = Path(__file__).with_name("_parquet_reader.py")
 TIME = 90.0

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from msg_adapters.tables.column_table import Table, check_size
 from msg_adapters.tables.elements import base_and_index, number_in
 from msg_adapters.tables.layout import BLANKS, TextLayout, counts, index_in, layout_of
-from msg_adapters.tables.lines import blocks_of_lines
 from msg_adapters.tables.numerals import has_decimal_comma, numeral
-from msg_adapters.tables.table import Table, check_size
+from msg_adapters.tables.text_lines import blocks_of_lines
 from rsea_ros.decimal_number import is_decimal
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import brief, shown

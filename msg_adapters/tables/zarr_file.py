@@ -17,8 +17,8 @@ import numpy as np
 
 from msg_adapters.tables.blosc import unpack_blosc
 from msg_adapters.tables.child import finite_table
+from msg_adapters.tables.column_table import Table, check_size, index_of
 from msg_adapters.tables.elements import place_of
-from msg_adapters.tables.table import Table, check_size, index_of
 from msg_adapters.tables.zarr_store import ARRAY, ArrayStore, opened
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import shown

@@ -74,11 +74,11 @@ def score(answers: Mapping[str, Answer], truths: Mapping[str, RecordTruth], effe
 
 
 def _counts(answer: Answer, truth: RecordTruth, effects: Sequence[str]) -> _Counts:
-    said = np.array([answer.causes.get(n, 0.0) for n in effects])
+    probability = np.array([answer.causes.get(n, 0.0) for n in effects])
     hidden = np.array([n in truth.causes for n in effects])
-    named = said >= NAMED
-    ranks = tuple(_rank(float(p), said[~hidden]) for p in said[hidden])
-    brier = float(np.sum((said - hidden) ** 2))
+    named = probability >= NAMED
+    ranks = tuple(_rank(float(p), probability[~hidden]) for p in probability[hidden])
+    brier = float(np.sum((probability - hidden) ** 2))
     empty = not hidden.any()
     return _Counts(int(hidden.sum()), int((named & hidden).sum()), int(named.sum()), empty, brier, ranks)
 

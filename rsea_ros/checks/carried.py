@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Record
+from rsea_ros.signals import Channel, Record
+from rsea_ros.torque_edge import behind_the_edge
 from rsea_ros.wording import listed
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
-          "clipping", "nan", "coarse_steps")  # fmt: skip
+          "clipping", "nan", "coarse_steps", "early_torque")  # fmt: skip
 """Faults that the diagnosis finds and masks itself."""
 
 
@@ -37,7 +40,8 @@ def noted(record: Record, rig: Rig) -> Record:
 def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     """Return a record with the faults that were found; a dead channel is left out.
 
-    masks: the next stage finds, masks and reports faulty samples itself.
+    masks: the next stage finds, masks and reports faulty samples itself, and moves an early torque. For any
+    other stage both are done here.
 
     Raises IdentificationError where no channel is left that measures anything.
     """
@@ -50,7 +54,21 @@ def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
         )
     again = _AGAIN if masks else ()
     kept = (*record.faults, *(f for f in findings.faults if f.kind not in again and f not in record.faults))
-    return replace(record, channels=channels, faults=kept)
+    record = replace(record, channels=channels, faults=kept)
+    return record if masks else _sound(behind_the_edge(record)[0], findings)
+
+
+def _sound(record: Record, findings: Findings) -> Record:
+    """Return the record without the samples that must not count; commands stay, and what a fit refuses."""
+    sound = {}
+    for name, bad in findings.masked.items():
+        channel = record.channels.get(name)
+        if name in ("command", "reference") or channel is None or len(channel) != len(bad):
+            continue
+        left_out = bad & np.isfinite(channel.y)
+        if left_out.any():
+            sound[name] = Channel(channel.t[~left_out], channel.y[~left_out])
+    return record.with_channels(**sound)
 
 
 def _reasons(record: Record, findings: Findings) -> str:

@@ -8,22 +8,22 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.checks.angle_jumps import jump_findings
+from rsea_ros.checks.channel_spectra import Quotient, quotient
 from rsea_ros.checks.expected import Side, is_full_of_gaps, quotients, sides
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.checks.gain_findings import gain_findings, strangers
 from rsea_ros.checks.gains import Readings, readings_of
-from rsea_ros.checks.impedance import impedance_findings
 from rsea_ros.checks.lag import in_step, lag_findings, lags
-from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings
-from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.linearised_rig import linear_of
+from rsea_ros.checks.machine_impedance import impedance_findings
+from rsea_ros.checks.moved_spans import is_commanded
 from rsea_ros.checks.offset_findings import angle_offset_findings, offset_findings
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.rig_values import value_findings
 from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.smoothing import smoothing_findings
-from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
 from rsea_ros.checks.standstill import standstill_findings
 from rsea_ros.checks.unused import unused_sentence
@@ -76,7 +76,7 @@ def check_record(
         every += _other_axes(checked, rig, axis, wrench)
     faults = (*checked.faults, *(_fault(f) for f in every if f.kind in FAULTY and f.light != "green"))
     findings = tuple(_of_targets(f) for f in every) if rig.loop is not None else tuple(every)
-    return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults)
+    return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults, masked=checked.masked)
 
 
 def _no_targets(record: Record) -> Finding:

@@ -8,7 +8,7 @@ import numpy as np
 
 from rsea_ros.checks.expected import Side, quotients
 from rsea_ros.checks.lag import lag_of
-from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.moved_spans import is_commanded
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import MEASURED, Channel, Fault, Record

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.checks.spectra import Quotient, quotient
+from rsea_ros.checks.channel_spectra import Quotient, quotient
 from rsea_ros.errors import RseaError
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
 from rsea_ros.model.rig import Rig

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 from rsea_ros.model.rig_choice import RigChoice
-from rsea_ros.signals import Fault
+from rsea_ros.signals import BoolArray, Fault
 
 Light = Literal["green", "amber", "red"]
 LIGHTS: tuple[Light, ...] = ("green", "amber", "red")
@@ -42,6 +42,7 @@ class Findings:
     """All findings of a record compared with a rig, the most important first.
 
     faults: those of the data, of which every result made from the record repeats the whole list.
+    masked: which samples must not count, by channel, at the repaired stamps.
     """
 
     source: str
@@ -49,6 +50,7 @@ class Findings:
     findings: tuple[Finding, ...]
     faults: tuple[Fault, ...] = ()
     rig_choice: RigChoice = field(default_factory=RigChoice)
+    masked: Mapping[str, BoolArray] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def light(self) -> Light:

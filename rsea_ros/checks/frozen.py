@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from rsea_ros.checks.motion import MotionBeside, motion_beside, witness_of
+from rsea_ros.checks.moved_spans import MotionBeside, motion_beside, witness_of
 from rsea_ros.identification.quantum import step_of
 from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from rsea_ros.checks.channel_spectra import Quotient
 from rsea_ros.checks.factors import Factor
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.checks.gains import SHAPED, ChannelCorrection, Readings
-from rsea_ros.checks.shape import FittedShape
-from rsea_ros.checks.spectra import Quotient
+from rsea_ros.checks.response_shape import FittedShape
 from rsea_ros.model.rig import Rig
 
 _FAR, _MOVED, _ELSEWHERE = 4.0, 1.6, 4.0
@@ -22,6 +22,9 @@ _APART = 5.0
 """Factor between the sizes of two signals that have nothing in common, from which the rig is another."""
 _STRANGE, _FOREIGN = 2.0 * SHAPED, 1.2
 """What is left of ln R: play and friction on a coarse rig reach the first, another machine the second."""
+_UNIT = 0.2
+"""Logarithm: what a unit leaves of a gain, up to which it is that unit; a calibration leaves 0.1."""
+_BY_A_CONSTANT = "a current, a voltage or a count"
 RIGHT_RIG = "is this the right rig? name another with --rig, or another joint with --joint"
 
 
@@ -64,19 +67,7 @@ def _of_channel(r: ChannelCorrection, axis: str) -> list[Finding]:
             )
         )
     if r.factor is not None:
-        meant = " or ".join(f.meaning for f in (r.factor, *r.also))
-        findings.append(
-            Finding(
-                "red",
-                "scale",
-                r.channel,
-                r.factor.value,
-                "1",
-                expected="1, SI at the gear output",
-                detail=f"looks like {meant}",
-                remedy=_unit(r.channel, r.factor),
-            )
-        )
+        findings.append(_scaled(r, r.factor))
     if r.odd or not findings:
         findings.append(
             Finding(
@@ -91,6 +82,27 @@ def _of_channel(r: ChannelCorrection, axis: str) -> list[Finding]:
             )
         )
     return findings
+
+
+def _scaled(r: ChannelCorrection, factor: Factor) -> Finding:
+    """Return the finding of a channel in another unit; its factor, or the measured one where that is off."""
+    meant = " or ".join(f.meaning for f in (factor, *r.also))
+    measured = factor.value * math.exp(r.gain)
+    if abs(r.gain) < _UNIT:
+        value, detail, remedy = factor.value, f"looks like {meant}", _unit(r.channel, factor)
+    else:
+        value, detail = measured, f"times SI; {meant} would be {factor.value:.3g}: no unit explains it all"
+        remedy = f"`scale: {1.0 / measured:.3g}` for {r.channel} in the import map, if it is {_BY_A_CONSTANT}"
+    return Finding(
+        "red",
+        "scale",
+        r.channel,
+        value,
+        "1",
+        expected="1, SI at the gear output",
+        detail=detail,
+        remedy=remedy,
+    )
 
 
 def _turn(channel: str, axis: str) -> str:
@@ -128,6 +140,8 @@ def _of_rig(shape: FittedShape, rig: Rig) -> list[Finding]:
                 )
             )
     for name, error in shape.error.items():
+        beside = shape.error_measured[name]
+        error = max(error, beside if beside > _FOREIGN else 0.0)
         if error > _STRANGE:
             far = error > _FOREIGN and not rig.rigid_spring
             findings.append(

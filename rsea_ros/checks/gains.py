@@ -1,4 +1,4 @@
-"""Sign and scale of every channel, tried: the rig is fitted with and without each factor (shape.py).
+"""Sign and scale of every channel, tried: the rig is fitted with and without each factor (response_shape.py).
 
 A factor is reported only where the fit with it is much better than the fit without, and leaves a response
 that has the rig's shape. Gains within ALLOWED do not come from units: a torque constant, a calibration.
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.checks.channel_spectra import Quotient
 from rsea_ros.checks.factors import Factor, factors
-from rsea_ros.checks.shape import FittedShape, Prior, ShapeFit
-from rsea_ros.checks.spectra import Quotient
+from rsea_ros.checks.response_shape import FittedShape, Prior, ShapeFit
 from rsea_ros.model.rig import Rig
 
 ALLOWED = 1.1

@@ -20,7 +20,8 @@ from rsea_ros.signals import Channel, FloatArray, Record
 REACH = 2.0
 """s, either way."""
 NEAR = 0.05
-"""s. Smaller lags are found by their phases (shape.py, linear.py), and another rig's response looks so."""
+"""s. Smaller lags are found by their phases (response_shape.py, linearised_rig.py), and another rig's
+response looks so."""
 _PEAK = 0.5
 """Correlation that the best lag must reach."""
 _BESIDE = 0.7

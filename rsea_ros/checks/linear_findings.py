@@ -1,11 +1,11 @@
-"""Findings about clocks (linear.py)."""
+"""Findings about clocks (linearised_rig.py)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.checks.linear import LinearisedFit, Number
+from rsea_ros.checks.linearised_rig import LinearisedFit, Number
 from rsea_ros.model.rig import CLOCK_DOUBT
 
 _ALLOWED = 3.0 * CLOCK_DOUBT

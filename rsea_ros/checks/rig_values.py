@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.gain_findings import RIGHT_RIG
-from rsea_ros.checks.linear import LinearisedFit
+from rsea_ros.checks.linearised_rig import LinearisedFit
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.estimates import parameters_of
 from rsea_ros.identification.misfit import reweighted

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.fft import rfft, rfftfreq
 
 from rsea_ros.checks.finding import Finding
-from rsea_ros.checks.motion import at_rest
+from rsea_ros.checks.moved_spans import at_rest
 from rsea_ros.checks.stamp_findings import natural_frequency
 from rsea_ros.identification.noise import noise_floor
 from rsea_ros.model.rig import Rig

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from rsea_ros.checks.channel_spectra import Quotient, usable
 from rsea_ros.checks.finding import Finding
-from rsea_ros.checks.spectra import Quotient, usable
 from rsea_ros.signals import ComplexArray, FloatArray
 
 _MOST = 60

@@ -26,6 +26,10 @@ _REPEATED, _REGULAR = 3.0, 1.6
 """Samples that a value lasts, at least, and times as long that nine of ten last at most."""
 _MANY_STEPS = 4.0
 """Times the smallest step: a sensor that goes on by one step or two is coarse, not slow."""
+_OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "clock_jump", "partly_recorded", "early_torque")
+"""Faults of a whole channel, whose share of its samples means nothing."""
+_MENDED = ("early_torque",)
+"""Faults that leave no doubt in a result once they are mended."""
 _REMEDIES = {
     "missing_topic": "record it, or name its topic with --topic",
     "frozen_samples": "look at the sensor's driver: it repeats its last value",
@@ -36,6 +40,7 @@ _REMEDIES = {
     "duplicate_stamps": "stamp at acquisition, not on arrival",
     "clock_jump": "keep the clocks from being set during a run",
     "out_of_order": "sort by the stamps of the headers; nothing else to do",
+    "early_torque": "stamp it when it was measured; nothing else to do",
     "outliers": "look for a loose cable; they are masked",
     "clipping": "widen the sensor's range, or excite less",
     "nan": "look at the driver; they are masked",
@@ -47,8 +52,8 @@ _REMEDIES = {
 def fault_finding(fault: Fault) -> Finding:
     """Return the finding of a fault of the data."""
     bad = fault.kind == "dead_channel" or (fault.kind != "missing_topic" and fault.share > _RED_SHARE)
-    whole = fault.kind in ("missing_topic", "coarse_steps", "coarse_stamps", "clock_jump", "partly_recorded")
-    light: Light = "red" if bad and not whole else "amber"
+    whole = fault.kind in _OF_ALL
+    light: Light = "red" if bad and not whole else "green" if fault.kind in _MENDED else "amber"
     share = None if whole or not math.isfinite(fault.share) else 100.0 * fault.share
     value, unit = (fault.size, fault.unit) if fault.size is not None else (share, "%" if share else "")
     return Finding(

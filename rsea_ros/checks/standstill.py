@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.checks.finding import Finding
-from rsea_ros.checks.motion import moves
+from rsea_ros.checks.moved_spans import moves
 from rsea_ros.signals import SENSED, BoolArray, Channel, FloatArray, Record
 
 _LONGEST, _SHARE = 1.0, 0.1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.checks.motion import is_still
+from rsea_ros.checks.moved_spans import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.fault_kinds import FAULT_KINDS
 from rsea_ros.signals import UNITS, Channel, Record

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rsea_ros.cli import _lines
-from rsea_ros.report.lines import wrapped
+from rsea_ros.report.wrapped_lines import wrapped
 
 _NARROWEST = 16
 """Columns of the last cell at least; where fewer are left it is not wrapped."""

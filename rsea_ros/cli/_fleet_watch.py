@@ -45,13 +45,13 @@ def _look(args: argparse.Namespace, held: list[Held], at_first: bool) -> int:
 
     held: recordings unchanged since the previous look, so that none is still being recorded.
     """
-    from rsea_ros.fleet.alarms import tell_alarms
+    from rsea_ros.fleet.alarm_files import write_alarms
     from rsea_ros.fleet.store import open_store
 
     summary = worked(args, args.store, held)
     if summary.rows:
         print(summary.sentence(), flush=True)
-    alarms = tell_alarms(open_store(args.store)) if summary.rows or at_first else []
+    alarms = write_alarms(open_store(args.store)) if summary.rows or at_first else []
     for alarm in alarms:
         print(f"alarm: {alarm.text}: {alarm.file}", flush=True)
     return len(alarms)

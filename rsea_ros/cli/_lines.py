@@ -6,7 +6,7 @@ import shutil
 import sys
 from typing import TYPE_CHECKING
 
-from rsea_ros.report.lines import WIDTH, wrapped
+from rsea_ros.report.wrapped_lines import WIDTH, wrapped
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -62,7 +62,8 @@ def results_place(
 ) -> Destination:
     """Return the folder of the results: --out, else a free name (NAME, NAME-2, …).
 
-    Raises OutputError, before any work, if --out is a file, holds results, or is the folder of an input.
+    Raises OutputError, before any work, if --out is a file or a symbolic link, holds results, or is the
+    folder of an input.
     """
     if args.out is None:
         check_free([unused(Path(default))], inputs=list(filter(None, inputs)))
@@ -70,5 +71,7 @@ def results_place(
     folder = Path(args.out)
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"--out {folder}: is a file, expected a directory or a new name")
+    if folder.is_symlink():
+        raise OutputError(f"--out {folder}: is a symbolic link, expected a directory or a new name")
     check_free((folder / name for name in names), force=args.force, inputs=list(filter(None, inputs)))
     return Destination(folder, args.force)

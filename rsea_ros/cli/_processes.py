@@ -89,11 +89,11 @@ class Processes:
         shares = re.findall(rb"\b(\d+)%", self.log(node).read_bytes())
         return int(shares[-1]) / 100.0 if shares else 0.0
 
-    def _failure(self, node: str, what: str) -> RseaError:
+    def _failure(self, node: str, event: str) -> RseaError:
         """Return an error with the last line of a node."""
         lines = self.log(node).read_text(errors="replace").splitlines()
         last = re.sub(r"^\[\w+\] \[[\d.]+\] \[[^]]*\]: ", "", lines[-1]) if lines else "no output"
-        return RseaError(f"{node} {what}: {last} (log: {self.log(node)})")
+        return RseaError(f"{node} {event}: {last} (log: {self.log(node)})")
 
 
 def _text(value: object) -> str:

@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from msg_adapters.topics import AXES, ROLES, TopicMap
+from msg_adapters.topic_map import AXES, ROLES, TopicMap
 from rsea_ros.errors import ParameterError
 from rsea_ros.signals import Channel, Record
 

@@ -17,12 +17,12 @@ from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._output import path
 from rsea_ros.cli._runs import RIG
 from rsea_ros.errors import ParameterError
-from rsea_ros.hardware.peer.bus import EmulatedBus
 from rsea_ros.hardware.peer.ft import ForceSensor
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import KEPT, EmulatedMotor
+from rsea_ros.hardware.peer.peer_motor import KEPT, EmulatedMotor
 from rsea_ros.hardware.peer.registers import MODELS
 from rsea_ros.hardware.peer.requests import LineRequests
+from rsea_ros.hardware.peer.serial_line import EmulatedBus
 from rsea_ros.hardware.peer.station import Station
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig

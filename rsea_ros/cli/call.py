@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
             print(caller.call(args.node, action), flush=True)
         if not args.action:
             every = caller.callable_nodes(args.seconds)
-            _list(caller, [caller.found(args.node)] if args.node else every)
+            _list(caller, [caller.full_name(args.node)] if args.node else every)
     return 0
 
 

@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from msg_adapters import TopicMap, read_record
-from msg_adapters.topics import AXES
+from msg_adapters.topic_map import AXES
 from rsea_ros.cli import _lines
 from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import FOUND

@@ -75,9 +75,9 @@ def _add_demand(parser: argparse.ArgumentParser, default: Requirement, name: str
 
 def run(args: argparse.Namespace) -> int:
     """Test the stiffness, find the stiffnesses that meet all demands, write the results."""
-    from rsea_ros.design.catalogue import unit_named
     from rsea_ros.design.judge import judge, least_stiffness
-    from rsea_ros.design.margins import robust_stiffness
+    from rsea_ros.design.motor_gear_units import unit_named
+    from rsea_ros.design.tolerance import robust_stiffness
     from rsea_ros.report.design.json import design_json
     from rsea_ros.report.design.page import design_report
     from rsea_ros.report.json_values import json_text

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import get_args
 
 from msg_adapters import TopicMap, read_record
-from msg_adapters.overlay import write_overlay
+from msg_adapters.overlay_bag import write_overlay
 from rsea_ros.cli import _lines
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
@@ -115,8 +115,8 @@ def _print(result: Diagnosis, report: Path) -> None:
     from rich.console import Console
 
     from rsea_ros.report.diagnosis.terminal import terminal_lines
-    from rsea_ros.report.lines import command_row
     from rsea_ros.report.rig.words import command
+    from rsea_ros.report.wrapped_lines import command_row
 
     console, width = Console(), _lines.columns()
     for line in terminal_lines(result, width):

@@ -20,8 +20,8 @@ from rsea_ros.report.file_names import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MO
 
 if TYPE_CHECKING:
     from rsea_ros.experiment.advice import Advice
-    from rsea_ros.experiment.files import ModelFile
     from rsea_ros.experiment.hypothesis import Hypothesis
+    from rsea_ros.experiment.stored_models import ModelFile
     from rsea_ros.identification.solver import Map
 
 HELP = "design the run that separates the remaining causes, within the limits of a bench"
@@ -31,7 +31,7 @@ NO_RUN = "no_run"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    from rsea_ros.experiment.limits import UNITS
+    from rsea_ros.experiment.run_limits import UNITS
 
     units = ", ".join(f"{name} ({unit})" for name, unit in UNITS.items())
     add = parser.add_argument
@@ -57,8 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Design the run and write it."""
     from rsea_ros.experiment.advice import advise
-    from rsea_ros.experiment.limits import limits_from
     from rsea_ros.experiment.proposal import DesignRequest
+    from rsea_ros.experiment.run_limits import limits_from
     from rsea_ros.identification.workers import worker_pools
 
     place = results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
@@ -81,8 +81,8 @@ def run(args: argparse.Namespace) -> int:
 def models_in(path: str) -> list[ModelFile]:
     """Return the causes of a model.yaml, a rig, or a diagnosis.json beside its model.yaml."""
     from rsea_ros import strict_yaml
-    from rsea_ros.experiment.documents import models_of
-    from rsea_ros.experiment.files import model_of
+    from rsea_ros.experiment.diagnosis_document import models_of
+    from rsea_ros.experiment.stored_models import model_of
     from rsea_ros.model.rig_file import load_rig
 
     if Path(path).suffix != ".json":
@@ -101,14 +101,14 @@ def _possible(
 
     With bags, one more hypothesis is that there is no cause.
     """
-    from rsea_ros.experiment.files import hypotheses_from
+    from rsea_ros.experiment.stored_models import hypotheses_from
 
     if not args.bag:
         return hypotheses_from(models), {}, {}
     from rsea_ros.cli.diagnose import readable
     from rsea_ros.experiment.campaign import Rules
     from rsea_ros.experiment.hypothesis import NOTHING
-    from rsea_ros.experiment.weighing import weigh
+    from rsea_ros.experiment.joint_weighing import weigh
 
     first = models[0].rig
     rig = first.with_effects(*(e for e in first.effects if e.name != models[0].name))
@@ -138,7 +138,7 @@ def written(advice: Advice, place: Destination, args: argparse.Namespace) -> Pat
 
 def _print(advice: Advice, report: Path) -> None:
     from rsea_ros.report.experiment.words import limit_rows, plain_name, proof_words, verdict
-    from rsea_ros.report.lines import LABEL
+    from rsea_ros.report.wrapped_lines import LABEL
     from rsea_ros.units import plain
 
     say(verdict(advice))

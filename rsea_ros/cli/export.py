@@ -14,8 +14,8 @@ from rsea_ros.cli._output import FOUND, add_force, path
 from rsea_ros.new_files import check_free, write_file
 
 if TYPE_CHECKING:
-    from rsea_ros.exports.coverage import Export
     from rsea_ros.exports.difference import Difference
+    from rsea_ros.exports.represented import Export
     from rsea_ros.model.rig import Rig
 
 HELP = "convert a rig to MuJoCo, FMI, URDF, SDF, Isaac Lab or BAM, and list the parts left out"
@@ -143,11 +143,11 @@ def _lines(
     made: Export, rig: Rig, out: Path, differences: tuple[Difference, ...], not_played: str
 ) -> list[str]:
     """Return the report as text: file, content, omissions, differences."""
-    from rsea_ros.exports.coverage import coverage_lines
+    from rsea_ros.exports.represented import coverage_lines
     from rsea_ros.units import plain
 
     lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]
-    lines += [f"  {line}" for line in coverage_lines(made.said, made.unsaid)]
+    lines += [f"  {line}" for line in coverage_lines(made.represented, made.omitted)]
     lines += [
         f"played in both: {one.channel} differs by {one.times_noise:.3g} times the sensor's noise "
         f"({one.rms:.3g} {plain(one.unit)} of {one.signal:.3g})"
@@ -164,8 +164,8 @@ def _document(
         "rig": rig.name,
         "target": made.target,
         "file": str(out),
-        "says": {one.name: one.how for one in made.said},
-        "leaves_out": {one.name: one.why for one in made.unsaid},
+        "says": {one.name: one.how for one in made.represented},
+        "leaves_out": {one.name: one.why for one in made.omitted},
         "not_played": not_played or None,
         "difference": {
             one.channel: {

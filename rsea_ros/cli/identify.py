@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 def _print(result: Identification, report: Path) -> None:
     """Print the verdict, the table, and a line for each remark."""
     from rsea_ros.report.fault_words import fault_lines
-    from rsea_ros.report.identification.statics import statics_sentences
+    from rsea_ros.report.identification.statics_sentences import statics_sentences
     from rsea_ros.report.identification.terminal import terminal_table
     from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
     from rsea_ros.report.remark_words import remark_sentences

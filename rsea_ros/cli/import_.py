@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     if len(args.files) == len(args.index) == 1 and mapping.runs is None:
         (imported,) = import_records(args.files[0], mapping, args.index)
         write_record(imported.record, args.out, topic_map(args), args.storage, force=args.force)
-        lines = list(_said(imported, args.out))
+        lines = list(_lines_on(imported, args.out))
     else:
         lines = _write_several(args, mapping)
     for line in lines:
@@ -71,11 +71,11 @@ def _write_several(args: argparse.Namespace, mapping: ImportMap) -> list[str]:
                     raise OutputError(f"{folder / name}: is the bag of two inputs, expected other file names")
                 names.add(name)
                 write_record(imported.record, new.staged(name), topic_map(args), args.storage)
-                lines += _said(imported, folder / name)
+                lines += _lines_on(imported, folder / name)
     return lines
 
 
-def _said(imported: Imported, out: str | Path) -> Iterator[str]:
+def _lines_on(imported: Imported, out: str | Path) -> Iterator[str]:
     """Yield lines on the contents of a bag."""
     record = imported.record
     yield from summary(record, imported.mapping)

@@ -43,8 +43,8 @@ def run(args: argparse.Namespace) -> int:
         records = [readable(bag, topics, args) for bag in each_once(args.bags)]
         records = checked(records, rig, topics.axis, quiet=args.json, masks=True)
         from rsea_ros.cli._provenance import provenance
+        from rsea_ros.laws.effect_source import LawProvenance
         from rsea_ros.laws.learn import learn
-        from rsea_ros.laws.writing import LawProvenance
         from rsea_ros.report.law.files import write_law
 
         where = provenance("law", args.bags, args.rig)

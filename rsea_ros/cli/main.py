@@ -20,7 +20,7 @@ from rsea_ros.cli._compiling import compilation_announced
 from rsea_ros.cli._shown import shown
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.interrupts import Stopped, Stops
-from rsea_ros.report.lines import wrapped
+from rsea_ros.report.wrapped_lines import wrapped
 from rsea_ros.wording import did_you_mean, printable
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141

@@ -15,7 +15,7 @@ from msg_adapters import read_record
 from rsea_ros.checks.faults import check
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
-from rsea_ros.model.prediction import Comparison, predict
+from rsea_ros.model.prediction_errors import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free, write_text
 from rsea_ros.report.json_values import fault_json, numbers

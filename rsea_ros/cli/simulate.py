@@ -105,15 +105,15 @@ def run(args: argparse.Namespace) -> int:
 
 def _settings(args: argparse.Namespace, default: ExcitationSettings) -> ExcitationSettings:
     """Return the excitation of the options, with the defaults of this kind of rig."""
-    asked = {
+    options = {
         "rate": args.rate,
         "amplitude": args.amplitude,
         "noise": args.deviation,
         "low": args.low,
         "high": args.high,
     }
-    said = {name: value for name, value in asked.items() if value is not None}
-    return replace(default, duration=args.duration, period=args.period, seed=args.seed, **said)
+    given = {name: value for name, value in options.items() if value is not None}
+    return replace(default, duration=args.duration, period=args.period, seed=args.seed, **given)
 
 
 def parse_effect(text: str) -> EffectSetting:

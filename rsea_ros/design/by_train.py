@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.design.catalogue import MotorGear
 from rsea_ros.design.judge import judge, least_for_band, least_stiffness
+from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.model.train import Train

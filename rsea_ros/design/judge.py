@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from rsea_ros.design import mechanism
-from rsea_ros.design.catalogue import MotorGear
+from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end, flat_band, pure_torque_bandwidth, undamped_stiffness

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -165,11 +166,14 @@ def is_trial_of(trial: Trial, name: str, model: Candidate) -> bool:
 
 
 def reached_by(trial: Trial, effect: Effect) -> Guess:
-    """Return the parameters of an effect that its trial reached; of a mode, the rig's values with them."""
+    """Return the parameters of an effect that its trial reached; of a mode, the rig's values with them.
+
+    Not those with a prior, which lies around where a fit begins.
+    """
     unknowns = zip(trial.problem.unknowns, trial.theta, strict=True)
     values = {u.name: u.outer(float(t)) for u, t in unknowns}
     rig = {n: v for n, v in values.items() if n in FIELDS} if "mode" in effect.tags else {}
-    mine = {p.name: f"{effect.name}.{p.name}" for p in effect.parameters}
+    mine = {p.name: f"{effect.name}.{p.name}" for p in effect.parameters if math.isinf(p.spread)}
     return {**rig, **{p: values[n] for p, n in mine.items() if n in values}}
 
 

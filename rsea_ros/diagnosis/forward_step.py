@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from rsea_ros.diagnosis.candidate import Candidate
+from rsea_ros.diagnosis.candidate import Candidate, effect_size
 from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.screening import ScreenedEffect
 from rsea_ros.diagnosis.selection import Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.step_fits import StepFits
+from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.workers import Pools
 from rsea_ros.progress import Progress
@@ -49,7 +50,8 @@ class ForwardStep:
     def run(self) -> StepResult:
         """Try every effect, and two at once where none helps alone."""
         screened = self.fits.screened(self.fits.on_pieces)
-        finalists = self._finalists(screened)
+        close = self._fitted_to_pieces(screened)
+        finalists = self._finalists(screened, close)
         models = self.fits.fit_all(finalists)
         if not self._acceptable(models):
             overlooked = self.fits.overlooked(_others(screened, finalists))
@@ -57,9 +59,12 @@ class ForwardStep:
             models += self.fits.fit_all(overlooked)
         if self.fits.is_far and all(self._is_far(m) for m in self._acceptable(models)):
             models += self.fits.on_measured_angle()
-        chosen, equals = break_tie(
-            self._acceptable(models) or self._pairs(finalists), self.present.validation, self.settings
-        )
+        chosen, equals = self._chosen(self._acceptable(models) or self._pairs(finalists))
+        if chosen is not None and any(m is chosen for m in models):
+            undecided = self.fits.nearly_as_good(_others(close, finalists), chosen)
+            finalists += undecided
+            models += self.fits.fit_all(undecided)
+            chosen, equals = self._chosen(self._acceptable(models))
         trials = [self._far_behind(s) for s in _others(screened, finalists)]
         trials += [self._refused(m, chosen) for m in models if m is not chosen]
         return StepResult(chosen, trials, equals)
@@ -75,14 +80,26 @@ class ForwardStep:
     def _is_far(self, model: Candidate) -> bool:
         return is_far_from_floor(model, self.settings)
 
-    def _finalists(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
+    def _chosen(self, models: Sequence[Candidate]) -> tuple[Candidate | None, tuple[Candidate, ...]]:
+        """Return the model to accept and those that do as well."""
+        return break_tie(models, self.present.validation, self.settings)
+
+    def _fitted_to_pieces(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
+        """Return the best of the screening fitted to the pieces, best first.
+
+        Also where no step helped: the guess may have been poor.
+        """
+        best = screened[: self.settings.forward.piece_fits]
+        return sorted(self.fits.fit_pieces(best), key=lambda s: s.cost)
+
+    def _finalists(
+        self, screened: Sequence[ScreenedEffect], close: Sequence[ScreenedEffect]
+    ) -> list[ScreenedEffect]:
         """Return the best on the pieces, and the effects that are said to be confused with the very best."""
         rule, present = self.settings.forward, self.fits.on_pieces.cost
-        worth = screened[: rule.piece_fits]  # also where no step helped: the guess may have been poor
-        close = sorted(self.fits.fit_pieces(worth), key=lambda s: s.cost)
         if not close:
             return []
-        best, alike = close[0].cost, close[0].effect.claims.confusable_with
+        best, alike = close[0].cost, _look_alikes(close[0].effect, self.effects)
         if self.fits.is_far:
             close = [s for s in close if s.cost < rule.hope_one * present] or close[:1]
         first, following = close[: rule.full_fits], close[rule.full_fits : 2 * rule.full_fits]
@@ -105,10 +122,10 @@ class ForwardStep:
         for first in firsts[: rule.paired]:
             seconds = fits.screened(fits.with_typical(first.effect))[: rule.paired]
             pairs += fits.fit_pieces(seconds)
-        hopeful = sorted(
+        promising = sorted(
             (p for p in pairs if p.cost < rule.hope_two * fits.on_pieces.cost), key=lambda p: p.cost
         )
-        return self._acceptable(fits.fit_all(hopeful[: rule.paired_fits]))
+        return self._acceptable(fits.fit_all(promising[: rule.paired_fits]))
 
     def _far_behind(self, screened: ScreenedEffect) -> Trial:
         problem, theta = self.fits.complete(screened)
@@ -131,6 +148,13 @@ class ForwardStep:
         """Report the present trial; each step counts as half of the remaining work."""
         share = 1.0 - 0.5**self.number * (1.0 - 0.5 * within)
         self.tell(f"step {self.number + 1}: {what}", share)
+
+
+def _look_alikes(effect: Effect, effects: Sequence[Effect]) -> set[str]:
+    """Return the effects that one is said to be confused with, and no larger ones that say so of it."""
+    confusable, size = effect.claims.confusable_with, effect_size(effect.name)
+    alike = look_alikes(effect.name, effects)
+    return {e.name for e in alike if e.name in confusable or effect_size(e.name) <= size}
 
 
 def _others(screened: Sequence[ScreenedEffect], chosen: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +15,7 @@ from rsea_ros.diagnosis.candidate import (
     fit_candidate,
     refit,
 )
-from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, preference
+from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, loss_excess, preference
 from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.problem_variants import (
@@ -23,16 +24,17 @@ from rsea_ros.diagnosis.problem_variants import (
     with_misfit_as_noise,
     without_clocks,
 )
-from rsea_ros.diagnosis.score import score_on
+from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.screening import ScreenedEffect, fitted_on, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
 from rsea_ros.identification.alternatives import extended
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, power, solve
-from rsea_ros.identification.unknowns import apply
+from rsea_ros.identification.unknowns import apply, idle, start_vector, unknowns_of_effect
 from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
 
@@ -87,7 +89,7 @@ class StepFits:
 
         def tried(i: int) -> ScreenedEffect | None:
             self.say(effects[i].name, 0.4 * i / len(effects))
-            return screen(solution, effects[i], guesses[effects[i].name], self.settings.forward)
+            return screen(solution, _rough(effects[i]), guesses[effects[i].name], self.settings.forward)
 
         screened = [s for s in self.pools.fits.map(tried, range(len(effects))) if s is not None]
         rule = self.settings.forward
@@ -116,6 +118,17 @@ class StepFits:
         helps = self.pools.fits.map(self._surely_helps, left_out)
         return [s for s, is_sure in zip(left_out, helps, strict=True) if is_sure]
 
+    def nearly_as_good(self, left_out: Sequence[ScreenedEffect], chosen: Candidate) -> list[ScreenedEffect]:
+        """Return those of the effects left out that bring nearly what the chosen one brings.
+
+        On the validation blocks, as fitted so far. In a part of the band many laws are one; which of them was
+        fitted on is then chance.
+        """
+        gained = loss_excess(self.present, chosen)
+        least = self.settings.forward.undecided * gained
+        left = self.pools.fits.map(lambda s: self._least_loss(s, chosen), left_out)
+        return [s for s, excess in zip(left_out, left, strict=True) if excess < least]
+
     def on_measured_angle(self) -> list[Candidate]:
         """Return models with an effect of the rotor's angle, simulated on the measured angle.
 
@@ -134,9 +147,10 @@ class StepFits:
     def complete(self, screened: ScreenedEffect) -> tuple[Problem, FloatArray]:
         """Return the problem of a screened effect on every sample, clocks included, and its theta."""
         problem = replace(screened.problem, cases=self.present.cases)
-        if not self.is_far:
-            return problem, screened.theta
-        return with_clocks(problem, screened.theta, self.present.problem)
+        theta = screened.theta
+        if self.is_far:
+            problem, theta = with_clocks(problem, theta, self.present.problem)
+        return _refined(problem, theta, screened.effect)
 
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
         self.say(f"fitting {screened.name}", 0.5)
@@ -165,12 +179,23 @@ class StepFits:
 
     def _surely_helps(self, screened: ScreenedEffect) -> bool:
         """Return whether an effect with its fit to the pieces does better on the validation blocks."""
+        scores = self._scores(screened)
+        _, theta = self.complete(screened)
+        extra, rule = len(theta) - self.present.parameters, self.settings.acceptance
+        return any(preference(s, self.present.validation, extra, rule).sure for s in scores)
+
+    def _least_loss(self, screened: ScreenedEffect, chosen: Candidate) -> float:
+        """Return how much more an effect with its fit to the pieces loses than the chosen model."""
+        against = chosen.validation
+        losses = [float(s.loss(against).sum()) for s in self._scores(screened)]
+        return min(losses) - float(against.loss(against).sum())
+
+    def _scores(self, screened: ScreenedEffect) -> list[Score]:
+        """Return the scores on the validation blocks of an effect with its fit to the pieces."""
         problem, theta = self.complete(screened)
         outputs = [problem.outputs(start) for start in self._starts(problem, theta)]
         cases, blocks = self.present.cases, self.settings.blocks
-        scores = [score_on(problem, cases, VALIDATION, simulated, blocks) for simulated in outputs]
-        extra, rule = len(theta) - self.present.parameters, self.settings.acceptance
-        return any(preference(s, self.present.validation, extra, rule).sure for s in scores)
+        return [score_on(problem, cases, VALIDATION, simulated, blocks) for simulated in outputs]
 
     def _starts(self, problem: Problem, theta: FloatArray) -> list[FloatArray]:
         """Return the starts of a full fit: from the pieces, or from the present model beside the effect.
@@ -187,3 +212,17 @@ class StepFits:
         scores, channels = (model.validation, self.present.validation), model.validation.sums
         now, before = (np.array([max(s.ratio(n), 1.0) for n in channels]) for s in scores)
         return bool(np.any(np.abs(now / before - 1.0) > self.settings.forward.moved))
+
+
+def _rough(effect: Effect) -> Effect:
+    """Return an effect whose parameters with a prior stay there: from afar they lead a fit astray."""
+    held = tuple(p.name for p in effect.parameters if math.isfinite(p.spread))
+    return replace(effect, idle=lambda rig: held) if held else effect
+
+
+def _refined(problem: Problem, theta: FloatArray, effect: Effect) -> tuple[Problem, FloatArray]:
+    """Return a problem with all parameters of a rough effect free that its rig has, and its theta."""
+    known = {u.name for u in problem.unknowns} | idle(effect_named(effect.name), problem.rig)
+    more = unknowns_of_effect(effect, effect.typical, known)
+    larger = replace(problem, unknowns=(*problem.unknowns, *more))
+    return larger, np.concatenate([theta, start_vector(more)])

@@ -69,6 +69,7 @@ class Effect:
     tags: its kinds. compensation: the torque that a controller may add against it, by the same law.
     response: its linear frequency response on its signal (at a sensor, on ft), for a controller's margins.
     part: of the bench, if not the one of its port.
+    idle: the parameters that do nothing on a rig: `f(rig) -> names`.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Effect:
     compensation: Compensable | None = None
     response: Response | None = None
     part: str = ""
+    idle: Callable[[Any], tuple[str, ...]] | None = None
 
     @property
     def main(self) -> Parameter:

@@ -1,10 +1,11 @@
 """Gear train that gives between the rotor and the spring chassis.
 
-    T = stiffness · (q_gear - q_chassis)
+    T = stiffness · (q_gear - q_chassis) + 2 · damping_ratio · √(stiffness · J_c) · (ω_gear - ω_chassis),
+    J_c = chassis_share · J_m where the rig states no inertia of the chassis
 
-The chassis then moves on its own, with its own inertia. A rig that states none counts it to the rotor: a part
-of the rotor's goes over to it then. Source: Spong, Modeling and control of elastic joint robots, J. Dyn.
-Syst. Meas. Control 109, 1987.
+The chassis then moves on its own, with its own inertia J_c (on a rigid spring with what hangs on it). A rig
+that states none counts it to the rotor's J_m, from which it is taken then. Source: Spong, Modeling and
+control of elastic joint robots, J. Dyn. Syst. Meas. Control 109, 1987; damping: Ewins, Modal Testing, 2000.
 """
 
 import math
@@ -16,17 +17,31 @@ from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import beside_softer_rotor
 from rsea_ros.effects.signal_table import Port
 
-_PART = 0.05
-"""Of the rotor's reflected inertia: a chassis of which nothing is known. The paper's has a 240th, a large one
-a tenth; it only has to be light beside the rotor."""
+_SHARE = "chassis_share"
 
 
 def change(rig: Any, parameters: Mapping[str, float]) -> Any:
-    """Return the rig with a gear of that stiffness."""
+    """Return the rig with a gear of that stiffness and damping."""
+    parameters = EFFECT.complete(parameters)
+    stiffness = parameters["stiffness"]
+    if math.isinf(stiffness):
+        return rig
     rotor, chassis = rig["rotor.reflected_inertia"], rig["chassis.inertia"]
-    moved = 0.0 if chassis > 0.0 or rig.rigid_spring else _PART * rotor
-    values = {"rotor.reflected_inertia": rotor - moved, "chassis.inertia": chassis + moved}
-    return rig.with_values({"gear.stiffness": parameters["stiffness"], **values})
+    moved = 0.0 if idle(rig) else parameters[_SHARE] * rotor
+    is_on_load = rig.rigid_spring and rig.end_is_free("spring_end")
+    beyond = chassis + moved + (rig["spring_end.inertia"] if is_on_load else 0.0)
+    values = {
+        "gear.stiffness": stiffness,
+        "gear.damping": 2.0 * parameters["damping_ratio"] * math.sqrt(stiffness * beyond),
+        "rotor.reflected_inertia": rotor - moved,
+        "chassis.inertia": chassis + moved,
+    }
+    return rig.with_values(values)
+
+
+def idle(rig: Any) -> tuple[str, ...]:
+    """Return the share of the rotor's inertia where nothing goes over to the chassis."""
+    return (_SHARE,) if rig["chassis.inertia"] > 0.0 or rig.rigid_spring else ()
 
 
 EFFECT = Effect(
@@ -37,6 +52,15 @@ EFFECT = Effect(
             "stiffness", "N m/rad", null=math.inf, low=500.0, high=1e7, typical=1e4, starts=(3e3, 5e4),
             logarithmic=True,
             reason="a third of the spring's to thousands of times it, where it does not show",
+        ),
+        Parameter(
+            "damping_ratio", "1", null=0.0, low=0.0, high=0.1, typical=0.0, optional=True, spread=0.02,
+            reason="0.001 to 0.1 of metal structures (Ewins); 0.02 is usual, and one sigma around none",
+        ),
+        Parameter(
+            _SHARE, "1", null=0.02, low=1e-3, high=0.5, typical=0.02, logarithmic=True, optional=True,
+            spread=1.6,
+            reason="0.02 times or over 5, one sigma: the paper's is a 240th, a large one a tenth",
         ),
     ),
     claims=Claims(
@@ -50,4 +74,5 @@ EFFECT = Effect(
     guesses=beside_softer_rotor,
     about="gear train that gives between rotor and spring",
     equation=equation_of(__doc__),
+    idle=idle,
 )

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 from rsea_ros.experiment.apart import Apart, measurements_apart
 from rsea_ros.experiment.bound import Bound, bound
-from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
+from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.shape_rater import noise_by_channel
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.progress import Progress

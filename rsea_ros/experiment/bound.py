@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.experiment.hypothesis import Hypothesis, motion, run_case
-from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used
+from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used
 from rsea_ros.identification.excitation import ramped
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, serial, solve

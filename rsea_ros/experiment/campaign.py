@@ -12,11 +12,11 @@ from typing import Literal
 
 from rsea_ros.errors import DeviceError, IdentificationError, ParameterError
 from rsea_ros.experiment.advice import Proof, proofs_of
-from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
-from rsea_ros.experiment.limits import used
+from rsea_ros.experiment.joint_weighing import RunWeighing, weigh
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
-from rsea_ros.experiment.weighing import RunWeighing, weigh
+from rsea_ros.experiment.run_design import propose
+from rsea_ros.experiment.run_limits import used
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress

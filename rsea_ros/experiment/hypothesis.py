@@ -62,9 +62,9 @@ class Hypothesis:
         The most likely ones; where its size may as well be zero, one standard deviation from zero, and the
         others as they correlate with it: a run is rated by what it would show of the cause.
         """
-        if not self.own:
+        if not self.cause_indices:
             return self.theta
-        main, spread = self.own[0], np.linalg.inv(self.information)
+        main, spread = self.cause_indices[0], np.linalg.inv(self.information)
         away = self.theta[main] - self.problem.unknowns[main].inner(self.problem.unknowns[main].start)
         sd = float(np.sqrt(spread[main, main]))
         if abs(away) > _SEEN * sd:
@@ -81,7 +81,7 @@ class Hypothesis:
         return np.array(low), np.array([u.inner(u.high) for u in unknowns])
 
     @property
-    def own(self) -> list[int]:
+    def cause_indices(self) -> list[int]:
         """Where the cause's own parameters are among the unknowns."""
         names = [u.name for u in self.problem.unknowns]
         return [i for i, n in enumerate(names) if n.split(".")[0] == self.name]

@@ -13,7 +13,7 @@ from rsea_ros.effects.effect import Parameter
 from rsea_ros.experiment.hypothesis import NOTHING
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.unknowns import Unknown, unknowns_of_effect
+from rsea_ros.identification.unknowns import Unknown, idle, unknowns_of_effect
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.signals import MEASURED, FloatArray
 
@@ -31,7 +31,7 @@ def problem_of(name: str, rig: Rig, cases: Sequence[Case]) -> Problem:
         return Problem(tuple(cases), rig, nominal, MEASURED, stated=stated)
     effect = effect_named(name)
     with_it = rig.with_effects(*rig.effects, EffectSetting(name, effect.complete(effect.null)))
-    free = unknowns_of_effect(effect, effect.typical, rig.known)
+    free = unknowns_of_effect(effect, effect.typical, rig.known | idle(effect, rig))
     parameters = {f"{name}.{p.name}": p for p in effect.parameters}
     doubted = tuple(_doubted(u, parameters[u.name], u.name == f"{name}.{effect.main.name}") for u in free)
     return Problem(tuple(cases), with_it, (*nominal, *doubted), MEASURED, stated=stated)
@@ -43,6 +43,8 @@ def _doubted(unknown: Unknown, parameter: Parameter, is_size: bool) -> Unknown:
     if is_size and (parameter.null > 0.0 or not parameter.logarithmic) and math.isfinite(parameter.null):
         null = unknown.inner(parameter.null)
         return replace(unknown, start=parameter.null, doubt=_SIZES * abs(typical - null) or unknown.reach)
+    if math.isfinite(parameter.spread):
+        return unknown
     return replace(unknown, doubt=_SPAN * _width(unknown, parameter))
 
 

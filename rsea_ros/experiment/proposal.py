@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.limits import RunLimits
-from rsea_ros.experiment.margins import Peaks
-from rsea_ros.experiment.shape import Kind, Shape
+from rsea_ros.experiment.chance_constraint import Peaks
+from rsea_ros.experiment.run_limits import RunLimits
+from rsea_ros.experiment.run_shape import Kind, Shape
 from rsea_ros.signals import FloatArray
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from rsea_ros.experiment.proposal import DesignRequest
-from rsea_ros.experiment.shape import Shape
+from rsea_ros.experiment.run_shape import Shape
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray
 

@@ -106,7 +106,7 @@ def sharpened(hypothesis: Hypothesis, seen: Response) -> float:
 
     Half the logarithm of the ratio of the determinants of their information after and before.
     """
-    indices = hypothesis.own or list(range(len(hypothesis.theta)))
+    indices = hypothesis.cause_indices or list(range(len(hypothesis.theta)))
     before = np.linalg.inv(hypothesis.information)[np.ix_(indices, indices)]
     after = np.linalg.inv(hypothesis.information + seen.slope.T @ seen.slope)[np.ix_(indices, indices)]
     return 0.5 * float(np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1])

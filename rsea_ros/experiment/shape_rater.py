@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
-from rsea_ros.experiment.limits import of_command, of_response, used
 from rsea_ros.experiment.proposal import DesignRequest
-from rsea_ros.experiment.shape import Shape, command_of
+from rsea_ros.experiment.run_limits import of_command, of_response, used
+from rsea_ros.experiment.run_shape import Shape, command_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map
 from rsea_ros.signals import MEASURED, FloatArray

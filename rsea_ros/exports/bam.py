@@ -13,8 +13,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from rsea_ros.exports.coverage import Export, Said, Unsaid
-from rsea_ros.exports.others import acting, sized, unsaid_effects, unsaid_parts
+from rsea_ros.exports.others import acting, omitted_effects, omitted_parts, sized
+from rsea_ros.exports.represented import Export, Omitted, Represented
 from rsea_ros.model.rig import Rig
 
 ALPHA = 2.0
@@ -27,29 +27,29 @@ def export_bam(rig: Rig, actuator: str = "") -> Export:
     """Return the parameters of a rig. actuator: BAM's name of the servo, which brings its control law."""
     rig = acting(rig)
     effects = sized(rig)
-    said = [
-        Said("rotor.reflected_inertia", "armature"),
-        Said("rotor.reflected_damping", "friction_viscous"),
+    represented = [
+        Represented("rotor.reflected_inertia", "armature"),
+        Represented("rotor.reflected_damping", "friction_viscous"),
     ]
     values: dict[str, object] = {
         "armature": rig["rotor.reflected_inertia"],
         "q_offset": 0.0,
         "friction_viscous": rig["rotor.reflected_damping"],
     }
-    values |= _dry(effects, said) | _load(effects, said)
+    values |= _dry(effects, represented) | _load(effects, represented)
     model = _model(effects)
     values |= {"model": model, "actuator": actuator}
-    unsaid = [Unsaid("kt, R", "the rig has no voltage; from the data sheet, or from bam.fit")]
+    omitted = [Omitted("kt, R", "the rig has no voltage; from the data sheet, or from bam.fit")]
     if not actuator:
-        unsaid.append(Unsaid("actuator", "BAM's name of the servo, with its control law (--actuator)"))
-    unsaid += unsaid_parts(rig, "a BAM joint is rigid")
-    unsaid += unsaid_effects(rig, said, f"no parameter of {model.upper()}")
+        omitted.append(Omitted("actuator", "BAM's name of the servo, with its control law (--actuator)"))
+    omitted += omitted_parts(rig, "a BAM joint is rigid")
+    omitted += omitted_effects(rig, represented, f"no parameter of {model.upper()}")
     values["rsea"] = {
         "rig": rig.name,
-        "says": {one.name: one.how for one in said},
-        "leaves_out": {one.name: one.why for one in unsaid},
+        "says": {one.name: one.how for one in represented},
+        "leaves_out": {one.name: one.why for one in omitted},
     }
-    return Export("bam", ".json", json.dumps(values, indent=2) + "\n", tuple(said), tuple(unsaid))
+    return Export("bam", ".json", json.dumps(values, indent=2) + "\n", tuple(represented), tuple(omitted))
 
 
 def _model(effects: Mapping[str, Mapping[str, float]]) -> str:
@@ -63,18 +63,19 @@ def _model(effects: Mapping[str, Mapping[str, float]]) -> str:
     return "m2" if has_stribeck else "m1"
 
 
-def _dry(effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[str, float]:
+def _dry(effects: Mapping[str, Mapping[str, float]], represented: list[Represented]) -> dict[str, float]:
     """Return the parameters that do not depend on the load."""
     base = effects.get("coulomb_friction", {}).get("torque", 0.0)
     if base:
-        said.append(Said("coulomb_friction", "friction_base"))
+        represented.append(Represented("coulomb_friction", "friction_base"))
     stribeck, speed = 0.0, 1.0
     for name in ("stribeck_friction", "lugre_friction"):
         if name in effects:
             p = effects[name]
             base, stribeck, speed = base + p["coulomb_torque"], p["stribeck_torque"], p["stribeck_velocity"]
             left = ", its bristles left out" if name == "lugre_friction" else ""
-            said.append(Said(name, f"friction_base, friction_stribeck, dtheta_stribeck, alpha 2{left}"))
+            how = f"friction_base, friction_stribeck, dtheta_stribeck, alpha 2{left}"
+            represented.append(Represented(name, how))
     if _model(effects) in ("m1", "m3"):
         return {"friction_base": base}
     return {
@@ -82,18 +83,19 @@ def _dry(effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[s
     }  # fmt: skip
 
 
-def _load(effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[str, float]:
+def _load(effects: Mapping[str, Mapping[str, float]], represented: list[Represented]) -> dict[str, float]:
     """Return the parameters that depend on the load."""
     model, name = _model(effects), "directional_load_friction"
     if model in ("m3", "m4"):
-        said.append(Said("load_dependent_friction", "load_friction_base, half of the coefficient"))
+        how = "load_friction_base, half of the coefficient"
+        represented.append(Represented("load_dependent_friction", how))
         half = 0.5 * effects["load_dependent_friction"]["coefficient"]
         return {"load_friction_base": half, **({"load_friction_stribeck": 0.0} if model == "m4" else {})}
     if model not in ("m5", "m6"):
         return {}
     p = effects[name]
     quad = ", and their quad" if model == "m6" else ""
-    said.append(Said(name, f"load_friction_motor, load_friction_external{quad}"))
+    represented.append(Represented(name, f"load_friction_motor, load_friction_external{quad}"))
     values = {
         "load_friction_motor": p["motor_coefficient"],
         "load_friction_external": p["load_coefficient"],

@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.exports.coverage import Export, Said, Unsaid, coverage_lines
+from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.files import write_new
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import rig_text
@@ -29,14 +29,15 @@ def export_fmu(rig: Rig) -> Export:
         raise ParameterError(
             "--fmu needs the package pythonfmu3, which is not installed: pip install pythonfmu3"
         ) from None
-    said = [Said("bench", "our own compiled step, co-simulation; the Python that plays it needs rsea_ros")]
-    said += [Said(one.name, "in the step; its sizes are parameters") for one in rig.effects]
+    how = "our own compiled step, co-simulation; the Python that plays it needs rsea_ros"
+    represented = [Represented("bench", how)]
+    represented += [Represented(one.name, "in the step; its sizes are parameters") for one in rig.effects]
     if rig.linear:
-        said.append(Said("linear rig", "m and N stand in the place of rad and N m"))
-    unsaid = [Unsaid("sensor noise", "outputs are what perfect instruments read")] if rig.sensors else []
+        represented.append(Represented("linear rig", "m and N stand in the place of rad and N m"))
+    omitted = [Omitted("sensor noise", "outputs are what perfect instruments read")] if rig.sensors else []
     with tempfile.TemporaryDirectory() as folder:
-        files = {"rig.yaml": rig_text(rig), "coverage.txt": "\n".join(coverage_lines(said, unsaid))}
+        files = {"rig.yaml": rig_text(rig), "coverage.txt": "\n".join(coverage_lines(represented, omitted))}
         for name, text in files.items():
             write_new(Path(folder, name), text)
         made = FmuBuilder.build_FMU(SLAVE, dest=folder, project_files=[Path(folder, name) for name in files])
-        return Export("fmu", ".fmu", Path(made).read_bytes(), tuple(said), tuple(unsaid))
+        return Export("fmu", ".fmu", Path(made).read_bytes(), tuple(represented), tuple(omitted))

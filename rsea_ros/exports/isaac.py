@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from rsea_ros.exports.coverage import Export, Said, Unsaid, coverage_lines
-from rsea_ros.exports.others import acting, sized, unsaid_effects, unsaid_parts
+from rsea_ros.exports.others import acting, omitted_effects, omitted_parts, sized
+from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.rig import Rig
 
 PHYSICS_STEP = 0.005
@@ -21,79 +21,89 @@ def export_isaac(rig: Rig) -> Export:
     """Return the configuration of a rig's actuator."""
     rig = acting(rig)
     effects = sized(rig)
-    said: list[Said] = []
+    represented: list[Represented] = []
     delay = effects.get("command_delay", {}).get("delay", 0.0)
-    fields = _joint(rig, said) | _loop(rig, said) | _friction(effects, said) | _limits(rig, effects, said)
+    fields = _joint(rig, represented) | _loop(rig, represented)
+    fields |= _friction(effects, represented) | _limits(rig, effects, represented)
     kind = "DelayedPDActuatorCfg"
     if "voltage_sag" in effects and not delay:
         kind = "DCMotorCfg"
         sag = effects["voltage_sag"]
         fields |= {"saturation_effort": sag["limit"], "velocity_limit": sag["no_load_speed"]}
-        said.append(Said("voltage_sag", "DCMotorCfg, saturation_effort and velocity_limit"))
+        represented.append(Represented("voltage_sag", "DCMotorCfg, saturation_effort and velocity_limit"))
     elif delay:
-        said.append(Said("command_delay", "min_delay = max_delay, in steps of the physics"))
-    unsaid = [*unsaid_parts(rig, "an actuator drives one rigid joint; give it a passive joint beyond")]
-    unsaid += unsaid_effects(rig, said, f"{kind} has no field for it")
-    unsaid += _loop_left_out(rig)
-    return Export("isaac", ".py", _file(rig, kind, fields, delay, said, unsaid), tuple(said), tuple(unsaid))
+        represented.append(Represented("command_delay", "min_delay = max_delay, in steps of the physics"))
+    omitted = [*omitted_parts(rig, "an actuator drives one rigid joint; give it a passive joint beyond")]
+    omitted += omitted_effects(rig, represented, f"{kind} has no field for it")
+    omitted += _loop_left_out(rig)
+    text = _file(rig, kind, fields, delay, represented, omitted)
+    return Export("isaac", ".py", text, tuple(represented), tuple(omitted))
 
 
-def _joint(rig: Rig, said: list[Said]) -> dict[str, float]:
-    said.append(Said("rotor.reflected_inertia", "armature"))
-    said.append(Said("rotor.reflected_damping", "viscous_friction"))
+def _joint(rig: Rig, represented: list[Represented]) -> dict[str, float]:
+    represented.append(Represented("rotor.reflected_inertia", "armature"))
+    represented.append(Represented("rotor.reflected_damping", "viscous_friction"))
     return {"armature": rig["rotor.reflected_inertia"], "viscous_friction": rig["rotor.reflected_damping"]}
 
 
-def _loop(rig: Rig, said: list[Said]) -> dict[str, float]:
+def _loop(rig: Rig, represented: list[Represented]) -> dict[str, float]:
     """Return the gains; a rig that torques command has none, and takes efforts."""
     if rig.loop is None:
-        said.append(Said("torque command", "stiffness and damping 0: set joint efforts"))
+        represented.append(Represented("torque command", "stiffness and damping 0: set joint efforts"))
         return {"stiffness": 0.0, "damping": 0.0}
-    said.append(Said(f"{rig.loop} loop", "stiffness and damping"))
+    represented.append(Represented(f"{rig.loop} loop", "stiffness and damping"))
     if rig.loop == "pd":
         return {"stiffness": rig["controller.k_p"], "damping": rig["controller.k_d"]}
     k_v = rig["controller.k_v"]
     return {"stiffness": rig["controller.k_pos"] * k_v, "damping": k_v}
 
 
-def _loop_left_out(rig: Rig) -> list[Unsaid]:
+def _loop_left_out(rig: Rig) -> list[Omitted]:
     names = ("k_i", "k_f", "k_vi", "sample_time", "velocity_limit")
     values = {name: rig.values().get(f"controller.{name}", 0.0) for name in names}
     return [
-        Unsaid(f"controller.{name}", "the PD law has no place for it")
+        Omitted(f"controller.{name}", "the PD law has no place for it")
         for name, value in values.items()
         if value and math.isfinite(value)
     ]
 
 
-def _friction(effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[str, float]:
+def _friction(effects: Mapping[str, Mapping[str, float]], represented: list[Represented]) -> dict[str, float]:
     dynamic = effects.get("coulomb_friction", {}).get("torque", 0.0)
     if dynamic:
-        said.append(Said("coulomb_friction", "friction and dynamic_friction"))
+        represented.append(Represented("coulomb_friction", "friction and dynamic_friction"))
     static = dynamic
     for name in ("stribeck_friction", "lugre_friction"):
         if name in effects:
             dynamic += effects[name]["coulomb_torque"]
             static += effects[name]["coulomb_torque"] + effects[name]["stribeck_torque"]
-            said.append(Said(name, "friction at rest, dynamic_friction at speed; not the curve between"))
+            how = "friction at rest, dynamic_friction at speed; not the curve between"
+            represented.append(Represented(name, how))
     return {"friction": static, "dynamic_friction": dynamic}
 
 
-def _limits(rig: Rig, effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[str, float]:
+def _limits(
+    rig: Rig, effects: Mapping[str, Mapping[str, float]], represented: list[Represented]
+) -> dict[str, float]:
     limits = [rig["controller.torque_limit"]] if rig.loop else []
     if "torque_saturation" in effects:
         limits.append(effects["torque_saturation"]["limit"])
-        said.append(Said("torque_saturation", "effort_limit"))
+        represented.append(Represented("torque_saturation", "effort_limit"))
     finite = [limit for limit in limits if math.isfinite(limit)]
     return {"effort_limit": min(finite)} if finite else {}
 
 
 def _file(
-    rig: Rig, kind: str, fields: Mapping[str, float], delay: float, said: list[Said], unsaid: list[Unsaid]
+    rig: Rig,
+    kind: str,
+    fields: Mapping[str, float],
+    delay: float,
+    represented: list[Represented],
+    omitted: list[Omitted],
 ) -> str:
     """Return the Python file."""
     lines = [f'"""Actuator of {_plain(rig.name)}, written by rsea export --isaac.', ""]
-    lines += [_plain(line) for line in coverage_lines(said, unsaid)]
+    lines += [_plain(line) for line in coverage_lines(represented, omitted)]
     lines += ['"""', "", f"from isaaclab.actuators import {kind}", ""]
     if kind == "DelayedPDActuatorCfg":
         step = f"PHYSICS_STEP = {PHYSICS_STEP!r}  # s, of your SimulationCfg"

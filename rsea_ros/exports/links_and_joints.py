@@ -13,8 +13,8 @@ from xml.etree import ElementTree as xml
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import Chain, Joint, Link, chain_of
-from rsea_ros.exports.coverage import Export, Said, Unsaid, coverage_lines
 from rsea_ros.exports.others import acting, sized
+from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.rig import Rig
 
 Frame = Callable[[str], tuple[xml.Element, xml.Element]]
@@ -40,34 +40,36 @@ def export_chain(rig: Rig, language: Language) -> Export:
     """Return a rig in a language. Raises RigError for one that is no chain of links (see chain.py)."""
     rig = acting(rig)
     chain = chain_of(rig)
-    said, unsaid = _coverage(rig, chain, has_springs=language.has_springs)
+    represented, omitted = _coverage(rig, chain, has_springs=language.has_springs)
     root, model = language.frame(rig.name)
-    model.insert(0, _comment(said, unsaid))
+    model.insert(0, _comment(represented, omitted))
     model.extend(language.link(link) for link in chain.links)
     model.extend(language.joint(joint, rig) for joint in chain.joints)
     model.append(_block(language.block, rig))
-    return Export(language.target, f".{language.target}", _text(root), said, unsaid)
+    return Export(language.target, f".{language.target}", _text(root), represented, omitted)
 
 
-def _coverage(rig: Rig, chain: Chain, *, has_springs: bool) -> tuple[tuple[Said, ...], tuple[Unsaid, ...]]:
+def _coverage(
+    rig: Rig, chain: Chain, *, has_springs: bool
+) -> tuple[tuple[Represented, ...], tuple[Omitted, ...]]:
     """Return the parts in the joints, and those in the block alone."""
     only = "only in the block rsea"
-    said = [Said(one.name, _how(one, has_springs)) for one in chain.joints]
-    unsaid = [Unsaid(name, f"{why}; {only}") for name, why in chain.left_out.items()]
+    represented = [Represented(one.name, _how(one, has_springs)) for one in chain.joints]
+    omitted = [Omitted(name, f"{why}; {only}") for name, why in chain.left_out.items()]
     if not has_springs and not rig.rigid_spring:
-        unsaid.append(Unsaid("spring.stiffness", f"URDF joints have no spring; {only}"))
+        omitted.append(Omitted("spring.stiffness", f"URDF joints have no spring; {only}"))
     finite, has_stop = sized(rig), any(stop_of(joint, rig) for joint in chain.joints)
     for one in rig.effects:
         how = _EFFECTS.get(one.name)
         if one.name not in finite:
-            unsaid.append(Unsaid(one.name, f"a parameter of it is infinite; {only}"))
+            omitted.append(Omitted(one.name, f"a parameter of it is infinite; {only}"))
         elif how is None or (one.name == "hard_stop" and not has_stop):
-            unsaid.append(Unsaid(one.name, only))
+            omitted.append(Omitted(one.name, only))
         else:
-            said.append(Said(one.name, how))
+            represented.append(Represented(one.name, how))
     if rig.loop is not None:
-        unsaid.append(Unsaid(f"{rig.loop} loop", f"a controller's affair; {only}"))
-    return tuple(said), tuple(unsaid)
+        omitted.append(Omitted(f"{rig.loop} loop", f"a controller's affair; {only}"))
+    return tuple(represented), tuple(omitted)
 
 
 _EFFECTS = {
@@ -125,8 +127,8 @@ def _block(tag: str, rig: Rig) -> xml.Element:
     return block
 
 
-def _comment(said: tuple[Said, ...], unsaid: tuple[Unsaid, ...]) -> Any:
-    lines = ["rsea export", *coverage_lines(said, unsaid)]
+def _comment(represented: tuple[Represented, ...], omitted: tuple[Omitted, ...]) -> Any:
+    lines = ["rsea export", *coverage_lines(represented, omitted)]
     return xml.Comment(" " + "\n       ".join(lines).replace("--", "- -") + " ")
 
 

@@ -1,4 +1,4 @@
-"""A rig with its effects for MuJoCo 4: the bodies of design/mjcf.py, and each effect in MuJoCo's own terms.
+"""A rig with its effects for MuJoCo 4: bodies of design/mujoco_model.py, each effect in MuJoCo's own terms.
 
 Source: MuJoCo 4.0 XML reference (actuator delay, filterexact, dcmotor; tendon stiffness and damping as
 polynomials, springlength, springyield, frictionloss).
@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from xml.etree import ElementTree as xml
 
-from rsea_ros.design.mjcf import model_element, text
+from rsea_ros.design.mujoco_model import model_element, text
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import check_rotary
-from rsea_ros.exports.coverage import CannotSay, Export, Said, Unsaid, coverage_lines
 from rsea_ros.exports.mjcf_effects import EFFECTS, STRUCTURES
 from rsea_ros.exports.mjcf_loop import say_loop
 from rsea_ros.exports.others import acting, sized
+from rsea_ros.exports.represented import Export, Omitted, Represented, Unrepresentable, coverage_lines
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.structure import structured
 
@@ -22,31 +22,31 @@ from rsea_ros.model.structure import structured
 def export_mjcf(rig: Rig) -> Export:
     """Return the model of a rig.
 
-    Raises RigError for a rig that MJCF cannot represent (see design/mjcf.py).
+    Raises RigError for a rig that MJCF cannot represent (see design/mujoco_model.py).
     """
     check_rotary(rig)
     rig = acting(rig)
     finite = sized(rig)
     root = model_element(structured(rig), play_of(rig))
-    loop, unsaid = say_loop(rig, root)
-    said = [loop]
+    loop, omitted = say_loop(rig, root)
+    represented = [loop]
     for setting in sorted(rig.effects, key=lambda one: effect_named(one.name).order):
         parameters = effect_named(setting.name).complete(setting.parameters)
         try:
             if setting.name not in finite:
-                raise CannotSay("a parameter of it is infinite")
+                raise Unrepresentable("a parameter of it is infinite")
             if setting.name in STRUCTURES:
-                said.append(Said(setting.name, STRUCTURES[setting.name]))
+                represented.append(Represented(setting.name, STRUCTURES[setting.name]))
             elif setting.name in EFFECTS:
-                said.append(Said(setting.name, EFFECTS[setting.name](root, rig, parameters)))
+                represented.append(Represented(setting.name, EFFECTS[setting.name](root, rig, parameters)))
             else:
-                raise CannotSay("MuJoCo has no element for it")
-        except CannotSay as reason:
-            unsaid.append(Unsaid(setting.name, str(reason)))
-    unsaid += unsaid_of(rig)
-    lines = coverage_lines(said, unsaid)
+                raise Unrepresentable("MuJoCo has no element for it")
+        except Unrepresentable as reason:
+            omitted.append(Omitted(setting.name, str(reason)))
+    omitted += unsaid_of(rig)
+    lines = coverage_lines(represented, omitted)
     root.insert(0, xml.Comment(" " + "\n       ".join(["rsea export", *lines]).replace("--", "- -") + " "))
-    return Export("mjcf", ".xml", text(root), tuple(said), tuple(unsaid))
+    return Export("mjcf", ".xml", text(root), tuple(represented), tuple(omitted))
 
 
 def play_of(rig: Rig) -> float:
@@ -55,7 +55,7 @@ def play_of(rig: Rig) -> float:
     return float(gaps[0]) if gaps else 0.0
 
 
-def unsaid_of(rig: Rig) -> list[Unsaid]:
+def unsaid_of(rig: Rig) -> list[Omitted]:
     """Return the parts of the rig itself, without its effects, that the model leaves out."""
     noise = "sensors of MJCF are those of perfect instruments; the rig's noise and quanta stay with the rig"
-    return [Unsaid("sensor noise", noise)] if rig.sensors else []
+    return [Omitted("sensor noise", noise)] if rig.sensors else []

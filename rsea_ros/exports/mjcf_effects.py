@@ -1,4 +1,4 @@
-"""Effects in MuJoCo's terms: each a function that changes the model and returns how it is said."""
+"""Effects in MuJoCo's terms: each a function that changes the model and returns how it is represented."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from rsea_ros.design.mjcf import SOLIMP, SOLREF, STEP
-from rsea_ros.exports.coverage import CannotSay
+from rsea_ros.design.mujoco_model import SOLIMP, SOLREF, STEP
+from rsea_ros.exports.represented import Unrepresentable
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
 
@@ -59,7 +59,7 @@ def passive(root: xml.Element, name: str, **attributes: str) -> xml.Element:
 
 def _command_delay(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if p["delay"] < STEP:
-        raise CannotSay(f"a delay of {p['delay']:g} s is shorter than the model's step of {STEP:g} s")
+        raise Unrepresentable(f"a delay of {p['delay']:g} s is shorter than the model's step of {STEP:g} s")
     samples = math.ceil(p["delay"] / STEP) + 1
     for name, value in (("delay", repr(p["delay"])), ("nsample", str(samples)), ("interp", "zoh")):
         motor(root).set(name, value)
@@ -68,7 +68,7 @@ def _command_delay(root: xml.Element, rig: Rig, p: Parameters) -> str:
 
 def _current_loop_lag(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if motor(root).tag != "general":
-        raise CannotSay(f"the actuator is a {motor(root).tag}, which has no filter")
+        raise Unrepresentable(f"the actuator is a {motor(root).tag}, which has no filter")
     motor(root).set("dyntype", "filterexact")
     motor(root).set("dynprm", repr(p["time_constant"]))
     return f"actuator dyntype filterexact, {p['time_constant']:g} s"
@@ -83,7 +83,7 @@ def _torque_saturation(root: xml.Element, rig: Rig, p: Parameters) -> str:
 
 def _torque_constant_error(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if motor(root).tag != "general":
-        raise CannotSay(f"the actuator is a {motor(root).tag}, whose gain is that of its loop")
+        raise Unrepresentable(f"the actuator is a {motor(root).tag}, whose gain is that of its loop")
     motor(root).set("gainprm", repr(p["gain"]))
     return f"actuator gainprm {p['gain']:g}"
 
@@ -119,7 +119,7 @@ def _lugre(root: xml.Element, name: str, stiffness: float, p: Parameters, dampin
 
 def _asymmetric_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if p["viscous_difference"]:
-        raise CannotSay("damping is the same in both directions")
+        raise Unrepresentable("damping is the same in both directions")
     actuator = root.find("actuator")
     assert actuator is not None
     bias = {"gainprm": "0", "biastype": "affine", "biasprm": f"{-p['offset']!r} 0 0"}
@@ -164,7 +164,7 @@ def _spring_hysteresis(root: xml.Element, rig: Rig, p: Parameters) -> str:
     (Masing's rule, which elasto-plastic springs in parallel obey; u: way over `angle`.)
     """
     if p["gamma"]:
-        raise CannotSay(f"springs that yield unload as they load, gamma is {p['gamma']:g}")
+        raise Unrepresentable(f"springs that yield unload as they load, gamma is {p['gamma']:g}")
     edges = np.concatenate([[0.0], -0.5 * np.log1p(-np.arange(1, ELEMENTS) / ELEMENTS), [2.5]])
     levels = 1.0 - np.exp(-2.0 * edges)
     slopes = np.append(np.diff(levels) / np.diff(edges), 0.0)
@@ -184,16 +184,16 @@ def _torque_ripple(root: xml.Element, rig: Rig, p: Parameters) -> str:
 
 def _backlash(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if math.isfinite(rig["gear.stiffness"]):
-        raise CannotSay("play beside a gear that gives has no place in the model")
+        raise Unrepresentable("play beside a gear that gives has no place in the model")
     return f"a hinge each for chassis and gear, the tendon between them limited to {p['gap']:g} rad in all"
 
 
 def _voltage_sag(root: xml.Element, rig: Rig, p: Parameters) -> str:
     first = motor(root)
     if first.tag != "general" or first.get("dyntype"):
-        raise CannotSay("a dcmotor has no room for the rig's loop or lag beside it")
+        raise Unrepresentable("a dcmotor has no room for the rig's loop or lag beside it")
     if float(first.get("gainprm", "1")) != 1.0:
-        raise CannotSay("a dcmotor has no room for a torque constant error beside it")
+        raise Unrepresentable("a dcmotor has no room for a torque constant error beside it")
     first.tag = "dcmotor"
     del first.attrib["gainprm"]
     first.set("input", "ff")

@@ -6,15 +6,15 @@ import math
 from collections.abc import Iterator
 from xml.etree import ElementTree as xml
 
-from rsea_ros.exports.coverage import Said, Unsaid
 from rsea_ros.exports.mjcf_effects import motor
+from rsea_ros.exports.represented import Omitted, Represented
 from rsea_ros.model.rig import Rig
 
 
-def say_loop(rig: Rig, root: xml.Element) -> tuple[Said, list[Unsaid]]:
+def say_loop(rig: Rig, root: xml.Element) -> tuple[Represented, list[Omitted]]:
     """Turn the motor into the loop's actuator; return exported and omitted parts."""
     if rig.loop is None:
-        return Said("motor", "motor on the tendon output - housing"), []
+        return Represented("motor", "motor on the tendon output - housing"), []
     gains = _gains(rig)
     first = motor(root)
     first.tag = "pid"
@@ -26,7 +26,7 @@ def say_loop(rig: Rig, root: xml.Element) -> tuple[Said, list[Unsaid]]:
     if math.isfinite(limit):
         first.set("forcerange", f"{-limit!r} {limit!r}")
     how = "pid actuator, " + ", ".join(f"{name} {value:g}" for name, value in gains.items())
-    return Said(f"{rig.loop} loop", how), list(_left_out(rig))
+    return Represented(f"{rig.loop} loop", how), list(_left_out(rig))
 
 
 def _gains(rig: Rig) -> dict[str, float]:
@@ -38,10 +38,10 @@ def _gains(rig: Rig) -> dict[str, float]:
     return {name: value for name, value in named.items() if value}
 
 
-def _left_out(rig: Rig) -> Iterator[Unsaid]:
+def _left_out(rig: Rig) -> Iterator[Omitted]:
     if rig.encoder_end == "spring_end":
         why = "an actuator's loop closes over its own tendon, that of the gear output"
-        yield Unsaid("encoder at the spring's end", why)
+        yield Omitted("encoder at the spring's end", why)
     for name, why in (
         ("sample_time", "the loop runs at the model's step"),
         ("velocity_limit", "slewmax limits the target, not what the loop asks"),
@@ -50,4 +50,4 @@ def _left_out(rig: Rig) -> Iterator[Unsaid]:
     ):
         value = rig.values().get(f"controller.{name}", 0.0)
         if value and math.isfinite(value):
-            yield Unsaid(f"controller.{name}", why)
+            yield Omitted(f"controller.{name}", why)

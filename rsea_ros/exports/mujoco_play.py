@@ -8,7 +8,7 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from rsea_ros.design.mjcf import STEP
+from rsea_ros.design.mujoco_model import STEP
 from rsea_ros.errors import ParameterError
 from rsea_ros.exports.difference import RATE
 from rsea_ros.model.rig import Rig

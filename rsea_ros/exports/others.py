@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.exports.coverage import Said, Unsaid
+from rsea_ros.exports.represented import Omitted, Represented
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 
@@ -23,23 +23,23 @@ def sized(rig: Rig) -> dict[str, dict[str, float]]:
     return {name: p for name, p in complete.items() if all(map(math.isfinite, p.values()))}
 
 
-def unsaid_effects(rig: Rig, said: Sequence[Said], why: str) -> list[Unsaid]:
-    """Return the rig's effects that are not said."""
-    names, finite = {one.name for one in said}, sized(rig)
+def omitted_effects(rig: Rig, represented: Sequence[Represented], why: str) -> list[Omitted]:
+    """Return the rig's effects that the target does not represent."""
+    names, finite = {one.name for one in represented}, sized(rig)
     endless = "a parameter of it is infinite"
     effects = (one.name for one in rig.effects if one.name not in names)
-    return [Unsaid(name, why if name in finite else endless) for name in effects]
+    return [Omitted(name, why if name in finite else endless) for name in effects]
 
 
-def unsaid_parts(rig: Rig, why: str) -> Iterator[Unsaid]:
+def omitted_parts(rig: Rig, why: str) -> Iterator[Omitted]:
     """Yield the springs, loads and sensors that a target of one rigid joint leaves out."""
     if not rig.rigid_spring:
-        yield Unsaid("spring", f"{rig['spring.stiffness']:g} N·m/rad; {why}")
+        yield Omitted("spring", f"{rig['spring.stiffness']:g} N·m/rad; {why}")
     for name in ("gear", "proximal_spring"):
         if math.isfinite(rig[f"{name}.stiffness"]):
-            yield Unsaid(f"{name}.stiffness", why)
+            yield Omitted(f"{name}.stiffness", why)
     for end in END_NAMES:
         if rig.end_is_free(end):
-            yield Unsaid(end, "its load is the affair of the robot's own links")
+            yield Omitted(end, "its load is the affair of the robot's own links")
     if rig.sensors:
-        yield Unsaid("sensor noise", "the target's observations have their own")
+        yield Omitted("sensor noise", "the target's observations have their own")

@@ -6,8 +6,8 @@ import math
 from xml.etree import ElementTree as xml
 
 from rsea_ros.exports.chain import WORLD, Joint, Link
-from rsea_ros.exports.coverage import Export
 from rsea_ros.exports.links_and_joints import Language, effort, export_chain, friction, inertia, stop_of
+from rsea_ros.exports.represented import Export
 from rsea_ros.model.rig import Rig
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rsea_ros.fleet.columns import history, recordings
+    from rsea_ros.fleet.store_columns import history, recordings
 
 __all__ = ["history", "recordings"]
 
@@ -20,5 +20,5 @@ def __getattr__(name: str) -> Any:
         from rsea_ros.fleet.extra import need_extra
 
         need_extra()
-        return getattr(importlib.import_module("rsea_ros.fleet.columns"), name)
+        return getattr(importlib.import_module("rsea_ros.fleet.store_columns"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

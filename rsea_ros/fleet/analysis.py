@@ -19,7 +19,7 @@ from rsea_ros.checks.signal_findings import band
 from rsea_ros.checks.usable import check_diagnosable, require_motion
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import MappedJoint
-from rsea_ros.fleet.reading import JointRecording, read_run
+from rsea_ros.fleet.read_recording import JointRecording, read_run
 from rsea_ros.fleet.row import Row
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification, ParameterEstimate

@@ -20,8 +20,8 @@ import dask
 import distributed
 from distributed.scheduler import KilledWorker
 
-from rsea_ros.fleet.errors import FleetError
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
+from rsea_ros.fleet.fleet_error import FleetError
 
 SETTINGS: Mapping[str, Any] = {
     "distributed.worker.preload": ["rsea_ros.fleet.worker"],

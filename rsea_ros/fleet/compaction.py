@@ -14,8 +14,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from rsea_ros.fleet.keys import metadata, read
 from rsea_ros.fleet.row import write_table
+from rsea_ros.fleet.store_keys import metadata, read
 from rsea_ros.new_files import Destination, NewFiles
 
 _PART = "part-"

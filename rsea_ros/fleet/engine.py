@@ -167,8 +167,8 @@ class Engine:
         if isinstance(error, Changed):
             self._summary.changed.append(bag.url)
         else:
-            what = "" if isinstance(error, RseaError) else f"{bag.url}: {type(error).__name__}: "
-            self._summary.unreadable.append(reason(f"{what}{error}"))
+            prefix = "" if isinstance(error, RseaError) else f"{bag.url}: {type(error).__name__}: "
+            self._summary.unreadable.append(reason(f"{prefix}{error}"))
 
     def _quarantine(self, task: Task, why: str) -> None:
         self._put(TaskOutcome(task.row(outcome="quarantined", reason=reason(why))))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from rsea_ros.fleet.errors import FleetError
+from rsea_ros.fleet.fleet_error import FleetError
 
 PACKAGES = ("pyarrow", "duckdb", "fsspec", "dask", "distributed")
 

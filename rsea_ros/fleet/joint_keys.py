@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from msg_adapters.topics import ROLES
+from msg_adapters.topic_map import ROLES
 from rsea_ros.keys import NEEDED, Key, table
 
 MAP = (

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from msg_adapters.tables import ImportMap, load_map
-from msg_adapters.topics import TopicMap
+from msg_adapters.topic_map import TopicMap
 from rsea_ros import strict_yaml
 from rsea_ros.checked import mapping, only_keys, text
 from rsea_ros.errors import FieldError, RseaError
-from rsea_ros.fleet.errors import JointMapError
+from rsea_ros.fleet.fleet_error import JointMapError
 from rsea_ros.fleet.joint_keys import JOINT, MAP, TOPIC
 from rsea_ros.keys import names
 from rsea_ros.model.rig_file import load_rig, rig_folders, rig_text

@@ -8,7 +8,7 @@ from typing import Any
 
 import duckdb
 
-from rsea_ros.fleet.errors import FleetError
+from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.store import Store
 
 _ANALYSES = """

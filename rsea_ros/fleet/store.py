@@ -22,9 +22,9 @@ from pathlib import Path
 
 from rsea_ros.files import make_folder
 from rsea_ros.fleet.compaction import compact, finish, take_out
-from rsea_ros.fleet.errors import FleetError
-from rsea_ros.fleet.keys import known_rows
+from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.row import SCHEMA, Row, analysis_of, month_of, write
+from rsea_ros.fleet.store_keys import known_rows
 from rsea_ros.new_files import Destination, NewFiles, write_text
 
 MARK = "store.json"

@@ -36,4 +36,4 @@ class RunSummary:
             "unreadable": len(self.unreadable),
             "of no joint": self.unmapped,
         }
-        return ", ".join([*parts, *(f"{n} {what}" for what, n in others.items() if n)])
+        return ", ".join([*parts, *(f"{n} {name}" for name, n in others.items() if n)])

@@ -51,8 +51,8 @@ class DynamixelNetft:
         try:
             self._motor.open()
             check_limits(self._limits, self._motor.torque_limit, self._stiffness)
-            assert self._motor.own is not None
-            check_own_limits(self._limits, self._motor.own, self._motor.known.name)
+            assert self._motor.limits is not None
+            check_own_limits(self._limits, self._motor.limits, self._motor.known.name)
             position = self._motor.bus.patiently(self._motor.read).position
             self.origin = 0.0 if self._absolute else position
             if self._sensor is not None:
@@ -135,15 +135,15 @@ class DynamixelNetft:
     def health(self) -> Mapping[str, object]:
         """Return errors of bus and stream by kind, and the motor's last report."""
         values: dict[str, object] = {f"bus_{kind}": n for kind, n in self._motor.bus.errors.items()}
-        own = self._motor.own
-        if self._motor.table is not None and own is not None:
+        limits = self._motor.limits
+        if self._motor.table is not None and limits is not None:
             values |= {
                 "motor": self._motor.table.name,
-                "firmware": own.firmware,
+                "firmware": limits.firmware,
                 "torque_limit_nm": f"{self._motor.torque_limit:.4g}",
                 "torque_constant": self._motor.torque_constant,
-                "homing_offset_rad": f"{own.homing_offset:.6g}",
-                "reversed": own.reversed,
+                "homing_offset_rad": f"{limits.homing_offset:.6g}",
+                "reversed": limits.reversed,
             }
         if self._sensor is not None:
             values |= {f"ft_{kind}": n for kind, n in self._sensor.counts().items()}

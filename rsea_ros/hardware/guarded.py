@@ -14,7 +14,7 @@ from rsea_ros.hardware.device import Device, NoReply, State
 from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, complaint
 from rsea_ros.hardware.losses import Losses
 from rsea_ros.hardware.protection import NONE
-from rsea_ros.hardware.spring import Spring
+from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.hardware.together import cycle
 
 BUSY = "clear_fault or reboot is under way, expected it to be over"
@@ -36,7 +36,7 @@ class GuardedDevice:
         self.state: State | None = None
         self._taring = self.away = False
         self._turn = threading.Lock()
-        self._losses = {what: Losses(limits.lost_cycles) for what in ("read", "write")}
+        self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
 
     @property
     def fault(self) -> DeviceFault | None:
@@ -198,10 +198,10 @@ class GuardedDevice:
                         self.device.disable()
                         self.device.protection.beat(False)
 
-    def _failed(self, what: str, error: DeviceError) -> None:
+    def _failed(self, transfer: str, error: DeviceError) -> None:
         """Count a failure. One lost answer costs a cycle; many of them, and any other failure, trip."""
-        self.cycles[f"failed_{what}s"] += 1
+        self.cycles[f"failed_{transfer}s"] += 1
         if not isinstance(error, NoReply):
             self.guard.trip(DeviceFault(type(error).__name__.lower(), detail=str(error)))
-        elif fault := self._losses[what].take(lost=True):
+        elif fault := self._losses[transfer].take(lost=True):
             self.guard.trip(replace(fault, detail=fault.detail + str(error)))

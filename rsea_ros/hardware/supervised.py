@@ -116,7 +116,7 @@ class Supervisor:
     """
 
     def __init__(self, descriptor: int, timeout: float, frames: Sequence[bytes], service: str = "") -> None:
-        self._timeout, self._last, self._told, self._armed = timeout, 0.0, 0.0, False
+        self._timeout, self._last, self._beat, self._armed = timeout, 0.0, 0.0, False
         words = [frame.hex() for frame in frames]
         self._end: _End = (
             _Service(service, descriptor, timeout, words) if service else _Child(descriptor, timeout, words)
@@ -136,8 +136,8 @@ class Supervisor:
         now = time.monotonic()
         gap, armed_before = now - self._last, self._armed
         self._last, self._armed = now, armed_before if armed is None else armed
-        if self._armed != armed_before or now - self._told > self._timeout / BEATS:
-            self._told = now
+        if self._armed != armed_before or now - self._beat > self._timeout / BEATS:
+            self._beat = now
             self._tell()
         if armed_before and gap > SURE * self._timeout:
             limit = f"{1e3 * SURE * self._timeout:.0f} ms"

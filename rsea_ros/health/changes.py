@@ -16,14 +16,14 @@ import numpy as np
 
 from rsea_ros.health.bank import CHANNELS, Bank, LookEvidence
 from rsea_ros.health.cusum import Cusum, threshold
-from rsea_ros.health.estimates import Estimates
-from rsea_ros.health.finding import UNEXPLAINED, HealthFinding, unexplained
+from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, unexplained
 from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.health.look import FILTER_SETTLING, Look
+from rsea_ros.health.recursive_estimates import Estimates
 from rsea_ros.health.scatter import Scatter
 from rsea_ros.health.settings import WatchSettings
 from rsea_ros.health.single_cause import ChangeCause, Fitter
-from rsea_ros.model.observer.noise import Noise
+from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 
 SURE = 0.95
@@ -76,7 +76,7 @@ class Changes:
         self._models = dict(models)
         self._looks: deque[Look] = deque(maxlen=REMEMBERED)
         self._before: _Base | None = None
-        self.found: dict[str, HealthFinding] = {}
+        self.findings: dict[str, HealthFinding] = {}
         self.job: Job | None = None
         self._begin(_Base(rig, tuple(hypotheses)))
 
@@ -136,7 +136,7 @@ class Changes:
         self.job = None
         both = answer.beside[0].cost + answer.first
         if self._before is not None and answer.instead and answer.instead[0].cost < both + SIMPLER:
-            self.found.pop(self._before.last, None)
+            self.findings.pop(self._before.last, None)
             self._base, self._before = replace(self._before, since=self._base.since), None
             return self._weigh(answer.instead)
         return self._weigh(answer.beside)
@@ -148,7 +148,7 @@ class Changes:
         if best.explained < EXPLAINED:
             finding = unexplained(self._began, 1.0 - max(best.explained, 0.0))
             return self._later(finding if self._patience >= PATIENT else None)
-        self.found.pop(UNEXPLAINED, None)
+        self.findings.pop(UNEXPLAINED, None)
         finding = self._finding(best, confidence)
         if confidence < SURE:
             return self._later(finding if _is_change(best.hypothesis, finding.size) else None)
@@ -157,7 +157,7 @@ class Changes:
     def _finding(self, cause: ChangeCause, confidence: float) -> HealthFinding:
         h, half = cause.hypothesis, 0.5 * (cause.ci95[1] - cause.ci95[0])
         size = h.value + cause.change - self._models[h.name]
-        since = self.found[h.name].since if h.name in self.found else self._began
+        since = self.findings[h.name].since if h.name in self.findings else self._began
         return HealthFinding(h.code, h.name, h.unit, size, (size - half, size + half), since, confidence)
 
     def _later(self, finding: HealthFinding | None) -> HealthFinding | None:
@@ -166,10 +166,10 @@ class Changes:
         self._wait = self._patience
         if finding is None:
             return None
-        known = finding.name in self.found
-        for name in [n for n, f in self.found.items() if f.confidence < SURE]:
-            del self.found[name]
-        self.found[finding.name] = finding
+        known = finding.name in self.findings
+        for name in [n for n, f in self.findings.items() if f.confidence < SURE]:
+            del self.findings[name]
+        self.findings[finding.name] = finding
         return None if known else finding
 
     def _adopt(self, cause: ChangeCause, finding: HealthFinding) -> HealthFinding | None:
@@ -177,15 +177,15 @@ class Changes:
         h = cause.hypothesis
         adopted = replace(h, value=h.value + cause.change)
         hypotheses = tuple(adopted if other.name == h.name else other for other in self._base.hypotheses)
-        for name in [n for n, f in self.found.items() if f.confidence < SURE]:
-            del self.found[name]
+        for name in [n for n, f in self.findings.items() if f.confidence < SURE]:
+            del self.findings[name]
         changed = _is_change(h, finding.size)
         self._before = replace(self._base, last=h.name) if changed else None
         self._begin(_Base(h.changed(self._base.rig, cause.change), hypotheses, self._began - FILTER_SETTLING))
         if not changed:
-            self.found.pop(h.name, None)
+            self.findings.pop(h.name, None)
             return None
-        self.found[h.name] = finding
+        self.findings[h.name] = finding
         return finding
 
 

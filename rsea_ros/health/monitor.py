@@ -11,16 +11,16 @@ import numpy as np
 from rsea_ros.errors import RigError
 from rsea_ros.health.bank import Bank
 from rsea_ros.health.changes import CandidateCauses, Changes
-from rsea_ros.health.estimates import ChangeEstimate
-from rsea_ros.health.finding import HealthFinding, sensor_findings
+from rsea_ros.health.health_finding import HealthFinding, sensor_findings
 from rsea_ros.health.hypotheses import FACTOR, GAINS, ChangeHypothesis, hypotheses_of, nuisances_of
 from rsea_ros.health.look import FEWEST, Cutter, Look
+from rsea_ros.health.recursive_estimates import ChangeEstimate
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.health.sensors import Sensors
 from rsea_ros.health.settings import WatchSettings
 from rsea_ros.health.tuning import tuned
 from rsea_ros.model.observer.log import STATE
-from rsea_ros.model.observer.noise import Noise
+from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, IntArray
 
@@ -92,7 +92,7 @@ class Monitor:
 
     def findings(self) -> list[HealthFinding]:
         """Return the present findings."""
-        changed = [] if self.changes is None else list(self.changes.found.values())
+        changed = [] if self.changes is None else list(self.changes.findings.values())
         return [*changed, *sensor_findings(self.sensors, self.jumps, self.late)]
 
     def estimates(self) -> list[ChangeEstimate]:

@@ -16,7 +16,7 @@ from rsea_ros.health.bank import Bank, LookEvidence
 from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.health.look import Look
 from rsea_ros.health.scatter import scatter_of
-from rsea_ros.model.observer.noise import Noise
+from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray

@@ -22,7 +22,7 @@ from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.misfit import misfit_ratios, reweighted
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, solve
-from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect, with_effect
+from rsea_ros.identification.unknowns import idle, start_vector, unknowns_of_effect, with_effect
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.signals import FloatArray
 
@@ -55,7 +55,7 @@ def extended(
     present: Problem, theta: FloatArray, effect: Effect, start: dict[str, float]
 ) -> tuple[Problem, FloatArray]:
     """Return the present problem with one more effect whose parameters may move, and its start."""
-    unknowns = (*present.unknowns, *unknowns_of_effect(effect, start))
+    unknowns = (*present.unknowns, *unknowns_of_effect(effect, start, idle(effect, present.rig)))
     rig = with_effect(present.rig, effect.name, start)
     problem = replace(present, rig=rig, unknowns=unknowns, newest=effect.name)
     return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])

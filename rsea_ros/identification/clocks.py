@@ -120,14 +120,20 @@ def _left_over(solution: Solution, columns: FloatArray, taken: Sequence[Unknown]
 
 
 def _cost(solution: Solution, columns: FloatArray, free: Sequence[Unknown]) -> dict[str, float]:
-    """Return by unknown how many times as wide its interval would be, were some clocks free beside it."""
-    unknowns = solution.problem.unknowns
+    """Return by unknown how many times as wide its interval would be, were some clocks free beside it.
+
+    Of the unknowns that the residual shows: the interval of another is that of its bounds in any case.
+    """
+    shown = [i for i, u in enumerate(solution.problem.unknowns) if _is_shown(solution.jacobian[:, i], u)]
+    jacobian, unknowns = solution.jacobian[:, shown], [solution.problem.unknowns[i] for i in shown]
     without, beside = (
         np.diag(np.linalg.pinv(base.T @ base + np.diag([u.doubt**-2 for u in known]), hermitian=True))
-        for base, known in (
-            (solution.jacobian, unknowns),
-            (np.column_stack([solution.jacobian, columns]), (*unknowns, *free)),
-        )
+        for base, known in ((jacobian, unknowns), (np.column_stack([jacobian, columns]), (*unknowns, *free)))
     )
     wider = np.sqrt(beside[: len(unknowns)] / np.maximum(without, 1e-300))
     return {u.name: float(w) for u, w in zip(unknowns, wider, strict=True)}
+
+
+def _is_shown(column: FloatArray, unknown: Unknown) -> bool:
+    """Return whether an unknown changes the residual by one standard deviation at all within its bounds."""
+    return float(np.linalg.norm(column)) * unknown.reach >= 1.0

@@ -17,6 +17,7 @@ from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.identification.unknowns import (
     Unknown,
     clocks,
+    idle,
     start_vector,
     unknowns_of_effect,
     unknowns_of_rig,
@@ -63,8 +64,8 @@ def fit(
         ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < _MISFIT:
             break
-        heavier = tuple(reweighted(c, ratios) for c in solution.problem.cases)
-        solution = solve(replace(problem, cases=heavier), solution.theta, run=run)
+        cases = tuple(reweighted(c, ratios) for c in solution.problem.cases)
+        solution = solve(replace(problem, cases=cases), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
     return solution, known, asked
 
@@ -94,7 +95,8 @@ def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
 def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     """Return all that a fit of these cases may move."""
     channels = sorted({n for case in cases for n in case.measured})
-    effects = [unknowns_of_effect(e, stated, rig.known) for e, stated in _stated_effects(rig, cases)]
+    stated = _stated_effects(rig, cases)
+    effects = [unknowns_of_effect(e, start, rig.known | idle(e, rig)) for e, start in stated]
     return (
         *unknowns_of_rig(rig),
         *(u for group in effects for u in group),

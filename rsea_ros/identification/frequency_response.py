@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.identification.lines import Lines
 from rsea_ros.identification.local_polynomial import local_polynomial
 from rsea_ros.identification.multisine import multisine
 from rsea_ros.identification.periodicity import find_periods
 from rsea_ros.identification.resample import Aligned, align
+from rsea_ros.identification.response_lines import Lines
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.identification.unfold import unfold
 from rsea_ros.identification.welch import suits, welch

@@ -43,7 +43,7 @@ from rsea_ros.identification.workers import cores
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.position_loop import commanded
-from rsea_ros.model.prediction import fit_percent
+from rsea_ros.model.prediction_errors import fit_percent
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record

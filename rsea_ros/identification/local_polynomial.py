@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.fft import rfft
 
-from rsea_ros.identification.lines import Lines, detrended, widened
 from rsea_ros.identification.resample import Aligned
+from rsea_ros.identification.response_lines import Lines, detrended, widened
 from rsea_ros.signals import BoolArray, ComplexArray, FloatArray
 
 _UNKNOWNS = 6

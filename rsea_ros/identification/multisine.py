@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.fft import rfft
 
-from rsea_ros.identification.lines import Lines, widened
 from rsea_ros.identification.periodicity import Periods
 from rsea_ros.identification.resample import Aligned
+from rsea_ros.identification.response_lines import Lines, widened
 from rsea_ros.signals import ComplexArray, FloatArray, IntArray
 
 _EXCITED = 1e-2

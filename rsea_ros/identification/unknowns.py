@@ -150,7 +150,7 @@ def _rig_unknown(rig: Rig, name: str) -> Unknown:
 def unknowns_of_effect(
     effect: Effect, start: Mapping[str, float], known: Collection[str] = ()
 ) -> tuple[Unknown, ...]:
-    """Return the parameters of an effect from a start, without a prior; not those listed as known."""
+    """Return the parameters of an effect from a start, each with its prior; not those in `known`."""
     complete = effect.complete(start)
     return tuple(
         _effect_unknown(effect, p, complete[p.name])
@@ -162,7 +162,12 @@ def unknowns_of_effect(
 def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
     scale = 1.0 if p.logarithmic else abs(p.typical) or 1.0
     start = min(max(start, p.low), p.high)
-    return Unknown(f"{effect.name}.{p.name}", start, p.unit, p.low, p.high, p.logarithmic, math.inf, scale)
+    return Unknown(f"{effect.name}.{p.name}", start, p.unit, p.low, p.high, p.logarithmic, p.spread, scale)
+
+
+def idle(effect: Effect, rig: Rig) -> frozenset[str]:
+    """Return the names of the parameters of an effect that do nothing on a rig."""
+    return frozenset(f"{effect.name}.{p}" for p in (effect.idle(rig) if effect.idle else ()))
 
 
 def clocks(channels: Iterable[str], rig: Rig) -> tuple[Unknown, ...]:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.fft import rfft
 
 from rsea_ros.fast_length import next_fast_length
-from rsea_ros.identification.lines import Lines, detrended, widened
 from rsea_ros.identification.resample import Aligned
+from rsea_ros.identification.response_lines import Lines, detrended, widened
 from rsea_ros.signals import ComplexArray, FloatArray, IntArray
 
 LONGEST_SEGMENT = 16.0

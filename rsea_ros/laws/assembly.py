@@ -12,8 +12,8 @@ from rsea_ros.laws.columns import LawBench
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import SELECTION, Gram
 from rsea_ros.laws.law import FittedTerm, Law, LearntCurve, joined
-from rsea_ros.laws.reading import ranges_of
-from rsea_ros.laws.selection import SparseLaw
+from rsea_ros.laws.sparse_regression import SparseLaw
+from rsea_ros.laws.variable_places import ranges_of
 
 _POINTS = 41
 """Of a learnt curve, evenly apart."""

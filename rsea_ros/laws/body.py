@@ -6,7 +6,7 @@ import re
 
 from rsea_ros.laws.law import FittedTerm, Law
 from rsea_ros.laws.memory import RING
-from rsea_ros.laws.reading import READS, letters_of, time_letters
+from rsea_ros.laws.variable_places import READS, letters_of, time_letters
 
 FARTHER = 3.0
 """Times the range of the data: beyond that a law keeps its value, for no datum speaks for it."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from rsea_ros.laws.candidates import TermCandidate
 from rsea_ros.laws.gram import SELECTION, Gram
-from rsea_ros.laws.selection import standard_error
+from rsea_ros.laws.sparse_regression import standard_error
 from rsea_ros.laws.terms import Place
 
 _RIDGE = 1e-4

@@ -11,13 +11,13 @@ from rsea_ros.effects.catalogue import lent
 from rsea_ros.effects.effect import Claims, Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.unknowns import apply
-from rsea_ros.laws.claims import claims_of
 from rsea_ros.laws.columns import bench_of
+from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import Law
-from rsea_ros.laws.reading import letters_of
+from rsea_ros.laws.measured_claims import claims_of
 from rsea_ros.laws.refinement import Refined, effect_from
 from rsea_ros.laws.result import FigurePoints, WrittenLaw
-from rsea_ros.laws.writing import LawProvenance, source_of
+from rsea_ros.laws.variable_places import letters_of
 from rsea_ros.model.rig import EffectSetting
 
 _POINTS = 4000
@@ -47,7 +47,7 @@ def finished(
 ) -> list[WrittenLaw]:  # fmt: skip
     """Return the laws as they were fitted, with their files."""
     where = provenance or _NO_PROVENANCE
-    said = (
+    held_out_gain = (
         f"Gain on blocks of time that took part in no fit and no choice: {100 * gain:.1f} % "
         f"(95 %: {100 * ci95[0]:.1f} to {100 * ci95[1]:.1f} %)."
     )
@@ -67,7 +67,7 @@ def finished(
         with lent(effect):
             claims = claims_of(law, effect, rig, cases[0])
         written.append(
-            WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=said)), claims, shown)
+            WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=held_out_gain)), claims, shown)
         )
     return written
 

@@ -13,12 +13,12 @@ from rsea_ros.laws.assembly import curve_of, law_of
 from rsea_ros.laws.base import Base, fitted_base, levels_of
 from rsea_ros.laws.choice import MATTERS, Choice, Search, chosen_models, searched, tried_of
 from rsea_ros.laws.dependence import Dependence, dependences
+from rsea_ros.laws.effect_source import LawProvenance
 from rsea_ros.laws.file import Draft, finished
 from rsea_ros.laws.fitting import gain_on_tests, refined_laws, share_of
 from rsea_ros.laws.law import Law
 from rsea_ros.laws.refinement import acting, effect_from
 from rsea_ros.laws.result import LawResult, WrittenLaw
-from rsea_ros.laws.writing import LawProvenance
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import Record

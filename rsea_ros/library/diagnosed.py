@@ -64,13 +64,13 @@ class Diagnosed:
 
     def to_frame(self) -> Any:
         """Return the parameters of the re-fitted rig as a DataFrame. Raises ParameterError without pandas."""
-        from rsea_ros.library.frames import parameter_frame
+        from rsea_ros.library.data_frames import parameter_frame
 
         return parameter_frame(self.result.baseline)
 
     def plot(self) -> Figure:
         """Return a plotly figure: each channel measured, simulated without the causes, and with them."""
-        from rsea_ros.library.figures import overlay_figure
+        from rsea_ros.library.result_figures import overlay_figure
 
         return overlay_figure(self.result.before, self.result.after)
 
@@ -79,7 +79,7 @@ class Diagnosed:
 
         force: replace existing results; without it they raise OutputError.
         """
-        from msg_adapters.overlay import write_overlay
+        from msg_adapters.overlay_bag import write_overlay
         from rsea_ros.new_files import Destination
         from rsea_ros.report.diagnosis.files import write_diagnosis
 

@@ -85,7 +85,8 @@ def _train(rig: Rig) -> Iterator[Element]:
 
 def _distal_side(rig: Rig) -> Iterator[Element]:
     if math.isfinite(rig["gear.stiffness"]):
-        yield Element("K_g", "stiffness", ("m", "g"), rig["gear.stiffness"])
+        yield Element("K_g", "stiffness", ("m", "g.1"), rig["gear.stiffness"])
+        yield Element("b_g", "damping", ("g.1", "g"), rig["gear.damping"])
         yield Element("joint", "source", (GROUND, "g"))
     yield Element("J_sc", "inertia", ("m", "c"), rig["chassis.inertia"])
     if not rig.rigid_spring:

@@ -11,9 +11,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rsea_ros.compiler import njit
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import check_extent
+from rsea_ros.model.held_command import beside_mean, in_steps, mean_of_curve, mean_of_held, mean_of_line
+from rsea_ros.model.measured_motion import angle_at, first_state, initial_state
 from rsea_ros.model.rig import Hold
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import Channel, FloatArray, Record
@@ -30,16 +31,6 @@ ms make of 10 s at 280 Hz such a record of three hours, of which every simulatio
 
 LONGEST_OF_JOINTS = 1e-3
 """s, where targets at tens of Hz command a position loop, whose firmware samples about as often."""
-
-ON_GRID = 1e-3
-"""Stamps this near to the end of a step, in steps, are meant to be there: half a microsecond."""
-
-
-AT_REST = 0.5
-"""Of the whole record's standard deviation: a first sample below it is of a bench that started from rest."""
-
-LATE = 1.6
-"""Sample periods: a first sample later than this after the first command is of a channel that starts late."""
 
 
 @dataclass(frozen=True)
@@ -131,15 +122,15 @@ def drive_from(
             f"{record.source}: lasts {stop - start:.4g} s, expected up to {most * step:.4g} s at "
             f"{1.0 / period:.3g} Hz: are the stamps in s, not in ms or µs? If so, cut the record"
         )
-    knots, torque = _in_steps(command.t, start, step), command.y
+    knots, torque = in_steps(command.t, start, step), command.y
     if closed_loop:
         made = "motor_torque" if "motor_torque" in record else "command"
         torque = torque - np.interp(command.t, *_ty(record[made]))
     jumps = hold == "zero"
-    means = {"zero": _mean_of_held, "first": _mean_of_line, "band": partial(_mean_of_curve, steps)}
+    means = {"zero": mean_of_held, "first": mean_of_line, "band": partial(mean_of_curve, steps)}
     held = means[hold](knots, torque, count)
-    at = {n: _in_steps(record[n].t, start, step) for n in OUTPUTS if n in record}
-    beside = {n: _beside_mean(knots, torque, held, a) if jumps else np.zeros(len(a)) for n, a in at.items()}
+    at = {n: in_steps(record[n].t, start, step) for n in OUTPUTS if n in record}
+    beside = {n: beside_mean(knots, torque, held, a) if jumps else np.zeros(len(a)) for n, a in at.items()}
     ends = np.asarray(start + step * np.arange(1, count + 1), np.float64)
     return Drive(
         step=step,
@@ -148,8 +139,8 @@ def drive_from(
         at=MappingProxyType(at),
         impulse=MappingProxyType({n: step * b for n, b in beside.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
-        angle=_angle(record, ends),
-        initial=(0.0, 0.0) if from_rest else _first(record) if targeted else _initial(record),
+        angle=angle_at(record, ends),
+        initial=(0.0, 0.0) if from_rest else first_state(record) if targeted else initial_state(record),
         hold=steps,
         jumps=jumps,
     )
@@ -203,117 +194,3 @@ def _period(t: FloatArray) -> float:
 
 def _ty(channel: Channel) -> tuple[FloatArray, FloatArray]:
     return channel.t, channel.y
-
-
-def _finite(record: Record, name: str) -> tuple[FloatArray, FloatArray]:
-    """Return stamps and values of a channel where it has values; a rest of two samples where it has none."""
-    if name in record:
-        t, y = _ty(record[name])
-        good = np.isfinite(y)
-        if np.count_nonzero(good) > 1:
-            return t[good], y[good]
-    return np.arange(2.0), np.zeros(2)
-
-
-def _first(record: Record) -> tuple[float, float]:
-    """Return the first position and velocity, zero where there is none."""
-    position, velocity = (_finite(record, n)[1] for n in ("position", "velocity"))
-    return float(position[0]), float(velocity[0])
-
-
-def _initial(record: Record) -> tuple[float, float]:
-    """Return position and velocity at the start: rest, unless the first samples say otherwise.
-
-    The first sample comes a period after the first command; a motion that the command may have caused until
-    then, the largest change from sample to sample, is not an initial motion. A channel that was not measured
-    says nothing. The position at the start is the first one less what the first velocity brought until then.
-    """
-    (t, position), (_, velocity) = (_finite(record, n) for n in ("position", "velocity"))
-    if not (_moved(position) or _moved(velocity)):
-        return 0.0, 0.0
-    late = float(t[0] - record["command"].t[0])
-    passed = late if "position" in record and 0.0 < late < LATE * float(t[1] - t[0]) else 0.0
-    return float(position[0] - passed * velocity[0]), float(velocity[0])
-
-
-def _angle(record: Record, ends: FloatArray) -> FloatArray:
-    """Return the measured position at some times (s), by cubics where its speed is measured with it."""
-    if "position" not in record:
-        return np.empty(0)
-    t, q = _finite(record, "position")
-    if "velocity" in record and len(t) > 1:
-        at, v = _finite(record, "velocity")
-        if np.array_equal(at, t):
-            return _cubics(t, q, v, np.clip(ends, t[0], t[-1]))
-    return np.interp(ends, t, q)
-
-
-def _cubics(t: FloatArray, y: FloatArray, slope: FloatArray, at: FloatArray) -> FloatArray:
-    """Return at some times within t the cubics through y that have its slope there (Hermite)."""
-    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
-    width = t[k + 1] - t[k]
-    u = (at - t[k]) / width
-    left, right = u * (1.0 - u) ** 2 * width * slope[k], u**2 * (u - 1.0) * width * slope[k + 1]
-    return np.asarray(y[k] + (y[k + 1] - y[k]) * u**2 * (3.0 - 2.0 * u) + left + right)
-
-
-def _mean_of_line(knots: FloatArray, y: FloatArray, count: int) -> FloatArray:
-    """Return the mean over each step of the lines between the stamps (in steps), held beyond the last."""
-    at = np.union1d(knots, np.arange(count + 1.0))
-    line = np.interp(at, knots, y)
-    area = np.concatenate([[0.0], np.cumsum(0.5 * (line[1:] + line[:-1]) * np.diff(at))])
-    return np.diff(np.interp(np.arange(count + 1.0), at, area))
-
-
-def _mean_of_curve(finer: int, knots: FloatArray, y: FloatArray, count: int) -> FloatArray:
-    """Return the mean over each step of the band-limited curve through samples `finer` steps apart.
-
-    By Simpson's rule, from the Fourier series of the samples and their mirror image: no jump at the ends.
-    """
-    from scipy.signal import resample
-
-    series = resample(np.concatenate([y, y[::-1]]), 4 * finer * len(y))[: 2 * finer * (len(y) - 1) + 1]
-    means = (series[:-2:2] + 4.0 * series[1:-1:2] + series[2::2]) / 6.0
-    return np.concatenate([means, np.full(count, y[-1])])[:count]
-
-
-def _moved(y: FloatArray) -> bool:
-    least = max(AT_REST * np.std(y), np.max(np.abs(np.diff(y))))
-    return bool(y[0] != 0.0 and abs(y[0]) >= least)
-
-
-def _in_steps(t: FloatArray, start: float, step: float) -> FloatArray:
-    """Return stamps (s) in steps since `start`; those on the grid but for their rounding are put on it."""
-    at = (t - start) / step
-    nearest = np.rint(at)
-    result: FloatArray = np.where(np.abs(at - nearest) < ON_GRID, nearest, at)
-    return result
-
-
-def _beside_mean(knots: FloatArray, y: FloatArray, means: FloatArray, at: FloatArray) -> FloatArray:
-    """Return the integral of the held signal less that of its means, at instants; all in steps."""
-    off_grid = at != np.rint(at)
-    if not off_grid.any() or (knots == np.rint(knots)).all():
-        return np.zeros(len(at))
-    last = float(len(means))
-    end = max(last, float(knots[-1]))
-    held = np.concatenate([[0.0], np.cumsum(y * np.diff(knots, append=end))])
-    stepped = np.concatenate([[0.0], np.cumsum(means)])
-    inside = np.clip(at, 0.0, last)
-    beside = np.interp(inside, np.append(knots, end), held) - np.interp(inside, np.arange(last + 1), stepped)
-    return np.where(off_grid, beside, 0.0)
-
-
-@njit(cache=True, nogil=True)
-def _mean_of_held(at, y, count):  # type: ignore[no-untyped-def]
-    """Return the mean over each step of the piecewise constant signal y held from its stamps (in steps)."""
-    means, k = np.empty(count), 0
-    for i in range(count):
-        while k + 1 < len(at) and at[k + 1] <= i:
-            k += 1
-        total, since, j = 0.0, float(i), k
-        while j + 1 < len(at) and at[j + 1] < i + 1:
-            total += y[j] * (at[j + 1] - since)
-            since, j = at[j + 1], j + 1
-        means[i] = y[k] if j == k else total + y[j] * (i + 1 - since)
-    return means

@@ -134,6 +134,7 @@ def actuator_matrices(rig: Rig) -> tuple[FloatArray, FloatArray, FloatArray]:
         stiffness += _between(C, D, rig["spring.stiffness"])
     if math.isfinite(rig["gear.stiffness"]):
         stiffness += _between(G, C, rig["gear.stiffness"])
+        damping += _between(G, C, rig["gear.damping"])
     if math.isfinite(rig["proximal_spring.stiffness"]):
         stiffness += _between(P, H, rig["proximal_spring.stiffness"])
         damping += _between(P, H, rig["proximal_spring.damping"])

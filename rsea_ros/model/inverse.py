@@ -166,8 +166,8 @@ def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
 
 def _parts(machine: Machine) -> tuple[Calls, FloatArray, FloatArray]:
     """Return calls, table and states for a walk along a motion, nothing remembered."""
-    machine.own[:] = 0.0
-    return machine.calls, machine.table, machine.own
+    machine.effect_x[:] = 0.0
+    return machine.calls, machine.table, machine.effect_x
 
 
 def _as_moved(machine: Machine, motion: Motion, period: float) -> Motion:
@@ -195,42 +195,42 @@ def predicted(rig: Rig, motion: Motion) -> Mapping[str, FloatArray]:
 
 
 @njit(cache=True, error_model="numpy")
-def motor_gains(calls, s, own, count):  # type: ignore[no-untyped-def]
+def motor_gains(calls, s, effect_x, count):  # type: ignore[no-untyped-def]
     """Return the gain of the effects at the motor, for a torque of 1 N m, at each sample."""
     gains = np.empty(count)
     for k in range(count):
         s[st.TIME], s[st.COMMAND] = k * s[st.STEP], 1.0
-        call_port(_MOTOR, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
+        call_port(_MOTOR, calls, s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data)
         gains[k] = s[st.COMMAND]
     return gains
 
 
 @njit(cache=True, error_model="numpy")
-def _made_of(calls, s, own, command, v):  # type: ignore[no-untyped-def]
+def _made_of(calls, s, effect_x, command, v):  # type: ignore[no-untyped-def]
     """Return the torque (N m) after the effects at the command, along a motion."""
     made = np.empty(len(command))
     for k in range(len(command)):
         s[st.TIME], s[st.OUTPUT_VELOCITY] = k * s[st.STEP], v[k]
         s[st.COMMAND] = s[st.CURRENT] = command[k]
-        call_port(_COMMAND, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
+        call_port(_COMMAND, calls, s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data)
         made[k] = s[st.COMMAND]
     return made
 
 
 @njit(cache=True, error_model="numpy")
-def _sensor_errors(calls, s, own, q):  # type: ignore[no-untyped-def]
+def _sensor_errors(calls, s, effect_x, q):  # type: ignore[no-untyped-def]
     """Return the angle (rad) that effects at the sensors add to the encoder's, along a motion."""
     errors = np.empty(len(q))
     for k in range(len(q)):
         s[st.TIME] = k * s[st.STEP]
         s[st.POSITION] = s[st.OUTPUT_ANGLE] = q[k]
-        call_port(_SENSOR, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
+        call_port(_SENSOR, calls, s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data)
         errors[k] = s[st.POSITION] - q[k]
     return errors
 
 
 @njit(cache=True, error_model="numpy")
-def _effect_torques(calls, s, own, q, v, torque, load):  # type: ignore[no-untyped-def]
+def _effect_torques(calls, s, effect_x, q, v, torque, load):  # type: ignore[no-untyped-def]
     """Return the torque (N m) that the effects add at the gear along a motion."""
     added = np.empty(len(q))
     s[st.MOBILITY] = s[st.GEAR_VELOCITY_SPAN] = 0.0
@@ -239,6 +239,6 @@ def _effect_torques(calls, s, own, q, v, torque, load):  # type: ignore[no-untyp
         s[st.TIME], s[st.COMMAND], s[st.LOAD] = k * s[st.STEP], torque[k], load[k]
         s[st.GEAR_ANGLE], s[st.GEAR_VELOCITY], s[st.ROTOR_ANGLE] = q[k], v[k], s[st.TURNS] * q[k]
         s[st.GEAR_TORQUE] = 0.0
-        call_port(_GEAR, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
+        call_port(_GEAR, calls, s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data)
         added[k] = s[st.GEAR_TORQUE]
     return added

@@ -5,22 +5,22 @@ from __future__ import annotations
 import math
 
 from rsea_ros.errors import ChannelError
-from rsea_ros.model import loop
+from rsea_ros.model import firmware_loop
 from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.signals import ComplexArray, Record
 
 
 def loop_parameters(rig: Rig) -> tuple[float, ...]:
-    """Return the parameters of loop.control, in its order, of a rig that has a loop."""
+    """Return the parameters of firmware_loop.control, in its order, of a rig that has a loop."""
     if rig.loop is None:
         c = rig.controller or PositionLoop(0.0, 0.0)
-        return loop.CASCADE, c.k_p, 0.0, c.k_v, 0.0, c.limit, math.inf, 0.0
+        return firmware_loop.CASCADE, c.k_p, 0.0, c.k_v, 0.0, c.limit, math.inf, 0.0
     limits = tuple(rig[f"controller.{name}"] for name in ("torque_limit", "velocity_limit", "sample_time"))
     if rig.loop == "pd":
         gains = tuple(rig[f"controller.{name}"] for name in ("k_p", "k_i", "k_d", "k_f"))
-        return loop.PD, *gains, *limits
+        return firmware_loop.PD, *gains, *limits
     gains = tuple(rig[f"controller.{name}"] for name in ("k_pos", "k_vi", "k_v"))
-    return loop.CASCADE, *gains, 0.0, *limits
+    return firmware_loop.CASCADE, *gains, 0.0, *limits
 
 
 def commanded(record: Record, rig: Rig) -> Record:

@@ -45,7 +45,7 @@ LOOP_FIELDS: Mapping[str, Mapping[str, Field]] = {
         "k_vi": Field("N m/rad", default=0.0),
     },
 }
-"""Gains of the kinds of position loop (model/loop.py)."""
+"""Gains of the kinds of position loop (model/firmware_loop.py)."""
 _LIMIT_FIELDS = {
     "torque_limit": Field("N m", low_allowed=False, default=math.inf),
     "velocity_limit": Field("rad/s", low_allowed=False, default=math.inf),
@@ -59,6 +59,7 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "rotor.reflected_damping": Field("N m s/rad"),
         "gear.ratio": Field("1", low=1.0, default=1.0),
         "gear.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
+        "gear.damping": Field("N m s/rad", default=0.0),
         "chassis.inertia": Field("kg m^2", default=0.0),
         "spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
         "spring.damping": Field("N m s/rad", default=0.0),

@@ -23,6 +23,7 @@ _MEANINGS = {
     "rotor.reflected_damping": "viscous damping of motor and gear, reflected to the gear output",
     "gear.ratio": "turns of the motor for one turn of the output",
     "gear.stiffness": "stiffness of the gear train",
+    "gear.damping": "damping of a gear train that gives",
     "chassis.inertia": "inertia of the spring chassis, which turns with the gear output",
     "spring.stiffness": "stiffness of the spring; required unless it is rigid",
     "spring.damping": "damping of the spring",

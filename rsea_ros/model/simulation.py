@@ -19,7 +19,7 @@ from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
-from rsea_ros.model.loop import STATES, control
+from rsea_ros.model.firmware_loop import STATES, control
 from rsea_ros.model.position_loop import commanded, loop_parameters
 from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import Rig
@@ -43,13 +43,13 @@ class Machine:
     calls: Calls
     x: FloatArray
     table: FloatArray
-    own: FloatArray
+    effect_x: FloatArray
     start_map: FloatArray
 
     def begin(self, initial: tuple[float, float] = (0.0, 0.0)) -> None:
         """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history."""
         self.x[:] = self.start_map @ np.array(initial)
-        self.own[:] = 0.0
+        self.effect_x[:] = 0.0
         self.table[st.FIRST_READ : st.VELOCITY + 1] = 0.0
         self.table[[st.POSITION, st.OUTPUT_ANGLE]], self.table[[st.VELOCITY, st.OUTPUT_VELOCITY]] = initial
         self.table[st.FT] = self.linear.outputs[2] @ self.x
@@ -142,7 +142,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
     empty = np.empty(0)
     reference, ridden = (empty if v is None else v for v in (reference, ridden))
     inputs = StepInputs(command, reference, ridden, start)
-    advance(machine.linear, machine.calls, inputs, StepState(machine.x, machine.table, machine.own), out)
+    advance(machine.linear, machine.calls, inputs, StepState(machine.x, machine.table, machine.effect_x), out)
 
 
 def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> Machine:

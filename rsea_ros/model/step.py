@@ -19,7 +19,7 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
-from rsea_ros.model.call import call
+from rsea_ros.model.compiled_call import call
 from rsea_ros.signals import FloatArray, IntArray
 
 OUTPUTS = ("position", "velocity", "motor_torque", "ft", "deflection")
@@ -81,13 +81,13 @@ class StepState(NamedTuple):
 
     x: FloatArray
     table: FloatArray
-    own: FloatArray
+    effect_x: FloatArray
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def call_port(port, calls, s_at, p_at, own_at):  # type: ignore[no-untyped-def]
+def call_port(port, calls, s_at, p_at, effect_x_at):  # type: ignore[no-untyped-def]
     for i in range(calls.first[port], calls.first[port + 1]):
-        call(calls.address[i], s_at, p_at + 8 * calls.p_at[i], own_at + 8 * calls.x_at[i])  # type: ignore[call-arg]
+        call(calls.address[i], s_at, p_at + 8 * calls.p_at[i], effect_x_at + 8 * calls.x_at[i])  # type: ignore[call-arg]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -167,15 +167,15 @@ def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
     Without numba's counted references (_nrt): a count is an atomic addition, and took half of a step.
     """
     command, reference, ridden, start = inputs
-    s, own = state.table, state.own
+    s, effect_x = state.table, state.effect_x
     h, x = s[st.STEP], _state(state.x, linear.rest)
-    s_at, p_at, own_at = s.ctypes.data, calls.p.ctypes.data, own.ctypes.data
+    s_at, p_at, effect_x_at = s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data
     for k in range(len(command)):
         s[st.TIME], s[st.COMMAND], s[st.CURRENT] = start + k * h, command[k], command[k]
         if len(reference) > 0:
             s[st.REFERENCE] = reference[k]
-        call_port(_COMMAND, calls, s_at, p_at, own_at)
-        call_port(_MOTOR, calls, s_at, p_at, own_at)
+        call_port(_COMMAND, calls, s_at, p_at, effect_x_at)
+        call_port(_MOTOR, calls, s_at, p_at, effect_x_at)
         free = end = _free(linear, s[st.COMMAND], x)
         if calls.nonlinear:
             s[st.TIME], s[st.COMMIT] = start + (k + 0.5) * h, 0.0
@@ -185,8 +185,8 @@ def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
             _read(linear, _middle(x, end), s)
             if len(ridden) > 0:
                 s[st.ROTOR_ANGLE] = ridden[k]
-            call_port(_GEAR, calls, s_at, p_at, own_at)
-            call_port(_SPRING, calls, s_at, p_at, own_at)
+            call_port(_GEAR, calls, s_at, p_at, effect_x_at)
+            call_port(_SPRING, calls, s_at, p_at, effect_x_at)
             end = _with_torques(linear, s, free)
         x = end
         s[st.TIME] = start + (k + 1) * h
@@ -194,10 +194,10 @@ def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
             held = s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE]
             s[st.COMMIT], s[st.DEFLECTION_SPAN] = 1.0, 0.0
             _read(linear, x, s)
-            call_port(_SPRING, calls, s_at, p_at, own_at)
+            call_port(_SPRING, calls, s_at, p_at, effect_x_at)
             s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE] = held
         _read_outputs(linear, x, s)
-        call_port(_SENSOR, calls, s_at, p_at, own_at)
+        call_port(_SENSOR, calls, s_at, p_at, effect_x_at)
         out[k, 0], out[k, 1], out[k, 2] = s[st.POSITION], s[st.VELOCITY], s[st.CURRENT]
         out[k, 3], out[k, 4] = s[st.FT], s[st.SPRING_ANGLE]
     for i in range(len(x)):

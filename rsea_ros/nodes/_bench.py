@@ -18,13 +18,13 @@ from msg_adapters.ros import (
     joint_state_message,
     wrench_message,
 )
-from msg_adapters.topics import JOINT_STATE, TYPES
+from msg_adapters.topic_map import JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import HORIZON, CommandQueue
 from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
-from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import JOINT, NodeParameter
 from rsea_ros.nodes._publishers import Obeyed
 from rsea_ros.nodes._qos import COMMAND, MEASURED, OVERRIDES
@@ -67,7 +67,7 @@ class Bench:
         within = f"{part}/" if part else ""
         self._node, self._every_record, self._strict = node, every_record, strict
         self.commands, self._obeyed = CommandQueue(strict=strict), Obeyed()
-        self._told: Mapping[str, int] = {}
+        self._reported: Mapping[str, int] = {}
         self._polled = 0
         self._states = _publisher(node, JointState, f"{within}joint_states")
         self._ft = _publisher(node, WrenchStamped, f"{within}ft")
@@ -89,9 +89,8 @@ class Bench:
         )  # fmt: skip
         self._deflections = _publisher(node, JointState, f"{within}deflection") if deflects else None
         self._wanted = Mailbox(
-            node, JOINT_STATE, f"{within}torque_command", COMMAND, self.commands.refuse, ("effort", 0),
-            joint=joint,
-            admit=self._admit if strict else None,
+            node, f"{within}torque_command", MessageFields(JOINT_STATE, (("effort", 0),), joint),
+            COMMAND, self.commands.refuse, admit=self._admit if strict else None,
         )  # fmt: skip
 
     def poll(self, anchor: Anchor) -> None:
@@ -134,8 +133,8 @@ class Bench:
             "steps of the system clock": cycle.anchor.steps,
             **(more or {}),
         }
-        new = {kind: count - self._told.get(kind, 0) for kind, count in counts.items()}
-        self._told = {**self._told, **counts}
+        new = {kind: count - self._reported.get(kind, 0) for kind, count in counts.items()}
+        self._reported = {**self._reported, **counts}
         troubles = [f"{count} {kind}" for kind, count in new.items() if count > 0]
         values = {
             **timing.values(),

@@ -41,18 +41,18 @@ def _lines(joints: Sequence[Values]) -> dict[str, Line]:
 
 def _check_apart(values: Values, other: Values) -> None:
     """Raise ParameterError where two joints have one motor or sensor, or want their port differently."""
-    this, that = values["joint"], other["joint"]
+    joint, other_joint = values["joint"], other["joint"]
     places = [(each["ft_host"], each["ft_port"]) for each in (values, other)]
     if values["ft_host"] and places[0] == places[1]:
         raise ParameterError(
-            f"parameter {this}.ft_host = {values['ft_host']}, expected another than {that}'s: a sensor has"
-            " one client (empty: there is none)"
+            f"parameter {joint}.ft_host = {values['ft_host']}, expected another than {other_joint}'s: a"
+            " sensor has one client (empty: there is none)"
         )
     if values["port"] != other["port"]:
         return
     if values["id"] == other["id"]:
-        raise ParameterError(f"parameter {this}.id = {values['id']}, expected another than {that}'s")
+        raise ParameterError(f"parameter {joint}.id = {values['id']}, expected another than {other_joint}'s")
     for name in ("baud", "latency", "fast_sync"):
         if values[name] != other[name]:
-            text = f"{other[name]} as {that}'s on {values['port']}"
-            raise ParameterError(f"parameter {this}.{name} = {values[name]}, expected {text}")
+            text = f"{other[name]} as {other_joint}'s on {values['port']}"
+            raise ParameterError(f"parameter {joint}.{name} = {values[name]}, expected {text}")

@@ -57,7 +57,7 @@ class Caller:
 
         Raises ParameterError for an unknown node or action, CallRefused when the node does not do it.
         """
-        name = self.found(name)
+        name = self.full_name(name)
         _await(lambda: action in self.actions(name))
         if action in (transitions := self._transitions(name)):
             return self._change(name, action, transitions[action])
@@ -81,7 +81,7 @@ class Caller:
             raise CallRefused(f"{name}: {service} was refused: {answer.message}")
         return f"{name}: {answer.message or service}"
 
-    def found(self, name: str) -> str:
+    def full_name(self, name: str) -> str:
         """Return the full name of a node. Raises ParameterError when it does not run or offers nothing."""
         name = absolute(name)
         if not _await(lambda: name in self._nodes() and bool(self.actions(name))):

@@ -9,7 +9,7 @@ from rclpy.serialization import serialize_message
 
 from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, joint_states_message
-from msg_adapters.topics import TYPES
+from msg_adapters.topic_map import TYPES
 from rsea_ros.hardware.device import State
 from rsea_ros.nodes._qos import MEASURED, OVERRIDES
 

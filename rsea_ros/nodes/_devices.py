@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from msg_adapters.topics import sign_and_index
+from msg_adapters.topic_map import sign_and_index
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.device import Device
 from rsea_ros.hardware.dynamixel.line import Line
@@ -18,7 +18,7 @@ from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
-from rsea_ros.hardware.spring import Spring
+from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.rig_file import load_rig

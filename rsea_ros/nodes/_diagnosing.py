@@ -6,7 +6,7 @@ from collections.abc import Generator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 
-from msg_adapters.overlay import write_overlay
+from msg_adapters.overlay_bag import write_overlay
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.errors import RseaError

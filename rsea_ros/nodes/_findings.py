@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, statuses_message
 from rsea_ros.health.codes import TABLE
-from rsea_ros.health.finding import HealthFinding
+from rsea_ros.health.health_finding import HealthFinding
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import STEADY
 from rsea_ros.nodes._qos import COMMAND

@@ -8,11 +8,11 @@ from collections.abc import Callable
 import numpy as np
 from rclpy.node import Node
 
-from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
+from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.observer.log import COMMAND, FT, STATE
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import RECORD
 from rsea_ros.signals import FloatArray, IntArray
 
@@ -34,8 +34,9 @@ class HealthInputs:
         self.counts = {"torque_command": 0, "joint_states": 0, "ft": 0}
 
         def mailbox(topic: str, kind: str, *fields: tuple[str, int]) -> Mailbox:
+            read = MessageFields(kind, fields, "" if topic == "ft" else joint)
             box = Mailbox(
-                node, kind, topic, RECORD, self._refuse, *fields, joint="" if topic == "ft" else joint,
+                node, topic, read, RECORD, self._refuse,
                 keep=lambda at, raw: keep(box.subscription.topic_name, kind, at, raw),
             )  # fmt: skip
             return box

@@ -40,7 +40,7 @@ class DrivenJoint:
         self.bench: Bench | None = None
         self._cycle: Cycle | None = None
         self._ended = ""
-        self._told: tuple[DeviceFault | None, int] = (None, 0)
+        self._reported: tuple[DeviceFault | None, int] = (None, 0)
         self._health = Health(node, self.report, part=part)
         for name, work in (
             ("zero_ft", self._zero_ft), ("clear_fault", self.clear_fault), ("reboot", self._reboot),
@@ -84,7 +84,7 @@ class DrivenJoint:
     def follow(self) -> None:
         """Log and publish changes: a fault, commands that were cut."""
         fault, limited = now = self.guarded.fault, self.guarded.guard.limited
-        before, self._told = self._told, now
+        before, self._reported = self._reported, now
         if fault is not None and fault != before[0]:
             text = f"fault {fault}; torque zero until clear_fault or reboot"
             self._node.get_logger().error(self.named(text))

@@ -15,7 +15,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._visitor import DISCOVERY, POLL, absolute, spin
 from rsea_ros.wording import did_you_mean
 
-_OWN = ("/rosout", "/parameter_events")
+_ROS_TOPICS = ("/rosout", "/parameter_events")
 
 
 class Listener:
@@ -30,7 +30,7 @@ class Listener:
         return [
             (name, ", ".join(types), *self._counts(name))
             for name, types in self._node.get_topic_names_and_types()
-            if name not in _OWN
+            if name not in _ROS_TOPICS
         ]
 
     def rate(self, topic: str, seconds: float) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -31,25 +32,36 @@ class Polled(CallbackGroup):
         """Do nothing."""
 
 
-class Mailbox:
-    """A polled subscription. refuse: called for each message that cannot be read.
+@dataclass(frozen=True)
+class MessageFields:
+    """The numbers that are read of each message of a topic.
 
-    admit: decides by a publisher's identity whether its messages count; None: all.
+    fields: name and index of each number; nan for one that a message lacks. joint: name that a message with
+    names must have; empty: any. most: names that it may have.
     """
 
+    msgtype: str
+    fields: tuple[tuple[str, int], ...]
+    joint: str = ""
+    most: int = 1
+
+
+class Mailbox:
+    """A polled subscription."""
+
     def __init__(
-        self, node: Node, msgtype: str, topic: str, qos: QoSProfile, refuse: Callable[[], None],
-        *fields: tuple[str, int], joint: str = "", most: int = 1,
+        self, node: Node, topic: str, read: MessageFields, qos: QoSProfile, refuse: Callable[[], None], *,
         admit: Callable[[object], bool] | None = None, keep: Callable[[int, bytes], None] | None = None,
     ) -> None:  # fmt: skip
-        """fields: name and index of each number; nan for one that a message lacks.
+        """refuse: called for each message that cannot be read.
 
-        joint: name that a message with names must have; empty: any. most: names that it may have.
+        admit: decides by a publisher's identity whether its messages count; None: all.
         keep: gets arrival (ns), bytes of what is read.
         """
         self._node, self._topic, self._refuse, self._admit = node, topic, refuse, admit
         self._keep = keep
-        self._kind, self._reader = message_type(msgtype), RawReader(msgtype, fields, joint, most)
+        self._kind = message_type(read.msgtype)
+        self._reader = RawReader(read.msgtype, read.fields, read.joint, read.most)
         self.subscription: Any = node.create_subscription(
             self._kind, topic, lambda message: None, qos, callback_group=Polled(), raw=True,
             qos_overriding_options=OVERRIDES,

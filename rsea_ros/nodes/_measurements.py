@@ -8,12 +8,12 @@ from collections.abc import Iterator, Sequence
 
 from rclpy.node import Node
 
-from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
+from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import CommandQueue
-from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 
 WAITING = 500
@@ -43,19 +43,17 @@ class Measurements:
         self.desired = CommandQueue()
         self.unusable = self._heard = 0
         state = (("position", 0), ("velocity", 0), ("effort", 0))
-        self._states = Mailbox(
-            node, JOINT_STATE, "joint_states", MEASUREMENT, self._refuse, *state, joint=joint
-        )
-        self._fts = Mailbox(node, WRENCH, "ft", MEASUREMENT, self._refuse, ("wrench", along))
+        states = MessageFields(JOINT_STATE, state, joint)
+        self._states = Mailbox(node, "joint_states", states, MEASUREMENT, self._refuse)
+        wrench = MessageFields(WRENCH, (("wrench", along),))
+        self._fts = Mailbox(node, "ft", wrench, MEASUREMENT, self._refuse)
         self._encoder, self._before = encoder, 0
         self._waiting_deflections: deque[tuple[int, float]] = deque(maxlen=WAITING)
         self._deflection = (0, math.nan)
-        self._deflections = encoder and Mailbox(
-            node, JOINT_STATE, "deflection", MEASUREMENT, lambda: None, ("position", 0), joint=joint
-        )
-        self._desired = Mailbox(
-            node, JOINT_STATE, "desired_torque", COMMAND, self.desired.refuse, ("effort", 0), joint=joint
-        )
+        angle = MessageFields(JOINT_STATE, (("position", 0),), joint)
+        self._deflections = encoder and Mailbox(node, "deflection", angle, MEASUREMENT, lambda: None)
+        torque = MessageFields(JOINT_STATE, (("effort", 0),), joint)
+        self._desired = Mailbox(node, "desired_torque", torque, COMMAND, self.desired.refuse)
         self.subscriptions = [self._states.subscription, self._fts.subscription]
 
     def take(self) -> Iterator[tuple[int, Measurement]]:

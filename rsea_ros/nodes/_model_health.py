@@ -50,7 +50,7 @@ class ModelHealth:
             )
         tests = self._observer.consistency()
         stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in self._inputs.frozen]
-        doubts = (_told(name, test) for name, test in tests.items() if test.broken)
+        doubts = (_inconsistency(name, test) for name, test in tests.items() if test.broken)
         troubles = [*stopped, *self._silence(), *doubts]
         summary = "; ".join(troubles) or self._error.verdict
         return NodeHealth(
@@ -110,7 +110,7 @@ class ModelHealth:
         }
 
 
-def _told(name: str, test: Consistency) -> str:
+def _inconsistency(name: str, test: Consistency) -> str:
     return (
         f"model inconsistent with {name}: innovations {test.ratio:.2f} times theirs (limit {test.limit:.2f})"
     )

@@ -10,12 +10,12 @@ from statistics import median
 
 from rclpy.node import Node
 
-from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
+from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.observer import Observer, TorqueEstimate
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._frozen import Frozen
-from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 
 PERIODS = 64
@@ -38,14 +38,18 @@ class ModelInputs:
         self._sign, along = sign_and_index(axis)
         self._timeout = round(ft_timeout * SECOND)
         self._epoch: int | None = None
-        self._state_stamp = self._ft_stamp = self._told = 0
+        self._state_stamp = self._ft_stamp = self._estimate_stamp = 0
         self._periods: deque[float] = deque(maxlen=PERIODS)
         self.refused = self.unstamped = 0
         self._still, self._numb = Frozen(max(MOVED * ft_noise, LEAST)), Frozen()
         deep = RECORD_RELIABLE if reliable else None
         self._commands, self._states, self.ft = (
             Mailbox(
-                node, kind, topic, deep or usual, self._refuse, *fields, joint="" if topic == "ft" else joint
+                node,
+                topic,
+                MessageFields(kind, tuple(fields), "" if topic == "ft" else joint),
+                deep or usual,
+                self._refuse,
             )
             for kind, topic, usual, *fields in (
                 (JOINT_STATE, "torque_command", COMMAND, ("effort", 0)),
@@ -110,9 +114,9 @@ class ModelInputs:
         return self._observer.state(self.seconds(stamp), a, b)
 
     def _note_period(self, stamp: int) -> None:
-        if 0 < stamp - self._told < SECOND:
-            self._periods.append((stamp - self._told) / SECOND)
-        self._told = stamp
+        if 0 < stamp - self._estimate_stamp < SECOND:
+            self._periods.append((stamp - self._estimate_stamp) / SECOND)
+        self._estimate_stamp = stamp
 
     def _command(self, stamp: int, torque: float) -> None:
         newest = max(self._state_stamp, self._ft_stamp)

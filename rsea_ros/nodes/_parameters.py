@@ -10,7 +10,7 @@ from typing import Any
 from rclpy.node import Node
 
 from msg_adapters.ros import parameter_descriptor
-from msg_adapters.topics import AXES
+from msg_adapters.topic_map import AXES
 from rsea_ros.errors import ParameterError
 from rsea_ros.wording import did_you_mean
 

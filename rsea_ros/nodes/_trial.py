@@ -12,7 +12,7 @@ from msg_adapters import TopicMap
 from msg_adapters.contents import Contents
 from msg_adapters.reading import record_from
 from msg_adapters.ros import ERROR, DiagnosticArray, message_type
-from msg_adapters.topics import ROLES, TYPES
+from msg_adapters.topic_map import ROLES, TYPES
 from rsea_ros.errors import DeviceError, RseaError
 from rsea_ros.experiment.opinion import SHORTEST
 from rsea_ros.nodes._player import Player

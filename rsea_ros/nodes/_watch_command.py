@@ -13,7 +13,7 @@ from rclpy.serialization import serialize_message
 
 from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, torque_command_message
-from msg_adapters.topics import JOINT_STATE
+from msg_adapters.topic_map import JOINT_STATE
 from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._watch_source import WatchSource

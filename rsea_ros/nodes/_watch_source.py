@@ -14,11 +14,11 @@ from typing import Any
 from rclpy.node import Node
 
 from msg_adapters.ros import Bool, DiagnosticArray
-from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
+from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.nodes._anchor import SECOND
-from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import LATCHED, MEASUREMENT
 
 SILENT, GONE = 3.0, 30.0
@@ -48,7 +48,9 @@ class WatchSource:
         self.bench = f"{self._namespace.strip('/')} · {rig.name}"
         effort = ("effort", 0)
         self._boxes = {
-            topic: Mailbox(node, kind, topic, MEASUREMENT, self._refuse, *fields, joint=name, most=most)
+            topic: Mailbox(
+                node, topic, MessageFields(kind, tuple(fields), name, most), MEASUREMENT, self._refuse
+            )
             for topic, kind, name, most, *fields in (
                 ("joint_states", JOINT_STATE, joint, 1, ("position", 0), effort),
                 ("ft", WRENCH, "", 1, ("wrench", along)),

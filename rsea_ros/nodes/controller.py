@@ -13,7 +13,7 @@ from rclpy.serialization import serialize_message
 
 from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, Trigger, torque_command_message
-from msg_adapters.topics import TYPES
+from msg_adapters.topic_map import TYPES
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.grid import Grid
 from rsea_ros.nodes._anchor import Anchor
@@ -54,7 +54,7 @@ class ControllerNode:
         self._judge = Judge(values)
         self._last, self._heard, self._watched, self._until, self._torque = 0, 0, 0, 0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
-        self._steps = self._missed = self._limited = self._late = self._told = self._restarts = 0
+        self._steps = self._missed = self._limited = self._late = self._late_reported = self._restarts = 0
         self._told_losses = 0
         self._squares: list[float] = []
         self._commands = node.create_publisher(JointState, "torque_command", COMMAND)
@@ -216,7 +216,7 @@ class ControllerNode:
             return NodeHealth(ERROR, self._fault, values)
         if not self._last:
             return NodeHealth(WARN, "waiting for joint_states and ft", values)
-        new, self._told = self._late - self._told, self._late
+        new, self._late_reported = self._late - self._late_reported, self._late
         if new:
             return NodeHealth(WARN, f"{new} commands more than a sample late, with less feedback", values)
         if words := self._new_loss():

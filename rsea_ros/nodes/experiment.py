@@ -15,14 +15,14 @@ from typing import Any
 from rclpy.node import Node
 
 from msg_adapters import read_record, write_record
-from msg_adapters.overlay import write_overlay
+from msg_adapters.overlay_bag import write_overlay
 from msg_adapters.ros import JointState, Trigger
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.experiment.campaign import Budget, Campaign, CampaignOutcome, Round
-from rsea_ros.experiment.causes import USUAL, causes_from
-from rsea_ros.experiment.limits import limits_from
 from rsea_ros.experiment.opinion import diagnosed
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
+from rsea_ros.experiment.run_limits import limits_from
+from rsea_ros.experiment.weighed_causes import USUAL, causes_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import Destination, unused
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
@@ -154,9 +154,9 @@ class ExperimentNode:
             if waits:
                 assert self._proposal is not None
                 self._answer = answer
-                said = f"{'plays' if answer else 'does not play'}: {shape_words(self._proposal)}"
+                outcome = f"{'plays' if answer else 'does not play'}: {shape_words(self._proposal)}"
                 self._changed.notify_all()
-            response.success, response.message = waits, said if waits else "no run waits for an answer"
+            response.success, response.message = waits, outcome if waits else "no run waits for an answer"
         return response
 
     def _cancel(self, request: Any, response: Any) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from rsea_ros.health.finding import HealthFinding
+from rsea_ros.health.health_finding import HealthFinding
 from rsea_ros.health.monitor import Monitor
 from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.rig_file import load_rig
@@ -99,9 +99,9 @@ class HealthNode:
             done, self._fit = self._fit, None
             answer = done.result()
             if self._monitor.job is not None:
-                self._told(self._monitor.conclude(answer))
+                self._report_finding(self._monitor.conclude(answer))
 
-    def _told(self, finding: HealthFinding | None) -> None:
+    def _report_finding(self, finding: HealthFinding | None) -> None:
         """Report new findings, and keep a bag of them."""
         if finding is None:
             return

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from msg_adapters.contents import Contents
 from msg_adapters.reading import record_from
 from msg_adapters.ros import Trigger, message_type
-from msg_adapters.topics import ROLES, TYPES, TopicMap
+from msg_adapters.topic_map import ROLES, TYPES, TopicMap
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import load_rig

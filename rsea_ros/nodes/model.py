@@ -11,7 +11,7 @@ from rclpy.serialization import serialize_message
 
 from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, efforts_message
-from msg_adapters.topics import TYPES
+from msg_adapters.topic_map import TYPES
 from rsea_ros.model.observer import Observer
 from rsea_ros.model.pure_torque import FlagSettings, PureTorque
 from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings

@@ -12,7 +12,7 @@ from rclpy.node import Node
 
 from msg_adapters import BagWriter
 from msg_adapters.ros import message_type
-from msg_adapters.topics import JOINT_STATE, WRENCH
+from msg_adapters.topic_map import JOINT_STATE, WRENCH
 from rsea_ros.new_files import unused
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter

@@ -6,9 +6,9 @@ another machine, or what rests on an estimate of ours is none.
 
 from __future__ import annotations
 
-from rsea_ros.paper.finding import PaperFinding
 from rsea_ros.paper.findings_bench import identification, moving_output, prototype
 from rsea_ros.paper.findings_theory import circuit, equations
+from rsea_ros.paper.paper_finding import PaperFinding
 
 
 def findings() -> tuple[PaperFinding, ...]:

@@ -17,7 +17,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.spring import spring_radius
 from rsea_ros.paper import claims, formulas
 from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
-from rsea_ros.paper.finding import PaperFinding
+from rsea_ros.paper.paper_finding import PaperFinding
 
 
 def identification() -> Iterator[PaperFinding]:

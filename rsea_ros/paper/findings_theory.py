@@ -15,7 +15,7 @@ from rsea_ros.model.bandwidth import (
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.spring import spring_radius
 from rsea_ros.paper import claims, formulas
-from rsea_ros.paper.finding import PaperFinding
+from rsea_ros.paper.paper_finding import PaperFinding
 
 
 def circuit() -> Iterator[PaperFinding]:

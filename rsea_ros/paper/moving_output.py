@@ -18,7 +18,7 @@ from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.lumped import lumped
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.paper.rivals import Rival, compare
+from rsea_ros.paper.rival_models import Rival, compare
 from rsea_ros.signals import Channel, Record
 
 NOISE = 30.0

@@ -21,6 +21,7 @@ PARAMETERS = {
     "rotor.reflected_damping": "Rotor damping, reflected",
     "gear.ratio": "Gear ratio",
     "gear.stiffness": "Gear stiffness",
+    "gear.damping": "Gear damping",
     "chassis.inertia": "Spring chassis inertia",
     "spring.stiffness": "Spring stiffness",
     "spring.damping": "Spring damping",

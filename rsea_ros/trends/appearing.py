@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
-from rsea_ros.trends.causes import Naming
+from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Interval
 from rsea_ros.trends.settings import DAY, TrendSettings
 from rsea_ros.trends.significance import adjusted

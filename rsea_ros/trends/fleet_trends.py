@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.trends.appearing import appearances
-from rsea_ros.trends.causes import namings, size_series, temperatures
+from rsea_ros.trends.cause_series import namings, size_series, temperatures
+from rsea_ros.trends.course_search import Tested, described, tested
 from rsea_ros.trends.day_effect import DayEffect, day_effect
 from rsea_ros.trends.days import Days, day_means
 from rsea_ros.trends.outliers import outliers
 from rsea_ros.trends.result import FleetTrends, Trend
-from rsea_ros.trends.search import Tested, described, tested
 from rsea_ros.trends.series import RECORDINGS, Series, Table, all_series, check_columns
 from rsea_ros.trends.settings import DEFAULT, TrendSettings
 from rsea_ros.trends.significance import adjusted
-from rsea_ros.trends.temperature import fleet_prior
+from rsea_ros.trends.temperature_slope import fleet_prior
 from rsea_ros.trends.trend import trend_of
 
 Key = tuple[str, str]

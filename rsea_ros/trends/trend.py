@@ -9,6 +9,7 @@ import numpy as np
 
 from rsea_ros.normal import Z95
 from rsea_ros.trends.course import Course
+from rsea_ros.trends.course_search import Tested
 from rsea_ros.trends.quantities import (
     Dated,
     combined,
@@ -23,7 +24,6 @@ from rsea_ros.trends.quantities import (
 )
 from rsea_ros.trends.regression import term
 from rsea_ros.trends.result import Change, Interval, ParameterCourse, Trend
-from rsea_ros.trends.search import Tested
 from rsea_ros.trends.series import Series
 from rsea_ros.trends.settings import DAY, YEAR, TrendSettings
 from rsea_ros.trends.significance import scan_threshold

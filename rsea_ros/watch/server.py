@@ -17,8 +17,8 @@ from rsea_ros.errors import RseaError
 from rsea_ros.watch.access import Access, addresses
 from rsea_ros.watch.command import Commander
 from rsea_ros.watch.desk import Desk
-from rsea_ros.watch.frames import FrameSource, frame
 from rsea_ros.watch.handlers import routes
+from rsea_ros.watch.page_frames import FrameSource, frame
 from rsea_ros.watch.runs import Runs
 
 FRAME, STATE = 1.0 / 30.0, 0.5

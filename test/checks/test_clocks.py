@@ -9,8 +9,8 @@ import pytest
 from independent.bench import drawn_bench, record_run
 
 from rsea_ros.checks.check import check_record
-from rsea_ros.checks.linear import Number
 from rsea_ros.checks.linear_findings import clock_findings
+from rsea_ros.checks.linearised_rig import Number
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel
 

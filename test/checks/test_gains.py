@@ -132,3 +132,19 @@ def test_commands_and_sensors_may_each_have_another_unit():
     }  # fmt: skip
     remedies = " ".join(f.remedy for f in findings.of("scale"))
     assert all(f"unit: {unit}" in remedies for unit in ("mN m", "deg", "rpm"))
+
+
+@pytest.mark.parametrize("channel", ["command", "motor_torque"])
+def test_amperes_are_reported_with_the_measured_factor_not_that_of_a_unit_near_it(channel):
+    findings = check_record(scaled(good(), **{channel: 1 / 6.826}), RIG)
+    (found,) = (f for f in findings.of("scale") if f.light == "red")
+    assert found.channel == channel
+    assert found.value == pytest.approx(1 / 6.826, rel=0.1)
+    assert "no unit" in found.detail
+    assert float(found.remedy.split()[1].rstrip("`")) == pytest.approx(6.826, rel=0.1)
+
+
+def test_commands_in_the_place_of_the_ft_torque_are_not_the_rig_s_response():
+    record = good()
+    same = record.with_channels(ft=Channel(record["command"].t, record["command"].y))
+    assert told(check_record(same, RIG), "wrong_rig") == {("wrong_rig", "ft")}

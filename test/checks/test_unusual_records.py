@@ -10,8 +10,8 @@ import pytest
 
 from rsea_ros import simulate
 from rsea_ros.checks.check import check_record
-from rsea_ros.checks.linear import linear_of
-from rsea_ros.checks.motion import is_still
+from rsea_ros.checks.linearised_rig import linear_of
+from rsea_ros.checks.moved_spans import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record

@@ -13,7 +13,7 @@ import yaml
 from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli.main import main
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.peer import motor
+from rsea_ros.hardware.peer import peer_motor
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -74,7 +74,7 @@ def test_a_file_with_the_name_of_the_port_is_not_removed(tmp_path, capsys):
 
 def test_the_memory_for_requests_is_bounded():
     """The memory grew by 3.7 MB a minute."""
-    made = motor.EmulatedMotor(54024, SimpleNamespace(write=lambda torque: None), kept=50)
+    made = peer_motor.EmulatedMotor(54024, SimpleNamespace(write=lambda torque: None), kept=50)
     goal = made.model.registers["goal"]
     for k in range(200):
         made.write(k, goal.address, (k % 100).to_bytes(goal.size, "little"))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main
-from rsea_ros.experiment.documents import models_of
+from rsea_ros.experiment.diagnosis_document import models_of
 from rsea_ros.experiment.run_file import read_run
 from rsea_ros.model.rig_file import load_rig, save_rig
 

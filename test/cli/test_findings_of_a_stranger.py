@@ -77,3 +77,37 @@ def test_a_closed_stdout_is_no_error(monkeypatch):
     monkeypatch.setattr("sys.stdout", None)
     with shown():
         print("nobody hears this")  # noqa: T201
+
+
+def test_diagnose_tells_of_a_command_that_never_changes(tmp_path, capsys):
+    held = rsea.simulate(RIG, np.full(1680, 7.0), 280.0, seed=4)
+    write_record(held, tmp_path / "bag.mcap")
+    assert main(["diagnose", str(tmp_path / "bag.mcap"), "--out", str(tmp_path / "out")]) == 0
+    assert "red: excitation commanded motor torque: 7.00 N·m the command never changes" in (
+        " ".join(capsys.readouterr().out.split())
+    )
+
+
+@pytest.mark.parametrize("exists", [True, False])
+def test_a_symbolic_link_as_out_is_refused_before_any_work(exists, record, tmp_path, capsys):
+    bag, link = tmp_path / "bag.mcap", tmp_path / "link"
+    write_record(record, bag)
+    link.symlink_to(tmp_path if exists else tmp_path / "nowhere", target_is_directory=True)
+    assert main(["identify", str(bag), "--out", str(link)]) == 2
+    said = capsys.readouterr()
+    assert f"--out {link}: is a symbolic link, expected a directory or a new name" in said.err
+    assert not said.out
+
+
+def clipped(record):
+    return record.with_channels(ft=Channel(record["ft"].t, np.clip(record["ft"].y, -4.0, 4.0)))
+
+
+@pytest.mark.parametrize(("damage", "kind"), [(frozen, "frozen_samples"), (clipped, "clipping")])
+def test_identify_fits_no_sample_that_it_reports(damage, kind, record):
+    fit = rsea.identify(damage(record), RIG)
+    assert kind in {fault.kind for fault in fit.result.faults}
+    assert fit.result.verdict == "adequate"
+    low, high = next(p.ci95 for p in fit.result.parameters if p.name == "spring.stiffness")
+    assert low < rsea.load_rig(RIG)["spring.stiffness"] < high
+    assert high - low < 2.0

@@ -11,7 +11,7 @@ import pytest
 from rsea_ros import compiler
 from rsea_ros.cli import _lines
 from rsea_ros.cli.main import main
-from rsea_ros.report.lines import command_row, row, wrapped
+from rsea_ros.report.wrapped_lines import command_row, row, wrapped
 
 VERBS = [
     ["--help"], ["rigs"], ["maps"], ["effects"], ["effects", "backlash"], ["effects", "structural_resonance"],

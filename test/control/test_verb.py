@@ -22,7 +22,8 @@ def test_the_verb_writes_json_and_a_page(tmp_path, capsys):
 def test_senseless_options_are_refused_in_one_line_with_status_2(tmp_path, capsys):
     for arguments, line in (
         (["bare_drive"], "rig bare_drive: spring.rigid = True"),
-        (["--rate", "0"], "--rate 0 Hz, expected 50 to 10000 Hz"),
+        (["--rate", "0"], "--rate 0 Hz, expected 50 to 2000 Hz"),
+        (["--rate", "10000"], "--rate 10000 Hz, expected 50 to 2000 Hz"),
         (["--free", "paper_high_impedance"], "both ends are clamped"),
         (["nowhere.yaml"], "nowhere.yaml"),
     ):

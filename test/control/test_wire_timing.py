@@ -14,7 +14,7 @@ from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.grid import Grid
 from rsea_ros.control.law import Gains
 from rsea_ros.control.prediction import Prediction
-from rsea_ros.hardware.peer.motor import EmulatedMotor
+from rsea_ros.hardware.peer.peer_motor import EmulatedMotor
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
 

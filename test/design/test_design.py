@@ -10,10 +10,10 @@ import pytest
 
 from rsea_ros.design import mechanism
 from rsea_ros.design.by_train import band_range, by_train
-from rsea_ros.design.catalogue import catalogue, unit_named
 from rsea_ros.design.judge import judge, least_stiffness, rig_of, stiffness_bounds
-from rsea_ros.design.margins import margins, robust_stiffness, spreads_of
+from rsea_ros.design.motor_gear_units import catalogue, unit_named
 from rsea_ros.design.requirement import Requirement, gyration
+from rsea_ros.design.tolerance import margins, robust_stiffness, spreads_of
 from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import inner_inertia, undamped_band

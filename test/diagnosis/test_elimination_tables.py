@@ -2,53 +2,17 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
-import numpy as np
 import pytest
 import scripted
-from scripted import POOLS, Script, script
+from scripted import script
 
 from rsea_ros.diagnosis import backward_elimination as elimination
-from rsea_ros.diagnosis.backward_elimination import ReducedModels, eliminate_backwards, nested_sequence
-from rsea_ros.diagnosis.selection import Selection, trial_of
-from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.diagnosis.backward_elimination import nested_sequence
+from rsea_ros.diagnosis.selection import Selection
 
 FRICTION, STRIBECK, LUGRE = "coulomb_friction", "stribeck_friction", "lugre_friction"
 GAP, STOP, CUBIC = "backlash", "hard_stop", "nonlinear_spring"
 DELAY, LAG, DRIFT, BIAS = "command_delay", "current_loop_lag", "ft_drift", "ft_bias"
-
-
-class World:
-    """Backward elimination on scripted fits. screened: by rival, whether a fit of it may begin."""
-
-    def __init__(self, monkeypatch, fits: Script, *effects):
-        self.fits, self.guesses, self.impossible = fits, {}, set()
-        self.models = ReducedModels([effect_named(n) for n in effects], POOLS, DEFAULT)
-        monkeypatch.setattr(elimination, "fit_candidate", fits.fit)
-        monkeypatch.setattr(elimination, "apply", lambda rig, unknowns, theta: (rig, None))
-        monkeypatch.setattr(elimination, "RecordView", lambda case, rig, outputs: (case, rig, outputs))
-        monkeypatch.setattr(elimination, "initial_guesses", lambda effect, view: [{"from": "residual"}])
-        monkeypatch.setattr(elimination, "screen", self.screen)
-
-    def screen(self, solution, rival, guesses, rule):
-        assert rule is DEFAULT.forward
-        self.guesses[rival.name] = guesses
-        if rival.name in self.impossible:
-            return None
-        made = scripted.problem(*solution.problem.added, rival.name)
-        return SimpleNamespace(problem=made, theta=np.zeros(len(made.unknowns)))
-
-    def eliminate(self, *causes):
-        """Return the selection that is left of some causes."""
-        selection = Selection((self.fits.candidate(), self.fits.candidate(*causes)))
-        return eliminate_backwards(selection, self.models.effects, POOLS, DEFAULT)
-
-
-@pytest.fixture
-def world(monkeypatch):
-    return lambda fits, *effects: World(monkeypatch, fits, *effects)
 
 
 def reasons(selection):
@@ -191,34 +155,6 @@ def test_a_replacement_is_followed_by_the_next(world):
         (LUGRE, "no_better_than_simpler", STRIBECK), (STRIBECK, "no_better_than_simpler", FRICTION)
     ]  # fmt: skip
     assert [m.causes for m in selection.models] == [(), (FRICTION,)]
-
-
-@pytest.mark.parametrize(
-    ("cause", "rival", "typical"),
-    [(STRIBECK, FRICTION, {"torque"}), (STOP, CUBIC, None)],  # N m for N m; 1/rad^2 for rad
-)
-def test_a_rival_begins_with_the_size_of_the_cause_where_that_is_one(world, cause, rival, typical):
-    it = world(script({"": 9.0, cause: 1.0, rival: 4.0}), rival)
-    model = it.fits.candidate(cause)
-    model.solution.theta[1:] = 0.75  # every parameter of the cause
-    it.models.with_rivals(model)
-    begun = it.guesses[rival]
-    assert begun[0] == {"from": "residual"}
-    if typical is None:
-        assert len(begun) == 1
-    else:
-        assert begun[1:] == [{**effect_named(rival).typical, effect_named(rival).main.name: 0.75}]
-
-
-@pytest.mark.parametrize(("beside", "is_used"), [((), True), ((GAP,), False)])
-def test_a_rival_begins_where_its_trial_beside_the_same_causes_ended(world, beside, is_used):
-    it = world(script({"": 9.0, STRIBECK: 1.0, FRICTION: 4.0, GAP: 5.0, f"{FRICTION}+{GAP}": 4.0}), FRICTION)
-    tried = it.fits.candidate(*beside, FRICTION)
-    tried.solution.theta[1:] = 0.5
-    trial = trial_of(tried, FRICTION, it.fits.candidate(*beside), "explains_less")
-    it.models.with_rivals(it.fits.candidate(STRIBECK), [trial])
-    reached = {p.name: 0.5 for p in effect_named(FRICTION).parameters}
-    assert it.guesses[FRICTION][0] == (reached if is_used else {"from": "residual"})
 
 
 def test_models_nest_from_the_most_useful_cause_on(world):

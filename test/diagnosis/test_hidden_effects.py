@@ -18,7 +18,7 @@ from independent.severities import SIZES, drawn_parameters
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
-from rsea_ros.model.prediction import predict
+from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
 

@@ -17,7 +17,7 @@ from rsea_ros.control.compensation import compensation
 from rsea_ros.control.lags import lagging
 from rsea_ros.control.sampled import responses, sampled
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.naming.causes import undetermined_play
+from rsea_ros.diagnosis.naming.cause_facts import undetermined_play
 from rsea_ros.diagnosis.problem_variants import with_common_clock_in_delay
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
@@ -151,7 +151,7 @@ def test_an_outside_effect_has_a_page_and_a_line_in_the_catalogue(capsys):
 def test_an_export_says_that_it_leaves_an_outside_effect_out(export):
     rig = load_rig("pendulum" if export is export_bam else "paper_moving_output")
     exported = export(rig.with_effects(EffectSetting("paddle", SIZE)))
-    assert "paddle" in {unsaid.name for unsaid in exported.unsaid}
+    assert "paddle" in {omitted.name for omitted in exported.omitted}
 
 
 def test_the_controller_compensates_an_outside_effect_by_the_law_of_the_step():

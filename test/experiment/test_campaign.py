@@ -9,11 +9,11 @@ from independent.hidden import hide
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.experiment.campaign import Budget, Campaign
-from rsea_ros.experiment.causes import causes_from
-from rsea_ros.experiment.design import propose
-from rsea_ros.experiment.limits import RunLimits
+from rsea_ros.experiment.joint_weighing import middles_of_runs, weigh
 from rsea_ros.experiment.proposal import DesignRequest
-from rsea_ros.experiment.weighing import middles_of_runs, weigh
+from rsea_ros.experiment.run_design import propose
+from rsea_ros.experiment.run_limits import RunLimits
+from rsea_ros.experiment.weighed_causes import causes_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.campaign.files import write_campaign
 

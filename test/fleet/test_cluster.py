@@ -9,8 +9,8 @@ from distributed.scheduler import KilledWorker
 
 from rsea_ros.fleet import cluster
 from rsea_ros.fleet.cluster import PER_WORKER, OnDask
-from rsea_ros.fleet.errors import FleetError
 from rsea_ros.fleet.executor import Job, WorkerLost
+from rsea_ros.fleet.fleet_error import FleetError
 
 
 class Future:

@@ -15,8 +15,8 @@ from fleet_stubs import HIP, KNEE, stub_work
 
 from rsea_ros.fleet import engine as engines
 from rsea_ros.fleet.engine import ATTEMPTS, Engine, EngineLimits
-from rsea_ros.fleet.errors import FleetError
 from rsea_ros.fleet.executor import Done, Job, Serial, WorkerLost
+from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.plan import is_anything_new
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of

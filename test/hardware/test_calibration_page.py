@@ -11,7 +11,7 @@ import time
 import pytest
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.netft import calibration, page
+from rsea_ros.hardware.netft import calibration, web_page
 
 GOOD = (
     b"<?xml version='1.0'?><netft><cfgcpf>1000000</cfgcpf><cfgcpt>1000</cfgcpt>"
@@ -117,7 +117,7 @@ def test_a_page_that_drips_ends_in_time(case):
 
 
 def test_an_endless_page_is_abandoned_at_the_size_limit(monkeypatch):
-    monkeypatch.setattr(page, "LARGEST", 1000)
+    monkeypatch.setattr(web_page, "LARGEST", 1000)
     with (
         served([HEAD + b"\r\n"], itertools.repeat(b" " * 500)) as (port, _),
         pytest.raises(DeviceError, match="more than 1000 bytes"),

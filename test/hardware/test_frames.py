@@ -5,9 +5,9 @@ import random
 
 import pytest
 
+from rsea_ros.hardware.dynamixel.frame_stream import StatusFrameParser
 from rsea_ros.hardware.dynamixel.frames import crc16, frame, stuffed, unstuffed
 from rsea_ros.hardware.dynamixel.handler import PacketHandler
-from rsea_ros.hardware.dynamixel.receiver import StatusFrameParser
 from rsea_ros.hardware.peer import protocol2
 
 ALPHABET = (0xFF, 0xFD, 0x00, 0x55)

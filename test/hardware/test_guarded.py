@@ -11,7 +11,7 @@ from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import DeviceFault, Limits
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE
-from rsea_ros.hardware.spring import Spring
+from rsea_ros.hardware.spring_sensor import Spring
 from test.hardware.logged_device import LOST, Device, guarded
 
 WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 7.0)

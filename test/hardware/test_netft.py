@@ -11,8 +11,8 @@ import pytest
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.netft.calibration import parse
+from rsea_ros.hardware.netft.rdt import RESYNCHRONISE, RdtRecord, Sequence, decode, request, trouble
 from rsea_ros.hardware.netft.receiver import DatagramReceiver
-from rsea_ros.hardware.netft.records import RESYNCHRONISE, RdtRecord, Sequence, decode, request, trouble
 
 
 def datagram(sequence, ft_sequence=None, status=0, values=(1, -2, 3, -4, 5, -6)):

@@ -5,9 +5,9 @@ import argparse
 import pytest
 
 from rsea_ros.cli.bench import _motors
-from rsea_ros.hardware.peer.bus import EmulatedBus
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
 from rsea_ros.hardware.peer.protocol2 import instruction
+from rsea_ros.hardware.peer.serial_line import EmulatedBus
 
 READ = bytes((0x63, 0x02, 15, 0))
 

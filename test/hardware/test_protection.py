@@ -12,7 +12,7 @@ from rsea_ros.hardware.limits import Limits, complaint
 from rsea_ros.hardware.outside import options_of, outside_device
 from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.simulated import SimulatedDevice
-from rsea_ros.hardware.spring import Spring
+from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.model.rig_file import load_rig
 
 TOY = Path(__file__).with_name("toy_device.py")

@@ -7,7 +7,7 @@ from statistics import fmean
 import pytest
 
 from rsea_ros.errors import RseaError
-from rsea_ros.hardware.dynamixel.tables import TABLES
+from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.peer.registers import MODELS
 from test.hardware.conftest import Loop, device_on, well_behaved

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rsea_ros.health.finding import sensor_findings
+from rsea_ros.health.health_finding import sensor_findings
 from rsea_ros.health.look import events_of
 from rsea_ros.health.monitor import Monitor
 from rsea_ros.health.sensors import Sensors

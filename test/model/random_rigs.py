@@ -20,7 +20,7 @@ RANGES = {
     "chassis.inertia": (1e-3, 5e-2),
 }
 SPRING = {"spring.stiffness": (50.0, 3000.0), "spring.damping": (0.02, 5.0)}
-GEAR = {"gear.stiffness": (2e3, 5e4)}
+GEAR = {"gear.stiffness": (2e3, 5e4), "gear.damping": (0.02, 5.0)}
 PROXIMAL = {
     "proximal_spring.stiffness": (200.0, 5e4),
     "proximal_spring.damping": (0.02, 5.0),

@@ -42,6 +42,7 @@ def kinetic(rig: Rig, w: np.ndarray) -> float:
 def dissipation(rig: Rig, w: np.ndarray) -> float:
     """Return half the power lost, W."""
     inside = rig["rotor.reflected_damping"] * (w[1] - w[0]) ** 2 + rig["spring.damping"] * (w[2] - w[3]) ** 2
+    inside += rig["gear.damping"] * (w[1] - w[2]) ** 2
     inside += rig["proximal_spring.damping"] * (w[4] - w[0]) ** 2
     return 0.5 * (inside + sum(_end(rig, end, "damping") * w[i] ** 2 for i, end in _ENDS))
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.model.prediction import predict
+from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig

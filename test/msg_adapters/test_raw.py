@@ -14,7 +14,7 @@ from msg_adapters.ros import (
     wrench_message,
     wrench_of,
 )
-from msg_adapters.topics import JOINT_STATE, WRENCH
+from msg_adapters.topic_map import JOINT_STATE, WRENCH
 from rsea_ros.errors import ParameterError
 
 STAMP = 1_700_000_000_123_456_789

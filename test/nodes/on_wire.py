@@ -10,7 +10,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from msg_adapters.ros import DiagnosticArray, JointState, Trigger, torque_command_message
-from rsea_ros.hardware.dynamixel.tables import TABLES
+from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.nodes._qos import COMMAND
 from test.nodes.stalls import every, is_stall
 

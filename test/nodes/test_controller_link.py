@@ -58,7 +58,7 @@ def test_it_is_not_used_and_the_node_says_why(tmp_path, rig, given, reason):
 class Post(dict):
     """Mailboxes by topic, filled by the test."""
 
-    def __call__(self, node, kind, topic, *args, **options):
+    def __call__(self, node, topic, *args, **options):
         self[topic] = Box()
         return self[topic]
 

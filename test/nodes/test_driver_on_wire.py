@@ -10,7 +10,7 @@ import pytest
 from lifecycle_msgs.msg import Transition
 
 from msg_adapters.ros import DiagnosticArray, JointState, WrenchStamped, torque_command_message
-from rsea_ros.hardware.dynamixel.tables import TABLES
+from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from test.nodes.on_wire import Driven, Script, newest_value

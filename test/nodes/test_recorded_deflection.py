@@ -6,7 +6,7 @@ from rclpy.serialization import serialize_message
 
 from msg_adapters import BagWriter, read_record
 from msg_adapters.ros import deflection_message, torque_command_message, wrench_message
-from msg_adapters.topics import FIELDS, ROLES, TYPES
+from msg_adapters.topic_map import FIELDS, ROLES, TYPES
 from rsea_ros.nodes import record
 from rsea_ros.nodes._bench import SPRING_FRAME
 

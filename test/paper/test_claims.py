@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.design.catalogue import unit_named
+from rsea_ros.design.motor_gear_units import unit_named
 from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from msg_adapters.overlay import write_overlay
+from msg_adapters.overlay_bag import write_overlay
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.identification.excitation import ExcitationSettings, excitation

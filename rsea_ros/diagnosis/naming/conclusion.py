@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from rsea_ros.diagnosis.coherence import lost_above
 from rsea_ros.diagnosis.criteria import is_at_floor
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined, held_out_of
-from rsea_ros.diagnosis.naming.causes import alternative_of, latest, rejected_of, undetermined_play
+from rsea_ros.diagnosis.naming.cause_facts import alternative_of, latest, rejected_of, undetermined_play
 from rsea_ros.diagnosis.naming.outcome import Outcome, outcome_of
 from rsea_ros.diagnosis.naming.weighing import Weighed, weigh
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
@@ -25,7 +25,7 @@ from rsea_ros.identification.off_rig import off_rig
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.workers import Pools
-from rsea_ros.model.prediction import fit_percent
+from rsea_ros.model.prediction_errors import fit_percent
 from rsea_ros.signals import Record
 
 

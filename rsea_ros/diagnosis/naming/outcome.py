@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.diagnosis.criteria import is_at_floor, takes_most, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined
-from rsea_ros.diagnosis.naming.causes import cause_of, dropped_of
+from rsea_ros.diagnosis.naming.cause_facts import cause_of, dropped_of
 from rsea_ros.diagnosis.naming.status import Named, named
 from rsea_ros.diagnosis.naming.weighing import Weighing
 from rsea_ros.diagnosis.result import Cause, Rejected, Verdict

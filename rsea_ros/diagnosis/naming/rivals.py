@@ -19,7 +19,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.candidate import Candidate, effect_size, prior_cost
+from rsea_ros.diagnosis.candidate import (
+    Candidate,
+    FitSetup,
+    effect_size,
+    fit_candidate,
+    prior_cost,
+    refit,
+)
+from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut
 from rsea_ros.diagnosis.naming.evidence import Claim
 from rsea_ros.diagnosis.score import RESAMPLES, Score, tempered_loss
@@ -69,9 +77,10 @@ def weighed(
     """
     accepted, rule = selection.last.causes, selection.last.settings.evidence
     tried = [t for t in tried if t.name == claim.name or t.name not in accepted]
-    scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), tried))
-    priors = [prior_cost(t.problem, t.theta) for t in tried]
-    weights = _stacked(scores, priors, [effect_size(t.name) for t in tried], far)
+    scores, weights = _race(tried, held_out, pools, far)
+    if sum(w >= rule.close_weight for w in weights) > 1:
+        tried = _with_close_ones_fitted(tried, weights, selection, pools)
+        scores, weights = _race(tried, held_out, pools, far)
     weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
         Claim(t.name, t.problem, t.theta, s, held_out.score_of(t.beside), weight_of[t.name])
@@ -90,6 +99,38 @@ def weighed(
     once = {r.name: r for r in reversed(heavy)}
     kept = sorted(once.values(), key=lambda r: -r.weight)[: rule.most_rivals]
     return Contest(replace(claim, weight=min(among_tried, among_swapped[0])), tuple(kept))
+
+
+def _race(
+    tried: Sequence[Trial], held_out: HeldOut, pools: Pools, far: float
+) -> tuple[list[Score], list[float]]:
+    """Return the scores of trials and their weights."""
+    scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), tried))
+    priors = [prior_cost(t.problem, t.theta) for t in tried]
+    return scores, _stacked(scores, priors, [effect_size(t.name) for t in tried], far)
+
+
+def _with_close_ones_fitted(
+    tried: Sequence[Trial], weights: Sequence[float], selection: Selection, pools: Pools
+) -> list[Trial]:
+    """Return trials, those of some weight fitted to the end."""
+    least = selection.last.settings.evidence.close_weight
+    fitted = [t for t, w in zip(tried, weights, strict=True) if w >= least]
+    ends = {t.name: t for t in pools.fits.map(lambda t: _fitted_to_the_end(t, selection, pools), fitted)}
+    return [ends.get(t.name, t) for t in tried]
+
+
+def _fitted_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Trial:
+    """Return a trial fitted as the models that are tested: the steps of the search stop far earlier.
+
+    Where laws are nearly the same a fit is long: the values of one make up for what the other does.
+    """
+    settings = selection.last.settings
+    blocks, gain = (*TRAIN, *VALIDATION), settings.fits.final_gain
+    setup = FitSetup(selection.cases, settings, pools.run, blocks=blocks, gain=gain)
+    begun = fit_candidate(replace(setup, iterations=0), trial.problem, trial.theta)
+    model = refit(begun, setup)
+    return replace(trial, problem=model.problem, theta=model.solution.theta)
 
 
 def _stacked(

@@ -1,8 +1,8 @@
 """Every number that steers a verdict: its meaning, its unit, and why it has this value.
 
-data.py: blocks, pieces, levels of a residual; search.py: acceptance and fits; causes.py: names and sizes;
-next_run.py: the recommended run. No setting changes the numbers of noise and data, which stand with their
-reasons in identification/noise.py, noise_level.py, coloured.py and in checks/.
+data.py: blocks, pieces, levels of a residual; search.py: acceptance and fits; cause_names.py: names and
+sizes; next_run.py: the recommended run. No setting changes the numbers of noise and data, which stand with
+their reasons in identification/noise.py, noise_level.py, coloured.py and in checks/.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 
-from rsea_ros.diagnosis.settings.causes import EvidenceSettings, NamingSettings, SizeSettings
+from rsea_ros.diagnosis.settings.cause_names import EvidenceSettings, NamingSettings, SizeSettings
 from rsea_ros.diagnosis.settings.data import BlockSettings, FloorSettings, PieceSettings
 from rsea_ros.diagnosis.settings.next_run import NextRunSettings
 from rsea_ros.diagnosis.settings.number import Setting

@@ -57,6 +57,10 @@ class ForwardSettings:
     )
     behind_first: float = number(4.0, "1", "of the best cost on pieces: how close the first of them must be")
     behind_next: float = number(1.1, "1", "of the best cost on pieces: how close the others must be")
+    undecided: float = number(
+        0.1, "1", "of what the chosen effect brings: how much less another may bring and still be fitted on",
+        "as `room`: so much a simpler law may lose beside a larger one",
+    )  # fmt: skip
     hope_one: float = number(
         0.98, "1", "of the present cost on pieces: no hope above it, while far", flat("0.8", "1")
     )

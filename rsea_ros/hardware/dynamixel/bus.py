@@ -10,9 +10,9 @@ from typing import TypeVar
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS
 
 from rsea_ros.hardware.device import NoReply, Refused
+from rsea_ros.hardware.dynamixel.control_tables import Item
 from rsea_ros.hardware.dynamixel.handler import PacketHandler
 from rsea_ros.hardware.dynamixel.port import SerialPort
-from rsea_ros.hardware.dynamixel.tables import Item
 
 T = TypeVar("T")
 ATTEMPTS, PATIENCE = 5, 0.02
@@ -99,17 +99,17 @@ class Bus:
             self.port.latency, self.port.return_delay = self.latency, self.return_delay
             yield
 
-    def _check(self, what: str, result: int, error: int) -> None:
+    def _check(self, request: str, result: int, error: int) -> None:
         if result != COMM_SUCCESS:
             kind = "corrupt" if result == COMM_RX_CORRUPT else "lost"
             self._failed[kind] += 1
             reply = "a damaged reply" if kind == "corrupt" else "no reply"
-            raise NoReply(f"motor ID {self._id} on {self.port.port_name}: {reply} to {what}")
+            raise NoReply(f"motor ID {self._id} on {self.port.port_name}: {reply} to {request}")
         self.alert = bool(error & ALERT)
         if error & ~ALERT:
             self._failed["refused"] += 1
             why = REFUSALS.get(error & ~ALERT, f"error {error & ~ALERT}")
-            raise Refused(f"motor ID {self._id}: {what} refused: {why}")
+            raise Refused(f"motor ID {self._id}: {request} refused: {why}")
 
 
 def _repeated(transaction: Callable[[], T]) -> T:

@@ -16,9 +16,9 @@ from dynamixel_sdk import (
     Protocol2PacketHandler,
 )
 
+from rsea_ros.hardware.dynamixel.frame_stream import StatusFrameParser
 from rsea_ros.hardware.dynamixel.frames import LONGEST, OVERHEAD, crc16, frame, stuffed, unstuffed
 from rsea_ros.hardware.dynamixel.port import SerialPort
-from rsea_ros.hardware.dynamixel.receiver import StatusFrameParser
 
 EMPTY = 11
 """Bytes of a status packet without parameters."""

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, PortLost
+from rsea_ros.hardware.dynamixel.control_tables import ControlTable
+from rsea_ros.hardware.dynamixel.frame_stream import BROADCAST, StatusFrameParser
 from rsea_ros.hardware.dynamixel.frames import frame
 from rsea_ros.hardware.dynamixel.port import SerialPort
-from rsea_ros.hardware.dynamixel.receiver import BROADCAST, StatusFrameParser
-from rsea_ros.hardware.dynamixel.tables import ControlTable
 
 SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
 EMPTY = 11

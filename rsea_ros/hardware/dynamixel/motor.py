@@ -9,12 +9,12 @@ from collections.abc import Callable
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply, PortLost
 from rsea_ros.hardware.dynamixel.bus import Bus
+from rsea_ros.hardware.dynamixel.control_tables import TABLES, ControlTable, TorqueConstant, error_names
 from rsea_ros.hardware.dynamixel.frames import frame
 from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, own_limits
 from rsea_ros.hardware.dynamixel.port import SerialPort
 from rsea_ros.hardware.dynamixel.sample import MotorSample, sample_of
 from rsea_ros.hardware.dynamixel.settings import MotorConnection
-from rsea_ros.hardware.dynamixel.tables import TABLES, ControlTable, TorqueConstant, error_names
 from rsea_ros.hardware.dynamixel.watchlist import Watchlist
 from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection, Supervised
 
@@ -42,7 +42,7 @@ class Motor:
         self._longer, self._spared = 0, 0.0
         self.acknowledged_late, self._unanswered = False, -1
         self.table: ControlTable | None = None
-        self.own: OwnLimits | None = None
+        self.limits: OwnLimits | None = None
         self.torque_constant = TorqueConstant(math.nan, math.nan, math.nan, "")
 
     @property
@@ -55,7 +55,7 @@ class Motor:
     @property
     def torque_limit(self) -> float:
         """The torque at the motor's own current limit, N m."""
-        return math.nan if self.own is None else self.torque_of(self.own.current)
+        return math.nan if self.limits is None else self.torque_of(self.limits.current)
 
     def open(self) -> None:
         """Open the port, check who answers, switch the torque off, set torque mode, read the limits."""
@@ -64,11 +64,11 @@ class Motor:
         self.table = table = _table(self.bus.patiently(self.bus.ping), self._settings)
         self.torque_constant = _constant(table, self._settings)
         self.bus.set(table.status_level, ACKNOWLEDGE_ALL)
-        self.own = own = own_limits(self.bus, table)
-        self.protection = self._protection(table, own)
+        self.limits = limits = own_limits(self.bus, table)
+        self.protection = self._protection(table, limits)
         self._stop()
-        self.bus.return_delay = RETURN_DELAY_UNIT * own.return_delay
-        if own.operating_mode != TORQUE_MODE:
+        self.bus.return_delay = RETURN_DELAY_UNIT * limits.return_delay
+        if limits.operating_mode != TORQUE_MODE:
             self.bus.set(table.operating_mode, TORQUE_MODE)
         self._supervise()
 

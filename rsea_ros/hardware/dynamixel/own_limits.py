@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.dynamixel.bus import Bus
-from rsea_ros.hardware.dynamixel.tables import ControlTable
+from rsea_ros.hardware.dynamixel.control_tables import ControlTable
 from rsea_ros.hardware.limits import Limits
 
 REVERSED, ENABLED_BY_GOAL = 0x01, 0x08
@@ -43,13 +43,13 @@ def own_limits(bus: Bus, table: ControlTable) -> OwnLimits:
     start, size = table.span(READ)
     data = bus.patiently(lambda: bus.read(start, size))
     value = {name: table.items[name].value(data, start) for name in READ if name in table.items}
-    for name, bit, what in (
+    for name, bit, reason in (
         ("drive_mode", ENABLED_BY_GOAL, "a goal that is written switches its torque on"),
         ("startup", ENABLED_AT_START, "its torque is on when the power comes"),
     ):
         if value.get(name, 0) & bit:
             without = value[name] & ~bit
-            raise DeviceError(f"motor: {name} {value[name]}: {what}, expected {without}, set in the motor")
+            raise DeviceError(f"motor: {name} {value[name]}: {reason}, expected {without}, set in the motor")
     return OwnLimits(
         firmware=value["firmware"],
         return_delay=value["return_delay"],
@@ -63,18 +63,19 @@ def own_limits(bus: Bus, table: ControlTable) -> OwnLimits:
     )
 
 
-def check_own_limits(limits: Limits, own: OwnLimits, name: str) -> None:
+def check_own_limits(limits: Limits, motor_limits: OwnLimits, name: str) -> None:
     """Compare the driver's limits with the motor's. Raises ParameterError that names all that do not fit."""
     wrong = []
-    if limits.temperature > own.temperature:
+    if limits.temperature > motor_limits.temperature:
         wrong.append(
-            f"temperature_limit = {limits.temperature:g} °C, expected at most {own.temperature:g} °C, where"
-            " the motor switches itself off"
+            f"temperature_limit = {limits.temperature:g} °C, expected at most"
+            f" {motor_limits.temperature:g} °C, where the motor switches itself off"
         )
-    if limits.voltage >= own.highest_voltage:
+    if limits.voltage >= motor_limits.highest_voltage:
         wrong.append(
-            f"voltage_limit = {limits.voltage:g} V, expected less than {own.highest_voltage:.4g} V, the most"
-            f" that the motor takes (it takes {own.lowest_voltage:.4g} V or more)"
+            f"voltage_limit = {limits.voltage:g} V, expected less than"
+            f" {motor_limits.highest_voltage:.4g} V, the most that the motor takes"
+            f" (it takes {motor_limits.lowest_voltage:.4g} V or more)"
         )
     if wrong:
         raise ParameterError(f"parameter {'; '.join(wrong)} ({name})")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsea_ros.hardware.dynamixel.tables import ControlTable
+from rsea_ros.hardware.dynamixel.control_tables import ControlTable
 
 
 @dataclass(frozen=True)

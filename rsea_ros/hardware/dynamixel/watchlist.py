@@ -6,7 +6,7 @@ import time
 
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.bus import Bus
-from rsea_ros.hardware.dynamixel.tables import Item
+from rsea_ros.hardware.dynamixel.control_tables import Item
 
 LOOK = 0.8
 """s in which each register is looked at once; a fault is latched within a second."""

@@ -10,7 +10,7 @@ from xml.parsers import expat
 from rsea_ros.decimal_number import is_decimal
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import Wrench
-from rsea_ros.hardware.netft.page import get
+from rsea_ros.hardware.netft.web_page import get
 from rsea_ros.wording import shown
 
 NEWTON = {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "klbf": 4448.2216152605, "kgf": 9.80665}

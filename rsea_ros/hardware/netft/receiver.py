@@ -11,7 +11,7 @@ from collections import Counter, deque
 from typing import NamedTuple
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.netft.records import STOP, STREAM, RdtRecord, Sequence, decode, request
+from rsea_ros.hardware.netft.rdt import STOP, STREAM, RdtRecord, Sequence, decode, request
 
 SO_TIMESTAMPNS = 35
 """Linux: the kernel stamps a datagram on arrival, however late the thread comes to fetch it."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import Wrench
 from rsea_ros.hardware.netft.calibration import Calibration, fetch
+from rsea_ros.hardware.netft.rdt import SET_BIAS, trouble
 from rsea_ros.hardware.netft.receiver import Arrival, DatagramReceiver
-from rsea_ros.hardware.netft.records import SET_BIAS, trouble
 
 AVERAGING_TIME, FIRST = 0.1, 3.0
 """s over which noise and tare are measured; s that the first record may take."""

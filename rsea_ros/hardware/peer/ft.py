@@ -8,7 +8,7 @@ from collections import deque
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import Mechanism
+from rsea_ros.hardware.peer.peer_motor import Mechanism
 
 RECORDS = 500_000
 """Records of the log, where somebody watches: a minute at 7 kHz."""

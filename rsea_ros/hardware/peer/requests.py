@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
-from rsea_ros.hardware.peer.bus import EmulatedBus
 from rsea_ros.hardware.peer.ft import SATURATED, ForceSensor
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import KEPT, EmulatedMotor
+from rsea_ros.hardware.peer.peer_motor import KEPT, EmulatedMotor
+from rsea_ros.hardware.peer.serial_line import EmulatedBus
 
 Request = Mapping[str, Any]
 LOWEST_VOLTAGE, VOLTAGE_ERROR = 18.0, 1

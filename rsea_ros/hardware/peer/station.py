@@ -8,9 +8,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from rsea_ros.hardware.peer.bus import EmulatedBus
 from rsea_ros.hardware.peer.ft import ForceSensor
-from rsea_ros.hardware.peer.motor import EmulatedMotor, Mechanism
+from rsea_ros.hardware.peer.peer_motor import EmulatedMotor, Mechanism
+from rsea_ros.hardware.peer.serial_line import EmulatedBus
 
 STILL = 10_000_000
 """ns between two turns from which on the bench itself was held up: it turns at least every TICK."""

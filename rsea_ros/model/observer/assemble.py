@@ -11,7 +11,7 @@ from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.equations import PORTS
 from rsea_ros.model.observer.filter import CLOCK, SIGMA, FilterModel, FilterState, disturbance
 from rsea_ros.model.observer.linear import linear_model
-from rsea_ros.model.observer.noise import Noise
+from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls
@@ -80,7 +80,7 @@ def _with_disturbance(calls: Calls) -> Calls:
 
 def _state(n: int, size: int, machine: Machine) -> FilterState:
     """Return a state of zeros, all its parts views of one array."""
-    states = len(machine.own)
+    states = len(machine.effect_x)
     sizes = (n, size - n, size * size, st.SIZE, states, n, 3, SIGMA + 3, CLOCK, 9)
     whole = np.zeros(sum(sizes))
     parts = np.split(whole, np.cumsum(sizes)[:-1])

@@ -24,7 +24,7 @@ from rsea_ros.model.observer.filter import (
     weigh_torque,
 )
 from rsea_ros.model.observer.log import COMMAND, STATE
-from rsea_ros.model.observer.noise import Noise
+from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, IntArray
 

@@ -78,7 +78,7 @@ class FilterState(NamedTuple):
     extra: FloatArray
     p: FloatArray
     table: FloatArray
-    own: FloatArray
+    effect_x: FloatArray
     reach: FloatArray
     predicted: FloatArray
     estimate: FloatArray
@@ -116,7 +116,7 @@ def _propagate(model, state, t):  # type: ignore[no-untyped-def]
     model.calls.p[0] = state.extra[0] + state.clock[ERROR]
     command, out, none = np.full(count, state.clock[FORCED]), np.empty((count, len(OUTPUTS))), np.empty(0)
     inputs = StepInputs(command, none, none, state.clock[NOW])
-    advance(model.linear, model.calls, inputs, StepState(state.x, state.table, state.own), out)
+    advance(model.linear, model.calls, inputs, StepState(state.x, state.table, state.effect_x), out)
     n = len(state.x)
     for i in range(n):
         state.reach[i] = model.f[i, n]

@@ -13,7 +13,7 @@ from rsea_ros.model.observer.consistency import Consistency, consistency
 from rsea_ros.model.observer.filter import SIGMA
 from rsea_ros.model.observer.handle import handle_of, receive
 from rsea_ros.model.observer.log import COMMAND, FT, LATE, REFUSED, STATE, empty_log
-from rsea_ros.model.observer.noise import Noise, noise_of
+from rsea_ros.model.observer.signal_noise import Noise, noise_of
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.experiment.campaign import CampaignOutcome
-from rsea_ros.experiment.limits import RunLimits
+from rsea_ros.experiment.run_limits import RunLimits
 from rsea_ros.report.campaign.words import end_sentence, size
 from rsea_ros.report.experiment.page import command_figure, limits_section, spectrum_figure
 from rsea_ros.report.experiment.words import plain_name, proof_words, shape_words
@@ -13,7 +13,7 @@ from rsea_ros.report.figures.figure import Figure, axis, label, layout, line, nu
 from rsea_ros.report.figures.palette import AFTER, BEFORE, QUIET, TRUTH
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
-from rsea_ros.report.page.table import table
+from rsea_ros.report.page.html_table import table
 from rsea_ros.report.provenance import Provenance
 
 _COLOURS = (AFTER, BEFORE, TRUTH, "#862e9c", "#5c940d", "#0b7285")

@@ -9,8 +9,8 @@ from rich.text import Text
 
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.report import words
-from rsea_ros.report.lines import WIDTH, wrapped
 from rsea_ros.report.rig.words import rig_in_brackets
+from rsea_ros.report.wrapped_lines import WIDTH, wrapped
 
 _LIGHT, _KIND, _CHANNEL = 7, 14, 25
 """Columns."""
@@ -27,7 +27,7 @@ _KINDS = {
 _DOUBTED = {"wrong_rig": "wrong rig?", "identifiability": "undetermined"}
 """Names of kinds whose plain name would say the opposite of an amber or red light."""
 SAID_ELSEWHERE = ("identifiability", "rig_value", "noise", "excitation", "rest")
-"""Kinds that identify and diagnose speak of in their results anyway."""
+"""Kinds that identify and diagnose speak of in their results anyway; not a command that never changes."""
 
 
 def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
@@ -38,25 +38,29 @@ def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
     lines = []
     for f in _each_remedy_once(findings.findings):
         head = f"{f.light:<{_LIGHT}}{f'{kind(f)} ':<{_KIND}}{f'{_channel(f)} ':<{_CHANNEL}}"
-        text = wrapped(f"{head}{_said(f)}", width, len(head))
+        text = wrapped(f"{head}{_finding_text(f)}", width, len(head))
         lines.append(Text.assemble((text[:_LIGHT], _STYLES[f.light]), text[_LIGHT:]))
     return lines
 
 
-def _said(f: Finding) -> str:
+def _finding_text(f: Finding) -> str:
     value = number(f)
-    said = f"{value} {f.detail}" if f.unit == "1" else ", ".join(filter(None, (value, f.detail)))
+    text = f"{value} {f.detail}" if f.unit == "1" else ", ".join(filter(None, (value, f.detail)))
     if f.light == "green":
-        return said
-    return "; ".join(filter(None, (said, f.expected and f"expected {f.expected}", f.remedy)))
+        return text
+    return "; ".join(filter(None, (text, f.expected and f"expected {f.expected}", f.remedy)))
 
 
 def warnings(findings: Findings) -> list[str]:
     """Return a line for each amber or red finding that a fit's results would not repeat; rig first."""
-    chosen = [f for f in findings.findings if f.light != "green" and f.kind not in SAID_ELSEWHERE]
+    chosen = [f for f in findings.findings if f.light != "green" and not _said_elsewhere(f)]
     reported = {(f.kind, f.channel) for f in findings.faults}
     chosen = [f for f in chosen if f.kind == "wrong_rig" or (f.kind, f.channel) not in reported]
     return [sentence(f) for f in _each_remedy_once(sorted(chosen, key=lambda f: f.kind != "wrong_rig"))]
+
+
+def _said_elsewhere(f: Finding) -> bool:
+    return f.kind in SAID_ELSEWHERE and (f.kind, f.light) != ("excitation", "red")
 
 
 def _each_remedy_once(findings: Iterable[Finding]) -> Iterator[Finding]:
@@ -69,9 +73,9 @@ def _each_remedy_once(findings: Iterable[Finding]) -> Iterator[Finding]:
 
 def sentence(f: Finding) -> str:
     """Return a finding as one line."""
-    what = " ".join(filter(None, (f"{f.light}:", kind(f), _channel(f))))
-    said = " ".join(filter(None, (number(f), f.detail))) or "none"
-    parts = (f"{what}: {said}", f"expected {f.expected}" if f.expected else "", f.remedy)
+    subject = " ".join(filter(None, (f"{f.light}:", kind(f), _channel(f))))
+    text = " ".join(filter(None, (number(f), f.detail))) or "none"
+    parts = (f"{subject}: {text}", f"expected {f.expected}" if f.expected else "", f.remedy)
     return "; ".join(filter(None, parts))
 
 

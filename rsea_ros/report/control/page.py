@@ -16,7 +16,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.report.control.tables import control_tables, gains_words
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
-from rsea_ros.report.figures.response import Band, Mark, ResponseCurve, response_figure
+from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
 
@@ -62,7 +62,7 @@ def _crossover(at: AtRate) -> float:
 def _keys(study: Study) -> list[tuple[str, str]]:
     at = study.rates[0]
     value = {trial.what: trial for trial in at.trials}
-    errors = [(f"{t.value:.1f} %", what) for what, t in value.items() if t.unit == "%"][:1]
+    errors = [(f"{t.value:.1f} %", name) for name, t in value.items() if t.unit == "%"][:1]
     return [
         (f"{study.resonance:.1f} Hz", "open-loop resonance"),
         (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz"),

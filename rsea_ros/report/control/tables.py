@@ -10,7 +10,7 @@ from rsea_ros.control.study import Study
 from rsea_ros.control.trials import TrialResult
 from rsea_ros.report import words
 from rsea_ros.report.page.html import section
-from rsea_ros.report.page.table import table
+from rsea_ros.report.page.html_table import table
 
 Rows = list[list[str]]
 

@@ -25,7 +25,7 @@ from rsea_ros.report.design.tables import (
 )
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, QUIET, TRUTH
-from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure
+from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import equation, key_numbers, section
 from rsea_ros.signals import FloatArray
@@ -53,11 +53,11 @@ def design_report(asked: SpringDesign, least: SpringDesign, robust: SpringDesign
 def verdict(d: SpringDesign) -> str:
     """Return in a sentence which demands the design meets."""
     unmet = [c for c in d.checks if not c.met]
-    what = f"{d.stiffness:.0f} N·m/rad"
+    spring = f"{d.stiffness:.0f} N·m/rad"
     if not unmet:
         turned = f"{math.degrees(d.deflection):.1f}° at {d.requirement.torque:.0f} N·m"
-        return f"{what} meet every demand: {_hz(d.band_exact)}, {turned}"
-    band = f"{what} reach {d.band_eq_7:.1f} Hz by Eq. (7)"
+        return f"{spring} meet every demand: {_hz(d.band_exact)}, {turned}"
+    band = f"{spring} reach {d.band_eq_7:.1f} Hz by Eq. (7)"
     return f"{band}, but miss {len(unmet)} of {len(d.checks)} demands"
 
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 from rsea_ros.design.by_train import NINETY_PERCENT, WithTrain, sense_unknown
 from rsea_ros.design.judge import Check, SpringDesign, judge
-from rsea_ros.design.margins import Margin, margins, spreads_of
+from rsea_ros.design.tolerance import Margin, margins, spreads_of
 from rsea_ros.report import words
 from rsea_ros.report.page.html import section
-from rsea_ros.report.page.table import table
+from rsea_ros.report.page.html_table import table
 
 
 def checks_table(designs: Sequence[SpringDesign]) -> str:

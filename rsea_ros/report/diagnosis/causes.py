@@ -14,7 +14,7 @@ from rsea_ros.report.diagnosis.sentences import evidence
 from rsea_ros.report.diagnosis.standing import STATUS, standing
 from rsea_ros.report.figures.palette import AFTER, GRID, MEASURED, QUIET, faint
 from rsea_ros.report.page.html import bullets, equation, paragraph, section
-from rsea_ros.report.page.table import table_of_rows
+from rsea_ros.report.page.html_table import table_of_rows
 from rsea_ros.wording import listed
 
 _WIDTH, _HEIGHT = 180.0, 18.0
@@ -42,8 +42,8 @@ def _sizes(cause: Cause) -> str:
     for name, p in cause.parameters.items():
         value, doubt, unit = num.estimate(p)
         doubt = f" <small>{doubt.strip()}</small>" if doubt else ""
-        what = f"{escape(name.replace('_', ' '))}, 95 % interval{escape(_model_share(p))}"
-        cells.append(f"<div><b>{value}{doubt} {escape(unit)}</b><span>{what}</span></div>")
+        label = f"{escape(name.replace('_', ' '))}, 95 % interval{escape(_model_share(p))}"
+        cells.append(f"<div><b>{value}{doubt} {escape(unit)}</b><span>{label}</span></div>")
     return f'<div class="keys">{"".join(cells)}</div>'
 
 

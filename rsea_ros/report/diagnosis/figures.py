@@ -23,13 +23,13 @@ _FIRST_VIEW = 3.0
 
 def spectrum_figure(diagnosis: Diagnosis, spectrum: Spectrum) -> Figure:
     """Return the residual's density before and after against the noise floor."""
-    s, what = spectrum, words.channel(spectrum.channel)
+    s, channel = spectrum, words.channel(spectrum.channel)
     if not diagnosis.causes:
         curves = [SpectrumLine("residual", AFTER if diagnosis.at_noise_floor else BEFORE, s.before)]
-        title = finding(s.frequency, s.before, s.noise, what)
+        title = finding(s.frequency, s.before, s.noise, channel)
         return residual_figure(title, s.channel, s.frequency, curves, s.noise)
     curves = [SpectrumLine("before", BEFORE, s.before), SpectrumLine("after", AFTER, s.after)]
-    title, caption = _before_and_after(diagnosis, s), f"Residual of the {what}: measured minus simulated."
+    title, caption = _before_and_after(diagnosis, s), f"Residual of the {channel}: measured minus simulated."
     figure = residual_figure(title, s.channel, s.frequency, curves, s.noise, caption)
     return replace(figure, data=[_gained(s), *figure.data])
 
@@ -49,8 +49,8 @@ def _before_and_after(diagnosis: Diagnosis, s: Spectrum) -> str:
     peak = f"{words.number(before[k], 2)} times the noise floor at {words.number(f[k], 2)} Hz"
     rest = f"at most {words.number(after[left], 2)} times at {words.number(f[left], 2)} Hz"
     end = "it is at the floor" if after[left] < ABOVE_FLOOR else rest
-    them = "it" if len(diagnosis.causes) == 1 else "them"
-    return f"Without {causes} the residual is up to {peak}; with {them}, {end}"
+    pronoun = "it" if len(diagnosis.causes) == 1 else "them"
+    return f"Without {causes} the residual is up to {peak}; with {pronoun}, {end}"
 
 
 def time_figure(diagnosis: Diagnosis, channel: str) -> Figure:

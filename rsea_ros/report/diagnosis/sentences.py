@@ -35,8 +35,8 @@ def verdict_sentence(
     """
     name, data = words.channel(channel), (f" {off}." if off else "") + _data(faults)
     named = words.sentence(listed([words.effect(c.name) for c in causes]))
-    them = "them" if len(causes) > 1 else "it"
-    fall = f"with {them} the {name} residual falls from {before:.1f} to"
+    pronoun = "them" if len(causes) > 1 else "it"
+    fall = f"with {pronoun} the {name} residual falls from {before:.1f} to"
     silent = [words.channel(n) for n in silent_channels(faults)]
     if verdict == "unexplained" and silent and at_floor:
         return (

@@ -8,7 +8,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, Setting
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis.noise_numbers import NOISE_NUMBERS
 from rsea_ros.report.page.html import folded, paragraph
-from rsea_ros.report.page.table import table_of_rows
+from rsea_ros.report.page.html_table import table_of_rows
 
 _DEFAULTS = {s.name: s.value for s in (*DEFAULT.listed(), *NOISE_NUMBERS)}
 

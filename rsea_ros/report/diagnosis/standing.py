@@ -23,14 +23,14 @@ def standing(cause: Cause, alternatives: Sequence[Alternative] = (), at_floor: b
     """
     rivals = against(cause, alternatives)
     items: list[Cause | Alternative] = [cause, *rivals]
-    said = [f"{sized(item)}, probability {item.probability:.2f}" for item in items]
+    listed_items = [f"{sized(item)}, probability {item.probability:.2f}" for item in items]
     reason = _REASON[cause.status]
     if at_floor and cause.status == "leading":
         reason = "it reduces the residual to the noise, but another law may do the same"
     if cause.status == "one_of" and rivals:
-        return f"one of: {listed(said, 'or')}; {reason}"
-    text = f"{STATUS[cause.status]}: {said[0]}; {reason}"
-    return f"{text}; less likely instead: {listed(said[1:], 'or')}" if rivals else text
+        return f"one of: {listed(listed_items, 'or')}; {reason}"
+    text = f"{STATUS[cause.status]}: {listed_items[0]}; {reason}"
+    return f"{text}; less likely instead: {listed(listed_items[1:], 'or')}" if rivals else text
 
 
 def against(cause: Cause, alternatives: Sequence[Alternative]) -> list[Alternative]:

@@ -10,7 +10,7 @@ from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.sentences import next_run
 from rsea_ros.report.page.html import code, paragraph, section
-from rsea_ros.report.page.table import table_of_rows
+from rsea_ros.report.page.html_table import table_of_rows
 from rsea_ros.signals import UNITS
 
 _EXCITE = ("kind", "amplitude", "noise", "low", "high", "period", "duration", "rate", "seed")

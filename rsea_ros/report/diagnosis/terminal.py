@@ -14,9 +14,9 @@ from rsea_ros.report.diagnosis.causes import fitted_rivals
 from rsea_ros.report.diagnosis.sentences import next_run
 from rsea_ros.report.diagnosis.standing import standing
 from rsea_ros.report.fault_words import fault_lines
-from rsea_ros.report.lines import LABEL, WIDTH, command_row, row, wrapped
 from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.report.rig.words import command, rig_named, right_rig, split_off_rig
+from rsea_ros.report.wrapped_lines import LABEL, WIDTH, command_row, row, wrapped
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
 _MOST = 3

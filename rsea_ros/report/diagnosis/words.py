@@ -42,9 +42,9 @@ def rejection(rejected: Rejected) -> str:
     return _REASONS[rejected.reason].format(rival=rejected.rival, probability=probability)
 
 
-def respect(what: str) -> str:
+def respect(quantity: str) -> str:
     """Return the plain name of the quantity of a residual profile."""
-    return _RESPECTS.get(what, what.replace("_", " "))
+    return _RESPECTS.get(quantity, quantity.replace("_", " "))
 
 
 def prose(text: str) -> str:

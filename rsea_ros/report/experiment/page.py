@@ -20,7 +20,7 @@ from rsea_ros.report.figures.figure import Figure, axis, frequency_axis, label, 
 from rsea_ros.report.figures.palette import AFTER, BEFORE, QUIET
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
-from rsea_ros.report.page.table import table
+from rsea_ros.report.page.html_table import table
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.signals import FloatArray
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from rsea_ros.experiment.advice import Advice, Proof
+from rsea_ros.experiment.chance_constraint import LEVEL
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
-from rsea_ros.experiment.limits import UNITS
-from rsea_ros.experiment.margins import LEVEL
 from rsea_ros.experiment.proposal import Proposal
+from rsea_ros.experiment.run_limits import UNITS
 from rsea_ros.report import words
 from rsea_ros.wording import listed
 
@@ -42,7 +42,7 @@ def _narrowed(hypothesis: Hypothesis, p: Proposal) -> str:
     """Return how much a run narrows each interval where one cause is left: the geometric mean over them."""
     if hypothesis.name == NOTHING:
         return "No cause is in doubt; a run can only narrow the intervals of the rig, and this one does most"
-    count = len(hypothesis.own) or len(hypothesis.theta)
+    count = len(hypothesis.cause_indices) or len(hypothesis.theta)
     times = f"{math.exp(p.sharpened / count):.3g} times"
     if count == 1:
         return f"The next run narrows the interval of {plain_name(hypothesis.name)} {times}"

@@ -18,21 +18,21 @@ _COHERENT = 0.9
 
 def finding(measured: FrequencyResponse, model: ComplexArray | None) -> str:
     """Return the sentence: where model and measurement agree, or where they part the most."""
-    what = f"{words.channel(measured.output)} per {words.channel(measured.input)}"
+    ratio = f"{words.channel(measured.output)} per {words.channel(measured.input)}"
     if model is None:
-        return words.sentence(f"{what}, measured from {_range(measured.frequency)}")
+        return words.sentence(f"{ratio}, measured from {_range(measured.frequency)}")
     distance = np.abs(measured.response - model) / (_CIRCLE * np.maximum(measured.sd, 1e-300))
     share = float(np.mean(distance < 1.0))
     trusted = np.where(measured.coherence > 0.5, distance, 0.0)
     worst = int(np.argmax(trusted))
     if share >= _AGREES and trusted[worst] < _STRAYS:
         return words.sentence(
-            f"{what}: the model lies in the measured 95 % circle at {100.0 * share:.0f} % "
+            f"{ratio}: the model lies in the measured 95 % circle at {100.0 * share:.0f} % "
             f"of the frequencies from {_range(measured.frequency)}"
         )
     decibel = 20.0 * np.log10(np.abs(model[worst] / measured.response[worst]))
     where = words.minus(f"{words.number(measured.frequency[worst])} Hz ({decibel:+.1f} dB)")
-    return words.sentence(f"{what}: the model leaves the measured 95 % circle, most at {where}")
+    return words.sentence(f"{ratio}: the model leaves the measured 95 % circle, most at {where}")
 
 
 def _range(frequency: FloatArray) -> str:

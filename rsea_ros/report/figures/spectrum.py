@@ -83,17 +83,17 @@ def in_bands(frequency: FloatArray, values: FloatArray) -> tuple[FloatArray, Flo
     return np.add.reduceat(frequency, starts) / count, np.sqrt(power)
 
 
-def finding(frequency: FloatArray, values: FloatArray, noise: float, what: str) -> str:
+def finding(frequency: FloatArray, values: FloatArray, noise: float, channel: str) -> str:
     """Return the sentence: at the noise floor, or where above it the most."""
     f, d = in_bands(frequency, values)
     ratio = d / max(noise, _TINY)
     worst = int(np.argmax(ratio))
     if ratio[worst] < ABOVE_FLOOR:
-        return words.sentence(f"{what}: the residual lies at the noise floor at all frequencies")
+        return words.sentence(f"{channel}: the residual lies at the noise floor at all frequencies")
     above = f[ratio > ABOVE_FLOOR]
     band = f"{words.number(above[0], 2)} to {words.number(above[-1], 2)} Hz"
     most = f"{words.number(f[worst], 2)} Hz ({words.number(ratio[worst], 2)} times)"
-    return words.sentence(f"{what}: the residual stands above the noise floor from {band}, most at {most}")
+    return words.sentence(f"{channel}: the residual stands above the noise floor from {band}, most at {most}")
 
 
 def _exponent(value: float) -> float:

@@ -9,7 +9,7 @@ from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, nu
 from rsea_ros.report.figures.palette import BEFORE, MEASURED, NOISE, QUIET, faint
 from rsea_ros.report.fleet.marks import change_marks, date_axis, points
 from rsea_ros.report.fleet.words import day, name, value
-from rsea_ros.trends.causes import Naming
+from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance
 from rsea_ros.trends.weeks import Steps
 

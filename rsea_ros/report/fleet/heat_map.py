@@ -12,7 +12,7 @@ from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import name, percent, short_day
 from rsea_ros.report.page.html import section
 from rsea_ros.signals import FloatArray
-from rsea_ros.trends.causes import Naming
+from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.series import BoolArray
 from rsea_ros.trends.weeks import Steps, binned
@@ -113,10 +113,9 @@ def _picture(
     for i, joint in enumerate(joints):
         for j in np.flatnonzero(np.isfinite(depth[i]) | undetermined[i]):
             blank = bool(undetermined[i, j])
-            said = "cannot be determined" if blank else text(i, int(j))
-            cells.append(
-                _cell(i, int(j), "n" if blank else _class(float(depth[i, j])), f"{joint}, {weeks[j]}: {said}")
-            )
+            change = "cannot be determined" if blank else text(i, int(j))
+            shade = "n" if blank else _class(float(depth[i, j]))
+            cells.append(_cell(i, int(j), shade, f"{joint}, {weeks[j]}: {change}"))
     height = _ROW * len(joints)
     labels = "".join(f"<li>{links.joint(j)}</li>" for j in joints)
     return (

@@ -15,10 +15,10 @@ from rsea_ros.report.fleet.tables import alarm_table, parameter_rows
 from rsea_ros.report.fleet.words import finding, sentence, short_day
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import folded, key_numbers, paragraph, section
-from rsea_ros.report.page.table import table_of_cells
+from rsea_ros.report.page.html_table import table_of_cells
 from rsea_ros.report.words import sentence as capital
 from rsea_ros.trends.alarms import Alarm
-from rsea_ros.trends.causes import Naming
+from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.series import Table
 from rsea_ros.trends.weeks import Steps

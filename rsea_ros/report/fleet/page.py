@@ -57,8 +57,8 @@ def _blocks(
         yield section("Worst joints first", alarm_table(ranked, links))
     for parameter in _mapped(fleet):
         yield heat_map(parameter, joints[:_ROWS], fleet, steps, links)
-    for kind, what in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
-        yield naming_map(what, kind, _naming(fleet, kind, what, joints)[:_ROWS], fleet, steps, links)
+    for kind, subject in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
+        yield naming_map(subject, kind, _naming(fleet, kind, subject, joints)[:_ROWS], fleet, steps, links)
     yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
     yield _undetermined(fleet, links)
     yield folded("Certainty of these findings", bullets(_sure(fleet)))
@@ -79,7 +79,7 @@ def _mapped(fleet: FleetTrends) -> list[str]:
 
 def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:
     if not any(t.state != "undetermined" for t in fleet.trends.values()):
-        latest = [f"{what} in {joint}" for joint, what in latest_causes(fleet.joints, recordings).items()]
+        latest = [f"{cause} in {joint}" for joint, cause in latest_causes(fleet.joints, recordings).items()]
         now = f"; the latest name {listed(latest[:_NAMED])}" if latest else ""
         return f"Too few recordings yet for trends{now}"
     groups = by_joint(alarms)
@@ -110,8 +110,8 @@ def _grouped(number: int) -> str:
     return f"{number:,}".replace(",", " ")
 
 
-def _naming(fleet: FleetTrends, kind: str, what: str, joints: Sequence[str]) -> list[str]:
-    naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, what)}
+def _naming(fleet: FleetTrends, kind: str, subject: str, joints: Sequence[str]) -> list[str]:
+    naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, subject)}
     return [j for j in joints if j in naming]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from rsea_ros.report import words
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import day, doubt_of_date, name, percent, sentence, value
-from rsea_ros.report.page.table import table_of_cells
+from rsea_ros.report.page.html_table import table_of_cells
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.series import Table

@@ -14,7 +14,7 @@ from rsea_ros.report.figures.palette import AFTER, MEASURED
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
 from rsea_ros.report.identification.correlation import correlation_section
 from rsea_ros.report.identification.parameters import clock_sentence, parameter_table
-from rsea_ros.report.identification.statics import statics_sentences
+from rsea_ros.report.identification.statics_sentences import statics_sentences
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, code, key_numbers, paragraph, section
@@ -132,8 +132,8 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
 def _undetermined(identification: Identification) -> str:
     title = "What these data cannot determine"
     others = split_off_rig(identification.remarks)[1]
-    said = (*doubt_sentences(identification), *remark_sentences(others))
-    body = bullets(said) if said else paragraph("The data determine every free value.")
+    sentences = (*doubt_sentences(identification), *remark_sentences(others))
+    body = bullets(sentences) if sentences else paragraph("The data determine every free value.")
     return section(title, body)
 
 

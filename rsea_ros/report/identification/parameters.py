@@ -10,7 +10,7 @@ from rsea_ros.identification.result import CLOCKS, ParameterEstimate
 from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, GRID, QUIET, faint
-from rsea_ros.report.page.table import table_of_rows
+from rsea_ros.report.page.html_table import table_of_rows
 
 _WIDTH, _HEIGHT = 190.0, 26.0
 

@@ -46,12 +46,12 @@ def next_command(identification: Identification) -> str:
 
 def doubt_sentences(identification: Identification) -> tuple[str, ...]:
     """Return the conditions of the intervals, if they cover more or less than noise."""
-    said = []
+    sentences = []
     if identification.coloured:
-        said.append(coloured_noise(identification.coloured))
+        sentences.append(coloured_noise(identification.coloured))
     if not identification.at_noise:
-        said.append(_misfit_sentence(identification))
-    return tuple(said)
+        sentences.append(_misfit_sentence(identification))
+    return tuple(sentences)
 
 
 def _misfit_sentence(identification: Identification) -> str:

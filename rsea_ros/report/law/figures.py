@@ -34,10 +34,10 @@ def over_figure(written: WrittenLaw) -> Figure:
         line(centre, 0.5 * (low + high), "law", AFTER, 2.6),
     ]  # fmt: skip
     top = float(np.quantile(np.abs(y), 0.995))
-    what = "angle" if unit == "rad" else "torque"
+    quantity = "angle" if unit == "rad" else "torque"
     wave = "one period of the " if _cycles(written) else ""
     return Figure(
-        f"The missing {what} over the {NAMES[shown.over]}, and the law in it",
+        f"The missing {quantity} over the {NAMES[shown.over]}, and the law in it",
         f"Grey: missing in the simulation, point by point (one sigma {shown.sd:.2g} {words.unit(unit)}). "
         "Black: its mean with 95 %. Blue: the law; its band is the spread from its other variables. The "
         "slider shows one stretch of time in orange.",

@@ -10,7 +10,7 @@ from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, QUIET, faint
 from rsea_ros.report.law.words import gain_sentence
 from rsea_ros.report.page.html import folded, paragraph, section
-from rsea_ros.report.page.table import table_of_rows
+from rsea_ros.report.page.html_table import table_of_rows
 from rsea_ros.signals import UNITS as CHANNEL_UNITS
 
 _MOST_TRIED = 12
@@ -41,8 +41,8 @@ def gain_section(result: LawResult) -> str:
     rows = [
         f"<tr><td>{escape(words.channel(n))}</td>"
         + "".join(
-            f"<td class='number' data-label='{what}'>{words.quantity(rms, CHANNEL_UNITS[n], 3)}</td>"
-            for what, rms in (
+            f"<td class='number' data-label='{case}'>{words.quantity(rms, CHANNEL_UNITS[n], 3)}</td>"
+            for case, rms in (
                 ("without", result.before[n]), ("with the law", result.after[n]), ("noise", result.noise[n])
             )
         )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from rsea_ros.laws.equation import equation_of
 from rsea_ros.laws.law import Law
+from rsea_ros.laws.law_text import equation_of
 from rsea_ros.laws.result import LawResult
 from rsea_ros.report import words
 

@@ -14,7 +14,7 @@ from rsea_ros.report.json_values import strict
 from rsea_ros.report.page.bundle import plotly_for
 from rsea_ros.report.page.html import section
 
-_HERE = Path(__file__).parent
+_FOLDER = Path(__file__).parent
 
 Block = Figure | str
 """A figure, or finished HTML."""
@@ -79,4 +79,4 @@ def _block(block: Block, index: int) -> str:
 
 
 def _asset(name: str) -> str:
-    return (_HERE / name).read_text(encoding="utf-8")
+    return (_FOLDER / name).read_text(encoding="utf-8")

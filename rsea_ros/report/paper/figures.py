@@ -22,7 +22,7 @@ from rsea_ros.report import words
 from rsea_ros.report.design.surface import Point, bandwidth_surface, slices
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
-from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure
+from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
 from rsea_ros.report.figures.thinned import thinned
 from rsea_ros.signals import FloatArray
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import GRID, INK, QUIET
-from rsea_ros.report.figures.response import Mark, ResponseCurve
+from rsea_ros.report.figures.response_curves import Mark, ResponseCurve
 
 _WIDTH, _HEIGHT = 760.0, 300.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 190.0, 30.0, 44.0

@@ -8,12 +8,12 @@ from html import escape
 from rsea_ros.paper.arrangements import Arrangement, Limit
 from rsea_ros.paper.bands import TOLERANCES, Bands
 from rsea_ros.paper.claims import TABLE_2, PaperClaim
-from rsea_ros.paper.finding import PaperFinding
 from rsea_ros.paper.moving_output import MovingOutput
-from rsea_ros.paper.rivals import Judged
+from rsea_ros.paper.paper_finding import PaperFinding
+from rsea_ros.paper.rival_models import Judged
 from rsea_ros.report import words
 from rsea_ros.report.page.html import equation, section
-from rsea_ros.report.page.table import table
+from rsea_ros.report.page.html_table import table
 
 EQUATIONS = """\
 (1)   T_d/T_m = K_s / (J_eff s² + b_eff s + K_s)                         lumped

@@ -20,5 +20,5 @@ def right_rig_block(remarks: Sequence[Remark], command: str = "") -> str:
     off, _ = split_off_rig(remarks)
     if not off:
         return ""
-    what = f"<p>{escape(right_rig('' if command else MODEL))} {code(command) if command else ''}</p>"
-    return section("Values that differ from the rig", bullets(remark_sentences(off)), what)
+    remedy = f"<p>{escape(right_rig('' if command else MODEL))} {code(command) if command else ''}</p>"
+    return section("Values that differ from the rig", bullets(remark_sentences(off)), remedy)

@@ -12,7 +12,7 @@ import pytest
 from scipy.io import savemat
 
 from msg_adapters.tables import json_file, npz_file, parquet_file
-from msg_adapters.tables.files import read_columns
+from msg_adapters.tables.column_files import read_columns
 from rsea_ros.errors import ImportMapError
 
 T = np.arange(6) * 0.01

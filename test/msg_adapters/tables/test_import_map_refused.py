@@ -154,6 +154,6 @@ def test_a_folder_and_a_pipe_are_refused(files, tmp_path):
 
 
 def test_a_table_with_too_many_numbers_is_refused(files, monkeypatch):
-    monkeypatch.setattr("msg_adapters.tables.table.LARGEST", 300)
+    monkeypatch.setattr("msg_adapters.tables.column_table.LARGEST", 300)
     with pytest.raises(ImportMapError, match=r"more than 75 rows of 4 columns, expected a shorter record"):
         files(MAP, CSV + "1.5,0,0,6\n" * 97)

@@ -11,7 +11,7 @@ import pytest
 from zarr_groups import as_tar, blosc, header, write_group
 
 from msg_adapters.tables.blosc import unpack_blosc
-from msg_adapters.tables.files import read_columns
+from msg_adapters.tables.column_files import read_columns
 from rsea_ros.errors import ImportMapError
 
 N = 10_000

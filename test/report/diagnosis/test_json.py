@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.diagnosis.result import CauseParameter, Experiment
-from rsea_ros.model.prediction import predict
+from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.normal import Z95
 from rsea_ros.report.diagnosis.json import diagnosis_json

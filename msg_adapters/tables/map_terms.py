@@ -1,0 +1,150 @@
+"""Terms of an import map: a column or an expression, its unit, sign and scale."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from msg_adapters.tables.column_units import CHANNELS, LINEAR, unit
+from msg_adapters.tables.elements import chosen
+from msg_adapters.tables.expression import Expression, parse
+from msg_adapters.tables.map_keys import TERM
+from rsea_ros.errors import FieldError
+from rsea_ros.keys import NEEDED, Key
+from rsea_ros.wording import shown
+
+LARGEST = 1e300
+"""Of the numbers in a map: products of two of them and a unit stay finite."""
+
+
+@dataclass(frozen=True)
+class ChannelTerm:
+    """A part of a channel, in SI: sign · scale · column · (SI factor of its unit) + constant.
+
+    expression: of columns, in the place of the column. file: in the directory that is read; empty for the one
+    file that is. held: the log repeats a value until the next one arrives.
+    """
+
+    column: str
+    unit: str
+    gain: float
+    constant: float = 0.0
+    file: str = ""
+    expression: Expression | None = None
+    held: bool = False
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that it needs."""
+        return (self.column,) if self.expression is None else self.expression.columns
+
+    def at(self, index: int | None) -> ChannelTerm:
+        """Return the term for one number of lists in cells."""
+        if self.expression is None:
+            return replace(self, column=chosen(self.column, index))
+        text = chosen(self.expression.text, index)
+        return replace(self, column=text, expression=parse(text))
+
+
+def terms_of(channel: str, value: object) -> tuple[ChannelTerm, ...]:
+    parts = value if isinstance(value, list) else [value]
+    if not parts:
+        raise FieldError(
+            f"channels.{channel} is an empty list, expected a column or more", f"channels.{channel}"
+        )
+    fields = [f"channels.{channel}" + (f"[{i}]" if value is parts else "") for i in range(len(parts))]
+    terms = tuple(term_of(field, part, CHANNELS[channel]) for field, part in zip(fields, parts, strict=True))
+    if len({term.file for term in terms}) > 1:
+        raise FieldError(
+            f"channels.{channel} sums columns of several files, expected one file", f"channels.{channel}"
+        )
+    return terms
+
+
+def term_of(field: str, value: object, dimension: str) -> ChannelTerm:
+    """Return a term. A unit of another dimension than the channel's needs a scale that converts it."""
+    body = checked_keys(value, field, TERM)
+    try:
+        stated_dimension, factor = unit(body["unit"])
+    except ValueError as error:
+        raise FieldError(f"{field}: {error}", f"{field}.unit") from None
+    if LINEAR.get(stated_dimension, stated_dimension) != dimension and "scale" not in body:
+        raise FieldError(
+            f"{field}: unit {body['unit']!r} is a {stated_dimension}, expected a {dimension}, "
+            "or a scale to it",
+            f"{field}.unit",
+        )
+    sign = number(body.get("sign", 1), f"{field}.sign")
+    if sign not in (1, -1):
+        raise FieldError(f"{field}.sign is {sign}, expected 1 or -1", f"{field}.sign")
+    scale = number(body.get("scale", 1), f"{field}.scale")
+    if scale == 0.0:
+        raise FieldError(
+            f"{field}.scale is 0, expected another number: the channel would be lost", f"{field}.scale"
+        )
+    expression = _expression(body, field)
+    column = expression.text if expression else column_name(body["column"], f"{field}.column")
+    constant = number(body.get("constant", 0), f"{field}.constant")
+    file = _file(body.get("file", ""), f"{field}.file")
+    held = _flag(body.get("held", False), f"{field}.held")
+    return ChannelTerm(column, str(body["unit"]), sign * factor * scale, constant, file, expression, held)
+
+
+def _expression(body: Mapping[str, Any], field: str) -> Expression | None:
+    """Return the expression of a term, None where it has a column."""
+    if ("column" in body) == ("expression" in body):
+        raise FieldError(f"{field}: expected either a column or an expression", field)
+    if "column" in body:
+        return None
+    text = body["expression"]
+    if not isinstance(text, str):
+        where = f"{field}.expression"
+        raise FieldError(f"{where} is {shown(text)}, expected a text in quotes", where)
+    try:
+        return parse(text)
+    except ValueError as error:
+        raise FieldError(f"{field}.expression {error}", f"{field}.expression") from None
+
+
+def _flag(value: object, field: str) -> bool:
+    if isinstance(value, bool):
+        return value
+    raise FieldError(f"{field} is {shown(value)}, expected true or false", field)
+
+
+def number(value: object, field: str) -> float:
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < LARGEST:
+        return float(value)
+    raise FieldError(f"{field} is {shown(value)}, expected a number", field)
+
+
+def column_name(value: object, field: str) -> str:
+    """Return the name of a column, or its number."""
+    if isinstance(value, (str, int)) and not isinstance(value, bool):
+        return str(value).strip()
+    raise FieldError(f"{field} is {shown(value)}, expected a name; put quotes around it", field)
+
+
+def _file(value: object, field: str) -> str:
+    """Return the plain name of a file."""
+    if isinstance(value, str) and value == Path(value).name:
+        return value
+    raise FieldError(f"{field} is {shown(value)}, expected the name of a file in the directory", field)
+
+
+def checked_keys(value: object, field: str, keys: Sequence[Key]) -> Mapping[str, Any]:
+    """Return a mapping that has only these keys, and all of them that are needed."""
+    allowed = ", ".join(sorted(key.name for key in keys))
+    if not isinstance(value, Mapping):
+        held = "empty" if value is None else shown(value)
+        raise FieldError(f"{field} is {held}, expected a mapping with {allowed}", field)
+    for name in value:
+        if name not in [key.name for key in keys]:
+            raise FieldError(f"{field}: unknown key {shown(name)}, expected {allowed}", f"{field}.{name}")
+    needed = sorted(key.name for key in keys if key.default == NEEDED)
+    for name in needed:
+        if name not in value:
+            raise FieldError(f"{field}: no {name!r}, expected {', '.join(needed)}", field)
+    return value

@@ -1,0 +1,78 @@
+"""Settings of the names of accepted causes, and of the intervals of their sizes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rsea_ros.diagnosis.settings.number import CALIBRATED, flat, number
+
+
+@dataclass(frozen=True)
+class EvidenceSettings:
+    """The features of a cause's probability (naming/), and the choice of its rivals."""
+
+    parts: int = number(4, "1", "parts of amplitude and of time, for the shape of a law", CALIBRATED)
+    bands: int = number(6, "1", "frequency bands, for the shape of a law", CALIBRATED)
+    least_spread: float = number(
+        3e-3, "1", "spread of lambda that two right simulations of one law have", CALIBRATED
+    )
+    most_spread: float = number(3.0, "1", "spread of lambda from which more says no more", CALIBRATED)
+    surest: float = number(
+        4.0, "1", "log odds among rivals from which more says no more: all of them may be wrong", CALIBRATED
+    )
+    least_weight: float = number(
+        0.02, "1", "weight among all that was tried in a cause's place, from which an effect is a rival",
+        CALIBRATED,
+    )  # fmt: skip
+    close_weight: float = number(
+        1e-6, "1", "the same, from which an effect is fitted to the end before it is weighed",
+        "27 of twice the log likelihood: what the end of a long fit was seen to bring",
+    )  # fmt: skip
+    most_rivals: int = number(3, "1", "rivals of a cause that are weighed", CALIBRATED)
+
+
+@dataclass(frozen=True)
+class NamingSettings:
+    """The probabilities from which a cause is named, by status (naming/status.py)."""
+
+    confirmed_at_floor: float = number(
+        0.8, "1", "probability from which a cause is confirmed where all causes together leave only noise",
+        "another law could leave that too, but hardly by chance; at 0.9 a mild right cause is no more than "
+        "leading (docs/settings.md)",
+    )  # fmt: skip
+    confirmed: float = number(
+        0.98, "1", "the same where more is missing",
+        f"{flat('0.8', '0.995')}; two wrong names in a hundred are the most that may be",
+    )  # fmt: skip
+    likely: float = number(
+        0.5, "1", "probability of a cause and its rivals from which it is named if it surely helps at all",
+        "likelier than none of these",
+    )  # fmt: skip
+    possible: float = number(
+        0.2, "1", "the same where it surely brings what a cause must bring (acceptance.fall)",
+        "below it four to one speak against the name",
+    )  # fmt: skip
+    rival: float = number(0.05, "1", "probability from which a rival is an alternative", "one in twenty")
+    carried: float = number(
+        2.6, "1", "standard deviations by which a cause's misfit lasts from block to block, above which it "
+        "is not confirmed although only noise is left (naming/signature.py)",
+        "one right cause in 200; 0 of 88 played exceeded it, 6 of 8 drifts told of a wandering sensor did",
+    )  # fmt: skip
+    clear: float = number(
+        0.8, "1", "share of the probability of a cause and its rivals, below which it is `one_of` them",
+        "four to one over all rivals together",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SizeSettings:
+    """The interval of a cause's size, and the channel of its gain."""
+
+    model_error: float = number(
+        0.0025, "1", "relative error of the simulation itself in every size, one sigma",
+        "measured between the simulation and the second bench in test/independent",
+    )  # fmt: skip
+    fall: float = number(
+        1.02, "1", "ratio by which a channel's residual must fall for the gain to speak of that channel",
+        "less is within what acceptance.matters calls nothing",
+    )  # fmt: skip

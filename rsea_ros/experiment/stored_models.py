@@ -1,0 +1,87 @@
+"""Hypotheses from models that were written before, without the records behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.prior import problem_of, vector_at, weights_of
+from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.model.rig import Quantity, Rig
+from rsea_ros.normal import Z95
+
+SPREAD = 0.2
+"""Relative, one sigma: the doubt of a cause's parameter whose file states no interval."""
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A cause in a rig. intervals: 95 %, of its parameters by name, SI. probability: None if unsaid."""
+
+    name: str
+    rig: Rig
+    intervals: Mapping[str, tuple[float, float]]
+    probability: float | None = None
+
+
+def model_of(rig: Rig) -> ModelFile:
+    """Return a model.yaml as a model: its last effect is the cause, the others belong to the rig."""
+    name = rig.effects[-1].name if rig.effects else NOTHING
+    return ModelFile(name, rig, {})
+
+
+def hypotheses_from(models: Sequence[ModelFile]) -> list[Hypothesis]:
+    """Return models as hypotheses; those without a probability share the rest equally.
+
+    Raises ParameterError for two models of one name and for less than one.
+    """
+    names = [m.name for m in models]
+    for name in names:
+        if names.count(name) > 1:
+            raise ParameterError(f"two models with {name}, expected each cause once")
+    total = sum(m.probability or 0.0 for m in models)
+    unstated = sum(m.probability is None for m in models)
+    rest = max(1.0 - total, 0.05) / unstated if unstated else 0.0
+    shares = np.array([rest if m.probability is None else m.probability for m in models])
+    return [_hypothesis(m, float(p)) for m, p in zip(models, shares / shares.sum(), strict=True)]
+
+
+def _hypothesis(model: ModelFile, probability: float) -> Hypothesis:
+    """Return a model as a hypothesis around its values."""
+    rig = model.rig
+    setting = next((e for e in rig.effects if e.name == model.name), None)
+    bare = rig.with_effects(*(e for e in rig.effects if e is not setting))
+    problem = problem_of(model.name, bare, ())
+    problem = replace(problem, unknowns=(*problem.unknowns, *_clocks(problem, rig)))
+    start = {f"{model.name}.{k}": v for k, v in (setting.parameters if setting else {}).items()}
+    theta = vector_at(problem, {}, {**rig.values(), **start})
+    sds = [_sd(u, float(x), rig, model) for u, x in zip(problem.unknowns, theta, strict=True)]
+    known = weights_of(problem)
+    information = np.diag(np.maximum(1.0 / np.array(sds) ** 2, known))
+    return Hypothesis(model.name, problem, theta, information, probability)
+
+
+def _clocks(problem: Problem, rig: Rig) -> tuple[Unknown, ...]:
+    """Return the clocks of the sensors that a rig lists; a problem without records has none."""
+    from rsea_ros.identification.unknowns import clocks
+
+    listed = [n for n in rig.sensors if rig.measures(n)]
+    known = {u.name for u in problem.unknowns}
+    return tuple(u for u in clocks(sorted(listed), rig) if u.name not in known)
+
+
+def _sd(unknown: Unknown, coordinate: float, rig: Rig, model: ModelFile) -> float:
+    """Return one sigma of an unknown in the fit's coordinates: of its interval, else as stated or SPREAD."""
+    quantity = rig.quantities.get(unknown.name, Quantity(0.0))
+    pair = quantity.ci95 or model.intervals.get(unknown.name)
+    if pair is not None:
+        ends = [unknown.inner(min(max(v, unknown.low), unknown.high) or 1e-12) for v in pair]
+        return max((ends[1] - ends[0]) / (2.0 * Z95), 1e-6 * unknown.scale)
+    if unknown.name.startswith(f"{model.name}."):
+        return SPREAD if unknown.logarithmic else SPREAD * (abs(coordinate) or unknown.scale)
+    return unknown.reach

@@ -1,0 +1,96 @@
+"""Alarms as files, one each, never twice: the store remembers reported alarms.
+
+A file has the form that Prometheus' Alertmanager sends to a webhook, so that any such receiver accepts it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from rsea_ros.errors import OutputError
+from rsea_ros.files import make_folder
+from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet.store import Store
+from rsea_ros.fleet.store_columns import history, recordings
+from rsea_ros.new_files import write_text
+from rsea_ros.trends import Alarm, alarms
+
+FOLDER = "alarms"
+
+
+@dataclass(frozen=True)
+class AlarmFile:
+    """A new alarm. file: its path. text: the event in a sentence."""
+
+    file: Path
+    text: str
+
+
+def write_alarms(store: Store) -> list[AlarmFile]:
+    """Write a file for each alarm that the store has not reported before, and return those.
+
+    Two processes at once write each alarm once. Raises OSError where the store cannot be written.
+    """
+    folder = store.path / FOLDER
+    make_folder(folder)
+    return list(_new(store, folder))
+
+
+def _new(store: Store, folder: Path) -> Iterator[AlarmFile]:
+    try:
+        present = alarms(history(store.path), recordings(store.path))
+    except FleetError:  # no row yet
+        return
+    for alarm in present:
+        file = folder / f"{alarm.joint}-{hashlib.sha256(alarm.key.encode()).hexdigest()[:12]}.json"
+        with suppress(OutputError):
+            write_text(file, json.dumps(webhook(alarm), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+            yield AlarmFile(file, sentence(alarm))
+
+
+def webhook(alarm: Alarm) -> dict[str, Any]:
+    """Return an alarm as the body of a webhook, in the form of Alertmanager's (version 4)."""
+    size = alarm.size
+    labels = {"alertname": f"{alarm.kind} {alarm.about}", "joint": alarm.joint, "about": alarm.about,
+              "kind": alarm.kind}  # fmt: skip
+    annotations = {
+        "summary": sentence(alarm),
+        "unit": alarm.unit,
+        "size": "" if size is None else f"{size.value:.6g}",
+        "low": "" if size is None else f"{size.low:.6g}",
+        "high": "" if size is None else f"{size.high:.6g}",
+        "confidence": f"{alarm.confidence:.4g}",
+        "earliest": _time(alarm.earliest_s),
+        "latest": _time(alarm.latest_s),
+        "recording": alarm.recording,
+        "artefacts": alarm.artefacts,
+    }
+    one = {"status": "firing", "labels": labels, "annotations": annotations, "startsAt": _time(alarm.since_s),
+           "fingerprint": alarm.key}  # fmt: skip
+    return {"version": "4", "receiver": "rsea", "status": "firing", "groupKey": alarm.key, "alerts": [one],
+            "commonLabels": labels, "commonAnnotations": annotations}  # fmt: skip
+
+
+def sentence(alarm: Alarm) -> str:
+    """Return a sentence on the event: joint, cause, size, date."""
+    since = f" since {_time(alarm.since_s)[:10]}" if math.isfinite(alarm.since_s) else ""
+    if alarm.size is None:
+        return f"{alarm.joint}: {alarm.about} ({alarm.kind}){since}"
+    unit = "" if alarm.unit == "1" else f" {alarm.unit}"
+    interval = f"{alarm.size.low:.4g} to {alarm.size.high:.4g}{unit}"
+    return f"{alarm.joint}: {alarm.about} ({alarm.kind}) {alarm.size.value:+.4g}{unit}, {interval}{since}"
+
+
+def _time(seconds: float) -> str:
+    """Return a time as ISO 8601, empty where it is not known."""
+    if not math.isfinite(seconds):
+        return ""
+    return datetime.fromtimestamp(seconds, timezone.utc).isoformat(timespec="seconds")

@@ -1,0 +1,33 @@
+"""Models of which only the scores are given: the same residual in all blocks, so that ratios are exact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.diagnosis.score import Score
+
+BLOCKS = 40
+
+
+def score(missed=0.0, samples=100.0, **ratios):
+    """Return a score with the same residual over the noise in all blocks."""
+    sums = {n: np.full(BLOCKS, samples * r**2) for n, r in ratios.items()}
+    return Score(sums, {n: np.full(BLOCKS, samples) for n in ratios}, missed)
+
+
+@dataclass(frozen=True)
+class Model:
+    """The part of a candidate that the criteria use."""
+
+    validation: Score
+    causes: tuple[str, ...] = ()
+    size: int = 1
+    prior_cost: float = 0.0
+    parameters: int = 7
+    is_at_bound: bool = False
+
+
+def model(*causes, size=1, prior_cost=0.0, parameters=7, **ratios):
+    return Model(score(**ratios), causes, size, prior_cost, parameters)

@@ -1,0 +1,218 @@
+"""Scores by hand: residuals over the noise by block, gains, and how far data may outweigh known values."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scripted_scores import BLOCKS, model, score
+
+from rsea_ros.diagnosis import score as scores
+from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
+from rsea_ros.diagnosis.score import (
+    Score,
+    bootstrap_means,
+    gain,
+    gain_of,
+    likelier_by,
+    score_on,
+    temper,
+    tempered_deviance,
+    tempered_loss,
+)
+from rsea_ros.diagnosis.settings import BlockSettings
+from rsea_ros.identification.problem import Case
+
+SECONDS = BlockSettings(longest=1.0, shortest=1.0)
+NOISE = 2.0
+
+
+def case(over_noise, names=("ft",)):
+    """Return a record of two samples a second and a model's outputs, off by multiples of the noise.
+
+    nan: a faulty sample.
+    """
+    errors = np.array(over_noise, float)
+    t = 0.25 + 0.5 * np.arange(len(errors))
+    drive = SimpleNamespace(t=np.array([0.0, 0.5 * len(errors)]))
+    keep = np.isfinite(errors)
+    measured = np.full(len(t), 10.0)
+    made = Case(
+        drive, dict.fromkeys(names, t), dict.fromkeys(names, measured), dict.fromkeys(names, NOISE),
+        dict.fromkeys(names, keep),
+    )  # fmt: skip
+    return made, dict.fromkeys(names, measured + NOISE * np.nan_to_num(errors))
+
+
+def scored(*runs, channels=("ft", "position"), rule=SECONDS):
+    cases, outputs = zip(*runs, strict=True)
+    return scores.score(SimpleNamespace(channels=channels), tuple(cases), list(outputs), rule)
+
+
+def test_residuals_count_over_the_noise_by_block_without_faulty_samples():
+    result = scored(case([1, np.nan, 3, 0, -1, 1]))
+    assert result.sums["ft"].tolist() == [1.0, 9.0, 2.0]
+    assert result.counts["ft"].tolist() == [1.0, 2.0, 2.0]
+    assert result.ratio("ft") == pytest.approx(np.sqrt(12.0 / 5.0))
+    assert list(result.sums) == ["ft"], "a channel that nobody measured has no score"
+
+
+def test_a_short_record_has_shorter_blocks():
+    result = scored(case([1, 2, 3, 4]), rule=BlockSettings(longest=0.5, shortest=0.5))
+    assert result.sums["ft"].tolist() == [1.0, 4.0, 9.0, 16.0]
+
+
+def test_a_block_without_a_sound_sample_is_none():
+    result = scored(case([1, 1, np.nan, np.nan, 2, 2]))
+    assert result.sums["ft"].tolist() == [2.0, 8.0]
+
+
+def test_one_sound_sample_is_enough_for_a_channel():
+    assert scored(case([np.nan, 3])).counts["ft"].tolist() == [1.0]
+
+
+def test_records_follow_each_other_and_may_lack_a_channel():
+    result = scored(case([1, 1, 1, 1]), case([2, 2], names=("position",)))
+    assert result.sums["ft"].tolist() == [2.0, 2.0, 0.0]
+    assert result.counts["ft"].tolist() == [2.0, 2.0, 0.0]
+    assert result.sums["position"].tolist() == [0.0, 0.0, 8.0]
+
+
+def test_a_channel_that_the_model_does_not_have_is_left_out():
+    run, _ = case([1, 1], names=("ft", "position"))
+    assert list(scored((run, {"ft": run.measured["ft"]})).sums) == ["ft"]
+
+
+def test_each_sample_is_in_training_validation_or_test():
+    run, outputs = case(np.arange(32.0))
+    parts = [
+        score_on(SimpleNamespace(channels=("ft",)), [run], of, [outputs], SECONDS)
+        for of in (TRAIN, VALIDATION, TEST)
+    ]
+    assert all(p.counts["ft"].sum() > 0 for p in parts)
+    assert sum(p.counts["ft"].sum() for p in parts) == 32
+    assert sum(p.sums["ft"].sum() for p in parts) == pytest.approx(np.sum(np.arange(32.0) ** 2))
+
+
+@pytest.mark.parametrize(
+    ("shares", "names", "missed"),
+    [
+        ([0.2, 0.6], ("ft",), 0.6),
+        ([0.6, 0.2], ("ft",), 0.6),
+        ([0.6], ("position",), 0.0),  # asked of the F/T torque alone
+    ],
+)
+def test_the_largest_missed_response_of_all_records_counts(monkeypatch, shares, names, missed):
+    left = iter(shares)
+
+    def coherence(run, output, channel, blocks, rule):
+        assert channel == "ft"
+        return next(left)
+
+    monkeypatch.setattr(scores, "missed_response", coherence)
+    assert scored(*(case([1, 1], names) for _ in shares)).missed == missed
+
+
+def test_a_model_without_the_measured_torque_misses_no_response(monkeypatch):
+    monkeypatch.setattr(scores, "missed_response", lambda *_: 1.0)
+    run, outputs = case([1, 1], names=("ft", "position"))
+    assert scored((run, {"position": outputs["position"]})).missed == 0.0
+
+
+@pytest.mark.parametrize(
+    ("now", "against", "loss"),
+    [
+        (score(ft=2.0), score(ft=4.0), 25.0),  # in units of the other's residual
+        (score(ft=2.0), score(ft=0.5), 400.0),  # or of the noise where that is larger
+        (score(ft=2.0, position=8.0), score(ft=2.0, position=4.0), 500.0),  # each channel in its own
+    ],
+)
+def test_a_loss_is_in_units_of_the_other_models_residual(now, against, loss):
+    assert now.loss(against).tolist() == [loss] * BLOCKS
+
+
+def test_ratios_by_channel_and_the_worst():
+    result = score(ft=2.0, position=8.0, velocity=0.5)
+    assert result.ratios == {"ft": 2.0, "position": 8.0, "velocity": 0.5} and result.worst == "position"
+    assert Score({"ft": np.array([4.0])}, {"ft": np.array([1.0])}).ratio("ft") == 2.0
+    assert Score({"ft": np.zeros(1)}, {"ft": np.zeros(1)}).ratio("ft") == 0.0, "no sample, no residual"
+    assert Score({}, {}).missed == 0.0
+
+
+@pytest.mark.parametrize(("after", "before", "part"), [(2.0, 4.0, 0.5), (4.0, 4.0, 0.0), (8.0, 4.0, -1.0)])
+def test_a_gain_is_the_part_of_the_residual_that_is_gone(after, before, part):
+    assert gain(score(ft=after), score(ft=before), "ft") == (part, (part, part))
+
+
+def test_a_residual_of_zero_leaves_no_gain_undefined():
+    value, (low, high) = gain_of(np.zeros(4), np.array([0.0, 0.0, 0.0, 1.0]))
+    assert (value, low, high) == (1.0, 1.0, 1.0)
+    assert gain_of(np.zeros(4), np.zeros(4)) == (1.0, (1.0, 1.0))
+
+
+def test_the_interval_of_a_gain_is_that_of_blocks_drawn_anew():
+    """Of 40 blocks that differ by 10 %: the mean is known to 10 % / sqrt(40), its root to half of that."""
+    uneven = np.resize([1.1, 0.9], BLOCKS)
+    value, (low, high) = gain_of(uneven, np.ones(BLOCKS))
+    width = 1.96 * 0.5 * 0.1 / np.sqrt(BLOCKS)
+    assert value == pytest.approx(0.0, abs=1e-12)
+    assert -low == pytest.approx(width, rel=0.06) and high == pytest.approx(width, rel=0.06)
+
+
+def test_an_interval_leaves_out_what_happens_less_than_once_in_forty():
+    """Two of ten blocks hold all the residual. Five of them or more are drawn once in 30, six once in 157."""
+    two = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    value, interval = gain_of(two, np.ones(10))
+    assert value == 1.0 - np.sqrt(0.2)
+    assert interval == (1.0 - np.sqrt(0.5), 1.0)
+
+
+def test_means_of_resampled_blocks_have_the_scatter_of_a_mean():
+    means = bootstrap_means(np.resize([1.0, -1.0], BLOCKS), 4000)
+    assert means.shape == (4000,)
+    assert means.mean() == pytest.approx(0.0, abs=0.01)
+    assert means.std() == pytest.approx(1.0 / np.sqrt(BLOCKS), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("differences", "weight"),
+    [
+        ([3.0, -1.0], 0.5),  # sum 2 claims a variance of 8, the blocks scatter by 16
+        ([-3.0, 1.0], 0.5),
+        ([2.0, 2.0, 2.0], 1.0),  # never more than in full
+        ([5.0], 0.0),  # of one block nobody knows the scatter
+    ],
+)
+def test_data_weigh_as_much_as_their_blocks_agree(differences, weight):
+    assert temper(np.array(differences)) == weight
+
+
+def uneven(ratio, wave):
+    """Return a score whose neighbouring blocks differ by a share of their residual."""
+    sums = 100.0 * ratio**2 * (1.0 + wave * np.resize([1.0, -1.0], BLOCKS))
+    return Score({"ft": sums}, {"ft": np.full(BLOCKS, 100.0)})
+
+
+@pytest.mark.parametrize(
+    ("ratios", "far", "tempered"),
+    [((4.0, 8.0), 4.0, True), ((4.0, 8.0), 4.5, False), ((8.0, 4.0), 4.5, False), ((8.0, 4.0), 4.0, True)],
+)
+def test_data_are_tempered_only_where_both_models_are_far_from_the_floor(ratios, far, tempered):
+    one, other = uneven(ratios[0], 0.5), uneven(ratios[1], -0.5)
+    in_full = (one.loss(other) - other.loss(other)).sum()
+    share = (tempered_loss(one, other, far) - other.loss(other)).sum() / in_full
+    assert 0.0 < share < 0.9 if tempered else share == pytest.approx(1.0)
+
+
+def test_two_models_are_compared_in_units_of_the_worse():
+    near, worse = score(ft=2.0), score(ft=4.0)
+    assert tempered_deviance(near, worse, 5.0) == BLOCKS * 75.0
+    assert tempered_deviance(worse, near, 5.0) == -BLOCKS * 75.0
+
+
+@pytest.mark.parametrize(
+    ("ratio", "prior_cost", "by"), [(2.0, 3.0, -2.0), (2.0, 1.0, 0.0), (1.0, 3.0, 2998.0)]
+)
+def test_the_odds_are_those_of_the_data_and_of_the_known_values(ratio, prior_cost, by):
+    assert likelier_by(model(ft=ratio, prior_cost=prior_cost), model(ft=2.0, prior_cost=1.0), 5.0) == by

@@ -1,0 +1,46 @@
+"""Alarms are files, each sent once; a week of trouble is one file."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from fleet_stubs import KNEE, stub_work
+
+from rsea_ros.fleet import alarm_files
+from rsea_ros.fleet.engine import Engine
+from rsea_ros.fleet.executor import Serial
+from rsea_ros.fleet.sources import bags_of
+from rsea_ros.trends import Alarm
+from rsea_ros.trends.result import Interval
+
+STEP = Alarm("knee/spring.stiffness/down", "knee", "spring.stiffness", "change", 1.7e9, 1.69e9, 1.71e9,
+             Interval(-200.0, -250.0, -150.0), "N m/rad", -0.15, 0.99, "ab", "artefacts/knee/ab")  # fmt: skip
+
+
+@pytest.fixture
+def worn(store, folder, monkeypatch):
+    """Return a store whose trends show a change of one joint."""
+    Engine(store, Serial(), stub_work, lambda step, share: None).run(bags_of([str(folder)], [KNEE]))
+    monkeypatch.setattr(alarm_files, "alarms", lambda history, recordings: (STEP,))
+    return store
+
+
+def test_an_alarm_is_sent_once(worn):
+    (first,) = alarm_files.write_alarms(worn)
+    assert "knee: spring.stiffness" in first.text and "-250 to -150 N m/rad" in first.text
+    assert alarm_files.write_alarms(worn) == []
+    assert [file.name for file in (worn.path / "alarms").iterdir()] == [first.file.name]
+
+
+def test_an_alarm_has_the_form_that_a_webhook_accepts(worn):
+    (first,) = alarm_files.write_alarms(worn)
+    body = json.loads(first.file.read_text(encoding="utf-8"))
+    (alert,) = body["alerts"]
+    assert (body["version"], body["status"], alert["status"]) == ("4", "firing", "firing")
+    assert alert["labels"]["joint"] == "knee" and alert["startsAt"].startswith("2023-11-14T")
+    assert all(isinstance(text, str) for text in {**alert["labels"], **alert["annotations"]}.values())
+
+
+def test_an_empty_store_has_no_alarm(store):
+    assert alarm_files.write_alarms(store) == []

@@ -1,0 +1,36 @@
+"""Who imports whom, read from the syntax tree of every module."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
+
+
+def name_of(path: Path) -> str:
+    """Return the dotted name of a module's file."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imports(path: Path, source: str) -> Iterator[tuple[str, int]]:
+    """Yield every module that a source imports, at any depth, by its absolute name, with its line."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            module = absolute(path, node)
+            names = [f"{module}.{alias.name}" for alias in node.names] if module == "rsea_ros" else [module]
+            yield from ((name, node.lineno) for name in names)
+
+
+def absolute(path: Path, node: ast.ImportFrom) -> str:
+    """Return the absolute name of the module of a `from … import`."""
+    if not node.level:
+        return str(node.module)
+    ancestors = path.relative_to(ROOT).parent.parts
+    kept = ancestors[: len(ancestors) - node.level + 1]
+    return ".".join([*kept, node.module] if node.module else kept)
