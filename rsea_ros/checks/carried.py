@@ -12,13 +12,14 @@ from rsea_ros.checks.running_clock import at_rates
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
+from rsea_ros.held_samples import without_held_samples
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Record
 from rsea_ros.torque_edge import behind_the_edge
 from rsea_ros.wording import listed
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
-          "clipping", "nan", "coarse_steps", "early_torque")  # fmt: skip
+          "clipping", "nan", "coarse_steps", "early_torque", "held_samples")  # fmt: skip
 """Faults that the diagnosis finds and masks itself."""
 
 
@@ -57,7 +58,7 @@ def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     kept = (*record.faults, *(f for f in findings.faults if f.kind not in again and f not in record.faults))
     record = replace(record, channels=channels, faults=kept)
     record = _with_even_clocks(record, findings) if masks else record
-    return record if masks else _sound(behind_the_edge(record)[0], findings)
+    return record if masks else _sound(behind_the_edge(without_held_samples(record)[0])[0], findings)
 
 
 def _with_even_clocks(record: Record, findings: Findings) -> Record:
