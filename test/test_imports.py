@@ -115,6 +115,7 @@ FOREIGN = {
     "coverage": {"numpy"},
     "stamps": {"numpy"},
     "stamp_gaps": {"numpy"},
+    "held_samples": {"numpy"},
     "stamp_order": {"numpy"},
     "torque_edge": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},

@@ -95,7 +95,7 @@ def with_drifts(solution: Solution, run: Map = serial) -> Solution:
 
 
 def _drifts(problem: Problem, theta: FloatArray) -> dict[str, float]:
-    """Return the rate of the clock of each channel whose lag drifts along a line, ppm, later being positive."""
+    """Return the clock's rate of each channel whose lag drifts along a line, ppm, later being positive."""
     rates: dict[str, list[float]] = {}
     for case, out in zip(problem.cases, problem.outputs(theta), strict=True):
         for n in set(problem.present(case)) - {"motor_torque"}:

@@ -11,6 +11,7 @@ weighted by what they show, sum p'^2.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -45,8 +46,8 @@ class LagLine(NamedTuple):
 
     @property
     def is_clear(self) -> bool:
-        """Whether the lags follow the line of a clock, too far for a linear fit and no faster than clocks run."""
-        steep = _LEAST_RISE < abs(self.rise) and abs(self.rate) < 1e-6 * FASTEST
+        """Whether the lags follow a clock's line: too far for a linear fit, no faster than clocks run."""
+        steep = abs(self.rise) > _LEAST_RISE and abs(self.rate) < 1e-6 * FASTEST
         return steep and self.scatter < _SCATTER * abs(self.rise)
 
 
@@ -71,7 +72,7 @@ def _lags(
     since, found, weight = [], [], []
     lag, last = 0.0, 0
     edges = np.searchsorted(t, np.arange(t[0], t[-1] + BLOCK, BLOCK))
-    for k, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for k, (a, b) in enumerate(pairwise(edges.tolist())):
         if b - a < _FEWEST_SAMPLES:
             continue
         at, share = _lag_of(t[a:b], y[a:b], (t, p, slope), lag, _FARTHEST * (k + 1 - last))

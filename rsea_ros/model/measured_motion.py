@@ -34,6 +34,28 @@ def initial_state(record: Record) -> tuple[float, float]:
     return float(position[0] - passed * velocity[0]), float(velocity[0])
 
 
+def state_at(record: Record, first: float, at: float) -> tuple[float, float]:
+    """Return position and velocity at a time (s), from the first samples at or behind `first` (s).
+
+    Zero where there is none; a velocity that is not measured is the slope of the position.
+    """
+    position, velocity = (_from(record, n, first) for n in ("position", "velocity"))
+    if velocity is not None:
+        v = float(velocity[1][0])
+    else:
+        v = float(np.diff(position[1][:2])[0] / np.diff(position[0][:2])[0]) if position is not None else 0.0
+    return (0.0 if position is None else float(position[1][0] + v * (at - position[0][0]))), v
+
+
+def _from(record: Record, name: str, first: float) -> tuple[FloatArray, FloatArray] | None:
+    """Return stamps and finite values of a channel from a time (s) on, None where fewer than two are left."""
+    if name not in record:
+        return None
+    t, y = record[name].t, record[name].y
+    keep = (t >= first) & np.isfinite(y)
+    return (t[keep], y[keep]) if np.count_nonzero(keep) > 1 else None
+
+
 def angle_at(record: Record, ends: FloatArray) -> FloatArray:
     """Return the measured position at some times (s), by cubics where its speed is measured with it."""
     if "position" not in record:

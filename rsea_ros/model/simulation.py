@@ -96,15 +96,20 @@ def simulate_drives(rig: Rig, drives: Sequence[Drive], *, ride: bool = False) ->
 
 def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, FloatArray]:
     """Return the channels of a drive at their sampling instants, from its own beginning."""
-    machine.begin(drive.initial)
     ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
     out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
-    out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
     torque, reference = drive.command, drive.reference
     if rig.loop is not None:
         torque, reference = np.zeros(len(drive.command)), drive.command
-    run(machine, torque, out[1:], start=drive.origin, reference=reference, ridden=ridden)
-    out[0, 2] = out[1, 2]
+    begins = [(0, drive.initial), *(r for r in drive.restarts if 0 < r[0] < len(torque))]
+    ends = [*(k for k, _ in begins[1:]), len(torque)]
+    for (k, state), end in zip(begins, ends, strict=True):
+        machine.begin(state)
+        out[k] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
+        span = slice(k, end)
+        run(machine, torque[span], out[k + 1 : end + 1], start=drive.origin + k * drive.step,
+            reference=reference[span], ridden=ridden[span])  # fmt: skip
+        out[k, 2] = out[k + 1, 2]
     channels = [n for n in drive.at if rig.measures(n)]
     at = {n: _instants(rig, drive, n) for n in channels}
     sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.kinks) for n in channels}

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import rsea_ros as rsea
 from rsea_ros import simulate
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.linearised_rig import linear_of
