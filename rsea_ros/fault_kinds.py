@@ -47,6 +47,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "scale": "a channel has another unit than the rig",
         "offset": "a zero is off: of the F/T torque beyond any of the run, of the position beyond its motion",
         "angle_jumps": "an angle jumps: it is wrapped at a turn, or the encoder began to count anew",
+        "no_excitation": "the command never changes: the data show nothing of the machine",
         "standstill": "the machine stands still for a while although the command goes on",
         "smoothing": "a channel was averaged before it was logged",
         "wrong_rig": "the record does not fit the rig",

@@ -75,7 +75,9 @@ def check_record(
             every += [] if _bridged(checked) else standstill_findings(checked.record)
             every += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
         every += _other_axes(checked, rig, axis, wrench)
-    faults = (*checked.faults, *(_fault(f) for f in every if f.kind in FAULTY and f.light != "green"))
+    idle = (replace(f, kind="no_excitation") for f in every if (f.kind, f.light) == ("excitation", "red"))
+    doubts = (*(f for f in every if f.kind in FAULTY and f.light != "green"), *idle)
+    faults = (*checked.faults, *map(_fault, doubts))
     findings = tuple(_of_targets(f) for f in every) if rig.loop is not None else tuple(every)
     return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults, masked=checked.masked)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record
 
 AT_REST = 0.5
@@ -11,6 +12,12 @@ AT_REST = 0.5
 
 LATE = 1.6
 """Sample periods: a first sample later than this after the first command is of a channel that starts late."""
+
+
+def zero_unknown(record: Record, rig: Rig, channel: str) -> bool:
+    """Return whether a channel's changes alone count: by the rig, or for a position that a check saw far off."""
+    off = any((f.kind, f.channel) == ("offset", "position") for f in record.faults)
+    return rig.zero_unknown(channel) or (channel == "position" and off)
 
 
 def first_state(record: Record) -> tuple[float, float]:

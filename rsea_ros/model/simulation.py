@@ -20,6 +20,7 @@ from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.firmware_loop import STATES, control
+from rsea_ros.model.measured_motion import zero_unknown
 from rsea_ros.model.position_loop import commanded, loop_parameters
 from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import Rig
@@ -71,7 +72,7 @@ def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
         commanded(record, rig),
         refine=refine,
         closed_loop=rig.loop is None and rig.controller is not None and "reference" in record,
-        from_rest="position" in record and rig.zero_unknown("position"),
+        from_rest="position" in record and zero_unknown(record, rig, "position"),
         targeted=rig.loop is not None,
         hold=rig.hold,
     )

@@ -14,6 +14,7 @@ from rsea_ros.checks.check import check_record
 from rsea_ros.checks.linearised_rig import linear_of
 from rsea_ros.checks.moved_spans import is_still
 from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.statics import statics_of
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record
 
@@ -133,3 +134,19 @@ def test_stamps_in_another_unit_than_seconds_are_a_red_rate(unit):
     record = simulate(RIG, 15.0 * np.random.default_rng(0).standard_normal(len(T)), 280.0)
     slow = Record({n: Channel(t[: len(c)], c.y) for n, c in record.channels.items()})
     assert {f.light for f in check_record(slow, RIG).findings if f.kind == "rate"} == {"red"}
+
+
+def test_a_diagnosis_of_a_constant_command_says_that_it_could_see_nothing():
+    """`Nothing is wrong with the simulation` of a bench that was never moved."""
+    record = simulate(RIG, np.full(2800, 4.0), rate=280.0)
+    found = rsea.diagnose(record, RIG)
+    assert found.sentence.startswith("These data show nothing: the command never changes")
+    assert found.summary().startswith("These data show nothing")
+
+
+def test_statics_need_an_angle_that_grows_with_the_load():
+    """At 1 Hz `Static stiffness inf N m/rad` stood beside red rates."""
+    t = np.arange(60.0)
+    command = Channel(t, 15.0 * np.sin(0.3 * t))
+    position = Channel(t, 1e-3 * np.random.default_rng(0).standard_normal(60) - 1e-3 * command.y)
+    assert statics_of(Record({"command": command, "position": position}), RIG) is None
