@@ -29,6 +29,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "clock_drift": "the clock of a channel runs faster or slower than the command's",
         "early_torque": "each motor torque is of the command with its stamp, and is read behind that",
         "dropped_samples": "samples are missing: the stamps have gaps",
+        "mixed_rows": "the clock stepped back and the log was sorted by it: rows of two times, left out",
         "partly_recorded": "a channel starts later or ends earlier than the run",
         "duplicate_stamps": "stamps repeat; the first sample of each is kept",
         "out_of_order": "samples out of order in the log, sorted by their stamps",

@@ -11,6 +11,7 @@ import numpy as np
 from rsea_ros.coverage import absent_spans
 from rsea_ros.errors import ChannelError
 from rsea_ros.held_samples import without_held_samples
+from rsea_ros.mixed_rows import without_mixed_rows
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
 from rsea_ros.stamp_gaps import dropped_samples
 from rsea_ros.stamp_order import (
@@ -40,7 +41,8 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     """
     faults: list[Fault] = []
     record, shared = _without_long_pauses(record)
-    faults += shared
+    record, mixed = without_mixed_rows(record)
+    faults += [*shared, *mixed]
     channels = {}
     for name, channel in record.channels.items():
         channel, jumps = _without_jumps(channel, name, _expected_span(record, name))

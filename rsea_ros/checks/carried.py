@@ -13,13 +13,15 @@ from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
 from rsea_ros.held_samples import without_held_samples
+from rsea_ros.mixed_rows import without_mixed_rows
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Record
 from rsea_ros.torque_edge import behind_the_edge
 from rsea_ros.wording import listed
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
-          "clipping", "nan", "coarse_steps", "early_torque", "held_samples")  # fmt: skip
+          "clipping", "nan", "coarse_steps", "early_torque", "held_samples",
+          "mixed_rows")  # fmt: skip
 """Faults that the diagnosis finds and masks itself."""
 
 
@@ -58,7 +60,7 @@ def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     kept = (*record.faults, *(f for f in findings.faults if f.kind not in again and f not in record.faults))
     record = replace(record, channels=channels, faults=kept)
     record = _with_even_clocks(record, findings) if masks else record
-    return record if masks else _sound(behind_the_edge(without_held_samples(record)[0])[0], findings)
+    return record if masks else _sound(_repaired(record), findings)
 
 
 def _with_even_clocks(record: Record, findings: Findings) -> Record:
@@ -66,6 +68,13 @@ def _with_even_clocks(record: Record, findings: Findings) -> Record:
     drifts = {f.channel: f.value for f in findings.of("clock_drift") if f.light == "amber"}
     rates = {n: 1e-6 * ppm for n, ppm in drifts.items() if n in record and ppm is not None}
     return at_rates(record, rates) if rates and "command" in record else record
+
+
+def _repaired(record: Record) -> Record:
+    """Return the record as the check saw it, whose faults it has reported."""
+    for repair in (without_mixed_rows, without_held_samples, behind_the_edge):
+        record, _ = repair(record)
+    return record
 
 
 def _sound(record: Record, findings: Findings) -> Record:

@@ -21,7 +21,7 @@ _PER_CYCLE = 4.0
 _SLOW = 0.6
 """Of the command's rate: a slower sensor folds what is above its Nyquist frequency."""
 _OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "clock_jump", "partly_recorded", "early_torque",
-           "held_samples")  # fmt: skip
+           "held_samples", "mixed_rows")  # fmt: skip
 """Faults of a whole channel, whose share of its samples means nothing."""
 _MENDED = ("early_torque",)
 """Faults that leave no doubt in a result once they are mended."""
@@ -34,6 +34,7 @@ _REMEDIES = {
     "partly_recorded": "start the recorder first and stop it last, or cut the run with --from and --to",
     "unnamed_file": "remove it, or give its own name to read it",
     "duplicate_stamps": "stamp at acquisition, not on arrival",
+    "mixed_rows": "keep the clocks from being set during a run; log the time of arrival beside the stamps",
     "clock_jump": "keep the clocks from being set during a run",
     "out_of_order": "sort by the stamps of the headers; nothing else to do",
     "early_torque": "stamp it when it was measured; nothing else to do",
