@@ -48,7 +48,7 @@ def _began(command: Channel, torque: Channel) -> bool:
     if np.count_nonzero(at_edge) < _FEWEST:
         return False
     y, began, was = torque.y[at_edge], command.y[begun[at_edge]], command.y[ended[at_edge]]
-    return _left(y, began) < _BETTER * _left(y, was)
+    return _left(_scaled(y), _scaled(began)) < _BETTER * _left(_scaled(y), _scaled(was))
 
 
 def _period(channel: Channel) -> float:
@@ -56,8 +56,13 @@ def _period(channel: Channel) -> float:
     return float(np.median(np.diff(channel.t)))
 
 
+def _scaled(values: FloatArray) -> FloatArray:
+    """Return values over the largest of them, so that no square overflows."""
+    return np.asarray(values / (np.max(np.abs(values)) or 1.0))
+
+
 def _left(y: FloatArray, u: FloatArray) -> float:
-    """Return the RMS that a gain and a constant times the command leave of a torque, N m."""
+    """Return the RMS that a constant and a gain on the command leave of a torque, in the torque's unit."""
     y, u = y - y.mean(), u - u.mean()
     power = float(u @ u)
     return float(np.sqrt(np.mean((y - (float(u @ y) / power if power else 0.0) * u) ** 2)))

@@ -51,6 +51,11 @@ def test_any_other_torque_stays(record):
     assert repaired is record
 
 
+@pytest.mark.parametrize("size", [1e-300, 1e300])
+def test_no_square_of_a_huge_or_tiny_torque_overflows(size):
+    assert not behind_the_edge(_record(size * ENDED, u=size * U))[1]
+
+
 def test_a_slow_command_decides_it_where_the_noise_lets_it():
     slow = 20.0 * np.sin(2 * np.pi * 1.0 * T)
     assert behind_the_edge(_record(slow, u=slow))[1]

@@ -109,11 +109,13 @@ class Guard:
         self._missed = 0
 
     def trip(self, fault: DeviceFault) -> None:
-        """Latch a fault, unless there is one."""
+        """Latch a fault, unless there is one; any but late commands also ends the ramp of those."""
         if self.fault is None:
             self.fault = fault
             self._ramp_from = abs(self.torque)
             self._ramp = self._ramp_from * self._period / max(self.limits.ramp, self._period)
+        elif fault.cause != COMMAND_TIMEOUT:
+            self._ramp_from = 0.0
 
     def clear(self) -> None:
         """Clear the fault. The torque restarts softly from zero."""

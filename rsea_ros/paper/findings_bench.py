@@ -90,7 +90,8 @@ def moving_output() -> Iterator[PaperFinding]:
         "The lumped model of Fig. 18 can be read in two ways: only the parts within the inner line "
         "combined, its "
         "loads moving, or the motor pushing against the ground, as in Fig. 3. The first gives the "
-        "torque of the unlumped model within 0.3 dB below 1 Hz and 2.3 dB more at 2 Hz, the second up to "
+        "torque of the unlumped model within 0.3 dB below 1 Hz, within 4 dB beside the pendulum's notch at "
+        "1.33 Hz, and 2.3 dB more at 2 Hz, the second up to "
         f"{gap:.1f} dB more, at {gap_hz:.2f} Hz. What decides is the resonance: {resonance_hz(rig):.1f} Hz "
         f"unlumped, {resonance_hz(moving):.1f} Hz lumped with moving loads.",
     )
