@@ -16,6 +16,7 @@ from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
@@ -57,13 +58,15 @@ def fit_percent(error: FloatArray, measured: FloatArray) -> float:
     return 100.0 * (1.0 - float(np.linalg.norm(error)) / scale) if scale > 0.0 else 0.0
 
 
-def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
+def predict(rig: Rig | str, record: Record) -> Mapping[str, Comparison]:
     """Simulate a rig on the commands of a record and compare it with every measured channel.
 
-    Returns a Comparison for each channel by name. For a rig without a spring it compares the torque of the
-    measured motion (see inverse.py); for a sensor with an unknown zero it compares changes.
+    rig: a Rig, a file, or the name of a rig in config/rigs. Returns a Comparison for each channel by name.
+    For a rig without a spring it compares the torque of the measured motion (see inverse.py); for a sensor
+    with an unknown zero it compares changes. Behind a gap of the whole record it begins anew.
     Raises IdentificationError for a record with nothing to compare. Nothing is fitted.
     """
+    rig = load_rig(rig)
     record = bounded(commanded(record, rig))
     check_command(record)
     record = replace(record, channels={n: c for n, c in record.channels.items() if len(c)})
