@@ -14,6 +14,7 @@ from rsea_ros.model.extent import bounded, check_command
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.record_phase import in_phase
+from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.model.step import OUTPUTS
@@ -72,6 +73,8 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
         return {"motor_torque": _comparison(motion.t, motion.torque, torque, edges=True)}
     rig = in_phase(rig, record)
     compared = {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
+    known = {n: outside_gaps(record, c.t, SKIPPED_START) for n, c in compared.items()}
+    compared = {n: replace(c, counts=c.counts & known[n]) for n, c in compared.items()}
     if not compared:
         raise IdentificationError(f"{record.source}: nothing that {rig.name} measures{_why(record)}")
     return {n: _on_measured_zero(c) if rig.zero_unknown(n) else c for n, c in compared.items()}
