@@ -15,7 +15,7 @@ LATE = 1.6
 
 
 def zero_unknown(record: Record, rig: Rig, channel: str) -> bool:
-    """Return whether a channel's changes alone count: by the rig, or a check saw a position far off."""
+    """Return whether only the changes of a channel count: by the rig, or for a position that is far off."""
     off = any((f.kind, f.channel) == ("offset", "position") for f in record.faults)
     return rig.zero_unknown(channel) or (channel == "position" and off)
 
