@@ -67,7 +67,13 @@ def _with_even_clocks(record: Record, findings: Findings) -> Record:
     """Return the record without the drifts of its sensors' clocks that the findings are sure of."""
     drifts = {f.channel: f.value for f in findings.of("clock_drift") if f.light == "amber"}
     rates = {n: 1e-6 * ppm for n, ppm in drifts.items() if n in record and ppm is not None}
-    return at_rates(record, rates) if rates and "command" in record else record
+    if not rates or "command" not in record:
+        return record
+    faults = tuple(
+        replace(f, detail=f"taken out, {f.detail}") if f.kind == "clock_drift" and f.channel in rates else f
+        for f in record.faults
+    )
+    return at_rates(replace(record, faults=faults), rates)
 
 
 def _repaired(record: Record) -> Record:

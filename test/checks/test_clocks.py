@@ -84,3 +84,4 @@ def test_a_drift_that_turns_the_phases_is_a_fault_with_its_size(ppm):
     assert clock(findings, "clock_drift", "position").value == pytest.approx(0.0, abs=2.0)
     even = with_faults(record, findings, masks=True)
     assert np.ptp(even["ft"].t - (record["ft"].t / (1.0 + 1e-6 * ppm))) < 1e-4
+    assert [f.detail.split(",")[0] for f in even.faults if f.kind == "clock_drift"] == ["taken out"]
