@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.signals import SENSED, Channel, Fault, FloatArray, Record
+from rsea_ros.signals import SENSED, BoolArray, Channel, Fault, FloatArray, Record
 
 _FEWEST_VALUES = 32
 """Fewer say nothing of how often they come."""
@@ -35,16 +35,21 @@ def repeats_of(values: FloatArray) -> int:
 
     A coarse sensor repeats values too, but as long as the motion has it, and then goes on by a step or two.
     """
-    new = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    if len(new) < _FEWEST_VALUES:
+    new = np.flatnonzero(_is_new(values))
+    if len(new) < _FEWEST_VALUES or not np.isfinite(values).all():
         return 1
     usual, long = np.quantile(np.diff(new), (0.5, 0.9))
-    steps = np.abs(np.diff(values[new]))
+    steps = np.abs(np.diff(values[new] / np.max(np.abs(values))))
     regular = usual >= _REPEATED and long < _REGULAR * usual
     return int(usual) if regular and np.median(steps) > _MANY_STEPS * steps.min() else 1
 
 
 def _arrivals(channel: Channel) -> Channel:
     """Return the samples that differ from the one before; all that lack a value, which a check reports."""
-    new = np.diff(channel.y, prepend=np.nan) != 0.0
+    new = _is_new(channel.y)
     return Channel(channel.t[new], channel.y[new])
+
+
+def _is_new(values: FloatArray) -> BoolArray:
+    """Return which samples differ from the one before."""
+    return np.concatenate([[True], values[1:] != values[:-1]])
