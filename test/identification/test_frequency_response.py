@@ -150,7 +150,7 @@ def test_a_missing_channel_and_a_short_record_are_named() -> None:
 
 
 def test_a_stretch_at_rest_shows_no_response() -> None:
-    """A frozen encoder left only a stretch without a command: 0 over 0, and eigenvalues that do not converge."""
+    """A frozen encoder left only a stretch without a command: 0 over 0, and no eigenvalue converged."""
     t = np.arange(1200) / 280.0
     pulse = np.where(t > 3.0, 20.0 * np.sin(50.0 * t), 0.0)
     sensor = Channel(t, np.where(t > 2.5, np.nan, 0.01 * np.sin(t)))
