@@ -15,6 +15,7 @@ from collections.abc import Mapping
 
 from rsea_ros.exports.others import acting, omitted_effects, omitted_parts, sized
 from rsea_ros.exports.represented import Export, Omitted, Represented
+from rsea_ros.model.equations import gear_inertia
 from rsea_ros.model.rig import Rig
 
 ALPHA = 2.0
@@ -32,7 +33,7 @@ def export_bam(rig: Rig, actuator: str = "") -> Export:
         Represented("rotor.reflected_damping", "friction_viscous"),
     ]
     values: dict[str, object] = {
-        "armature": rig["rotor.reflected_inertia"],
+        "armature": gear_inertia(rig),
         "q_offset": 0.0,
         "friction_viscous": rig["rotor.reflected_damping"],
     }

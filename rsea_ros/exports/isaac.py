@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from rsea_ros.exports.others import acting, omitted_effects, omitted_parts, sized
 from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
+from rsea_ros.model.equations import gear_inertia
 from rsea_ros.model.rig import Rig
 
 PHYSICS_STEP = 0.005
@@ -43,7 +44,7 @@ def export_isaac(rig: Rig) -> Export:
 def _joint(rig: Rig, represented: list[Represented]) -> dict[str, float]:
     represented.append(Represented("rotor.reflected_inertia", "armature"))
     represented.append(Represented("rotor.reflected_damping", "viscous_friction"))
-    return {"armature": rig["rotor.reflected_inertia"], "viscous_friction": rig["rotor.reflected_damping"]}
+    return {"armature": gear_inertia(rig), "viscous_friction": rig["rotor.reflected_damping"]}
 
 
 def _loop(rig: Rig, represented: list[Represented]) -> dict[str, float]:

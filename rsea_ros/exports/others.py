@@ -7,8 +7,10 @@ from collections.abc import Iterator, Sequence
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.represented import Omitted, Represented
+from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.units import plain
 
 
 def acting(rig: Rig) -> Rig:
@@ -31,8 +33,22 @@ def omitted_effects(rig: Rig, represented: Sequence[Represented], why: str) -> l
     return [Omitted(name, why if name in finite else endless) for name in effects]
 
 
+def _spin(rig: Rig) -> Iterator[Omitted]:
+    """Yield the coupling n J_r of rotor and housing, which an armature, n^2 J_r alone, does not have."""
+    n = train_ratio(rig)
+    if rig.train == "lumped" or rig.linear or not rotor_inertia(rig):
+        return
+    spin = f"{n * rotor_inertia(rig):.3g} {plain(rig.unit('rotor.reflected_inertia'))}"
+    why = f"{rig.train}, n = {n:g}: an armature does not turn; its spin n J_r is {spin}"
+    yield Omitted("gear.train", why)
+
+
 def omitted_parts(rig: Rig, why: str) -> Iterator[Omitted]:
-    """Yield the springs, loads and sensors that a target of one rigid joint leaves out."""
+    """Yield the bodies, springs and sensors that a target of one rigid joint leaves out."""
+    if rig["chassis.inertia"]:
+        weight = f"{rig['chassis.inertia']:g} {plain(rig.unit('chassis.inertia'))}"
+        yield Omitted("chassis.inertia", f"{weight}; add it to the link behind the joint")
+    yield from _spin(rig)
     if not rig.rigid_spring:
         yield Omitted("spring", f"{rig['spring.stiffness']:g} N·m/rad; {why}")
     for name in ("gear", "proximal_spring"):

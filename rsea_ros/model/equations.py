@@ -76,6 +76,11 @@ def rotor_inertia(rig: Rig) -> float:
     return rig["rotor.reflected_inertia"] / rig["gear.ratio"] ** 2
 
 
+def gear_inertia(rig: Rig) -> float:
+    """Return n^2 J_r, kg m^2: the rotor's inertia at the gear output, the housing held."""
+    return float(rig["rotor.reflected_inertia"]) * (train_ratio(rig) / rig["gear.ratio"]) ** 2
+
+
 def mechanics(rig: Rig, *, linear_gravity: bool = True) -> Mechanics:
     """Return the equations of motion of a rig.
 

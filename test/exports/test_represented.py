@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
@@ -136,6 +138,30 @@ def test_bams_friction_budget_equals_ours_at_speed(motor, load):
     ours = abs(p["motor_coefficient"] * motor + p["load_coefficient"] * load)
     ours += p["quadratic"] * min(abs(motor), abs(load)) ** 2
     assert loss + fade * quad == pytest.approx(ours)
+
+
+TURNS = {"harmonic_circular_spline_held": -160, "harmonic_flexspline_held": 161, "star": -159, "spur": -160}
+
+
+@pytest.mark.parametrize("export", [export_isaac, export_bam])
+@pytest.mark.parametrize("train", TURNS)
+def test_one_joint_has_the_rotor_at_the_output_and_says_that_its_spin_is_left_out(export, train):
+    """A rotor of J_r and n turns weighs n^2 J_r at the joint; its spin n J_r couples it to the housing."""
+    rig, n = replace(load_rig("prototype_knee"), train=train), TURNS[train]
+    made = export(rig)
+    (armature,) = re.findall(r"armature\W+([0-9.e-]+)", made.content.split("ACTUATOR")[-1])
+    assert float(armature) == pytest.approx(1.2 * n**2 / 160**2)
+    left = {one.name: one.why for one in made.omitted}
+    assert f"n = {n}" in left["gear.train"]
+    assert f"{n * 1.2 / 160**2:.3g} kg·m²" in left["gear.train"]
+    assert "0.0006169 kg·m²" in left["chassis.inertia"]
+    assert f"n = {n}" in made.content
+
+
+@pytest.mark.parametrize("export", [export_isaac, export_bam])
+def test_a_lumped_rotor_has_no_spin_to_leave_out(export):
+    made = export(replace(load_rig("prototype_knee"), train="lumped"))
+    assert "gear.train" not in [one.name for one in made.omitted]
 
 
 @pytest.mark.parametrize("target", EXPORTS)
