@@ -10,6 +10,8 @@ import numpy as np
 
 from rsea_ros.coverage import absent_spans
 from rsea_ros.errors import ChannelError
+from rsea_ros.held_samples import without_held_samples
+from rsea_ros.mixed_rows import without_mixed_rows
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
 from rsea_ros.stamp_gaps import dropped_samples
 from rsea_ros.stamp_order import (
@@ -39,7 +41,8 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     """
     faults: list[Fault] = []
     record, shared = _without_long_pauses(record)
-    faults += shared
+    record, mixed = without_mixed_rows(record)
+    faults += [*shared, *mixed]
     channels = {}
     for name, channel in record.channels.items():
         channel, jumps = _without_jumps(channel, name, _expected_span(record, name))
@@ -52,8 +55,9 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         _check_even(channel, f"{record.source}: {name}")
         faults += dropped_samples(channel, name, int(repeated.sum()))
         channels[name] = channel
-    repaired, early = behind_the_edge(record.with_channels(**channels))
-    faults += early
+    repaired, held = without_held_samples(record.with_channels(**channels))
+    repaired, early = behind_the_edge(repaired)
+    faults += [*held, *early]
     explained = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}
     new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in explained]
     return repaired, [*new, *(fault for fault in absent_spans(repaired) if fault not in record.faults)]

@@ -10,7 +10,7 @@ from import_graph import MODULES, ROOT, imports, name_of
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-STAMPS = {"coverage", "stamps", "stamp_gaps", "stamp_order", "torque_edge"}
+STAMPS = {"coverage", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order", "torque_edge"}
 FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -19,7 +19,9 @@ OWN = {
     "errors": set(),
     "signals": {"errors", "arrays"},
     "coverage": {"signals"},
-    "stamps": {"coverage", "errors", "signals", "stamp_gaps", "stamp_order", "torque_edge"},
+    "held_samples": {"signals"},
+    "mixed_rows": {"signals"},
+    "stamps": {"errors", "signals", *(STAMPS - {"stamps"})},
     "stamp_gaps": {"signals", "stamp_order"},
     "stamp_order": {"signals"},
     "torque_edge": {"signals"},
@@ -114,6 +116,8 @@ FOREIGN = {
     "coverage": {"numpy"},
     "stamps": {"numpy"},
     "stamp_gaps": {"numpy"},
+    "held_samples": {"numpy"},
+    "mixed_rows": {"numpy"},
     "stamp_order": {"numpy"},
     "torque_edge": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},

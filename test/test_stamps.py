@@ -50,7 +50,7 @@ def test_a_jump_back_is_distinguished_from_disorder(periods):
 def test_a_jump_of_the_joint_states_is_found_though_they_are_three_channels():
     t = np.arange(COUNT) * PERIOD
     jumped = np.where(np.arange(COUNT) < 900, t, t + 0.5)
-    record = _record(t, position=jumped, velocity=jumped, motor_torque=jumped)
+    record = _record(t, position=jumped, velocity=jumped, motor_torque=jumped + 0.4 * PERIOD)
     repaired, faults = repair_stamps(record)
     assert {(f.kind, f.channel) for f in faults} == {
         ("clock_jump", name) for name in ("position", "velocity", "motor_torque")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from msg_adapters.tables.child import Reader
 from msg_adapters.tables.column_table import LARGEST, Table
@@ -11,12 +12,15 @@ from msg_adapters.tables.column_table import LARGEST, Table
 CHILD = Path(__file__).with_name("_mat_reader.py")
 TIME = 90.0
 """s. The largest file that is read takes 3 s."""
+_HEADER = 128
+"""Bytes before the first variable."""
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def read_mat(path: Path, columns: Sequence[str]) -> Table:
     """Return the requested variables. Raises OSError and ValueError with variable, shape and expectation."""
     _refuse_version_7_3(path)
+    _refuse_cut_off(path)
     return Reader("MAT", CHILD, TIME, LARGEST).read(path, columns)
 
 
@@ -25,3 +29,18 @@ def _refuse_version_7_3(path: Path) -> None:
         head = file.read(520)
     if head.startswith(b"MATLAB 7.3") or _HDF5 in (head[:8], head[512:]):
         raise ValueError("MAT file of version 7.3 (HDF5), expected version 7: save(…, '-v7') in MATLAB")
+
+
+def _refuse_cut_off(path: Path) -> None:
+    """Raise ValueError for a file of version 5 to 7 whose last variable goes on beyond its end."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(_HEADER)
+        if not head.startswith(b"MATLAB 5.0") or head[126:128] not in (b"IM", b"MI"):
+            return
+        order: Literal["little", "big"] = "little" if head[126:128] == b"IM" else "big"
+        while tag := file.read(8):
+            end = file.tell() + int.from_bytes(tag[4:8], order)
+            if len(tag) < 8 or end > size:
+                raise ValueError(f"MAT file cut off at {size} bytes, expected {end} or more: copy it again")
+            file.seek(end)

@@ -8,16 +8,20 @@ import numpy as np
 
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings
+from rsea_ros.checks.running_clock import at_rates
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
+from rsea_ros.held_samples import without_held_samples
+from rsea_ros.mixed_rows import without_mixed_rows
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Record
 from rsea_ros.torque_edge import behind_the_edge
 from rsea_ros.wording import listed
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
-          "clipping", "nan", "coarse_steps", "early_torque")  # fmt: skip
+          "clipping", "nan", "coarse_steps", "early_torque", "held_samples",
+          "mixed_rows")  # fmt: skip
 """Faults that the diagnosis finds and masks itself."""
 
 
@@ -40,8 +44,8 @@ def noted(record: Record, rig: Rig) -> Record:
 def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     """Return a record with the faults that were found; a dead channel is left out.
 
-    masks: the next stage finds, masks and reports faulty samples itself, and moves an early torque. For any
-    other stage both are done here.
+    masks: the next stage finds, masks and reports faulty samples itself, and moves an early torque, but fits
+    no rates of clocks: drifts are taken out here. For any other stage it is the other way round.
 
     Raises IdentificationError where no channel is left that measures anything.
     """
@@ -55,7 +59,28 @@ def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     again = _AGAIN if masks else ()
     kept = (*record.faults, *(f for f in findings.faults if f.kind not in again and f not in record.faults))
     record = replace(record, channels=channels, faults=kept)
-    return record if masks else _sound(behind_the_edge(record)[0], findings)
+    record = _with_even_clocks(record, findings) if masks else record
+    return record if masks else _sound(_repaired(record), findings)
+
+
+def _with_even_clocks(record: Record, findings: Findings) -> Record:
+    """Return the record without the drifts of its sensors' clocks that the findings are sure of."""
+    drifts = {f.channel: f.value for f in findings.of("clock_drift") if f.light == "amber"}
+    rates = {n: 1e-6 * ppm for n, ppm in drifts.items() if n in record and ppm is not None}
+    if not rates or "command" not in record:
+        return record
+    faults = tuple(
+        replace(f, detail=f"taken out, {f.detail}") if f.kind == "clock_drift" and f.channel in rates else f
+        for f in record.faults
+    )
+    return at_rates(replace(record, faults=faults), rates)
+
+
+def _repaired(record: Record) -> Record:
+    """Return the record as the check saw it, whose faults it has reported."""
+    for repair in (without_mixed_rows, without_held_samples, behind_the_edge):
+        record, _ = repair(record)
+    return record
 
 
 def _sound(record: Record, findings: Findings) -> Record:

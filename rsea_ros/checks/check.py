@@ -16,12 +16,13 @@ from rsea_ros.checks.gain_findings import gain_findings, strangers
 from rsea_ros.checks.gains import Readings, readings_of
 from rsea_ros.checks.lag import in_step, lag_findings, lags
 from rsea_ros.checks.linear_findings import clock_findings
-from rsea_ros.checks.linearised_rig import linear_of
+from rsea_ros.checks.linearised_rig import LinearisedFit, linear_of
 from rsea_ros.checks.machine_impedance import impedance_findings
 from rsea_ros.checks.moved_spans import is_commanded
 from rsea_ros.checks.offset_findings import angle_offset_findings, offset_findings
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.rig_values import value_findings
+from rsea_ros.checks.running_clock import at_rates, clock_rates, with_rates
 from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
@@ -74,7 +75,9 @@ def check_record(
             every += [] if _bridged(checked) else standstill_findings(checked.record)
             every += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
         every += _other_axes(checked, rig, axis, wrench)
-    faults = (*checked.faults, *(_fault(f) for f in every if f.kind in FAULTY and f.light != "green"))
+    idle = (replace(f, kind="no_excitation") for f in every if (f.kind, f.light) == ("excitation", "red"))
+    doubts = (*(f for f in every if f.kind in FAULTY and f.light != "green"), *idle)
+    faults = (*checked.faults, *map(_fault, doubts))
     findings = tuple(_of_targets(f) for f in every) if rig.loop is not None else tuple(every)
     return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults, masked=checked.masked)
 
@@ -117,8 +120,7 @@ def _topics(record: Record, rig: Rig) -> list[Finding]:
 
 def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Finding]:
     """Return the findings from comparing the record with the rig's simulation."""
-    record = checked.record
-    if is_full_of_gaps(record):
+    if is_full_of_gaps(checked.record):
         return [
             Finding(
                 "red",
@@ -129,9 +131,31 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
                 remedy="cut it with --from and --to",
             )
         ]
-    findings = []
-    whole = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) < _WHOLE * len(bad)}
-    both = checked.compared if checked.compared is not None else sides(record, rig)
+    both = checked.compared if checked.compared is not None else sides(checked.record, rig)
+    findings, linear = _compared(checked, both, rig, axis, {}, values)
+    if linear is None or not linear.is_clear:
+        start = float(checked.record["command"].t[0])
+        rates = clock_rates({n: s for n, s in both.items() if n in _whole(checked)}, start)
+        if rates:
+            even = replace(checked, record=at_rates(checked.record, rates))
+            again, linear = _compared(even, sides(even.record, rig), rig, axis, rates, values)
+            return again if linear is not None and linear.is_clear else findings
+    return findings
+
+
+def _compared(
+    checked: Checked,
+    both: Mapping[str, Side],
+    rig: Rig,
+    axis: str,
+    rates: Mapping[str, float],
+    values: bool,
+) -> tuple[list[Finding], LinearisedFit | None]:
+    """Return the findings from measured and predicted channels, and the linearised fit if one makes sense.
+
+    rates: of clocks (s/s) that are already taken out of the record.
+    """
+    record, findings, whole = checked.record, list[Finding](), _whole(checked)
     compared = {n: s for n, s in both.items() if n in whole}
     late = lags(compared)
     if late:
@@ -139,14 +163,20 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
         findings = lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
     if elsewhere := angle_offset_findings(rig, compared):
-        return [*findings, *elsewhere]
+        return [*findings, *elsewhere], None
     readings, matched = _matched(record, compared, rig, axis)
     scaled = any(f.kind == "scale" and f.channel == "ft" and f.light == "red" for f in matched)
     matched += [] if scaled else offset_findings(record, compared)
     findings += [*noises(record, rig, but=_bridged(checked)), *matched]
     if readings is None or late or _is_elsewhere(findings):
-        return findings
-    return [*findings, *_linearised(checked, rig, readings, values)]
+        return findings, None
+    more, linear = _linearised(checked, rig, readings, rates, values)
+    return [*findings, *more], linear
+
+
+def _whole(checked: Checked) -> set[str]:
+    """Return the channels of which so little was masked that their response is compared."""
+    return {n for n, bad in checked.masked.items() if np.count_nonzero(bad) < _WHOLE * len(bad)}
 
 
 def _bridged(checked: Checked) -> set[str]:
@@ -180,16 +210,18 @@ def _is_elsewhere(findings: list[Finding]) -> bool:
     return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in findings)
 
 
-def _linearised(checked: Checked, rig: Rig, readings: Readings, values: bool) -> list[Finding]:
+def _linearised(
+    checked: Checked, rig: Rig, readings: Readings, rates: Mapping[str, float], values: bool
+) -> tuple[list[Finding], LinearisedFit | None]:
     if is_inverse(rig):
-        return []
+        return [], None
     try:
         linear = linear_of(checked.record, checked.masked, rig, readings.applied)
         fitted = value_findings(linear, rig) if values else []
     except (RseaError, ValueError, np.linalg.LinAlgError):
-        return []
+        return [], None
     duration = checked.record.stop - checked.record.start
-    return [*clock_findings(linear, duration), *fitted]
+    return [*clock_findings(with_rates(linear, rates), duration), *fitted], linear
 
 
 def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) -> list[Finding]:

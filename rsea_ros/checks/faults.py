@@ -14,7 +14,7 @@ from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side, sides
 from rsea_ros.checks.frozen import SMALLEST_SHARE, frozen, longest, while_others_moved
 from rsea_ros.checks.moved_spans import is_commanded
-from rsea_ros.checks.stamp_findings import repeats_of
+from rsea_ros.held_samples import repeats_of
 from rsea_ros.identification.quantum import FEW, step_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.checks.linearised_rig import LinearisedFit, Number
+from rsea_ros.checks.linearised_rig import BESIDE, LinearisedFit, Number
 from rsea_ros.model.rig import CLOCK_DOUBT
 
 _ALLOWED = 3.0 * CLOCK_DOUBT
 """s. As far as a fit lets a sensor's clock move."""
 _SURE = 4.0
 """Sigmas."""
-_BESIDE = 2.0
-"""Residual over noise above which something in the machine may stand behind a clock."""
 _OPEN = 10.0 * _ALLOWED
 """s. One sigma from which a number would say nothing of a clock."""
 JOINT = ("velocity", "position")
@@ -87,13 +85,13 @@ def _left_open(kind: str, name: str, sd: float) -> Finding:
 
 
 def _is_clear(linear: LinearisedFit, names: Sequence[str]) -> bool:
-    return all(linear.misfit[n] < _BESIDE for n in names)
+    return all(linear.misfit[n] < BESIDE for n in names)
 
 
 def _beside(linear: LinearisedFit, name: str) -> str:
     misfit = linear.misfit[name]
     return (
         ""
-        if misfit < _BESIDE
+        if misfit < BESIDE
         else f"; beside a misfit of {misfit:.0f} times the noise a cause may stand in for it"
     )

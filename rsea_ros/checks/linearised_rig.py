@@ -27,6 +27,8 @@ _WORSE = 1.02
 """Of the best loss so far: a round that leaves more is not taken."""
 _DONE = 0.8
 """Of one sigma: smaller steps end the rounds."""
+BESIDE = 2.0
+"""Residual over noise above which something in the machine may stand behind a clock."""
 LONGEST = 30.0
 """s. More of a record would only cost more time."""
 _RESOLUTION = 3e-6
@@ -61,6 +63,11 @@ class LinearisedFit:
     settled: bool
     problem: Problem
     theta: FloatArray
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the clocks converged and no channel has a misfit that they might stand in for."""
+        return self.settled and all(misfit < BESIDE for misfit in self.misfit.values())
 
 
 def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: FittedShape) -> LinearisedFit:

@@ -57,7 +57,7 @@ def angle_offset_findings(rig: Rig, compared: Mapping[str, Side]) -> list[Findin
             middle - rest,
             "rad",
             expected=f"motion about {rest:.3g}, where the rig rests",
-            detail=f"all of the motion is about {middle:.4g} rad",
+            detail=f"all of the motion is about {middle:.4g} rad; fits compare its changes alone",
             remedy="`zero_unknown: true` for position in the rig, or give the constant in the import map",
         )
     ]

@@ -4,6 +4,8 @@ Measured over predicted of the F/T torque, over the same of the joint, is the se
 gain: errors of drive, inertia and damping are in both. An average of the last n samples has
 
     H(f) = sin(pi f n T) / (n sin(pi f T)) exp(-i pi f (n - 1) T)
+
+and one of the samples on either side, made after the run, has its size without its lag.
 """
 
 from __future__ import annotations
@@ -37,9 +39,11 @@ def smoothing_findings(related: Mapping[str, Quotient], period: float) -> list[F
     if np.count_nonzero(keep) < _FEWEST:
         return []
     response, sd = ft.value / joint.value, np.hypot(ft.sd, joint.sd)
-    number = _average(ft.frequency[keep], response[keep], sd[keep], period)
+    number, centred = _average(ft.frequency[keep], response[keep], sd[keep], period)
     if number < 2:
         return []
+    of = "a centred moving average" if centred else "a moving average"
+    takes = "spring and damping that are not the machine's" if centred else "its lag for the machine's"
     return [
         Finding(
             "amber",
@@ -48,24 +52,26 @@ def smoothing_findings(related: Mapping[str, Quotient], period: float) -> list[F
             1e3 * number * period,
             "ms",
             expected="none",
-            detail=f"looks like a moving average of {number} samples",
-            remedy="log the sensor unfiltered: a fit takes its lag for the machine's",
+            detail=f"looks like {of} of {number} samples",
+            remedy=f"log the sensor unfiltered: a fit takes {takes}",
         )
     ]
 
 
-def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: float) -> int:
-    """Return over how many samples a response was averaged, 1 for none."""
+def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: float) -> tuple[int, bool]:
+    """Return over how many samples a response was averaged, 1 for none, and whether without a lag."""
     weight = 1.0 / (sd**2 + 0.05**2)
     turn, number = np.pi * f * period, np.arange(2.0, _MOST + 1.0)[:, None]
     size = np.sin(number * turn) / (number * np.sin(turn))
     averages = np.asarray(size * np.exp(-1j * (number - 1.0) * turn), dtype=np.complex128)
-    tried = _left(response, np.vstack([np.ones(len(f), complex), averages]), weight)
+    none = np.ones((1, len(f)), complex)
+    tried = _left(response, np.vstack([none, averages, none, size[1::2]]), weight)
     lags = np.asarray(1.0 / (1.0 + 2j * np.pi * f * _LAGS[:, None]), dtype=np.complex128)
     lagged = _left(response, lags, weight).min()
     best = int(np.argmin(tried))
-    clear = tried[best] < _FALLS * min(tried[0], lagged) and tried[best] < _FITS**2
-    return best + 1 if clear else 1
+    if not (tried[best] < _FALLS * min(tried[0], lagged) and tried[best] < _FITS**2):
+        return 1, False
+    return (best + 1, False) if best < _MOST else (2 * (best - _MOST) + 1, True)
 
 
 def _left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> FloatArray:

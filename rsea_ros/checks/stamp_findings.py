@@ -10,7 +10,7 @@ from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.model.drive import SLOW
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, Fault, FloatArray, Record
+from rsea_ros.signals import Channel, Fault, Record
 from rsea_ros.stamp_gaps import polls_unevenly
 
 _AS_SECONDS = "are the stamps in s, not in ms or µs? If so, "
@@ -20,24 +20,21 @@ _PER_CYCLE = 4.0
 """Samples to a cycle of the rig's natural frequency, at least."""
 _SLOW = 0.6
 """Of the command's rate: a slower sensor folds what is above its Nyquist frequency."""
-_FEWEST_VALUES = 32
-"""Fewer say nothing of how often they come."""
-_REPEATED, _REGULAR = 3.0, 1.6
-"""Samples that a value lasts, at least, and times as long that nine of ten last at most."""
-_MANY_STEPS = 4.0
-"""Times the smallest step: a sensor that goes on by one step or two is coarse, not slow."""
-_OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "clock_jump", "partly_recorded", "early_torque")
+_OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "clock_jump", "partly_recorded", "early_torque",
+           "held_samples", "mixed_rows")  # fmt: skip
 """Faults of a whole channel, whose share of its samples means nothing."""
 _MENDED = ("early_torque",)
 """Faults that leave no doubt in a result once they are mended."""
 _REMEDIES = {
     "missing_topic": "record it, or name its topic with --topic",
     "frozen_samples": "look at the sensor's driver: it repeats its last value",
+    "held_samples": "log it as it arrives; the repeats are left out",
     "dropped_samples": "record with a deeper queue, on a quieter machine",
     "coarse_stamps": "log stamps as fine as the samples",
     "partly_recorded": "start the recorder first and stop it last, or cut the run with --from and --to",
     "unnamed_file": "remove it, or give its own name to read it",
     "duplicate_stamps": "stamp at acquisition, not on arrival",
+    "mixed_rows": "keep the clocks from being set during a run; log the time of arrival beside the stamps",
     "clock_jump": "keep the clocks from being set during a run",
     "out_of_order": "sort by the stamps of the headers; nothing else to do",
     "early_torque": "stamp it when it was measured; nothing else to do",
@@ -107,33 +104,7 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float, sl
             detail="slower than the commands: what is faster folds",
             remedy="record it faster",
         )
-    repeats = 1 if name in ("command", "reference") else repeats_of(channel.y)
-    if repeats > 1:
-        return Finding(
-            "amber",
-            "rate",
-            name,
-            rate / repeats,
-            "Hz",
-            expected=f"{rate:.4g} Hz as the log",
-            detail=f"the log repeats every value {repeats} times",
-            remedy=f"`held: true` for {name} in the import map, or log it as it arrives",
-        )
     return Finding("green", "rate", name, rate, "Hz", detail=longest)
-
-
-def repeats_of(values: FloatArray) -> int:
-    """Return in how many samples in a row a value arrives, 1 where each is a reading of its own.
-
-    A coarse sensor repeats values too, but as long as the motion has it, and then goes on by a step or two.
-    """
-    new = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    if len(new) < _FEWEST_VALUES:
-        return 1
-    usual, long = np.quantile(np.diff(new), (0.5, 0.9))
-    steps = np.abs(np.diff(values[new]))
-    regular = usual >= _REPEATED and long < _REGULAR * usual
-    return int(usual) if regular and np.median(steps) > _MANY_STEPS * steps.min() else 1
 
 
 def natural_frequency(rig: Rig) -> float | None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import write_record
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
@@ -100,6 +101,9 @@ def run(args: argparse.Namespace) -> int:
         f"{args.out}: {args.duration:g} s at {settings.rate:g} Hz of {rig.name}"
         + "".join(f", {e.name}" for e in rig.effects)
     )
+    if args.high is not None and settings.top < args.high:
+        half = settings.rate / 2.0
+        say(f"excited up to {settings.top:g} Hz, not {args.high:g} Hz: half the rate is {half:g} Hz")
     return 0
 
 

@@ -145,6 +145,7 @@ def _piece(case: Case, drive: Drive, begin: float, end: float, run_up: float) ->
         initial=_state_at(case, start),
         origin=drive.origin + first * drive.step,
         whole=drive.drift_time,
+        restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last),
     )
     return replace(
         case,

@@ -116,7 +116,7 @@ def run_case(command: FloatArray, rate: float, noise: Mapping[str, float], *, is
     t = np.arange(len(command)) / rate
     blank = {n: Channel(t + 1.0 / rate, np.zeros(len(t))) for n in noise}
     drive = drive_from(Record({"command": Channel(t, command), **blank}))
-    drive = replace(drive, initial=(0.0, 0.0))
+    drive = replace(drive, initial=(0.0, 0.0), restarts=())
     zeros = {n: c.y for n, c in blank.items()}
     mask = {n: np.ones(len(t), bool) for n in noise}
     return Case(coarser(drive) if is_quick else drive, {n: c.t for n, c in blank.items()}, zeros, noise, mask)

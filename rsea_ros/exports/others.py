@@ -39,7 +39,8 @@ def _spin(rig: Rig) -> Iterator[Omitted]:
     if rig.train == "lumped" or rig.linear or not rotor_inertia(rig):
         return
     spin = f"{n * rotor_inertia(rig):.3g} {plain(rig.unit('rotor.reflected_inertia'))}"
-    yield Omitted("gear.train", f"{rig.train}, n = {n:g}: an armature does not turn; its spin n J_r is {spin}")
+    why = f"{rig.train}, n = {n:g}: an armature does not turn; its spin n J_r is {spin}"
+    yield Omitted("gear.train", why)
 
 
 def omitted_parts(rig: Rig, why: str) -> Iterator[Omitted]:

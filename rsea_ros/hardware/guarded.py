@@ -34,7 +34,7 @@ class GuardedDevice:
         self.enabled = False
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
-        self._taring = self.away = False
+        self._taring = self.away = self._inferred = False
         self._turn = threading.Lock()
         self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
 
@@ -50,6 +50,9 @@ class GuardedDevice:
         otherwise, DeviceError; nothing stays open then.
         """
         self.device.open()
+        self.state, self._inferred = None, False
+        for losses in self._losses.values():
+            losses.clear()
         if self.device.protection.kind == NONE and not unprotected:
             self.device.close()
             raise ParameterError(
@@ -66,7 +69,7 @@ class GuardedDevice:
     def measures_deflection(self) -> bool:
         """Return whether a reading has the spring's deflection; False also if the device does not answer."""
         try:
-            return math.isfinite(self.device.read().deflection)
+            return math.isfinite(self._patiently().deflection)
         except DeviceError:
             return False
 
@@ -121,8 +124,7 @@ class GuardedDevice:
         with self._turn:
             self.guard.torque = 0.0
             if not self.away:
-                self.device.disable()
-                self.device.protection.beat(False)
+                self._switch_off()
 
     def zero_ft(self) -> None:
         """Tare the F/T sensor, beside the cycles. Raises DeviceError while torque is commanded."""
@@ -145,20 +147,36 @@ class GuardedDevice:
         return True
 
     def reboot(self) -> None:
-        """Restart the actuator; the fault is forgotten, the torque is on as before, at zero."""
+        """Restart the actuator; the fault is forgotten, the torque is on as before, at zero.
+
+        Raises DeviceError, with a fault latched and the torque off, where a reading has a fault all the same.
+        """
         self.guard.torque = 0.0
         self._alone(self._reboot)
 
     def _reboot(self) -> None:
-        self.device.disable()
-        self.device.protection.beat(False)
+        self._switch_off()
         self.device.reboot()
+        self._check()
 
     def _recover(self) -> None:
+        if self.guard.torque != 0.0:  # of a ramp, which no cycle goes on with meanwhile
+            self.guard.torque = 0.0
+            with suppress(DeviceError):
+                self._switch_off()
         self.device.recover()
-        fault = complaint(self.guard.limits, self._read())
+        self._check()
+
+    def _check(self) -> None:
+        """Raise DeviceError where a reading has a fault, which is latched."""
+        fault = complaint(self.guard.limits, self._patiently())
         if fault is not None:
+            self.guard.trip(fault)
             raise DeviceError(f"{fault} is still there, expected it to be over")
+
+    def _switch_off(self) -> None:
+        self.device.disable()
+        self.device.protection.beat(False)
 
     @property
     def ft_source(self) -> str:
@@ -173,9 +191,17 @@ class GuardedDevice:
         if self._spring is None:
             return state
         state = self._spring.felt(state)
-        if self.state is not None and self.state.inferred and not state.inferred:
+        if self._inferred and not state.inferred:
             return replace(state, ft_trouble="the spring's deflection is not measured any more")
+        self._inferred = state.inferred
         return state
+
+    def _patiently(self) -> State:
+        """Return a reading, of which as many answers may be lost as are no fault."""
+        for _ in range(self.guard.limits.lost_cycles - 1):
+            with suppress(NoReply):
+                return self._read()
+        return self._read()
 
     def _alone(self, work: Callable[[], None]) -> None:
         """Use the device while the cycles leave it alone, then restart at zero torque."""
@@ -195,8 +221,7 @@ class GuardedDevice:
                 self.away = False
                 if not self.enabled:  # also where it was requested meanwhile
                     with suppress(DeviceError):
-                        self.device.disable()
-                        self.device.protection.beat(False)
+                        self._switch_off()
 
     def _failed(self, transfer: str, error: DeviceError) -> None:
         """Count a failure. One lost answer costs a cycle; many of them, and any other failure, trip."""

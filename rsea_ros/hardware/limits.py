@@ -12,6 +12,8 @@ from rsea_ros.hardware.device import State
 COMMAND_TIMEOUT = "command_timeout"
 HEARD_LATE = 3
 """Cycles until a torque that was written shows in the measured one."""
+UNFELT = 1.0
+"""s without a measured torque that are a fault where ft is limited: the longest ft_timeout of a sensor."""
 
 
 @dataclass(frozen=True)
@@ -106,14 +108,16 @@ class Guard:
         self.halted = False
         self._ramp = self._ramp_from = self._room = 0.0
         self._written: deque[float] = deque(maxlen=HEARD_LATE)
-        self._missed = 0
+        self._missed = self._unfelt = 0
 
     def trip(self, fault: DeviceFault) -> None:
-        """Latch a fault, unless there is one."""
+        """Latch a fault, unless there is one; any but late commands also ends the ramp of those."""
         if self.fault is None:
             self.fault = fault
             self._ramp_from = abs(self.torque)
             self._ramp = self._ramp_from * self._period / max(self.limits.ramp, self._period)
+        elif fault.cause != COMMAND_TIMEOUT:
+            self._ramp_from = 0.0
 
     def clear(self) -> None:
         """Clear the fault. The torque restarts softly from zero."""
@@ -122,9 +126,16 @@ class Guard:
 
     def look(self, state: State) -> None:
         """Latch the fault in a reading."""
-        fault = complaint(self.limits, state) or self._missing(state.motor_torque)
+        fault = complaint(self.limits, state) or self._without_ft(state) or self._missing(state.motor_torque)
         if fault is not None:
             self.trip(fault)
+
+    def _without_ft(self, state: State) -> DeviceFault | None:
+        """Return a fault while the limit of ft cannot be applied for too long, also once it was cleared."""
+        self._unfelt = self._unfelt + 1 if state.wrench is None else 0
+        if math.isinf(self.limits.ft) or self._unfelt * self._period <= UNFELT:
+            return None
+        return DeviceFault("ft", detail=f"no torque measured for {UNFELT:g} s, expected one for ft_limit")
 
     def allowed(self, wanted: float, age: float | None) -> float:
         """Return the torque to write now (N m). age: of the command, s; None without a command."""

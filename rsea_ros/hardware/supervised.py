@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import socket
@@ -20,7 +21,9 @@ SURE = 0.8
 BEATS = 20
 """A time-out; a beat each cycle would wake the supervisor a thousand times a second."""
 ANSWER = 1.0
-"""s that a service may take to answer."""
+"""s that a supervisor may take to answer, or to end."""
+PIPE = 4096
+"""Beats that may wait until a supervisor that stands still is lost: those of 20 s."""
 SCRIPT = Path(__file__).with_name("supervisor.py")
 
 
@@ -56,6 +59,8 @@ class _Child:
         )  # fmt: skip
         assert self._process.stdin is not None
         self._stdin = self._process.stdin
+        fcntl.fcntl(self._stdin, fcntl.F_SETPIPE_SZ, PIPE)
+        os.set_blocking(self._stdin.fileno(), False)  # one that stands still is lost, and holds up no cycle
 
     def send(self, beat: bytes) -> None:
         os.write(self._stdin.fileno(), beat)
@@ -65,7 +70,11 @@ class _Child:
 
     def close(self) -> None:
         self._stdin.close()
-        self._process.wait()
+        try:
+            self._process.wait(ANSWER)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
 
 
 class _Service:
@@ -117,14 +126,15 @@ class Supervisor:
 
     def __init__(self, descriptor: int, timeout: float, frames: Sequence[bytes], service: str = "") -> None:
         self._timeout, self._last, self._beat, self._armed = timeout, 0.0, 0.0, False
+        self._lost = False
         words = [frame.hex() for frame in frames]
         self._end: _End = (
             _Service(service, descriptor, timeout, words) if service else _Child(descriptor, timeout, words)
         )
 
     def alive(self) -> bool:
-        """Return whether it runs."""
-        return self._end.alive()
+        """Return whether it runs, and takes beats."""
+        return not self._lost and self._end.alive()
 
     def beat(self, armed: bool | None = None) -> None:
         """Report that this process runs, and whether torque is commanded (None: as before).
@@ -147,6 +157,7 @@ class Supervisor:
         try:
             self._end.send(b"a" if self._armed else b"d")
         except OSError as error:
+            self._lost = True
             raise SupervisorLost(f"supervisor process: {error.strerror}, expected it to run") from None
 
     def close(self, *, safe: bool = True) -> None:

@@ -18,10 +18,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.identification.confidence import BLOCK, sample_blocks
+from rsea_ros.identification.lag_line import lag_line
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.remark import Remark
-from rsea_ros.identification.solver import Map, Solution, clock_columns, serial
-from rsea_ros.identification.unknowns import Unknown, clock_rates, clocks
+from rsea_ros.identification.solver import Map, Solution, clock_columns, serial, solve
+from rsea_ros.identification.unknowns import Unknown, clock_rates, clocks, start_vector
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.signals import FloatArray, IntArray
 
@@ -56,7 +57,8 @@ def asked_of(solution: Solution, run: Map = serial) -> RequiredClocks:
     if is_inverse(problem.rig):
         return RequiredClocks()
     channels = sorted({n for case in problem.cases for n in problem.present(case)})
-    left = [*clocks(channels, problem.rig), *clock_rates(channels)]
+    free = {u.name for u in problem.unknowns}
+    left = [u for u in (*clocks(channels, problem.rig), *clock_rates(channels)) if u.name not in free]
     columns, blocks = clock_columns(problem, solution.theta, left, run), sample_blocks(problem, BLOCK)
     taken: list[int] = []
     for _ in left:
@@ -71,6 +73,41 @@ def asked_of(solution: Solution, run: Map = serial) -> RequiredClocks:
     return RequiredClocks(
         tuple(left[i] for i in taken), _cost(solution, columns[:, others], [left[i] for i in others])
     )
+
+
+def with_drifts(solution: Solution, run: Map = serial) -> Solution:
+    """Return the fit with the rates of clocks free whose lags drift along lines, if they explain its misfit.
+
+    A score is linear: it does not see a clock whose drift turns the phases by a radian. The lags are those
+    behind the fit, and behind the rig as stated, which no drift has led astray. Offsets are left to the test.
+    """
+    problem = solution.problem
+    if is_inverse(problem.rig) or _rms(solution) <= MISFIT:
+        return solution
+    for theta in (solution.theta, start_vector(problem.unknowns)):
+        rates = _drifts(problem, theta)
+        asked = clock_rates(sorted(rates))
+        begin = np.concatenate([theta, [rates[u.name.split(".")[1]] for u in asked]])
+        free = replace(problem, unknowns=(*problem.unknowns, *asked))
+        if asked and _rms(drifting := solve(free, begin, run=run)) <= MISFIT:
+            return drifting
+    return solution
+
+
+def _drifts(problem: Problem, theta: FloatArray) -> dict[str, float]:
+    """Return the clock's rate of each channel whose lag drifts along a line, ppm, later being positive."""
+    rates: dict[str, list[float]] = {}
+    for case, out in zip(problem.cases, problem.outputs(theta), strict=True):
+        for n in set(problem.present(case)) - {"motor_torque"}:
+            keep = case.mask[n]
+            line = lag_line(case.t[n][keep], case.measured[n][keep], out[n][keep], case.start)
+            if line is not None and line.is_clear:
+                rates.setdefault(n, []).append(-1e6 * line.rate)
+    return {n: float(np.median(values)) for n, values in rates.items()}
+
+
+def _rms(solution: Solution) -> float:
+    return float(np.sqrt(np.mean(solution.residual**2)))
 
 
 def freed(solution: Solution, asked: RequiredClocks) -> tuple[Problem, FloatArray]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.scale import Scale
-from rsea_ros.identification.clocks import RequiredClocks, asked_of, freed, without_needless
+from rsea_ros.identification.clocks import RequiredClocks, asked_of, freed, with_drifts, without_needless
 from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
@@ -53,6 +53,11 @@ def fit(
         solution = solve(replace(problem, cases=known), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
         known = _with_noise_of(solution.problem, outputs)
+    drifting = with_drifts(solution, run)
+    if drifting is not solution:
+        solution, problem = drifting, drifting.problem
+        outputs = problem.outputs(solution.theta)
+        known = _with_noise_of(problem, outputs)
     asked = asked_of(solution, run)
     if asked.clocks:
         solution = solve(*freed(solution, asked), run=run)

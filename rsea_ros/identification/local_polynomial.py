@@ -14,9 +14,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.fft import rfft
 
-from rsea_ros.identification.resample import Aligned
+from rsea_ros.identification.resample import Aligned, AtRestError
 from rsea_ros.identification.response_lines import Lines, detrended, widened
-from rsea_ros.signals import BoolArray, ComplexArray, FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 _UNKNOWNS = 6
 _TINY = 1e-300
@@ -28,8 +28,11 @@ _RELATIVE_BAND = 0.03
 
 
 def local_polynomial(aligned: Aligned) -> Lines:
-    """Return the response of the longest stretch without a gap, at lines a quarter band apart."""
-    stretch = _longest(aligned.measured)
+    """Return the response of the longest stretch without a gap, at lines a quarter band apart.
+
+    Raises AtRestError where the command changes in none.
+    """
+    stretch = _longest(aligned)
     n = stretch.stop - stretch.start
     u, y = (rfft(detrended(x[stretch])) / np.sqrt(n) for x in (aligned.command, aligned.output))
     bands = _bands(len(u))
@@ -46,11 +49,14 @@ def local_polynomial(aligned: Aligned) -> Lines:
     )
 
 
-def _longest(measured: BoolArray) -> slice:
-    """Return the longest stretch that is true throughout."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], measured.astype(np.int8), [0]])))
-    longest = int(np.argmax(edges[1::2] - edges[::2]))
-    return slice(int(edges[2 * longest]), int(edges[2 * longest + 1]))
+def _longest(aligned: Aligned) -> slice:
+    """Return the longest stretch that was measured throughout and in which the command changes."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], aligned.measured.astype(np.int8), [0]])))
+    stretches = [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+    excited = [s for s in stretches if np.ptp(aligned.command[s]) > 0.0]
+    if not excited:
+        raise AtRestError(f"{aligned.name}: the command never changes where all is measured")
+    return max(excited, key=lambda s: s.stop - s.start)
 
 
 def _bands(lines: int) -> list[tuple[int, int]]:

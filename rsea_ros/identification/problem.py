@@ -14,8 +14,10 @@ from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
+from rsea_ros.model.measured_motion import zero_unknown
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.prediction_errors import SKIPPED_START
+from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
@@ -71,17 +73,18 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     channels = channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
     record = replace(record, channels={n: record[n] for n in (*beside, *channels)})
-    floating = frozenset(n for n in channels if rig.zero_unknown(n))
+    floating = frozenset(n for n in channels if zero_unknown(record, rig, n))
     sensors = {n: rig.sensors.get(n, Sensor()) for n in channels}
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
     start = float(record["command"].t[0]) + SKIPPED_START
+    known = {n: outside_gaps(record, record[n].t, SKIPPED_START) for n in channels}
     return Case(
         drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
         noise=MappingProxyType({n: noise_floor(record, n, sensors[n]) for n in channels}),
         mask=MappingProxyType(
-            {n: good[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
+            {n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
         ),
         source=record.source,
         floating=floating,

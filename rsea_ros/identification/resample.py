@@ -21,6 +21,10 @@ _DEGREE = 7
 _DRAWN = 15
 
 
+class AtRestError(IdentificationError):
+    """A record in which nothing is commanded while a channel is measured has no response to show."""
+
+
 @dataclass(frozen=True)
 class Aligned:
     """Command and one channel on the command's clock, both shape (n,).

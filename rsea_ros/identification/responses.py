@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 
 import numpy as np
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.identification.frequency_response import estimate_response
+from rsea_ros.identification.resample import AtRestError
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.equations import Mechanics
 from rsea_ros.model.position_loop import closed
@@ -21,8 +23,11 @@ def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
     outputs = [n for n in ("ft", "position", "deflection") if n in record and rig.measures(n)]
     if record["command"].is_still:
         return ()
-    outputs = [n for n in outputs if not record[n].is_still]
-    return tuple(estimate_response(record, n) for n in outputs)
+    responses = []
+    for name in (n for n in outputs if not record[n].is_still):
+        with suppress(AtRestError):
+            responses.append(estimate_response(record, name))
+    return tuple(responses)
 
 
 def model_response(rig: Rig, output: str, frequency: FloatArray) -> ComplexArray:

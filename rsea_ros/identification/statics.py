@@ -41,7 +41,8 @@ class Statics:
 
 
 def statics_of(record: Record, rig: Rig) -> Statics | None:
-    """Return the statics of a record of slow ramps on a rig with both ends clamped, None for any other."""
+    """Return the statics of a record of slow ramps on a rig with both ends clamped, None for any other,
+    and where the angle does not grow with the load."""
     held = rig.clamped.issuperset(END_NAMES) and not rig.rigid_spring
     if not held or "position" not in record or _rms_frequency(record) > SLOW:
         return None
@@ -54,10 +55,13 @@ def statics_of(record: Record, rig: Rig) -> Statics | None:
     torque = np.interp(t, acting.t, acting.y)
     forward, backward = command >= AT_END * end, command <= -AT_END * end
     reached = float(np.median(np.abs(torque[forward | backward])))
+    stiffness = _stiffness(command, torque, angle)
+    if not np.isfinite(stiffness) or not (forward.any() and backward.any()):
+        return None
     return Statics(
         torque=end,
         travel=float(np.median(angle[forward]) - np.median(angle[backward])),
-        stiffness=_stiffness(command, torque, angle),
+        stiffness=stiffness,
         lost_motion=_lost_motion(command, angle, end),
         limit=reached if reached < SATURATED * end else None,
     )

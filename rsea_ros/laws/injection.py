@@ -84,7 +84,7 @@ class Injector:
     def quiet(self) -> Injector:
         """Return the same rig at rest, without commands and without effects: its linear part."""
         drive, rig = self.drive, self.rig
-        still = replace(drive, command=np.zeros(len(drive.command)), initial=(0.0, 0.0))
+        still = replace(drive, command=np.zeros(len(drive.command)), initial=(0.0, 0.0), restarts=())
         return Injector(rig.with_effects(), still, self.sampled)
 
     def _run(self, torque: FloatArray | None, place: Place) -> FloatArray:

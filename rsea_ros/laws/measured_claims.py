@@ -48,7 +48,8 @@ def _beginning(drive: Drive) -> Drive:
     steps = min(len(drive.command), int(_LONGEST / drive.step))
     kept = {n: at[at <= steps] for n, at in drive.at.items()}
     impulse = {n: drive.impulse[n][: len(at)] for n, at in kept.items()}
-    return replace(drive, command=drive.command[:steps], at=kept, impulse=impulse, initial=(0.0, 0.0))
+    still = replace(drive, initial=(0.0, 0.0), restarts=())
+    return replace(still, command=drive.command[:steps], at=kept, impulse=impulse)
 
 
 def _change(law: Law, effect: Effect, rig: Rig, drive: Drive, factor: float) -> Mapping[str, FloatArray]:

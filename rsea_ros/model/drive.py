@@ -15,6 +15,7 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import check_extent
 from rsea_ros.model.held_command import beside_mean, in_steps, mean_of_curve, mean_of_held, mean_of_line
 from rsea_ros.model.measured_motion import angle_at, first_state, initial_state
+from rsea_ros.model.restarts import Restart, restarts
 from rsea_ros.model.rig import Hold
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import Channel, FloatArray, Record
@@ -45,6 +46,7 @@ class Drive:
     initial: position (rad) and velocity (rad/s) at the start. hold: steps in a command period.
     origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
     `duration` when the drive is a piece of one. jumps: the command is held, not a line between its stamps.
+    restarts: where it begins anew, behind gaps of the whole record.
     """
 
     step: float
@@ -59,6 +61,7 @@ class Drive:
     origin: float = 0.0
     whole: float = math.nan
     jumps: bool = True
+    restarts: tuple[Restart, ...] = ()
 
     @cached_property
     def kinks(self) -> FloatArray:
@@ -143,6 +146,7 @@ def drive_from(
         initial=(0.0, 0.0) if from_rest else first_state(record) if targeted else initial_state(record),
         hold=steps,
         jumps=jumps,
+        restarts=restarts(record, start, step, from_rest=from_rest),
     )
 
 
@@ -177,6 +181,7 @@ def coarser(drive: Drive) -> Drive:
         reference=drive.reference[:steps:2],
         angle=drive.angle[1:steps:2],
         hold=drive.hold // 2,
+        restarts=tuple((k // 2, state) for k, state in drive.restarts),
     )
 
 

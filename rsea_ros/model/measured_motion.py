@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record
 
 AT_REST = 0.5
@@ -11,6 +12,12 @@ AT_REST = 0.5
 
 LATE = 1.6
 """Sample periods: a first sample later than this after the first command is of a channel that starts late."""
+
+
+def zero_unknown(record: Record, rig: Rig, channel: str) -> bool:
+    """Return whether only the changes of a channel count: by the rig, or for a position that is far off."""
+    off = any((f.kind, f.channel) == ("offset", "position") for f in record.faults)
+    return rig.zero_unknown(channel) or (channel == "position" and off)
 
 
 def first_state(record: Record) -> tuple[float, float]:
@@ -32,6 +39,28 @@ def initial_state(record: Record) -> tuple[float, float]:
     late = float(t[0] - record["command"].t[0])
     passed = late if "position" in record and 0.0 < late < LATE * float(t[1] - t[0]) else 0.0
     return float(position[0] - passed * velocity[0]), float(velocity[0])
+
+
+def state_at(record: Record, first: float, at: float) -> tuple[float, float]:
+    """Return position and velocity at a time (s), from the first samples at or behind `first` (s).
+
+    Zero where there is none; a velocity that is not measured is the slope of the position.
+    """
+    position, velocity = (_from(record, n, first) for n in ("position", "velocity"))
+    if velocity is not None:
+        v = float(velocity[1][0])
+    else:
+        v = float(np.diff(position[1][:2])[0] / np.diff(position[0][:2])[0]) if position is not None else 0.0
+    return (0.0 if position is None else float(position[1][0] + v * (at - position[0][0]))), v
+
+
+def _from(record: Record, name: str, first: float) -> tuple[FloatArray, FloatArray] | None:
+    """Return stamps and finite values of a channel from a time (s) on, None where fewer than two are left."""
+    if name not in record:
+        return None
+    t, y = record[name].t, record[name].y
+    keep = (t >= first) & np.isfinite(y)
+    return (t[keep], y[keep]) if np.count_nonzero(keep) > 1 else None
 
 
 def angle_at(record: Record, ends: FloatArray) -> FloatArray:

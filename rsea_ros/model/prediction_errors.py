@@ -14,7 +14,9 @@ from rsea_ros.model.extent import bounded, check_command
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.record_phase import in_phase
+from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
@@ -56,13 +58,15 @@ def fit_percent(error: FloatArray, measured: FloatArray) -> float:
     return 100.0 * (1.0 - float(np.linalg.norm(error)) / scale) if scale > 0.0 else 0.0
 
 
-def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
+def predict(rig: Rig | str, record: Record) -> Mapping[str, Comparison]:
     """Simulate a rig on the commands of a record and compare it with every measured channel.
 
-    Returns a Comparison for each channel by name. For a rig without a spring it compares the torque of the
-    measured motion (see inverse.py); for a sensor with an unknown zero it compares changes.
+    rig: a Rig, a file, or the name of a rig in config/rigs. Returns a Comparison for each channel by name.
+    For a rig without a spring it compares the torque of the measured motion (see inverse.py); for a sensor
+    with an unknown zero it compares changes. Behind a gap of the whole record it begins anew.
     Raises IdentificationError for a record with nothing to compare. Nothing is fitted.
     """
+    rig = load_rig(rig)
     record = bounded(commanded(record, rig))
     check_command(record)
     record = replace(record, channels={n: c for n, c in record.channels.items() if len(c)})
@@ -72,6 +76,8 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
         return {"motor_torque": _comparison(motion.t, motion.torque, torque, edges=True)}
     rig = in_phase(rig, record)
     compared = {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
+    known = {n: outside_gaps(record, c.t, SKIPPED_START) for n, c in compared.items()}
+    compared = {n: replace(c, counts=c.counts & known[n]) for n, c in compared.items()}
     if not compared:
         raise IdentificationError(f"{record.source}: nothing that {rig.name} measures{_why(record)}")
     return {n: _on_measured_zero(c) if rig.zero_unknown(n) else c for n, c in compared.items()}

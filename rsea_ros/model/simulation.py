@@ -20,6 +20,7 @@ from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.firmware_loop import STATES, control
+from rsea_ros.model.measured_motion import zero_unknown
 from rsea_ros.model.position_loop import commanded, loop_parameters
 from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import Rig
@@ -71,7 +72,7 @@ def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
         commanded(record, rig),
         refine=refine,
         closed_loop=rig.loop is None and rig.controller is not None and "reference" in record,
-        from_rest="position" in record and rig.zero_unknown("position"),
+        from_rest="position" in record and zero_unknown(record, rig, "position"),
         targeted=rig.loop is not None,
         hold=rig.hold,
     )
@@ -96,15 +97,20 @@ def simulate_drives(rig: Rig, drives: Sequence[Drive], *, ride: bool = False) ->
 
 def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, FloatArray]:
     """Return the channels of a drive at their sampling instants, from its own beginning."""
-    machine.begin(drive.initial)
     ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
     out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
-    out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
     torque, reference = drive.command, drive.reference
     if rig.loop is not None:
         torque, reference = np.zeros(len(drive.command)), drive.command
-    run(machine, torque, out[1:], start=drive.origin, reference=reference, ridden=ridden)
-    out[0, 2] = out[1, 2]
+    begins = [(0, drive.initial), *(r for r in drive.restarts if 0 < r[0] < len(torque))]
+    ends = [*(k for k, _ in begins[1:]), len(torque)]
+    for (k, state), end in zip(begins, ends, strict=True):
+        machine.begin(state)
+        out[k] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
+        span = slice(k, end)
+        run(machine, torque[span], out[k + 1 : end + 1], start=drive.origin + k * drive.step,
+            reference=reference[span], ridden=ridden[span])  # fmt: skip
+        out[k, 2] = out[k + 1, 2]
     channels = [n for n in drive.at if rig.measures(n)]
     at = {n: _instants(rig, drive, n) for n in channels}
     sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.kinks) for n in channels}

@@ -69,12 +69,14 @@ class DriverCycle:
             self.guarded.guard.trip(DeviceFault(STOPPED, detail="the service stop was called"))
 
     def _see_to_the_clock(self, by: int) -> None:
-        """Move the commands with a system clock that was set.
+        """Drop the commands from before the system clock was set: nobody knows which are of now.
 
-        Where that was under torque nobody knows which commands are of now: it is a fault.
+        Where it was set under torque it is a fault.
         """
         if by:
             self._source.commands.shift(by)
+            self._source.poll(self.anchor)
+            self._source.commands.clear(self.anchor.now())
             if self.guarded.guard.torque != 0.0:
                 detail = f"the system clock was set by {by / SECOND:+.3f} s"
                 self.guarded.guard.trip(DeviceFault(CLOCK_STEP, detail=detail))

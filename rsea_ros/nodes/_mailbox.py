@@ -55,7 +55,7 @@ class Mailbox:
     ) -> None:  # fmt: skip
         """refuse: called for each message that cannot be read.
 
-        admit: decides by a publisher's identity whether its messages count; None: all.
+        admit: decides by a publisher's identity whether a message counts that can be read; None: all do.
         keep: gets arrival (ns), bytes of what is read.
         """
         self._node, self._topic, self._refuse, self._admit = node, topic, refuse, admit
@@ -78,14 +78,14 @@ class Mailbox:
                 message = handle.take_message(self._kind, True)
                 if message is None:
                     return
-                if self._admit is not None and not self._admit(message[1]["publisher_gid"]["data"]):
-                    continue
                 try:
                     stamp, numbers = self._reader.read(message[0])
                 except ParameterError as error:
                     self._refuse()
                     self._node.get_logger().error(f"{self._topic}: {error}", throttle_duration_sec=1.0)
-                else:
-                    if self._keep is not None:
-                        self._keep(message[1]["received_timestamp"], message[0])
-                    yield stamp, numbers, message[1]["received_timestamp"]
+                    continue
+                if self._admit is not None and not self._admit(message[1]["publisher_gid"]["data"]):
+                    continue
+                if self._keep is not None:
+                    self._keep(message[1]["received_timestamp"], message[0])
+                yield stamp, numbers, message[1]["received_timestamp"]

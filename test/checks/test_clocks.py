@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_run
 
+from rsea_ros.checks.carried import with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.linearised_rig import Number
@@ -70,3 +71,17 @@ def test_a_clock_that_the_data_leave_wide_open_gets_no_number(sd, shown):
     assert (offset.value is not None) == shown
     assert (drift.value is not None) == shown
     assert shown or all("not determined" in f.detail for f in (offset, drift))
+
+
+@pytest.mark.parametrize("ppm", [200.0, -450.0])
+def test_a_drift_that_turns_the_phases_is_a_fault_with_its_size(ppm):
+    """Two radians at 60 Hz by the end: no linear fit settles, and the clock was `not determined` in green."""
+    record = record_run(drawn_bench(np.random.default_rng(2)), 2, duration=30.0)
+    record = late(record, 0.0, 1e-6 * ppm, "ft")
+    findings = check_record(record, RIG)
+    drift = clock(findings, "clock_drift", "ft")
+    assert drift.value == pytest.approx(ppm, abs=2.0) and drift.light == "amber"
+    assert clock(findings, "clock_drift", "position").value == pytest.approx(0.0, abs=2.0)
+    even = with_faults(record, findings, masks=True)
+    assert np.ptp(even["ft"].t - (record["ft"].t / (1.0 + 1e-6 * ppm))) < 1e-4
+    assert [f.detail.split(",")[0] for f in even.faults if f.kind == "clock_drift"] == ["taken out"]

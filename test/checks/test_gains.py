@@ -112,6 +112,15 @@ def test_a_moving_average_is_named_with_its_length(samples):
     assert "smoothing" in {f.kind for f in findings.faults}
 
 
+@pytest.mark.parametrize("samples", [3, 5])
+def test_a_centred_average_has_no_lag_and_is_named_too(samples):
+    """Smoothed after the run: 63 times the noise in a diagnosis, and no word of it."""
+    y = np.convolve(good()["ft"].y, np.ones(samples) / samples, "same")
+    (smoothed,) = check_record(good().with_channels(ft=Channel(good()["ft"].t, y)), RIG).of("smoothing")
+    assert smoothed.value == pytest.approx(1e3 * samples / 280.0, rel=1e-3)
+    assert f"centred moving average of {samples} samples" in smoothed.detail
+
+
 @pytest.mark.parametrize(
     ("effect", "parameters"),
     [("ft_sensor_lag", {"time_constant": 5e-3}), ("command_delay", {"delay": 8e-3}), (None, {})],

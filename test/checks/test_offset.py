@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import rsea_ros as rsea
 from rsea_ros.checks.check import check_record
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
@@ -39,3 +40,12 @@ def test_an_angle_whose_zero_is_elsewhere_is_told_from_a_wrong_rig(zero, said):
     unknown = replace(RIG.sensors["position"], zero_unknown=True)
     knowing = replace(RIG, sensors={**RIG.sensors, "position": unknown})
     assert check_record(moved, knowing).of("offset") == ()
+
+
+@pytest.mark.parametrize("zero", [100.0, -0.5])
+def test_a_fit_compares_the_changes_of_an_angle_whose_zero_is_elsewhere(zero):
+    """15976725 times the noise, beside a line that said what is wrong."""
+    moved = RUN.with_channels(position=Channel(RUN["position"].t, RUN["position"].y + zero))
+    fit = rsea.identify(moved, RIG)
+    assert max(fit.result.times_noise.values()) < 1.2
+    assert fit.rig["spring.stiffness"] == pytest.approx(1530.456, abs=2.0)

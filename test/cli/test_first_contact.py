@@ -147,3 +147,10 @@ def test_a_long_kind_of_finding_is_apart_from_its_channel(kind):
     """`dropped samplesposition`."""
     found = Findings("run", "bench", (Finding("amber", kind, "position", 1.0, "1"),))
     assert f"{kind.replace('_', ' ')} position" in check_lines(found)[0].plain
+
+
+def test_what_a_check_says_of_a_file_with_a_long_name_keeps_its_column():
+    """Its name of 70 characters left a column of 20 for the rest."""
+    finding = Finding("amber", "coarse_stamps", "a_run_of_" * 8, detail="26592 of 31744 stamps repeat " * 4)
+    (lines,) = check_lines(Findings("run", "rig", (finding,)))
+    assert len(str(lines).splitlines()) <= 4

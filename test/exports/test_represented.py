@@ -146,7 +146,7 @@ TURNS = {"harmonic_circular_spline_held": -160, "harmonic_flexspline_held": 161,
 @pytest.mark.parametrize("export", [export_isaac, export_bam])
 @pytest.mark.parametrize("train", TURNS)
 def test_one_joint_has_the_rotor_at_the_output_and_says_that_its_spin_is_left_out(export, train):
-    """A rotor of J_r that makes n turns for one weighs n^2 J_r at the joint; n J_r couples it to the housing."""
+    """A rotor of J_r and n turns weighs n^2 J_r at the joint; its spin n J_r couples it to the housing."""
     rig, n = replace(load_rig("prototype_knee"), train=train), TURNS[train]
     made = export(rig)
     (armature,) = re.findall(r"armature\W+([0-9.e-]+)", made.content.split("ACTUATOR")[-1])

@@ -83,13 +83,25 @@ def test_any_other_fault_makes_the_torque_zero_at_once():
     assert it.fault.cause == "ft"
 
 
-def test_the_first_fault_stays_and_so_does_its_ramp():
+@pytest.mark.parametrize("late", [None, 0.0, 99.0])
+@pytest.mark.parametrize("cause", ["ft", "stopped", "temperature"])
+def test_the_first_fault_stays_and_any_other_ends_its_ramp(cause, late):
+    """A ramp may last 10 s: the service stop and a deflection beyond its limit did not end it."""
     it = guard(ramp=4 * PERIOD)
     it.allowed(8.0, 0.0)
     it.trip(DeviceFault("command_timeout"))
     it.allowed(8.0, 0.0)
-    it.trip(DeviceFault("ft"))
+    it.trip(DeviceFault(cause))
     assert it.fault.cause == "command_timeout"
+    assert torques(it, (8.0, late), (8.0, late)) == [0.0, 0.0]
+
+
+def test_a_second_silence_leaves_the_ramp_as_it_is():
+    it = guard(ramp=4 * PERIOD)
+    it.allowed(8.0, 0.0)
+    it.trip(DeviceFault("command_timeout"))
+    it.allowed(8.0, 0.0)
+    it.trip(DeviceFault("command_timeout"))
     assert torques(it, (8.0, 0.0), (8.0, 0.0)) == [4.0, 2.0]
 
 

@@ -7,7 +7,6 @@ import math
 import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
-from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import DeviceFault, Limits
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE
@@ -76,7 +75,11 @@ def test_a_cycle_writes_then_reads_and_beats_before_each(joint, device):
 def test_a_deflection_is_measured_where_a_reading_has_one(joint, device, value):
     device.reading = {"deflection": value}
     assert joint.measures_deflection() is math.isfinite(value)
-    device.broken = {"read": [NoReply("no reply")]}
+    device.broken = {"read": [LOST]}
+    assert joint.measures_deflection() is math.isfinite(value), "one lost reply took the topic away"
+    device.broken = {"read": [LOST] * 3}
+    assert joint.measures_deflection() is False
+    device.broken = {"read": [DeviceError("not open")]}
     assert joint.measures_deflection() is False
 
 

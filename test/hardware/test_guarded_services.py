@@ -96,10 +96,23 @@ def test_without_a_fault_there_is_nothing_to_clear(joint, device):
 def test_a_fault_is_cleared_by_a_reading_without_it(joint, device):
     joint.write(9.0, 0.0)
     joint.guard.trip(DeviceFault("ft"))
+    joint.write(9.0, 0.0)
     device.log.clear()
     assert joint.clear() is True
     assert device.log == ["recover", "read", "enable"]
     assert joint.fault is None and joint.write(9.0, 0.0) == 4.0 and not joint.away
+
+
+@pytest.mark.parametrize("refusal", [None, NoReply("no reply")])
+def test_a_torque_that_is_being_ramped_down_ends_before_a_fault_is_cleared(joint, device, refusal):
+    """No cycle ran while the sensor was waited for: the motor held what the ramp had left for seconds."""
+    joint.write(9.0, 0.0)
+    joint.guard.trip(DeviceFault("command_timeout"))
+    device.log.clear()
+    device.broken = {"disable": [refusal]}
+    assert joint.clear() is True
+    assert [each for each in device.log if "beat" not in each] == ["disable", "recover", "read", "enable"]
+    assert "beat False" in device.log or refusal
 
 
 def test_a_fault_is_not_cleared_while_a_reading_has_it(joint, device):
@@ -132,7 +145,7 @@ def test_a_reboot_ends_the_torque_first_and_restores_it_afterwards(joint, device
     device.during = {"disable": lambda: seen.append((joint.guard.torque, joint.away))}
     joint.guard.trip(DeviceFault("ft"))
     joint.reboot()
-    assert device.log == ["disable", "beat False", "reboot", "enable"]
+    assert device.log == ["disable", "beat False", "reboot", "read", "enable"]
     assert seen == [(0.0, True)]
     assert joint.fault is None and joint.enabled and not joint.away
     assert joint.write(9.0, 0.0) == 4.0
@@ -145,7 +158,7 @@ def test_a_disabled_device_stays_disabled_over_a_reboot(joint, device, refusal):
     device.broken = {"disable": [None, refusal]}
     joint.reboot()
     end = ["disable", "beat False"] if refusal is None else ["disable"]
-    assert device.log == ["disable", "beat False", "reboot", *end]
+    assert device.log == ["disable", "beat False", "reboot", "read", *end]
     assert not joint.away and not joint.enabled
 
 
@@ -160,5 +173,29 @@ def test_a_failed_reboot_lets_go_of_the_device(joint, device):
 def test_a_device_disabled_during_a_reboot_stays_without_torque(joint, device):
     device.during = {"reboot": joint.disable}
     joint.reboot()
-    assert device.log == ["disable", "beat False", "reboot", "disable", "beat False"]
+    assert device.log == ["disable", "beat False", "reboot", "read", "disable", "beat False"]
     assert not joint.enabled and not joint.away
+
+
+@pytest.mark.parametrize("latched", [True, False])
+def test_a_reboot_after_which_a_reading_has_a_fault_leaves_it(joint, device, latched):
+    """It was forgotten, also at 90 °C, and the next command made a torque."""
+    if latched:
+        joint.guard.trip(DeviceFault("temperature"))
+    device.reading = {"temperature": 90.0}
+    with pytest.raises(DeviceError, match="temperature: 90 °C, limit 70 °C is still there"):
+        joint.reboot()
+    assert joint.fault.cause == "temperature" and "enable" not in device.log
+    assert joint.write(9.0, 0.0) == 0.0 and not joint.away
+    device.reading = {}
+    assert joint.clear() is True and joint.write(9.0, 0.0) == 4.0
+
+
+def test_lost_answers_of_an_earlier_life_are_forgotten(joint, device):
+    device.broken = {"read": [LOST] * 2}
+    for _ in range(2):
+        joint.cycle(1.0, 0.0)
+    joint.open()
+    device.broken = {"read": [LOST]}
+    joint.cycle(1.0, 0.0)
+    assert joint.fault is None

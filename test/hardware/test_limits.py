@@ -14,6 +14,7 @@ from rsea_ros.hardware.protection import NONE, Protection
 
 PERIOD = 0.01
 ROOT = Path(__file__).resolve().parents[2]
+FELT, UNFELT = State(0, 0.0, 0.0, 0.0, wrench=(0.0,) * 6), State(0, 0.0, 0.0, 0.0)
 
 
 def guard(**limits):
@@ -180,6 +181,33 @@ def test_limits_hold_for_every_rig(limits, reading, told):
     seen = guard(**limits)
     seen.look(State(0, **({"position": 0.0, "velocity": 0.0, "motor_torque": 0.0} | reading)))
     assert str(seen.fault) == told
+
+
+@pytest.mark.parametrize(("readings", "fault"), [
+    ([FELT] * 50, None),
+    ([FELT, *[UNFELT] * 99] * 3, None),  # a sensor that is slower than the cycle
+    ([FELT, *[UNFELT] * 101], "ft: no torque measured for 1 s, expected one for ft_limit"),
+    ([UNFELT] * 101, "ft: no torque measured for 1 s, expected one for ft_limit"),
+])  # fmt: skip
+def test_an_ft_limit_needs_a_torque_that_is_measured(readings, fault):
+    """A device whose wrench ceased went on without the limit, and nobody was told."""
+    it = Guard(Limits(68.0, ft=60.0), 0.01)
+    for reading in readings:
+        it.look(reading)
+    assert (it.fault and str(it.fault)) == fault
+    it.clear()
+    it.look(readings[-1])
+    assert (it.fault and str(it.fault)) == fault, "clear_fault changes nothing of it"
+    it.clear()
+    it.look(FELT)
+    assert it.fault is None
+
+
+def test_without_an_ft_limit_no_torque_need_be_measured():
+    it = Guard(Limits(68.0), 0.01)
+    for _ in range(150):
+        it.look(UNFELT)
+    assert it.fault is None
 
 
 def test_the_ramp_after_the_last_command_takes_its_time_not_cycles():

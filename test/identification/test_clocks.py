@@ -11,8 +11,9 @@ from benches import bench, recorded
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_document import rig_from_document
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_to_document import rig_to_document
-from rsea_ros.model.simulation import simulate
+from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import Channel, Record
 
@@ -70,3 +71,21 @@ def test_a_clock_rate_is_part_of_the_rig():
     moved = simulate(true, with_clock(record, "ft", 0.0, -200.0))["ft"]
     assert np.abs(late - moved)[:-1].max() < 1e-6
     assert np.abs(late - simulate(true, record)["ft"]).max() > 0.02
+
+
+@pytest.mark.parametrize(("channels", "ppm"), [(("ft",), 200.0), (("position", "velocity"), -450.0)])
+def test_a_drift_that_turns_the_phases_is_fitted(channels, ppm):
+    """6 ms by the end of a chirp left 6 times the noise and the damping 28.4 for 25.4 N m s/rad."""
+    nominal = load_rig("paper_high_impedance")
+    true = nominal.with_values({"rotor.reflected_damping": 25.4, "spring.stiffness": 1480.0})
+    t = np.arange(0.0, 30.0, 1.0 / 280.0)
+    u = 8.0 * np.sin(2.0 * np.pi * 6.0 / np.log(300.0) * (300.0 ** (t / 30.0) - 1.0))  # 0.2 to 60 Hz
+    record = synthesize(true, Channel(t, u), seed=1)
+    for n in channels:
+        record = with_clock(record, n, 0.0, ppm)
+    result = identify([record], nominal)
+    assert max(result.times_noise.values()) < 1.1
+    for n in channels:
+        assert clocks(result)[f"clock_rate.{n}"].value == pytest.approx(ppm, abs=2.0)
+    damping = next(p for p in result.parameters if p.name == "rotor.reflected_damping")
+    assert damping.value == pytest.approx(25.4, abs=0.1)

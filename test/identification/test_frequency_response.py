@@ -8,6 +8,8 @@ import pytest
 from rsea_ros.errors import ChannelError, IdentificationError
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
+from rsea_ros.identification.resample import AtRestError
+from rsea_ros.identification.responses import responses_of
 from rsea_ros.identification.result import ComplexArray, FrequencyResponse
 from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
@@ -145,3 +147,14 @@ def test_a_missing_channel_and_a_short_record_are_named() -> None:
         estimate_response(record, "ft")
     with pytest.raises(IdentificationError, match="usable samples, expected at least 32"):
         estimate_response(record.between(0.0, 0.05), "position")
+
+
+def test_a_stretch_at_rest_shows_no_response() -> None:
+    """A frozen encoder left only a stretch without a command: 0 over 0, and no eigenvalue converged."""
+    t = np.arange(1200) / 280.0
+    pulse = np.where(t > 3.0, 20.0 * np.sin(50.0 * t), 0.0)
+    sensor = Channel(t, np.where(t > 2.5, np.nan, 0.01 * np.sin(t)))
+    record = Record({"command": Channel(t, pulse), "position": sensor})
+    with pytest.raises(AtRestError, match="position: the command never changes where all is measured"):
+        estimate_response(record, "position")
+    assert responses_of(record, load_rig("paper_high_impedance")) == ()

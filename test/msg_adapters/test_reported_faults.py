@@ -86,5 +86,5 @@ def test_the_keys_are_those_that_the_nodes_publish():
     root = Path(__file__).resolve().parents[2] / "rsea_ros"
     sources = [path.read_text() for folder in ("nodes", "hardware") for path in (root / folder).glob("*.py")]
     for key in COUNTERS:
-        stem = "failed_{what}s" if key.startswith("failed_") else key
+        stem = "failed_{transfer}s" if key.startswith("failed_") else key
         assert any(f'"{stem}"' in source for source in sources), key

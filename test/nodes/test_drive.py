@@ -51,6 +51,51 @@ def test_a_clock_step_without_torque_is_counted_and_is_no_fault(step):
     assert world.cycles(20, 10.0)[-1] == 10.0
 
 
+@pytest.mark.parametrize("step", [-SECOND // 5, -SECOND // 20, SECOND // 20])
+@pytest.mark.parametrize("ahead", [0.0, 0.1])
+def test_a_command_from_before_a_clock_step_never_acts(step, ahead):
+    """One that was on its way acted as much later as the clock was set back, for 50 ms."""
+    world = World()
+    world.activate()
+    world.cycles(5)
+    world.send(10.0, ahead)
+    world.off += step
+    assert world.cycles(100) == [0.0] * 100
+    assert world.guarded.fault is None and not world.monitor.violations
+
+
+@pytest.mark.parametrize("steps", [(3600, -3600), (0.05, 0.05), (-0.05, -3600), (0.021, -0.021)])
+def test_several_clock_steps_end_the_torque_as_one_does(world, steps):
+    for step in steps:
+        world.off += round(step * SECOND)
+        assert world.cycles(3, 10.0) == [0.0] * 3
+    assert world.guarded.fault.cause == "clock_step" and world.anchor.steps == 2
+    with world.drive.deaf():
+        world.guarded.clear()
+    assert world.cycles(20, 10.0)[-1] == 10.0 and not world.monitor.violations
+
+
+@pytest.mark.parametrize("ramp", [0.02, 10.0])
+def test_stop_and_clear_fault_leave_nothing_of_a_ramp(ramp):
+    """The service stop answered that the torque was zero: the ramp went on."""
+    world = World(ramp=ramp)
+    world.activate()
+    world.cycles(20, 10.0)
+    while world.guarded.fault is None:
+        world.cycle()
+    assert world.torques[-1] > 0.0
+    world.motor.during = lambda: seen.append((world.motor.goal, world.cycle()))
+    seen = []
+    with world.drive.deaf():
+        world.guarded.clear()
+    assert seen == [(0.0, 0.0)]
+    assert world.cycles(20, 10.0)[-1] == 10.0
+    while world.guarded.fault is None:
+        world.cycle()
+    world.drive.stop()
+    assert world.cycles(3) == [0.0] * 3 and not world.monitor.violations
+
+
 def test_a_trimmed_clock_is_followed_without_a_step(world):
     for _ in range(3000):
         world.off += 1786  # 500 ppm

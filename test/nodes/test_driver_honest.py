@@ -156,6 +156,25 @@ def test_of_two_publishers_the_first_is_obeyed_until_it_is_silent():
     assert obeyed.admit("b", second) and not obeyed.admit("a", second + 1)
 
 
+def test_a_publisher_for_another_joint_keeps_nobody_from_commanding(driver):
+    """Its messages were refused, and yet it was the one that was obeyed."""
+    other = driver.listener.node.create_publisher(JointState, "/honest/torque_command", COMMAND)
+
+    def beside():
+        other.publish(torque_command_message(time.time_ns(), -30.0, "right_knee"))
+        return driver.bench.torque()[0] > 0
+
+    driver.listener.until(lambda: driver.value("ignored_commands"))
+    begun, before = time.monotonic(), int(driver.value("ignored_commands"))
+    while time.monotonic() - begun < 0.6:  # the first that is heard
+        beside()
+        time.sleep(0.01)
+    driver.clear()
+    driver.push(5.0, beside)
+    driver.listener.node.destroy_publisher(other)
+    assert int(driver.value("ignored_commands")) == before
+
+
 def test_a_second_publisher_is_reported(driver):
     second = driver.listener.node.create_publisher(JointState, "/honest/torque_command", COMMAND)
 

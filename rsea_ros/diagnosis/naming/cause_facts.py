@@ -82,6 +82,17 @@ def sizes(
     return {p.name.split(".")[1]: with_model_uncertainty(p, rule) for p in parameters}
 
 
+def size_of(effect: str, last: Evaluated, rule: SizeSettings) -> CauseParameter:
+    """Return the size of an effect in a model: its main parameter."""
+    return sizes(effect, parameters_of(last.solution, last.confidence), rule)[effect_named(effect).main.name]
+
+
+def is_known(size: CauseParameter, rule: SizeSettings) -> bool:
+    """Return whether a size is known: its interval has one sign, and its ends are not far from each other."""
+    low, high = sorted(map(abs, size.ci95))
+    return size.ci95[0] * size.ci95[1] > 0.0 and high < rule.widest * low
+
+
 def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings) -> CauseParameter:
     """Return an estimate whose interval includes errors that no residual shows.
 

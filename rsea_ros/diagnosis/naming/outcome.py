@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.diagnosis.criteria import is_at_floor, takes_most, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined
-from rsea_ros.diagnosis.naming.cause_facts import cause_of, dropped_of
+from rsea_ros.diagnosis.naming.cause_facts import cause_of, dropped_of, is_known, size_of
 from rsea_ros.diagnosis.naming.status import Named, named
 from rsea_ros.diagnosis.naming.weighing import Weighing
 from rsea_ros.diagnosis.result import Cause, Rejected, Verdict
@@ -46,6 +46,7 @@ def outcome_of(weighing: Weighing, examined: Examined, settings: DiagnosisSettin
     steps = itertools.pairwise(stages)
     dropped = tuple(dropped_of(a, b, naming, channel) for a, b in steps if not is_named(b, naming))
     stages = without_unnamed_end(stages, naming)
+    naming = with_sizes_known(naming, stages, settings)
     statuses = [naming[s.added].status if s.added in naming else None for s in stages[1:]]
     verdict = verdict_of([s.test for s in stages], statuses, levels, examined.faults)
     if verdict == "unexplained":
@@ -68,6 +69,19 @@ def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Name
     first, last = weighing.stages[0].test, weighing.stages[-1].test
     at_floor, most = is_at_floor(last, settings.floor), takes_most(first, last, settings)
     return {n.cause.evidence.name: n for n in named(weighing.places, at_floor, most, settings)}
+
+
+def with_sizes_known(
+    naming: Mapping[str, Named], stages: Sequence[Evaluated], settings: DiagnosisSettings
+) -> dict[str, Named]:
+    """Return the naming with no cause confirmed whose size the last model leaves open."""
+    rule = settings.sizes
+    sized = {s.added: size_of(s.added, stages[-1], rule) for s in stages[1:] if is_named(s, naming)}
+    unknown = {name for name, size in sized.items() if not is_known(size, rule)}
+    return {
+        name: replace(by, status="leading") if name in unknown and by.status == "confirmed" else by
+        for name, by in naming.items()
+    }
 
 
 def is_named(stage: Evaluated, naming: Mapping[str, Named]) -> bool:

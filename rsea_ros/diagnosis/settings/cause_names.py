@@ -76,3 +76,7 @@ class SizeSettings:
         1.02, "1", "ratio by which a channel's residual must fall for the gain to speak of that channel",
         "less is within what acceptance.matters calls nothing",
     )  # fmt: skip
+    widest: float = number(
+        10.0, "1", "ratio of the ends of a size's interval from which a cause is not confirmed",
+        "what may be ten times larger or smaller is no known law; it bends to whatever is left",
+    )  # fmt: skip

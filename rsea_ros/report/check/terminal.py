@@ -38,7 +38,7 @@ def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
     lines = []
     for f in _each_remedy_once(findings.findings):
         head = f"{f.light:<{_LIGHT}}{f'{kind(f)} ':<{_KIND}}{f'{_channel(f)} ':<{_CHANNEL}}"
-        text = wrapped(f"{head}{_finding_text(f)}", width, len(head))
+        text = wrapped(f"{head}{_finding_text(f)}", width, min(len(head), _LIGHT + _KIND + _CHANNEL))
         lines.append(Text.assemble((text[:_LIGHT], _STYLES[f.light]), text[_LIGHT:]))
     return lines
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Verdict
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.fault_kinds import MASKED
-from rsea_ros.identification.silent import silent_channels
+from rsea_ros.identification.silent import is_unexcited, silent_channels
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.rig.words import values_off
@@ -43,6 +43,8 @@ def verdict_sentence(
             f"The {listed(silent)} measures nothing and is left out; with the model's values re-fitted "
             f"the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
         )
+    if verdict == "nothing_wrong" and is_unexcited(faults):
+        return f"These data show nothing: the command never changes, so no cause could be seen.{data}"
     if verdict == "nothing_wrong":
         fine = "The structure of the model fits" if off else "Nothing is wrong with the model"
         return (

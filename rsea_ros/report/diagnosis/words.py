@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit, Reason, Rejected
-from rsea_ros.identification.silent import silent_channels
+from rsea_ros.identification.silent import is_unexcited, silent_channels
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.rig.words import values_off
@@ -75,6 +75,8 @@ def _verdict(diagnosis: Diagnosis) -> str:
     silent = [words.channel(name) for name in silent_channels(d.faults)]
     if d.verdict == "unexplained" and silent and d.at_noise_floor:
         return f"{words.sentence(listed(silent))} measures nothing; in the other channels only noise is left"
+    if d.verdict == "nothing_wrong" and is_unexcited(d.faults):
+        return "These data show nothing: the command never changes, so no cause could be seen"
     if d.verdict == "nothing_wrong" and values_off(d.remarks):
         return "The structure of the simulation fits: with fitted values, only sensor noise is left"
     if d.verdict == "nothing_wrong":

@@ -8,6 +8,7 @@ from scipy.io import savemat
 
 from msg_adapters.tables import mat_file
 from msg_adapters.tables.column_files import read_columns
+from msg_adapters.tables.mat_file import read_mat
 from rsea_ros.errors import ImportMapError
 
 
@@ -110,3 +111,16 @@ def test_a_file_that_declares_more_than_memory_is_refused(tmp_path):
     (tmp_path / "run.mat").write_bytes(data.replace(shape, np.array([1, 99_999_999], "<i4").tobytes()))
     with pytest.raises(ImportMapError, match=str(tmp_path)):
         read_columns(tmp_path / "run.mat", ["x"])
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_file_that_breaks_off_is_cut_off(tmp_path, compressed):
+    """It said that it had no column 'w', whose values the copy had lost."""
+    whole = tmp_path / "run.mat"
+    rng = np.random.default_rng(0)
+    savemat(whole, {"t": rng.normal(size=500), "w": rng.normal(size=500)}, do_compression=compressed)
+    assert len(read_mat(whole, ["t", "w"])["w"]) == 500
+    cut = tmp_path / "cut.mat"
+    cut.write_bytes(whole.read_bytes()[:-1000])
+    with pytest.raises(ValueError, match="cut off"):
+        read_mat(cut, ["t", "w"])
