@@ -23,7 +23,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.bandwidth import end_over_end
+from rsea_ros.model.bandwidth import end_over_end, inner_inertia
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.pure_torque_window import (
     BEYOND,
@@ -47,6 +47,7 @@ from rsea_ros.model.structure import structured
 from rsea_ros.model.transfer import Fraction
 from rsea_ros.signals import FloatArray
 
+ROTOR = "rotor.reflected_inertia"
 NINETY_PERCENT = 1.6449
 """Sigmas either way that hold 90 % of a normal quantity."""
 
@@ -128,15 +129,29 @@ def edge_of(rig: Rig, tolerance: float) -> Edge:
 
 
 def _possible(rig: Rig) -> Iterator[Rig]:
-    """Yield the rig with its damping and rotor at both ends and in the middle of 90 %, with each train."""
-    names = [n for n in ("spring.damping", "rotor.reflected_inertia") if n in rig.quantities]
+    """Yield the rig with its damping and rotor at both ends and in the middle of 90 %, with each train, and
+    with the rotor whose spin cancels the chassis where it is between: the edge is highest there."""
+    ranges = {n: _range(rig, n) for n in ("spring.damping", ROTOR) if n in rig.quantities}
     for train in (rig.train, *rig.other_trains):
-        for steps in product((-1.0, 0.0, 1.0), repeat=len(names)):
-            values = {
-                n: rig[n] * math.exp(NINETY_PERCENT * step * rig.spread(n))
-                for n, step in zip(names, steps, strict=True)
-            }
-            yield replace(rig.with_values(values), train=train)
+        turned = replace(rig, train=train)
+        rotors = {ROTOR: (*ranges[ROTOR], *_cancelling(turned, ranges[ROTOR]))} if ROTOR in ranges else {}
+        for values in product(*(ranges | rotors).values()):
+            yield turned.with_values(dict(zip(ranges, values, strict=True)))
+
+
+def _range(rig: Rig, name: str) -> tuple[float, float, float]:
+    """Return both ends and the middle of 90 % of a value."""
+    wide = math.exp(NINETY_PERCENT * rig.spread(name))
+    return rig[name] / wide, rig[name], rig[name] * wide
+
+
+def _cancelling(rig: Rig, j_m: tuple[float, ...]) -> list[float]:
+    """Return the J_m within a range at which J_sc + n J_r = 0, kg m^2, if any."""
+    spin = inner_inertia(rig) - rig["chassis.inertia"]
+    if not spin:
+        return []
+    cancelling = -rig["chassis.inertia"] * rig[ROTOR] / spin
+    return [cancelling] if min(j_m) < cancelling < max(j_m) else []
 
 
 def _edge(function: Fraction, tolerance: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import ParameterError, RigError
-from rsea_ros.model.bandwidth import end_over_end
+from rsea_ros.model.bandwidth import end_over_end, flat_band
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.pure_torque_error import BEYOND, NOTHING, PURE, ErrorFlag, ErrorSettings, edge_of
 from rsea_ros.model.rig_file import load_rig
@@ -126,11 +126,29 @@ def test_the_interval_of_the_edge_follows_from_damping_rotor_and_train():
     assert len(set(edge_of(certain, 0.3))) == 1
 
 
-def test_the_edge_moves_with_the_damping():
-    """±3 dB at 44.7 to 89 Hz for b_s of 1 to 6; the error's edge lies in the same order."""
-    edges = [edge_of(PLATFORM.with_values({"spring.damping": b}), 0.4).hz for b in (1.0, 2.0, 3.0, 4.5, 6.0)]
-    assert edges == sorted(edges)
-    assert edges[0] == pytest.approx(52.5, abs=1.5)
+@pytest.mark.parametrize(
+    ("damping", "error_hz", "band_hz"),
+    [(1.0, 44.8, 44.7), (2.0, 45.9, 47.9), (3.0, 47.8, 57.0), (4.5, 52.4, 75.2), (6.0, 59.0, 89.3)],
+)
+def test_the_edges_move_with_the_damping(damping, error_hz, band_hz):
+    """The error's edge solves J w^2 = 0.3 |K_s + i b_s w|; the other, of ±3 dB and 30°, is 45 to 89 Hz."""
+    rig = PLATFORM.with_values({"spring.damping": damping})
+    inertia, w = 0.0040 + 0.953 / 502, 2.0 * math.pi * edge_of(rig, 0.3).hz
+    assert inertia * w**2 == pytest.approx(0.3 * abs(1530.456 + 1j * damping * w), rel=1e-9)
+    assert edge_of(rig, 0.3).hz == pytest.approx(error_hz, abs=0.06)
+    assert flat_band(end_over_end(rig), 3.0, 30.0) == pytest.approx(band_hz, abs=0.06)
+
+
+def test_the_interval_has_no_end_where_the_spin_may_cancel_the_chassis():
+    """J_sc + n J_r is zero for a J_m of 1.05 times the rig's: T_d is T_p there, at every frequency."""
+    cancelled = KNEE.with_values({"chassis.inertia": 1.05 * 1.2 / 160})
+    assert edge_of(replace(cancelled, other_trains=()), 0.3).high > 1e4
+
+
+def test_a_rig_that_leaves_the_damping_out_has_an_edge():
+    stated = {n: q for n, q in KNEE.quantities.items() if n != "spring.damping"}
+    edge = edge_of(replace(KNEE, quantities=stated), 0.3)
+    assert edge.low < edge.hz < edge.high
 
 
 def test_without_torque_the_flag_says_so_and_restarts():

@@ -40,6 +40,20 @@ def truth():
     return true_run(load_rig(RIG), command, RATE, seed=4)
 
 
+def edge_of_a_moving_output():
+    """Lowest, nominal and highest Hz of J w^2 = 0.3 |K_s + i b_s w - J w^2| over 90 % of b_s and J_m.
+
+    The housing is the distal end of this rig, so T_d is the torque with the chassis' inertia in it.
+    """
+    sigma, k_s = 1.6449 * np.array([-1.0, 0.0, 1.0]), 1530.456
+    b, j_m = np.meshgrid(3.0 * np.exp(0.5 * sigma), 0.953 * np.exp(0.15 * sigma))
+    j = 0.0040 + j_m / 502
+    square, linear = (1.0 - 0.09) * j**2, 0.09 * (2.0 * k_s * j - b**2)
+    w2 = (np.sqrt(linear**2 + 0.36 * square * k_s**2) - linear) / (2.0 * square)
+    hz = np.sqrt(w2) / (2.0 * np.pi)
+    return [hz.min(), hz[1, 1], hz.max()]
+
+
 class Heard:
     """What the node publishes."""
 
@@ -89,6 +103,8 @@ def test_the_flag_is_latched_for_late_subscribers(heard, listener):
     values = listener.until(lambda: heard.values().keys() >= CONTRACT and heard.values())
     assert float(values["bandwidth_hz"]) == pytest.approx(57.04, abs=0.01)
     assert float(values["eq_7_hz"]) == pytest.approx(53.20, abs=0.01)
+    edges = [float(values[f"error_edge{which}_hz"]) for which in ("_low", "", "_high")]
+    assert edges == pytest.approx(edge_of_a_moving_output(), abs=0.01)
     late = listener.node.create_subscription(Bool, "/rsea/pure_torque", (flags := []).append, LATCHED)
     listener.until(lambda: flags)
     listener.node.destroy_subscription(late)
