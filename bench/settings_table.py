@@ -23,7 +23,7 @@ from settings_curve import with_value
 from rsea_ros.diagnosis.settings import DEFAULT
 
 CURVES = {
-    "acceptance.fall": (0.03, 0.05, 0.2, 0.3),
+    "acceptance.fall": (0.03, 0.1, 0.2, 0.3),
     "acceptance.matters": (0.005, 0.05, 0.1),
     "acceptance.fall_in_doubt": (0.1, 0.2, 0.5),
     "floor.misfit": (1.2, 2.0, 3.0),

@@ -20,7 +20,7 @@ _LIKELY = 0.5
 """Probability from which a name counts that has rivals."""
 _BEST = 0.1
 """Quantile of the recordings, by how small a size they show."""
-_LEAST_GAIN = 0.1
+_LEAST_GAIN = 0.05
 """Gain below which a diagnosis names no cause (diagnosis/settings.py, acceptance.fall)."""
 
 

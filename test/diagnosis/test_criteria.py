@@ -82,8 +82,8 @@ FRICTION, GAP = "coulomb_friction", "backlash"
         (model(GAP, ft=1.0, at_bound=True), model(ft=20.0), "at_bound"),
         (model(GAP, ft=20.0), model(ft=20.0), "not_sure"),
         (model(GAP, ft=19.8), model(ft=20.0), "too_small"),  # sure, but 1 %
-        (model(GAP, ft=18.1), model(ft=20.0), "too_small"),  # 9.5 % of a channel
-        (model(GAP, ft=17.9), model(ft=20.0), None),
+        (model(GAP, ft=19.1), model(ft=20.0), "too_small"),  # 4.5 % of a channel
+        (model(GAP, ft=18.9), model(ft=20.0), None),
         (model(GAP, ft=1.02), model(ft=1.08), None),  # all that was left
         (model(GAP, ft=1.05), model(ft=1.1), "too_small"),
         # one channel is enough for one more cause

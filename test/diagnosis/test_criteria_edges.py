@@ -82,7 +82,7 @@ def test_a_candidate_must_take_away_enough(candidate, present, reason):
 def test_a_model_at_the_noise_is_enough_whatever_it_gains():
     rule = replace(DEFAULT, floor=replace(DEFAULT.floor, only_noise=1.0))
     assert refusal(model(A, ft=0.96875), model(ft=1.03125), rule) is None
-    assert refusal(model(A, ft=1.0), model(ft=1.0625), rule) == "too_small"
+    assert refusal(model(A, ft=1.0), model(ft=1.046875), rule) == "too_small"
 
 
 def test_a_cause_pays_for_its_own_parameters_alone():

@@ -70,7 +70,7 @@ def test_the_detection_limit_is_the_size_of_the_least_gain():
     names = recordings(("a",), 60, causes=lambda j, d: [cause("backlash", sizes[d], gain=gains[d])])
     (naming,) = fleet_trends(QUIET, names).namings
     rest = np.sqrt(noise**2 + (slope * naming.limit) ** 2)
-    assert 1.0 - noise / rest == pytest.approx(0.1)
+    assert 1.0 - noise / rest == pytest.approx(0.05)
 
 
 def test_bad_data_since_some_day_is_a_fault():

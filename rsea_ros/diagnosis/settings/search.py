@@ -27,8 +27,9 @@ class AcceptanceSettings:
         0.5, "1", "share of a missed response (coherence^2) below which seeing it matters by itself"
     )
     fall: float = number(
-        0.1, "1", "fall of some channel's residual that one more cause must bring", flat("0.03", "0.3")
-    )
+        0.05, "1", "fall of some channel's residual that one more cause must bring",
+        f"{flat('0.03', '0.3')}; several small causes overlap on a real machine",
+    )  # fmt: skip
     fall_in_doubt: float = number(
         0.3, "1", "fall of the worst channel for a pair, a replacement, or a third cause that leaves much",
         f"{flat('0.1', '0.5')}; such bend to whatever is left: they must bring three times as much",

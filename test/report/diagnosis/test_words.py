@@ -167,7 +167,7 @@ def test_the_settings_are_in_json_and_page_and_a_changed_one_stands_out(diagnose
     assert (written["acceptance.fall"], written["max_causes"]) == (0.25, 4)
     assert written["without"] == ["ft_bias"]
     section = settings_section(changed)
-    assert "<b>0.25</b> (default 0.1)" in section and "Not tried: ft_bias." in section
+    assert "<b>0.25</b> (default 0.05)" in section and "Not tried: ft_bias." in section
     assert section.count("<b>") == 1
 
 
