@@ -53,6 +53,11 @@ def test_a_limit_that_cannot_be_applied_is_refused(values, told):
         limits(**values)
 
 
+def test_zero_is_no_limit():
+    free = limits(temperature_limit=0.0, current_limit=0.0, voltage_limit=0.0)
+    assert (free.temperature, free.current, free.voltage) == (math.inf, math.inf, 0.0)
+
+
 def test_a_bare_drive_has_the_limits_that_apply_to_it():
     found = limits(rig="bare_drive", deflection_limit=0.0, ft_limit=0.0, position_limit=0.5)
     assert found.position == 0.5 and math.isinf(found.ft) and math.isfinite(found.velocity)
