@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rsea_ros.hardware.dynamixel.encoder import LINK, SPRING
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
 
 MOTOR = (
@@ -39,6 +40,20 @@ MOTOR = (
     ),
     NodeParameter("supervisor", "", "socket of a supervisor that runs as a service; empty: a child process"),
 )
+ENCODER = (
+    NodeParameter(
+        "encoder_id", -1, "of an encoder on the motor's bus that measures the spring; -1: none", "", -1, 252
+    ),
+    NodeParameter("encoder_address", 132, "of its angle, 4 bytes, signed", "", 0, 65535),
+    NodeParameter(
+        "encoder_pulses", 4096.0, "counts of a turn; negative: they fall as the angle grows", "", -1e9, 1e9
+    ),
+    NodeParameter(
+        "encoder_place", SPRING,
+        "what it measures: the spring's deflection, or the link relative to the housing",
+        choices=(SPRING, LINK),
+    ),
+)  # fmt: skip
 SAFETY = (
     NodeParameter(
         "allow_no_dead_host_protection", False,

@@ -9,6 +9,7 @@ from typing import Any
 from msg_adapters.topic_map import sign_and_index
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.device import Device
+from rsea_ros.hardware.dynamixel.encoder import EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line
 from rsea_ros.hardware.dynamixel.line_motor import LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
@@ -88,7 +89,7 @@ def _feels(values: Values, rig: Rig) -> bool:
     if rig.rigid_spring:
         return False
     if values["device"] in DEVICES:
-        return values["device"] == "simulated" or bool(values["ft_host"])
+        return values["device"] == "simulated" or bool(values["ft_host"]) or values["encoder_id"] >= 0
     return outside_device(values["device"], DEVICES).feels
 
 
@@ -96,7 +97,8 @@ def _check_applicable(values: Values, rig: Rig) -> None:
     """Raise ParameterError for a limit of a quantity that this bench does not measure."""
     feels = _feels(values, rig)
     clamped = rig.clamped == set(END_NAMES)
-    why = "its spring is rigid" if rig.rigid_spring else "ft_host is empty: no F/T sensor measures it"
+    unfelt = "ft_host is empty and encoder_id is -1: nothing measures it"
+    why = "its spring is rigid" if rig.rigid_spring else unfelt
     if values["device"] not in DEVICES:
         why = f"device {values['device']} does not measure it"
     for name, applicable in (("deflection", feels or (clamped and not rig.rigid_spring)), ("ft", feels)):
@@ -137,12 +139,27 @@ def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
         limits_of(values),
         stiffness,
         absolute=values["position_zero"] == "motor",
+        encoder=_encoder(values),
     )
+
+
+def _encoder(values: Values) -> EncoderConnection | None:
+    """Return the encoder of the spring, None without. Raises ParameterError."""
+    identity = values["encoder_id"]
+    if identity < 0:
+        return None
+    for name, wrong in (("encoder_id", values["id"]), ("encoder_pulses", 0.0)):
+        if values[name] == wrong:
+            expected = "another than that of the motor" if name == "encoder_id" else "counts of a turn"
+            raise ParameterError(f"parameter {name} = {wrong:g}, expected {expected}")
+    address, pulses, place = (values[f"encoder_{name}"] for name in ("address", "pulses", "place"))
+    return EncoderConnection(identity, address, pulses, place, latency_of(values))
 
 
 def latency_of(values: Values) -> float:
     """Return the allowed lateness of a reply, s."""
-    return float(values["latency"] or usual_latency(values["rate"]))
+    replies = 2 + (values["encoder_id"] >= 0)
+    return float(values["latency"] or usual_latency(values["rate"], replies))
 
 
 DYNAMIXEL = "dynamixel_netft"

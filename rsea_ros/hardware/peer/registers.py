@@ -147,3 +147,17 @@ def _models() -> dict[int, MotorModel]:
 
 
 MODELS = _models()
+ENCODER = MotorModel(
+    1,
+    {
+        "id": Register(7, 1, EEPROM, 0, 252, 1),
+        "return_delay": Register(9, 1, EEPROM, 0, 254),
+        "status_level": Register(68, 1, RAM, 0, 2, 2),
+        "hardware_error": Register(70, 1, READ_ONLY),
+        "position": Register(132, 4, READ_ONLY, signed=True),
+    },
+    0.0,
+    0.0,
+    1 << 20,
+)
+"""A microcontroller with an encoder of 20 bits, whose angle is where an X motor has its position."""
