@@ -26,4 +26,5 @@ class EmulatedEncoder(EmulatedMotor):
 
     def _measure(self, now: int) -> None:
         turns = self._plant.read().deflection / (2 * math.pi)
-        self.put("position", self._origin + round(turns * self.model.counts_per_turn))
+        counts = round(turns * self.model.counts_per_turn)
+        self.put("position", self._origin + self.get("homing_offset") + counts)

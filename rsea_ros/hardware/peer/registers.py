@@ -152,6 +152,7 @@ ENCODER = MotorModel(
     {
         "id": Register(7, 1, EEPROM, 0, 252, 1),
         "return_delay": Register(9, 1, EEPROM, 0, 254),
+        "homing_offset": Register(20, 4, EEPROM, -(2**31), 2**31 - 1, signed=True),
         "status_level": Register(68, 1, RAM, 0, 2, 2),
         "hardware_error": Register(70, 1, READ_ONLY),
         "position": Register(132, 4, READ_ONLY, signed=True),
