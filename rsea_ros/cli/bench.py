@@ -88,17 +88,19 @@ def run(args: argparse.Namespace) -> int:
 
 def _place(args: argparse.Namespace, sensor: ForceSensor) -> dict[str, object]:
     """Return where the bench is, and the command that starts the driver on it."""
-    felt: dict[str, object] = {
-        "ft_host": "127.0.0.1", "ft_port": sensor.port, "ft_page_port": sensor.page
-    }  # fmt: skip
+    encoder: dict[str, object] = {}
+    felt = f"ft_host:=127.0.0.1 ft_port:={sensor.port} ft_page_port:={sensor.page}"
     if args.deflection:
-        felt = {"ft_host": "''", "encoder_id": IDENTITY, "encoder_pulses": float(ENCODER.counts_per_turn)}
-    given = {"rig": args.rig, "port": args.port, **felt, "params": parameters_of_bench()}
-    words = " ".join(f"{name}:={quote(str(value))}" for name, value in given.items())
+        encoder = {"encoder_id": IDENTITY, "encoder_pulses": float(ENCODER.counts_per_turn)}
+        felt = " ".join(["ft_host:=\"''\"", *(f"{name}:={value}" for name, value in encoder.items())])
+    launch = (
+        f"rsea launch hardware rig:={quote(args.rig)} port:={quote(str(args.port))} {felt} "
+        f"params:={quote(str(parameters_of_bench()))} identify:=false"
+    )
     return {
         "port": str(args.port), "model": args.model[0], "ft_port": sensor.port, "page_port": sensor.page,
-        "launch": f"rsea launch hardware {words} identify:=false",
-    } | {name: value for name, value in felt.items() if name.startswith("encoder")}  # fmt: skip
+        "launch": launch, **encoder,
+    }  # fmt: skip
 
 
 def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice], list[EmulatedMotor]]:

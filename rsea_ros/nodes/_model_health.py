@@ -27,7 +27,7 @@ UNMOVED = "joint_states repeats one value while torque_command moves: stopped, o
 class ModelHealth:
     """Assesses the node once a second, and passes the noise of the estimates to the flag.
 
-    contradictions: sensors that differ from the others by more than what the flag tolerates, in words.
+    contradictions: sensors that differ from model and others by more than what the flag tolerates, in words.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class ModelHealth:
         limit = self._error.settings.tolerance * self._error.torque
         off = {name: tests[name].ratio * self._errors[name] for name in self._errors.keys() & tests.keys()}
         return [
-            f"{name} differs from the other sensors by {rms:.3g} N m RMS, limit {limit:.3g} N m"
+            f"{name} differs from model and other sensors by {rms:.3g} N m RMS, limit {limit:.3g} N m"
             for name, rms in sorted(off.items())
             if rms > limit > 0.0
         ]

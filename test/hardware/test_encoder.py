@@ -8,6 +8,8 @@ import pytest
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.encoder import LINK, EncoderConnection, SpringEncoder
+from rsea_ros.hardware.dynamixel.line import Line
+from rsea_ros.hardware.dynamixel.line_motor import LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.settings import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
@@ -17,6 +19,7 @@ from rsea_ros.hardware.peer.peer_encoder import IDENTITY
 from rsea_ros.hardware.peer.registers import ENCODER
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.hardware.spring_sensor import Spring
+from rsea_ros.hardware.together import cycle
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._devices import dynamixel_netft, limits_of
 from test.hardware.conftest import LATENCY, PERIOD, STIFFNESS, WATCHDOG
@@ -158,3 +161,25 @@ def test_a_configure_without_the_encoder_is_refused(bench):
     with pytest.raises(NoReply, match="encoder ID 77"):
         device.open()
     assert bench.torque() == (0, False)
+
+
+def test_it_is_read_beside_several_motors_of_a_line(tmp_path):
+    with RemoteBench(tmp_path / "tty", "--model", 1020, 1120, "--deflection") as bench:
+        line = Line(bench.port, 4_000_000, LATENCY)
+        small = Limits(3.0, deflection=math.inf)
+        settings = EncoderConnection(IDENTITY, pulses=ENCODER.counts_per_turn, latency=LATENCY)
+        members = []
+        for identity, felt in ((1, settings), (2, None)):
+            motor = LineMotor(MotorConnection(bench.port, 4_000_000, identity, latency=LATENCY), line)
+            device = DynamixelNetft(motor, None, small, math.inf, encoder=felt)
+            members.append(GuardedDevice(device, small, 1.0 / PERIOD, Spring(STIFFNESS)))
+        for member in members:
+            member.open()
+            member.enable()
+        for _ in range(100):
+            states = cycle(members, [(2.0, 0.0), (1.0, 0.0)], [line])
+        assert [member.fault for member in members] == [None, None]
+        assert states[0].deflection == pytest.approx(states[0].position, abs=2e-3)
+        assert math.isnan(states[1].deflection) and states[1].wrench is None
+        for member in members:
+            member.device.close()

@@ -61,7 +61,7 @@ def test_a_sensor_that_keeps_an_old_value_under_its_own_noise_contradicts(wrong)
     assert node.health.contradictions == []
     node.run(1.0)
     report = node.run(1.0)
-    assert report.level == WARN and "ft differs from the other sensors by" in report.summary
+    assert report.level == WARN and "ft differs from model and other sensors by" in report.summary
     assert node.health.contradictions
 
 
