@@ -22,7 +22,7 @@ NO_LIMIT = {"temperature": math.inf, "current": math.inf, "voltage": 0.0}
 @dataclass(frozen=True)
 class Limits:
     """SI. torque N m, slew N m/s, temperature °C, current A, voltage V (at least), velocity rad/s, position
-    rad from where the device was opened, ft N m about the actuator's axis, power W, measured, either way.
+    rad from its zero, ft N m about the actuator's axis, power W, measured, either way.
 
     deflection: rad, of the spring by a second encoder, otherwise of the drive's angle where that is
     the spring's.

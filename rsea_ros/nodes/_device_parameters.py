@@ -78,7 +78,7 @@ LIMITS = (
     NodeParameter("deflection_limit", 0.0873, "of the spring; 0: none", "rad", 0.0, 100.0),
     NodeParameter("velocity_limit", 5.0, "of the gear output; 0: none", "rad/s", 0.0, 1000.0),
     NodeParameter(
-        "position_limit", 0.0, "either way from where configure finds it; 0: none", "rad", 0.0, 1e4
+        "position_limit", 0.0, "either way from zero (position_zero); 0: none", "rad", 0.0, 1e4
     ),
     NodeParameter("ft_limit", 110.0, "of the torque that ft measures; 0: none", "N m", 0.0, 1000.0),
     NodeParameter("power_limit", 250.0, "of the motor torque times velocity; 0: none", "W", 0.0, 1e5),

@@ -30,18 +30,18 @@ Values = Mapping[str, Any]
 def limits_of(values: Values) -> Limits:
     """Return the limits that the parameters set. Raises ParameterError for one that cannot be applied.
 
-    The drive's angle is the spring's between clamped ends; with a free end the F/T torque limits the spring.
+    Where the drive's angle is not the spring's, the torque that is felt limits the spring.
     """
     rig = load_rig(values["rig"])
     _check_applicable(values, rig)
-    clamped = rig.clamped == set(END_NAMES)
+    by_angle = _deflects(values, rig)
     deflection, ft = (values[f"{name}_limit"] or math.inf for name in ("deflection", "ft"))
-    if not clamped and not rig.rigid_spring:
+    if not by_angle and not rig.rigid_spring:
         ft = min(ft, deflection * rig["spring.stiffness"])
     return Limits(
         torque=values["torque_limit"],
         slew=values["slew_limit"],
-        deflection=deflection if clamped else math.inf,
+        deflection=deflection if by_angle else math.inf,
         temperature=values["temperature_limit"] or math.inf,
         current=values["current_limit"] or math.inf,
         voltage=values["voltage_limit"],
@@ -84,6 +84,15 @@ def device_of(values: Values, known: Mapping[str, Callable[[Values], Device]]) -
         raise ParameterError(f"device {kind.name}: {type(error).__name__}: {error}") from error
 
 
+def _deflects(values: Values, rig: Rig) -> bool:
+    """Return whether the drive's angle is the spring's, or an encoder measures that.
+
+    Between clamped ends it is, as long as it counts from configure, with the spring at rest.
+    """
+    counts = values["position_zero"] == "configure" or values["encoder_id"] >= 0
+    return counts and rig.clamped == set(END_NAMES)
+
+
 def _feels(values: Values, rig: Rig) -> bool:
     """Return whether the torque of the spring's distal side is measured."""
     if rig.rigid_spring:
@@ -96,12 +105,12 @@ def _feels(values: Values, rig: Rig) -> bool:
 def _check_applicable(values: Values, rig: Rig) -> None:
     """Raise ParameterError for a limit of a quantity that this bench does not measure."""
     feels = _feels(values, rig)
-    clamped = rig.clamped == set(END_NAMES)
     unfelt = "ft_host is empty and encoder_id is -1: nothing measures it"
     why = "its spring is rigid" if rig.rigid_spring else unfelt
     if values["device"] not in DEVICES:
         why = f"device {values['device']} does not measure it"
-    for name, applicable in (("deflection", feels or (clamped and not rig.rigid_spring)), ("ft", feels)):
+    deflects = _deflects(values, rig) and not rig.rigid_spring
+    for name, applicable in (("deflection", feels or deflects), ("ft", feels)):
         if values[f"{name}_limit"] and not applicable:
             raise ParameterError(
                 f"parameter {name}_limit = {values[f'{name}_limit']:g} cannot be applied to rig {rig.name}"
