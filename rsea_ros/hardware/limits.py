@@ -127,6 +127,7 @@ class Guard:
         self._missed = 0
         self._unfelt: Counter[str] = Counter()
         self._measured: set[str] = set()
+        self._complete = False
 
     def trip(self, fault: DeviceFault) -> None:
         """Latch a fault, unless there is one; any but late commands also ends the ramp of those."""
@@ -153,6 +154,11 @@ class Guard:
 
         A limit of NO_LIMIT counts if its quantity was measured before: `GuardedDevice.open` refuses others.
         """
+        before, self._complete = self._complete, state.wrench is not None and math.isfinite(
+            state.temperature + state.current + state.voltage
+        )
+        if before and self._complete:
+            return None
         lacking = unmeasured(self.limits, state)
         self._measured |= NO_LIMIT.keys() - set(lacking)
         lacking = [name for name in lacking if name in self._measured]
