@@ -9,7 +9,7 @@ from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
 from rsea_ros.model.observer.consistency import Consistency
 from rsea_ros.model.pure_torque import PureTorque
-from rsea_ros.model.pure_torque_error import NOTHING, VERDICTS, ErrorFlag
+from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._model_inputs import ModelInputs
@@ -73,16 +73,16 @@ class ModelHealth:
         """Return the channels whose innovations, N m RMS, are more than the tolerated part of the torque.
 
         So large is no error of a model: a sensor repeats an old value under its own noise, or is wrong.
-        Without torque nothing is judged.
+        A torque too small beside the observer's doubt of it is not judged.
         """
-        if self._error.verdict == VERDICTS[NOTHING]:
+        if math.isnan(self._error.share):
             return []
         limit = self._error.settings.tolerance * self._error.torque
         off = {name: tests[name].ratio * self._errors[name] for name in self._errors.keys() & tests.keys()}
         return [
             f"{name} differs from model and other sensors by {rms:.3g} N m RMS, limit {limit:.3g} N m"
             for name, rms in sorted(off.items())
-            if rms > limit > 0.0
+            if rms > limit and tests[name].broken
         ]
 
     def _calibrate(self) -> None:

@@ -38,7 +38,7 @@ class Node:
             self._observer.command(t, torque)
             self._observer.state(t, position, torque)
             estimate = self._observer.ft(t, self._sensed(t, torque) + NOISE.ft * self._rng.normal())
-            self._error.take(t, estimate)
+            self._error.take(t, estimate, heard=True)
             self.health.tell(estimate)
             self._k += 1
         return self.health.report()
@@ -65,10 +65,15 @@ def test_a_sensor_that_keeps_an_old_value_under_its_own_noise_contradicts(wrong)
     assert node.health.contradictions
 
 
-def test_without_torque_nothing_is_compared():
-    node = Node(0.0, lambda t, torque: torque)
-    node.run(1.0)
+@pytest.mark.parametrize("amplitude", [0.0, 0.01])
+def test_a_torque_too_small_to_judge_is_not_compared(amplitude):
+    """The noise of every sensor is more than the tolerated part of a hundredth of a N m."""
+    node = Node(8.0, lambda t, torque: torque)
+    node.run(2.0)
+    node._amplitude = amplitude
+    node.run(2.0)
     assert node.run(1.0).level == OK and node.health.contradictions == []
+    assert node._error.verdict == "pure", "a finer detector still hears it"
 
 
 def test_states_that_do_not_follow_the_commands_are_reported():
