@@ -1,13 +1,18 @@
 """Controller and driver together on the bench on a wire, quiet and beside processes that burn every core.
 
-A sine of 5 Hz, 10 N m, 4.7 N m with a free end: its error, RMS, and the largest |ft|, which a load may not
-raise. The bare loop of the same minute shows what the machine can do, and so does a loop of only the two
-requests to the motor, on the same terminal once the driver has left it: how long it waits for a reply,
-and how many faults the driver's rule would make of that. The bench on a wire runs at SCHED_FIFO if that is
-permitted, above both nodes: motor and sensor have processors of their own; at 1 kHz a bench that waits for
-one is a motor that does not answer. Each rate as any process, and with both nodes at SCHED_FIFO where
-permitted (--priority): the machine's other work is then out of their way, but for the kernel's worker that
-carries the bytes of a pseudo-terminal.
+A sine of 5 Hz, 10 N m, 4.7 N m with a free end: its error, RMS, by period, and the largest |ft|, which a load
+may not raise. In each trial a bare loop shows how late this machine is, and once the driver has left the
+terminal a loop of only the two requests to the motor shows how long replies take and how many faults the
+driver's rule would make of that. A quiet trial in which the driver lost replies, and that loop would have
+too, is done again, at most TRIES times; the row says so.
+
+Each rate as any process, and with both nodes at SCHED_FIFO where permitted (--priority), with the defaults of
+config/nodes but for 4 Mbit/s; --patient: late replies, silent sensor and late commands are no fault, and the
+error is that between stalls. The bench runs at SCHED_FIFO where permitted, above both nodes: motor and sensor
+have processors of their own, and at 1 kHz a bench that waits for one is a motor that does not answer.
+
+The last row of a rate is another trial, with the simulated motor in place of the wire: the controller is held
+up until lateness latches a fault, and the time from that to zero torque is measured (driver_lateness.py).
 """
 
 from __future__ import annotations
@@ -81,7 +86,7 @@ def burning(count: int) -> Iterator[None]:
 
 
 def controller(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
-    """Try every rate, quiet and loaded, with the defaults of config/nodes."""
+    """Try every rate, quiet and loaded."""
     os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     rclpy.init()

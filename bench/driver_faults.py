@@ -117,6 +117,7 @@ FAULTS: dict[str, Trial] = {
     },
     "F/T condition latch alone": complains(0x8001_0000, latched=False),
     "F/T silent": misbehaves(10.0, ft_silent=True),
+    "F/T values stand still": misbehaves(40.0, ft_stuck=True),
     "half of the F/T records dropped": misbehaves(latched=False, ft_drop=0.5),
     "all F/T records but one in a hundred dropped": misbehaves(20.0, ft_drop=0.99),
     "a tenth of the F/T records dropped": misbehaves(latched=False, ft_drop=0.1),

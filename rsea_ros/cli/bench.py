@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 
@@ -19,12 +20,14 @@ from rsea_ros.cli._runs import RIG
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.peer.ft import ForceSensor
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
+from rsea_ros.hardware.peer.peer_encoder import IDENTITY, EmulatedEncoder
 from rsea_ros.hardware.peer.peer_motor import KEPT, EmulatedMotor
-from rsea_ros.hardware.peer.registers import MODELS
+from rsea_ros.hardware.peer.registers import ENCODER, MODELS
 from rsea_ros.hardware.peer.requests import LineRequests
 from rsea_ros.hardware.peer.serial_line import EmulatedBus
 from rsea_ros.hardware.peer.station import Station
 from rsea_ros.hardware.simulated import SimulatedDevice
+from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free
 
@@ -42,6 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="number of the motor; several form a line with the IDs 1, 2, …, the sensor on the first")
     add("--rig", default=RIG, help="rig of the plant: a name in config/rigs, or a file")
     add("--ft-rate", type=float, default=1000.0, help="record rate of the F/T sensor, Hz, 1 to 7000")
+    add("--deflection", action="store_true",
+        help="no F/T sensor: an encoder on the spring of the first motor, with ID 100 on the same line")
     add("--torque-constant", type=float, default=0.0, help="N m at the output per A; 0: that of the model")
     add("--return-delay", type=int, default=0, help="delay of each reply, unit 2 µs, 0 to 254")
     add("--seed", type=seed, default=0, help="seed of the sensor noise and of the misbehaviour")
@@ -59,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
     wrong = Misbehaviour(seed=args.seed)
     kept = KEPT if args.requests else 0  # nobody else can ask for the logs
     plants, motors = _motors(args, kept)
+    if args.deflection:
+        motors.append(EmulatedEncoder(plants[0]))
     bus, sensor = EmulatedBus(args.port, motors, wrong, kept), ForceSensor(plants[0], args.ft_rate, wrong)
     stop, stopping = os.pipe()
     inlet = sys.stdin.fileno() if args.requests else stop
@@ -81,21 +88,26 @@ def run(args: argparse.Namespace) -> int:
 
 def _place(args: argparse.Namespace, sensor: ForceSensor) -> dict[str, object]:
     """Return where the bench is, and the command that starts the driver on it."""
+    encoder: dict[str, object] = {}
+    felt = f"ft_host:=127.0.0.1 ft_port:={sensor.port} ft_page_port:={sensor.page}"
+    if args.deflection:
+        encoder = {"encoder_id": IDENTITY, "encoder_pulses": float(ENCODER.counts_per_turn)}
+        felt = " ".join(["ft_host:=\"''\"", *(f"{name}:={value}" for name, value in encoder.items())])
     launch = (
-        f"rsea launch hardware rig:={quote(args.rig)} port:={quote(str(args.port))} ft_host:=127.0.0.1 "
-        f"ft_port:={sensor.port} ft_page_port:={sensor.page} params:={quote(str(parameters_of_bench()))} "
-        "identify:=false"
+        f"rsea launch hardware rig:={quote(args.rig)} port:={quote(str(args.port))} {felt} "
+        f"params:={quote(str(parameters_of_bench()))} identify:=false"
     )
     return {
         "port": str(args.port), "model": args.model[0], "ft_port": sensor.port, "page_port": sensor.page,
-        "launch": launch,
+        "launch": launch, **encoder,
     }  # fmt: skip
 
 
 def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice], list[EmulatedMotor]]:
     """Return the running plant of each motor, and the motors, with the IDs 1, 2, …"""
-    rig = load_rig(args.rig)
-    plants, motors = [], []
+    rig = _with_encoder(load_rig(args.rig)) if args.deflection else load_rig(args.rig)
+    plants: list[SimulatedDevice] = []
+    motors: list[EmulatedMotor] = []
     for place, model in enumerate(args.model):
         plant = SimulatedDevice(rig, PLANT_RATE, seed=args.seed + place, clock=time.monotonic_ns)
         motor = EmulatedMotor(model, plant, args.torque_constant, kept=kept)
@@ -105,3 +117,13 @@ def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice],
         plants.append(plant)
         motors.append(motor)
     return plants, motors
+
+
+def _with_encoder(rig: Rig) -> Rig:
+    """Return a rig whose spring has an encoder: its own, or one that only its counts limit.
+
+    Raises ParameterError for a rig without a spring.
+    """
+    if rig.rigid_spring:
+        raise ParameterError(f"--deflection: the spring of rig {rig.name} is rigid, expected one that gives")
+    return replace(rig, sensors={"deflection": Sensor(), **rig.sensors})

@@ -34,7 +34,7 @@ class State:
     output relative to the housing. motor_torque: N m at the gear output, from measured current. wrench:
     force x, y, z (N) and torque x, y, z (N m) of the F/T sensor; None without one.
     wrenches: all since the last reading, as (stamp, wrench), where the sensor is faster.
-    current A, voltage V, temperature °C: nan where the device does not measure them.
+    current A, voltage V, temperature °C: nan where the device does not measure them: no limit then.
     hardware_error, ft_trouble: errors reported by motor and sensor, in words; empty without any.
     motor_trouble: settings that the motor has lost, such as torque off, in words.
     deflection: rad, of the spring, from a second encoder, the drive's side less the distal one; nan without.

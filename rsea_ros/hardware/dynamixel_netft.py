@@ -1,11 +1,13 @@
-"""The paper's bench as a device: a Dynamixel on its bus and an ATI Net F/T sensor."""
+"""A Dynamixel on its bus as a device, with an ATI Net F/T sensor, an encoder on the spring, or neither."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 
 from rsea_ros.hardware.device import State, Wrench
+from rsea_ros.hardware.dynamixel.encoder import EncoderConnection, SpringEncoder
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
 from rsea_ros.hardware.limits import Limits, check_limits
@@ -18,7 +20,7 @@ class DynamixelNetft:
 
     Angles count from where the drive stands when the device is opened: torque off, the spring at rest.
     absolute: they count from the motor's own zero instead, its encoder's with its homing offset.
-    motor: alone on its port, or a LineMotor.
+    motor: alone on its port, or a LineMotor. encoder: of the spring, on the same port.
     stiffness: of the rig's spring, N m/rad, which the limits are checked against.
     """
 
@@ -30,8 +32,10 @@ class DynamixelNetft:
         stiffness: float,
         *,
         absolute: bool = False,
+        encoder: EncoderConnection | None = None,
     ) -> None:
         self._motor = motor
+        self._encoder = SpringEncoder(encoder, motor.port) if encoder is not None else None
         self._sensor = ForceTorqueSensor(sensor) if sensor is not None else None
         self._limits, self._stiffness, self._absolute = limits, stiffness, absolute
         self._epoch = 0
@@ -53,8 +57,10 @@ class DynamixelNetft:
             check_limits(self._limits, self._motor.torque_limit, self._stiffness)
             assert self._motor.limits is not None
             check_own_limits(self._limits, self._motor.limits, self._motor.known.name)
-            position = self._motor.bus.patiently(self._motor.read).position
-            self.origin = 0.0 if self._absolute else position
+            sample = self._motor.bus.patiently(self._motor.read)
+            self.origin = 0.0 if self._absolute else sample.position
+            if self._encoder is not None:
+                self._encoder.open(sample, absolute=self._absolute)
             if self._sensor is not None:
                 self._sensor.open()
         except Exception:
@@ -72,6 +78,7 @@ class DynamixelNetft:
         """
         try:
             sample = self._motor.read(self._sensor.gather if self._sensor is not None else None)
+            deflection = math.nan if self._encoder is None else self._encoder.deflection(sample)
         finally:
             self._take_wrenches()
         wrenches, trouble, self._waiting, self._trouble = self._waiting, self._trouble, [], ""
@@ -90,6 +97,7 @@ class DynamixelNetft:
             hardware_error=sample.hardware_error,
             ft_trouble=trouble,
             motor_trouble=sample.trouble,
+            deflection=deflection,
             acknowledged_late=self._motor.acknowledged_late,
         )
         return self._last
@@ -145,6 +153,8 @@ class DynamixelNetft:
                 "homing_offset_rad": f"{limits.homing_offset:.6g}",
                 "reversed": limits.reversed,
             }
+        if self._encoder is not None:
+            values |= {f"encoder_{kind}": n for kind, n in self._encoder.errors.items()}
         if self._sensor is not None:
             values |= {f"ft_{kind}": n for kind, n in self._sensor.counts().items()}
             values["ft_noise_nm"] = f"{self._sensor.noise[5]:.3g}"

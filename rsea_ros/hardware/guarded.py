@@ -11,9 +11,9 @@ from dataclasses import replace
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
-from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, complaint
+from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, complaint, unmeasured, without
 from rsea_ros.hardware.losses import Losses
-from rsea_ros.hardware.protection import NONE
+from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.hardware.together import cycle
 
@@ -25,15 +25,18 @@ class GuardedDevice:
 
     enabled: whether commands pass. cycles: `failed_reads`, `failed_writes` of the cycles so far.
     away: whether another thread uses the device for longer than a cycle; cycles then leave it alone.
+    lifted: limits that do not apply, of what a simulation does not have.
     spring: turns a measured deflection into a wrench where no sensor measures one; None: no such wrench.
     """
 
     def __init__(self, device: Device, limits: Limits, rate: float, spring: Spring | None = None) -> None:
         self.device, self.guard = device, Guard(limits, 1.0 / rate)
+        self._limits = limits
         self._spring = spring
         self.enabled = False
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
+        self.lifted: list[str] = []
         self._taring = self.away = self._inferred = False
         self._turn = threading.Lock()
         self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
@@ -44,23 +47,46 @@ class GuardedDevice:
         return self.guard.fault
 
     def open(self, *, unprotected: bool = False) -> None:
-        """Open the device and check its protection against a dead host.
+        """Open the device; check its protection against a dead host, and that each limit can be applied.
 
         unprotected: whether protection may be missing. Raises ParameterError for a device without it
-        otherwise, DeviceError; nothing stays open then.
+        otherwise and for a limit of what it does not measure, DeviceError; nothing stays open then.
         """
         self.device.open()
-        self.state, self._inferred = None, False
+        self.state, self._inferred, self.guard.limits = None, False, self._limits
         for losses in self._losses.values():
             losses.clear()
-        if self.device.protection.kind == NONE and not unprotected:
+        try:
+            self._check_protection(unprotected=unprotected)
+            self._check_measured()
+        except Exception:
             self.device.close()
+            raise
+        self.guard.clear()
+
+    def _check_protection(self, *, unprotected: bool) -> None:
+        if self.device.protection.kind == NONE and not unprotected:
             raise ParameterError(
                 "nothing ends the torque of this device when the driver's process dies: dead-host protection"
                 " none, expected a bus watchdog or a supervisor, or parameter"
                 " allow_no_dead_host_protection = true"
             )
-        self.guard.clear()
+
+    def _check_measured(self) -> None:
+        """Raise ParameterError for a limit of a quantity that the device does not measure.
+
+        In a simulation, whose torque is its process's own, nothing gets hot: such limits are lifted.
+        """
+        lacking = unmeasured(self._limits, self._patiently())
+        simulated = self.device.protection.kind == PROCESS
+        if lacking and not simulated:
+            name = lacking[0]
+            raise ParameterError(
+                f"parameter {name}_limit = {getattr(self._limits, name):g} cannot be applied: the device"
+                f" measures no {name}, expected 0 for none"
+            )
+        self.lifted = lacking
+        self.guard.limits = without(self._limits, lacking)
 
     def cycle(self, wanted: float, age: float | None) -> State | None:
         """Do a cycle of this device alone, see `together.cycle`."""

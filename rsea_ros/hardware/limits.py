@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rsea_ros.errors import ParameterError
@@ -13,13 +14,15 @@ COMMAND_TIMEOUT = "command_timeout"
 HEARD_LATE = 3
 """Cycles until a torque that was written shows in the measured one."""
 UNFELT = 1.0
-"""s without a measured torque that are a fault where ft is limited: the longest ft_timeout of a sensor."""
+"""s without a measurement of a limited quantity that are a fault: the longest ft_timeout of a sensor."""
+NO_LIMIT = {"temperature": math.inf, "current": math.inf, "voltage": 0.0}
+"""Quantities that a device may not measure, and the limit that limits nothing."""
 
 
 @dataclass(frozen=True)
 class Limits:
     """SI. torque N m, slew N m/s, temperature °C, current A, voltage V (at least), velocity rad/s, position
-    rad from where the device was opened, ft N m about the actuator's axis, power W, measured, either way.
+    rad from its zero, ft N m about the actuator's axis, power W, measured, either way.
 
     deflection: rad, of the spring by a second encoder, otherwise of the drive's angle where that is
     the spring's.
@@ -46,6 +49,19 @@ class Limits:
     effort: float = math.inf
     effort_time: float = 0.1
     ft_axis: int = 5
+
+
+def unmeasured(limits: Limits, state: State) -> list[str]:
+    """Return the quantities of NO_LIMIT that are limited and that a reading does not have."""
+    return [
+        name for name, none in NO_LIMIT.items()
+        if getattr(limits, name) != none and math.isnan(getattr(state, name))
+    ]  # fmt: skip
+
+
+def without(limits: Limits, names: Sequence[str]) -> Limits:
+    """Return limits that do not limit some quantities of NO_LIMIT."""
+    return Limits(**{**vars(limits), **{name: NO_LIMIT[name] for name in names}})
 
 
 @dataclass(frozen=True)
@@ -108,7 +124,10 @@ class Guard:
         self.halted = False
         self._ramp = self._ramp_from = self._room = 0.0
         self._written: deque[float] = deque(maxlen=HEARD_LATE)
-        self._missed = self._unfelt = 0
+        self._missed = 0
+        self._unfelt: Counter[str] = Counter()
+        self._measured: set[str] = set()
+        self._complete = False
 
     def trip(self, fault: DeviceFault) -> None:
         """Latch a fault, unless there is one; any but late commands also ends the ramp of those."""
@@ -126,16 +145,34 @@ class Guard:
 
     def look(self, state: State) -> None:
         """Latch the fault in a reading."""
-        fault = complaint(self.limits, state) or self._without_ft(state) or self._missing(state.motor_torque)
+        fault = complaint(self.limits, state) or self._blind(state) or self._missing(state.motor_torque)
         if fault is not None:
             self.trip(fault)
 
-    def _without_ft(self, state: State) -> DeviceFault | None:
-        """Return a fault while the limit of ft cannot be applied for too long, also once it was cleared."""
-        self._unfelt = self._unfelt + 1 if state.wrench is None else 0
-        if math.isinf(self.limits.ft) or self._unfelt * self._period <= UNFELT:
+    def _blind(self, state: State) -> DeviceFault | None:
+        """Return a fault while a limit cannot be applied for too long, also once it was cleared.
+
+        A limit of NO_LIMIT counts if its quantity was measured before: `GuardedDevice.open` refuses others.
+        """
+        before, self._complete = self._complete, state.wrench is not None and math.isfinite(
+            state.temperature + state.current + state.voltage
+        )
+        if before and self._complete:
             return None
-        return DeviceFault("ft", detail=f"no torque measured for {UNFELT:g} s, expected one for ft_limit")
+        lacking = unmeasured(self.limits, state)
+        self._measured |= NO_LIMIT.keys() - set(lacking)
+        lacking = [name for name in lacking if name in self._measured]
+        if state.wrench is None and not math.isinf(self.limits.ft):
+            lacking.insert(0, "ft")
+        for name in lacking:
+            self._unfelt[name] += 1
+            if self._unfelt[name] * self._period > UNFELT:
+                quantity = "torque" if name == "ft" else name
+                detail = f"no {quantity} measured for {UNFELT:g} s, expected one for {name}_limit"
+                return DeviceFault(name, detail=detail)
+        for name in self._unfelt.keys() - set(lacking):
+            self._unfelt[name] = 0
+        return None
 
     def allowed(self, wanted: float, age: float | None) -> float:
         """Return the torque to write now (N m). age: of the command, s; None without a command."""

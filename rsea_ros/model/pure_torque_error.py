@@ -30,11 +30,14 @@ from rsea_ros.model.pure_torque_window import (
     HEARD,
     HYSTERESIS,
     LAST,
+    NEWEST,
     NOTHING,
+    OLDEST,
     PURE,
     QUIET,
     SHARE,
     STATE,
+    SUM_TORQUE,
     TOLERANCE,
     VERDICT,
     WINDOW,
@@ -120,6 +123,12 @@ class ErrorFlag:
     def share(self) -> float:
         """RMS(T_p - T_d) / RMS(T_d) over the window; nan if the torque is too small."""
         return float(self._state[SHARE])
+
+    @property
+    def torque(self) -> float:
+        """RMS(T_d) over the window, N m; 0 before the first estimate."""
+        count = self._state[NEWEST] - self._state[OLDEST]
+        return math.sqrt(max(self._state[SUM_TORQUE], 0.0) / count) if count else 0.0
 
 
 def edge_of(rig: Rig, tolerance: float) -> Edge:

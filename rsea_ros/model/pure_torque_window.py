@@ -69,7 +69,8 @@ def _anew(state, ring):  # type: ignore[no-untyped-def]
 def judge_error(state, ring, t, distal, proximal, sigma, heard):  # type: ignore[no-untyped-def]
     """Process both torques and the sum of their sigmas (N m) at a later t (s); return the verdict.
 
-    heard: hold the verdict while the torque is too small to be judged.
+    heard: hold the verdict while the torque is too small to be judged. A sigma that is not finite, of an
+    observer that does not settle, is a threshold that no torque passes: NOTHING at once.
     """
     if state[LAST] - t > AGAIN:
         state[:SUMS], state[VERDICT] = 0.0, NOTHING
@@ -80,6 +81,9 @@ def judge_error(state, ring, t, distal, proximal, sigma, heard):  # type: ignore
     error, torque = mean_squares(state, ring, state[WINDOW], t, proximal - distal, distal)
     least = AUDIBLE * sigma / state[TOLERANCE]
     state[SHARE] = math.nan
+    if not np.isfinite(sigma):
+        state[VERDICT], state[HEARD] = NOTHING, -math.inf
+        return NOTHING
     if torque > least * least:
         state[SHARE] = math.sqrt(error / torque)
         state[VERDICT] = _verdict(state)

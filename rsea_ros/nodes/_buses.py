@@ -50,8 +50,10 @@ def _check_apart(values: Values, other: Values) -> None:
         )
     if values["port"] != other["port"]:
         return
-    if values["id"] == other["id"]:
-        raise ParameterError(f"parameter {joint}.id = {values['id']}, expected another than {other_joint}'s")
+    for name in ("id", "encoder_id"):
+        if values[name] >= 0 and values[name] in (other["id"], other["encoder_id"]):
+            text = f"parameter {joint}.{name} = {values[name]}, expected another than {other_joint}'s"
+            raise ParameterError(text)
     for name in ("baud", "latency", "fast_sync"):
         if values[name] != other[name]:
             text = f"{other[name]} as {other_joint}'s on {values['port']}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rsea_ros.hardware.dynamixel.encoder import LINK, SPRING
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
 
 MOTOR = (
@@ -39,6 +40,20 @@ MOTOR = (
     ),
     NodeParameter("supervisor", "", "socket of a supervisor that runs as a service; empty: a child process"),
 )
+ENCODER = (
+    NodeParameter(
+        "encoder_id", -1, "of an encoder on the motor's bus that measures the spring; -1: none", "", -1, 252
+    ),
+    NodeParameter("encoder_address", 132, "of its angle, 4 bytes, signed", "", 0, 65535),
+    NodeParameter(
+        "encoder_pulses", 4096.0, "counts of a turn; negative: they fall as the angle grows", "", -1e9, 1e9
+    ),
+    NodeParameter(
+        "encoder_place", SPRING,
+        "what it measures: the spring's deflection, or the link relative to the housing",
+        choices=(SPRING, LINK),
+    ),
+)  # fmt: skip
 SAFETY = (
     NodeParameter(
         "allow_no_dead_host_protection", False,
@@ -63,15 +78,15 @@ LIMITS = (
     NodeParameter("deflection_limit", 0.0873, "of the spring; 0: none", "rad", 0.0, 100.0),
     NodeParameter("velocity_limit", 5.0, "of the gear output; 0: none", "rad/s", 0.0, 1000.0),
     NodeParameter(
-        "position_limit", 0.0, "either way from where configure finds it; 0: none", "rad", 0.0, 1e4
+        "position_limit", 0.0, "either way from zero (position_zero); 0: none", "rad", 0.0, 1e4
     ),
     NodeParameter("ft_limit", 110.0, "of the torque that ft measures; 0: none", "N m", 0.0, 1000.0),
     NodeParameter("power_limit", 250.0, "of the motor torque times velocity; 0: none", "W", 0.0, 1e5),
     NodeParameter("effort_limit", 6.0, "by which measured may miss commanded; 0: none", "N m", 0.0, 1000.0),
     NodeParameter("effort_time", 0.1, "for which it may", "s", 0.0, 10.0),
-    NodeParameter("temperature_limit", 70.0, "of the motor", "°C", 0.0, 100.0),
-    NodeParameter("current_limit", 12.0, "of the motor, measured", "A", 0.0, 100.0),
-    NodeParameter("voltage_limit", 20.0, "lowest supply voltage", "V", 0.0, 100.0),
+    NodeParameter("temperature_limit", 70.0, "of the motor; 0: none", "°C", 0.0, 100.0),
+    NodeParameter("current_limit", 12.0, "of the motor, measured; 0: none", "A", 0.0, 100.0),
+    NodeParameter("voltage_limit", 20.0, "lowest supply voltage; 0: none", "V", 0.0, 100.0),
     NodeParameter("command_timeout", 0.05, "time without a command that ends the torque", "s", 0.001, 10.0),
     NodeParameter("ramp", 0.02, "from there to zero torque", "s", 0.0, 10.0),
     NodeParameter("lost_cycles", 3, "cycles in a row without an answer that are a fault", "", 1, 100),

@@ -9,6 +9,7 @@ from typing import Any
 from msg_adapters.topic_map import sign_and_index
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.device import Device
+from rsea_ros.hardware.dynamixel.encoder import EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line
 from rsea_ros.hardware.dynamixel.line_motor import LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
@@ -29,20 +30,20 @@ Values = Mapping[str, Any]
 def limits_of(values: Values) -> Limits:
     """Return the limits that the parameters set. Raises ParameterError for one that cannot be applied.
 
-    The drive's angle is the spring's between clamped ends; with a free end the F/T torque limits the spring.
+    Where the drive's angle is not the spring's, the torque that is felt limits the spring.
     """
     rig = load_rig(values["rig"])
     _check_applicable(values, rig)
-    clamped = rig.clamped == set(END_NAMES)
+    by_angle = _deflects(values, rig)
     deflection, ft = (values[f"{name}_limit"] or math.inf for name in ("deflection", "ft"))
-    if not clamped and not rig.rigid_spring:
+    if not by_angle and not rig.rigid_spring:
         ft = min(ft, deflection * rig["spring.stiffness"])
     return Limits(
         torque=values["torque_limit"],
         slew=values["slew_limit"],
-        deflection=deflection if clamped else math.inf,
-        temperature=values["temperature_limit"],
-        current=values["current_limit"],
+        deflection=deflection if by_angle else math.inf,
+        temperature=values["temperature_limit"] or math.inf,
+        current=values["current_limit"] or math.inf,
         voltage=values["voltage_limit"],
         command_timeout=values["command_timeout"],
         ramp=values["ramp"],
@@ -83,23 +84,33 @@ def device_of(values: Values, known: Mapping[str, Callable[[Values], Device]]) -
         raise ParameterError(f"device {kind.name}: {type(error).__name__}: {error}") from error
 
 
+def _deflects(values: Values, rig: Rig) -> bool:
+    """Return whether the drive's angle is the spring's, or an encoder measures that.
+
+    Between clamped ends it is, as long as it counts from configure, with the spring at rest.
+    """
+    counts = values["position_zero"] == "configure" or values["encoder_id"] >= 0
+    return counts and rig.clamped == set(END_NAMES)
+
+
 def _feels(values: Values, rig: Rig) -> bool:
     """Return whether the torque of the spring's distal side is measured."""
     if rig.rigid_spring:
         return False
     if values["device"] in DEVICES:
-        return values["device"] == "simulated" or bool(values["ft_host"])
+        return values["device"] == "simulated" or bool(values["ft_host"]) or values["encoder_id"] >= 0
     return outside_device(values["device"], DEVICES).feels
 
 
 def _check_applicable(values: Values, rig: Rig) -> None:
     """Raise ParameterError for a limit of a quantity that this bench does not measure."""
     feels = _feels(values, rig)
-    clamped = rig.clamped == set(END_NAMES)
-    why = "its spring is rigid" if rig.rigid_spring else "ft_host is empty: no F/T sensor measures it"
+    unfelt = "ft_host is empty and encoder_id is -1: nothing measures it"
+    why = "its spring is rigid" if rig.rigid_spring else unfelt
     if values["device"] not in DEVICES:
         why = f"device {values['device']} does not measure it"
-    for name, applicable in (("deflection", feels or (clamped and not rig.rigid_spring)), ("ft", feels)):
+    deflects = _deflects(values, rig) and not rig.rigid_spring
+    for name, applicable in (("deflection", feels or deflects), ("ft", feels)):
         if values[f"{name}_limit"] and not applicable:
             raise ParameterError(
                 f"parameter {name}_limit = {values[f'{name}_limit']:g} cannot be applied to rig {rig.name}"
@@ -137,12 +148,27 @@ def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
         limits_of(values),
         stiffness,
         absolute=values["position_zero"] == "motor",
+        encoder=_encoder(values),
     )
+
+
+def _encoder(values: Values) -> EncoderConnection | None:
+    """Return the encoder of the spring, None without. Raises ParameterError."""
+    identity = values["encoder_id"]
+    if identity < 0:
+        return None
+    for name, wrong in (("encoder_id", values["id"]), ("encoder_pulses", 0.0)):
+        if values[name] == wrong:
+            expected = "another than that of the motor" if name == "encoder_id" else "counts of a turn"
+            raise ParameterError(f"parameter {name} = {wrong:g}, expected {expected}")
+    address, pulses, place = (values[f"encoder_{name}"] for name in ("address", "pulses", "place"))
+    return EncoderConnection(identity, address, pulses, place, latency_of(values))
 
 
 def latency_of(values: Values) -> float:
     """Return the allowed lateness of a reply, s."""
-    return float(values["latency"] or usual_latency(values["rate"]))
+    replies = 2 + (values["encoder_id"] >= 0)
+    return float(values["latency"] or usual_latency(values["rate"], replies))
 
 
 DYNAMIXEL = "dynamixel_netft"

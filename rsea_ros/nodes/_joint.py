@@ -151,6 +151,7 @@ class DrivenJoint:
             "fault": fault or "none",
             "dead_host_protection": self.guarded.device.protection,
             "ft_source": self.guarded.ft_source,
+            "lifted_limits": ", ".join(self.guarded.lifted) or "none",
             "limited_commands": self.guarded.guard.limited,
             **cycles,
             **report.values,

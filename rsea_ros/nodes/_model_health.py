@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from rsea_ros.model.bandwidth import pure_torque_bandwidth
-from rsea_ros.model.observer import Observer, TorqueEstimate
+from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
 from rsea_ros.model.observer.consistency import Consistency
 from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.pure_torque_error import ErrorFlag
@@ -21,17 +21,26 @@ CHANGED = 0.1
 """Part by which period or doubt of the estimates must have changed before their noise is worked out again."""
 
 
+UNMOVED = "joint_states repeats one value while torque_command moves: stopped, or the drive is off"
+
+
 class ModelHealth:
-    """Assesses the node once a second, and passes the noise of the estimates to the flag."""
+    """Assesses the node once a second, and passes the noise of the estimates to the flag.
+
+    contradictions: sensors that differ from model and others by more than what the flag tolerates, in words.
+    """
 
     def __init__(
-        self, rig: Rig, observer: Observer, flag: PureTorque, error: ErrorFlag, inputs: ModelInputs
-    ) -> None:
+        self, rig: Rig, noise: Noise, observer: Observer, flag: PureTorque, error: ErrorFlag,
+        inputs: ModelInputs,
+    ) -> None:  # fmt: skip
         self._observer, self._flag, self._error, self._inputs = observer, flag, error, inputs
         j_sc = rig["chassis.inertia"]
         sprung = j_sc > 0.0 and not rig.rigid_spring
         self._eq_7 = pure_torque_bandwidth(rig["spring.stiffness"], j_sc) if sprung else math.inf
         self._calibrated = (math.nan, math.nan)
+        self._errors = {"ft": noise.ft, "position": noise.position * rig["spring.stiffness"]}
+        self.contradictions: list[str] = []
         self.estimate: TorqueEstimate | None = None
         self.count = 0
 
@@ -49,13 +58,32 @@ class ModelHealth:
                 WARN, "no measurement yet, expected joint_states and ft", {"bandwidth_hz": self._edge()}
             )
         tests = self._observer.consistency()
+        self.contradictions = self._contradictions(tests)
         stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in self._inputs.frozen]
+        if self._inputs.unmoved and not stopped:
+            stopped = [UNMOVED]
         doubts = (_inconsistency(name, test) for name, test in tests.items() if test.broken)
-        troubles = [*stopped, *self._silence(), *doubts]
+        troubles = [*stopped, *self.contradictions, *self._silence(), *doubts]
         summary = "; ".join(troubles) or self._error.verdict
         return NodeHealth(
             WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)}
         )
+
+    def _contradictions(self, tests: Mapping[str, Consistency]) -> list[str]:
+        """Return the channels whose innovations, N m RMS, are more than the tolerated part of the torque.
+
+        So large is no error of a model: a sensor repeats an old value under its own noise, or is wrong.
+        A torque too small beside the observer's doubt of it is not judged.
+        """
+        if math.isnan(self._error.share):
+            return []
+        limit = self._error.settings.tolerance * self._error.torque
+        off = {name: tests[name].ratio * self._errors[name] for name in self._errors.keys() & tests.keys()}
+        return [
+            f"{name} differs from model and other sensors by {rms:.3g} N m RMS, limit {limit:.3g} N m"
+            for name, rms in sorted(off.items())
+            if rms > limit and tests[name].broken
+        ]
 
     def _calibrate(self) -> None:
         if self.estimate is None or math.isnan(self._inputs.period):

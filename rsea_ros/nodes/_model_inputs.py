@@ -31,9 +31,13 @@ class ModelInputs:
 
     def __init__(
         self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool, *,
-        joint: str = "", ft_noise: float = 0.0,
+        joint: str = "", ft_noise: float = 0.0, steps: bool = False, stiffness: float = 0.0,
     ) -> None:  # fmt: skip
-        """ft_noise: standard deviation, N m. joint: name that the joint must have."""
+        """ft_noise: standard deviation, N m. joint: name that the joint must have.
+
+        steps: whether ft may repeat a value at rest, as that of an encoder: its quantum exceeds its noise.
+        stiffness: of the spring, N m/rad.
+        """
         self._observer = observer
         self._sign, along = sign_and_index(axis)
         self._timeout = round(ft_timeout * SECOND)
@@ -41,7 +45,9 @@ class ModelInputs:
         self._state_stamp = self._ft_stamp = self._estimate_stamp = 0
         self._periods: deque[float] = deque(maxlen=PERIODS)
         self.refused = self.unstamped = 0
-        self._still, self._numb = Frozen(max(MOVED * ft_noise, LEAST)), Frozen()
+        least = max(MOVED * ft_noise, LEAST)
+        self._still, self._idle = Frozen(least), Frozen(least)
+        self._numb, self._stiffness = Frozen(least if steps else 0.0), stiffness
         deep = RECORD_RELIABLE if reliable else None
         self._commands, self._states, self.ft = (
             Mailbox(
@@ -98,6 +104,11 @@ class ModelInputs:
         topics = (("joint_states", self._still), ("ft", self._numb))
         return [topic for topic, sensor in topics if sensor.frozen]
 
+    @property
+    def unmoved(self) -> bool:
+        """Whether joint_states repeat a value while commands move: they have stopped, or the drive is off."""
+        return self._idle.frozen
+
     def _measured(self, stamp: int, a: float, b: float, kind: int) -> TorqueEstimate | None:
         """Give a sample to the observer, unless its sensor has stopped."""
         if kind == _FT:
@@ -109,6 +120,8 @@ class ModelInputs:
         if not self._ft_stamp or stamp < self._ft_stamp - SECOND:
             self._ft_stamp = stamp
         self._state_stamp = stamp
+        self._idle.take(stamp, (a, b))
+        self._numb.beside(self._stiffness * a)
         if self._still.take(stamp, (a, b)):
             return None
         return self._observer.state(self.seconds(stamp), a, b)
@@ -126,6 +139,7 @@ class ModelInputs:
         if not math.isfinite(torque):
             self._refuse()
         elif stamp:
+            self._idle.beside(torque)
             self._observer.command(self.seconds(stamp), torque)
 
     def _refuse(self) -> None:

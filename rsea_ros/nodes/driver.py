@@ -24,7 +24,7 @@ from rsea_ros.nodes._bench import NAMES, SPRING_FRAME
 from rsea_ros.nodes._buses import devices_of
 from rsea_ros.nodes._combined import Combined
 from rsea_ros.nodes._cycle import Cycle
-from rsea_ros.nodes._device_parameters import LIMITS, MOTOR, SAFETY, SENSOR
+from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR
 from rsea_ros.nodes._devices import DEVICES
 from rsea_ros.nodes._drive import step
 from rsea_ros.nodes._jobs import Jobs
@@ -45,6 +45,7 @@ TABLE = (
     JOINTS,
     *SAFETY,
     *MOTOR,
+    *ENCODER,
     *SENSOR,
     *LIMITS,
     *NAMES,

@@ -15,6 +15,7 @@ from msg_adapters.topic_map import TYPES
 from rsea_ros.model.observer import Observer
 from rsea_ros.model.pure_torque import FlagSettings, PureTorque
 from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings
+from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
@@ -82,9 +83,9 @@ class ModelNode:
         self._flags = Flags(node)
         self._inputs = ModelInputs(
             node, observer, values["ft_timeout"], values["axis"], values["reliable"], joint=values["joint"],
-            ft_noise=noise.ft,
+            ft_noise=noise.ft, steps=_steps(rig), stiffness=rig["spring.stiffness"],
         )  # fmt: skip
-        self._assess = ModelHealth(rig, observer, self._flag, self._error, self._inputs)
+        self._assess = ModelHealth(rig, noise, observer, self._flag, self._error, self._inputs)
         self._lock = threading.Lock()
         self._health = Health(node, self._report, values["rig"])
         self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
@@ -99,8 +100,13 @@ class ModelNode:
                 t = self._inputs.seconds(stamp)
                 heard = self._flag.take(t, estimate) != "no torque"
                 pure = self._error.take(t, estimate, heard=heard) == PURE
-                self._flags.show(stamp, pure and not self._inputs.frozen)
+                self._flags.show(stamp, pure and not self._doubted)
                 self._assess.tell(estimate)
+
+    @property
+    def _doubted(self) -> bool:
+        """Whether a sensor has stopped or is wrong: nobody knows the torque then."""
+        return bool(self._inputs.frozen or self._inputs.unmoved or self._assess.contradictions)
 
     def _report(self) -> NodeHealth:
         with self._lock:
@@ -117,6 +123,12 @@ class ModelNode:
         """Leave nothing behind: the flag of a node that is gone is down, and its subscribers know."""
         self._waiter.stop()
         self._flags.lower()
+
+
+def _steps(rig: Rig) -> bool:
+    """Return whether the quantum of ft is larger than what its noise changes at each sample."""
+    ft = rig.sensors.get("ft")
+    return ft is not None and ft.quantum > 2.0 * ft.noise
 
 
 def main() -> int:

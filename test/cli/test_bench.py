@@ -1,6 +1,7 @@
 """`rsea bench` as a program: it prints its addresses, obeys requests, and leaves nothing behind."""
 
 import json
+import shlex
 import signal
 import subprocess
 import sys
@@ -41,6 +42,24 @@ def test_it_prints_its_addresses_and_a_signal_removes_the_port(tmp_path, number)
     _, errors = process.communicate(timeout=30)
     assert (process.returncode, errors) == (0, "")
     assert not (tmp_path / "tty").is_symlink()
+
+
+def test_with_an_encoder_on_the_spring_there_is_no_ft_sensor(tmp_path):
+    with RemoteBench(tmp_path / "tty", "--deflection") as bench:
+        values = bench.parameters()
+    assert (values["encoder_id"], values["encoder_pulses"], values["ft_host"]) == (100, 2.0**20, "")
+    process = start("--port", tmp_path / "second", "--deflection")
+    words = json.loads(process.stdout.readline())["launch"]
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=30)
+    driver, *_ = node_calls("hardware", shlex.split(words)[3:])
+    given = driver.parameters
+    assert (given["encoder_id"], given["encoder_pulses"], given["ft_host"]) == ("100", "1048576.0", "''")
+
+
+def test_an_encoder_needs_a_spring(capsys):
+    assert main(["bench", "--rig", "bare_drive", "--deflection"]) == 2
+    assert "--deflection: the spring of rig bare_drive is rigid" in capsys.readouterr().err
 
 
 def test_an_unknown_request_is_answered_and_changes_nothing(tmp_path):

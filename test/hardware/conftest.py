@@ -105,6 +105,6 @@ def well_behaved(bench):
     """Undo every misbehaviour."""
     bench.ask("appear")
     calm = dict.fromkeys(("drop", "delay", "corrupt", "truncate", "wrong_crc", "ft_drop"), 0.0)
-    bench.ask("misbehave", unstuffed=False, silent=False, ft_silent=False, **calm)
+    bench.ask("misbehave", unstuffed=False, silent=False, ft_silent=False, ft_stuck=False, **calm)
     bench.ask("set", hardware_error=0, voltage=bench.volts, temperature=32)
     bench.ask("ft_status", bits=0)

@@ -49,6 +49,20 @@ def test_a_fault_is_latched_within_its_cycles_and_cleared_by_the_service(loop, n
     assert torques(loop.bench, since)[-1][0] != 0 and torques(loop.bench, since)[-1][1]
 
 
+def test_an_ft_sensor_that_repeats_one_value_has_stopped(loop):
+    """Its counters went on, and nobody noticed: ft_limit was blind."""
+    since = loop.bench.ask("misbehave", ft_stuck=True)["t"]
+    loop.until_fault(10.0)
+    assert loop.guarded.fault.cause == "ft" and "all six values unchanged for" in str(loop.guarded.fault)
+    loop.cycles(2, 10.0)
+    assert torques(loop.bench, since)[-1][0] == 0
+    with pytest.raises(DeviceError, match=r"all six values unchanged for .* is still there"):
+        loop.guarded.clear()
+    loop.bench.ask("misbehave", ft_stuck=False)
+    loop.guarded.clear()
+    assert loop.cycles(60, 10.0)[-1] == 10.0 and loop.guarded.fault is None
+
+
 @pytest.mark.parametrize("loop", ALL, indirect=True)
 def test_a_hardware_error_needs_a_reboot_and_is_over_after_it(loop):
     since = loop.bench.ask("alert", bits=0x20)["t"]

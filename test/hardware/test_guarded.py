@@ -9,7 +9,7 @@ import pytest
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import DeviceFault, Limits
-from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE
+from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring
 from test.hardware.logged_device import LOST, Device, guarded
 
@@ -42,7 +42,7 @@ def test_opening_begins_softly_and_without_a_fault(device):
     joint = GuardedDevice(device, Limits(64.0), 64.0)
     joint.guard.trip(DeviceFault("ft"))
     joint.open()
-    assert device.log == ["open"] and joint.fault is None
+    assert device.log == ["open", "read"] and joint.fault is None
 
 
 @pytest.mark.parametrize("kind", [NONE, BUS_WATCHDOG])
@@ -56,12 +56,54 @@ def test_a_device_that_nothing_protects_is_closed_again_unless_that_is_allowed(k
         assert device.log == ["open", "close"]
     else:
         joint.open(unprotected=unprotected)
-        assert device.log == ["open"]
+        assert device.log == ["open", "read"]
 
 
 def test_protection_is_required_by_default():
     with pytest.raises(ParameterError):
         GuardedDevice(Device(NONE), Limits(64.0), 64.0).open()
+
+
+@pytest.mark.parametrize("name", ["temperature", "current", "voltage"])
+def test_a_limit_of_what_is_not_measured_is_refused(device, name):
+    """It was dropped, and nobody was told."""
+    every = {"temperature": 30.0, "current": 1.0, "voltage": 24.0}
+    limits = Limits(64.0, temperature=70.0, current=12.0, voltage=20.0)
+    device.reading = every | {name: math.nan}
+    with pytest.raises(ParameterError, match=f"{name}_limit = .* measures no {name}, expected 0 for none"):
+        GuardedDevice(device, limits, 64.0).open()
+    assert device.log == ["open", "read", "close"]
+    device.reading = every
+    joint = GuardedDevice(device, limits, 64.0)
+    joint.open()
+    assert joint.lifted == [] and joint.guard.limits == limits
+
+
+def test_without_its_limit_a_quantity_need_not_be_measured(device):
+    device.reading = {}
+    GuardedDevice(device, Limits(64.0, temperature=math.inf), 64.0).open()
+    assert device.log == ["open", "read"]
+
+
+def test_a_simulation_says_which_limits_do_not_apply_to_it():
+    device = Device(PROCESS)
+    joint = GuardedDevice(device, Limits(64.0, voltage=20.0, current=12.0), 64.0)
+    joint.open()
+    assert joint.lifted == ["current", "voltage"]
+    device.reading |= {"voltage": 24.0, "current": 1.0}
+    joint.open()
+    assert joint.lifted == [], "the limits that were lifted for it are back"
+    assert joint.cycle(1.0, 0.0) and joint.fault is None
+    assert joint.cycle(1.0, 0.0) and joint.guard.limits.temperature == 70.0
+    device.reading |= {"voltage": 19.0}
+    assert joint.cycle(1.0, 0.0) and joint.fault.cause == "voltage"
+
+
+def test_a_device_that_does_not_answer_is_not_opened(device):
+    device.broken = {"read": [LOST] * 3}
+    with pytest.raises(DeviceError):
+        GuardedDevice(device, Limits(64.0), 64.0).open()
+    assert device.log[-1] == "close"
 
 
 def test_a_cycle_writes_then_reads_and_beats_before_each(joint, device):

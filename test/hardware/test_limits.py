@@ -203,6 +203,26 @@ def test_an_ft_limit_needs_a_torque_that_is_measured(readings, fault):
     assert it.fault is None
 
 
+@pytest.mark.parametrize("name", ["temperature", "current", "voltage"])
+def test_a_limited_quantity_must_go_on_being_measured(name):
+    good = {"temperature": 30.0, "current": 1.0, "voltage": 24.0}
+    it = Guard(Limits(68.0, temperature=70.0, current=12.0, voltage=20.0), 0.01)
+    read = lambda **values: it.look(State(0, 0.0, 0.0, 0.0, **(good | values)))  # noqa: E731
+    for _ in range(3):
+        read()
+        for _ in range(100):
+            read(**{name: math.nan})
+    assert it.fault is None
+    read(**{name: math.nan})
+    assert str(it.fault) == f"{name}: no {name} measured for 1 s, expected one for {name}_limit"
+    it.clear()
+    read(**{name: math.nan})
+    assert it.fault.cause == name, "clear_fault changes nothing of it"
+    it.clear()
+    read()
+    assert it.fault is None
+
+
 def test_without_an_ft_limit_no_torque_need_be_measured():
     it = Guard(Limits(68.0), 0.01)
     for _ in range(150):

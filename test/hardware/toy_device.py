@@ -24,6 +24,8 @@ class Toy:
         self.torque, self.on, self.opened = 0.0, False, False
         self.protection = Protection(NONE)
         self.deflection_known = True
+        self.measured = {"temperature": 30.0, "current": 0.0, "voltage": 24.0}
+        self.measured.pop(options.get("blind"), None)
 
     def open(self):
         self.near, self.far = socket.socketpair()
@@ -39,7 +41,9 @@ class Toy:
         if not self.opened:
             raise DeviceError("toy: not open")
         deflection = self.torque / 1000.0 if self.deflection_known else float("nan")
-        return State(1, 3.0 + self.torque / 1000.0, 0.0, self.torque, deflection=deflection)
+        return State(
+            1, 3.0 + self.torque / 1000.0, 0.0, self.torque, deflection=deflection, **self.measured
+        )
 
     def write(self, torque):
         self.torque = torque

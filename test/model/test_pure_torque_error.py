@@ -193,6 +193,19 @@ def test_values_that_are_not_finite_are_left_out(bad):
     assert np.isfinite(shares[200:]).all()
 
 
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+@pytest.mark.parametrize("heard", [False, True])
+def test_a_threshold_that_is_no_number_is_not_pure(bad, heard):
+    """A sigma of the proximal torque that overflows held the flag up for good."""
+    distal, proximal = (values.tolist() for values in ends(PLATFORM, tones(1.0, 20.0)))
+    flag = ErrorFlag(PLATFORM)
+    for k, (d, p) in enumerate(zip(distal, proximal, strict=True)):
+        sigma = bad if k == 800 else 0.007
+        verdict = flag.take(k / RATE, TorqueEstimate(d, p, 0.0, 0.007, sigma, 0.007), heard=heard)
+        assert verdict == (NOTHING if k == 800 else PURE if k > 200 else verdict)
+    assert flag.verdict == "pure", "it comes back with the numbers"
+
+
 def test_a_long_run_sums_as_exactly_as_a_short_one():
     """The ring goes round several times."""
     distal, proximal = ends(PLATFORM, tap := tones(20.0, 30.0))

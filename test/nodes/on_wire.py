@@ -22,15 +22,15 @@ WAIT = 55.0
 
 
 class Driven:
-    """A driver on a bench, in a namespace of its own."""
+    """A driver on a bench, in a namespace of its own. parameters: beside those of the bench."""
 
-    def __init__(self, bench, listener, name, begin):
+    def __init__(self, bench, listener, name, begin, parameters=PATIENT):
         self.bench, self.name, self._listener = bench, name, listener
         self._commands = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
         self._clear = listener.node.create_client(Trigger, f"/{name}/driver/clear_fault")
         self._health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.cleared = []
-        self.process = begin("driver", remaps={"__ns": f"/{name}"}, **bench.parameters(), **PATIENT)
+        self.process = begin("driver", remaps={"__ns": f"/{name}"}, **bench.parameters(), **parameters)
 
     def push(self, condition, torque=10.0):
         """Command a torque until the condition holds; clear what a busy machine has latched."""

@@ -33,6 +33,16 @@ def test_a_spring_with_a_free_end_is_limited_by_what_ft_measures():
     assert math.isinf(free.deflection) and free.ft == pytest.approx(0.05 * 1530.456)
 
 
+def test_an_angle_that_counts_from_the_motors_zero_is_not_the_springs():
+    """The limit of the deflection was that of the joint: one way twice as far, the other not at all."""
+    own = limits(device="dynamixel_netft", position_zero="motor", deflection_limit=0.05)
+    assert math.isinf(own.deflection) and own.ft == pytest.approx(0.05 * 1530.456)
+    felt = limits(device="dynamixel_netft", position_zero="motor", encoder_id=5, ft_host="")
+    assert felt.deflection == 0.0873
+    with pytest.raises(ParameterError, match=r"deflection_limit = 0\.05 cannot be applied"):
+        limits(device="dynamixel_netft", position_zero="motor", ft_host="", deflection_limit=0.05)
+
+
 def test_velocity_power_and_ft_are_limited_by_default_on_every_rig():
     for rig in ("paper_high_impedance", "paper_moving_output", "prototype_knee"):
         found = limits(rig=rig)
@@ -51,6 +61,11 @@ def test_velocity_power_and_ft_are_limited_by_default_on_every_rig():
 def test_a_limit_that_cannot_be_applied_is_refused(values, told):
     with pytest.raises(ParameterError, match=told):
         limits(**values)
+
+
+def test_zero_is_no_limit():
+    free = limits(temperature_limit=0.0, current_limit=0.0, voltage_limit=0.0)
+    assert (free.temperature, free.current, free.voltage) == (math.inf, math.inf, 0.0)
 
 
 def test_a_bare_drive_has_the_limits_that_apply_to_it():

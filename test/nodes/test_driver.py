@@ -158,6 +158,11 @@ def test_every_transition_out_of_active_writes_zero(spied, way):
     assert spy.written[-1] == 0.0
 
 
+def test_diagnostics_name_the_limits_that_a_simulation_lifts(spied):
+    _, program, _ = spied
+    assert program.joints[0].report().values["lifted_limits"] == "temperature, current, voltage"
+
+
 def test_closing_writes_zero_and_releases_the_device(spied):
     spy, program, _ = spied
     program.close()

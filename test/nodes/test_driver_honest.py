@@ -18,8 +18,10 @@ from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._publishers import Obeyed
 from rsea_ros.nodes._qos import COMMAND
 from test.nodes.clock_shim import in_python, preloaded, set_clock
+from test.nodes.stalls import is_stall
 
 ROOT = Path(__file__).resolve().parents[2]
+TRIES = 10
 DRIVER = "import sys\nfrom rsea_ros.nodes.driver import main\nsys.exit(main())\n"
 
 
@@ -59,6 +61,17 @@ class Shimmed:
         status = self.status()
         return {p.key: p.value for p in status.values}.get(key, "") if status else ""
 
+    def fault(self):
+        """The fault that the newest status has, None without."""
+        fault = self.value("fault")
+        return None if fault in ("", "none") else fault
+
+    def settled(self, key):
+        """A number of a status that is published from now on."""
+        self.health.clear()
+        self.listener.until(self.status)
+        return int(self.value(key))
+
     def told(self, text):
         """Whether any status has said so in its summary."""
         return any(text in m.status[0].message for m in self.health if m.status[0].name == "/honest/driver")
@@ -75,7 +88,7 @@ class Shimmed:
 
     def drive(self):
         """Command 10 N m until the motor has a torque; clear what a busy machine has latched."""
-        looked = time.monotonic()
+        looked = time.monotonic() - 1.2
 
         def driving():
             nonlocal looked
@@ -104,14 +117,25 @@ def driver(tmp_path_factory, listener):
         made.process.wait()
 
 
-@pytest.mark.parametrize("step", [-3600, 0])
-def test_a_step_of_the_system_clock_ends_the_torque_and_is_reported(driver, step):
-    """The clock goes an hour back and forward again; nobody commands any more."""
-    driver.drive()
-    driver.set_clock(step)
-    driver.listener.until(lambda: driver.bench.torque()[0] == 0)
-    driver.listener.until(lambda: "clock_step" in driver.value("fault") or "timeout" in driver.value("fault"))
-    driver.listener.until(lambda: driver.value("clock_steps") == ("1" if step else "2"))
+@pytest.mark.parametrize(("off", "step"), [(0, -3600), (-3600, 0)])
+def test_a_step_of_the_system_clock_ends_the_torque_and_is_reported(driver, off, step):
+    """The clock goes an hour back and forward again; nobody commands any more.
+
+    On a machine that stalls the commands may have ceased for 50 ms before the step: then again.
+    """
+    for _ in range(TRIES):
+        driver.set_clock(off)
+        driver.drive()
+        steps = driver.settled("clock_steps")
+        driver.drive()
+        driver.set_clock(step)
+        driver.listener.until(lambda: driver.bench.torque()[0] == 0)
+        fault = driver.listener.until(driver.fault)
+        assert driver.settled("clock_steps") == steps + 1
+        if fault.startswith("clock_step"):
+            break
+        assert is_stall(fault) or fault.startswith("command_timeout"), fault
+    assert fault == f"clock_step: the system clock was set by {step - off:+.3f} s", fault
     driver.drive()
 
 

@@ -27,6 +27,15 @@ def test_a_device_without_protection_is_not_configured(drive):
     assert "dead-host protection none" in program.joints[0].report()[1]
 
 
+def test_a_limit_of_what_the_device_does_not_measure_is_refused(drive):
+    values = {"allow_no_dead_host_protection": True, "device_options": "blind=temperature"}
+    program, node = drive(**values)
+    assert node._state_machine.current_state[1] == "unconfigured"
+    assert "parameter temperature_limit = 70 cannot be applied" in program.joints[0].report()[1]
+    _, node = drive(**values, temperature_limit=0.0)
+    assert node._state_machine.current_state[1] == "active"
+
+
 def test_the_deflection_is_published_also_as_an_ft_marked_as_such(drive, listener):
     program, _ = drive(allow_no_dead_host_protection=True, axis="-torque.y")
     wrenches = listener.hear(WrenchStamped, "/toy/ft", MEASUREMENT)

@@ -1,5 +1,6 @@
 """Several joints of one bus in one driver: each with commands, limits, faults and services of its own."""
 
+import threading
 import time
 
 import numpy as np
@@ -16,11 +17,17 @@ from test.nodes.stalls import every, is_stall
 from test.nodes.test_driver import Spy
 
 JOINTS = ("hip", "knee", "ankle")
+TRIALS = 10
 X = {
     "torque_limit": 3.0, "current_limit": 3.2, "voltage_limit": 10.0, "effort_limit": 0.0, "ft_limit": 0.0,
     "power_limit": 20.0, "deflection_limit": 0.0, "ft_host": "", "rig": "bare_drive",
 }  # fmt: skip
 """Of small motors of the X series without a spring."""
+PATIENT = {
+    "rate": 100.0, "latency": 0.05, "command_timeout": 5.0, "ft_timeout": 0.5, "watchdog": 2.0,
+    "lost_cycles": 20,
+}  # fmt: skip
+"""A machine that is busy with other tests must not look like a fault; the last tests have the defaults."""
 
 
 def values_of(**given):
@@ -64,16 +71,12 @@ def test_impossible_joints_are_refused(listener, given, told):
 
 
 class Leg:
-    """The driver process of three motors on one line."""
+    """The driver process of three motors on one line. patient: its limits."""
 
-    def __init__(self, bench, start, listener):
+    def __init__(self, bench, start, listener, patient=PATIENT):
         self.bench, self.listener = bench, listener
         ids = {f"{joint}.id": k + 1 for k, joint in enumerate(JOINTS)}
         known = {**bench.parameters(), **X, "baud": 4_000_000, "autostart": True, "joints": list(JOINTS)}
-        patient = {
-            "rate": 100.0, "latency": 0.05, "command_timeout": 5.0, "ft_timeout": 0.5, "watchdog": 2.0,
-            "lost_cycles": 20,
-        }  # fmt: skip
         sensor = {"hip.ft_host": "127.0.0.1"}
         self.process = start("driver", {"__ns": "/leg"}, **known, **patient, **ids, **sensor)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
@@ -120,6 +123,15 @@ class Leg:
             if message.status[0].name == f"/leg/driver/{joint}":
                 return {pair.key: pair.value for pair in message.status[0].values}.get(key)
         return None
+
+    def faults(self):
+        """The newest fault of each joint in words."""
+        return [self.value(joint, "fault") or "unknown" for joint in JOINTS]
+
+    def acting(self, place, since):
+        """Whether each write to a motor since an instant was of a torque that acts."""
+        log = self.bench.ask("log", motor=place, since=since)["result"]["torque"]
+        return [goal != 0 and on for _, goal, on in log]
 
     def call(self, service):
         """Call a service of the driver; return its answer."""
@@ -193,3 +205,70 @@ def test_the_end_of_the_driver_ends_all_torques(leg):
     leg.push(TORQUES, lambda: all(leg.goals()))
     assert leg.process.stop() == 0
     assert leg.goals() == [0, 0, 0]
+
+
+class Strict(Leg):
+    """A leg with the limits of config/nodes, which a thread commands at 280 Hz."""
+
+    def __init__(self, bench, start, listener):
+        super().__init__(bench, start, listener, {})
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._command, daemon=True)
+        self._thread.start()
+
+    def _command(self):
+        while not self._over.wait(1.0 / 280.0):
+            for joint, torque in TORQUES.items():
+                self.commands[joint].publish(torque_command_message(time.time_ns(), torque, joint))
+
+    def close(self):
+        """Command no more."""
+        self._over.set()
+        self._thread.join()
+
+    def ready(self):
+        """Wait until every motor has a torque and no fault is latched; clear what a stall has latched."""
+        clear_now_and_then = every(0.5, lambda: self.call("clear_fault"))
+
+        def driving():
+            clear_now_and_then()
+            return all(self.goals()) and set(self.faults()) == {"none"}
+
+        self.listener.until(driving)
+
+
+@pytest.fixture(scope="module")
+def strict(tmp_path_factory, start, listener):
+    with RemoteBench(tmp_path_factory.mktemp("strict") / "tty", "--model", 1020, 1120, 1170) as bench:
+        bench.hurry()
+        made = Strict(bench, start, listener)
+        yield made
+        made.close()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right", "causes", "most"),
+    [
+        (("set", {"motor": 1, "temperature": 90}), ("set", {"motor": 1, "temperature": 30}), {1: "temp"}, 2),
+        (
+            ("misbehave", {"silent": True}), ("misbehave", {"silent": False}),
+            dict.fromkeys(range(3), "no_reply"), 5,
+        ),
+    ],
+)  # fmt: skip
+def test_with_the_defaults_a_fault_ends_the_torques_that_it_concerns(strict, wrong, right, causes, most):
+    """Counted in writes from the bench's log; a machine that stalls latches faults of its own: then again."""
+    for _ in range(TRIALS):
+        strict.ready()
+        since = strict.bench.ask(wrong[0], **wrong[1])["t"]
+        strict.listener.until(lambda: all(strict.faults()[place] != "none" for place in causes))
+        writes, faults = [strict.acting(place, since) for place in range(3)], strict.faults()
+        strict.bench.ask(right[0], **right[1])
+        spared = all(all(writes[place]) for place in set(range(3)) - causes.keys())
+        if spared and all(faults[place].startswith(causes.get(place, "none")) for place in range(3)):
+            break
+    assert spared, "a fault of one joint leaves the others their torque"
+    for place in range(3):
+        assert faults[place].startswith(causes.get(place, "none")), faults
+    for place in causes:
+        assert max((k for k, acts in enumerate(writes[place]) if acts), default=-1) < most, writes

@@ -25,13 +25,15 @@ REFUSALS = {
 
 
 class Bus:
-    """One motor on a port. alert: bit 7 of the last error byte. errors: failed transactions by kind.
+    """One motor, or another device, on a port.
+
+    alert: bit 7 of the last error byte. errors: failed transactions by kind.
 
     latency, return_delay: see SerialPort; of this motor's transactions, also where others use the port.
     """
 
-    def __init__(self, port: SerialPort, identity: int) -> None:
-        self.port, self._id = port, identity
+    def __init__(self, port: SerialPort, identity: int, kind: str = "motor") -> None:
+        self.port, self._id, self._name = port, identity, f"{kind} ID {identity}"
         self.latency, self.return_delay = port.latency, port.return_delay
         self.handler = PacketHandler()
         self._failed: Counter[str] = Counter()
@@ -104,12 +106,12 @@ class Bus:
             kind = "corrupt" if result == COMM_RX_CORRUPT else "lost"
             self._failed[kind] += 1
             reply = "a damaged reply" if kind == "corrupt" else "no reply"
-            raise NoReply(f"motor ID {self._id} on {self.port.port_name}: {reply} to {request}")
+            raise NoReply(f"{self._name} on {self.port.port_name}: {reply} to {request}")
         self.alert = bool(error & ALERT)
         if error & ~ALERT:
             self._failed["refused"] += 1
             why = REFUSALS.get(error & ~ALERT, f"error {error & ~ALERT}")
-            raise Refused(f"motor ID {self._id}: {request} refused: {why}")
+            raise Refused(f"{self._name}: {request} refused: {why}")
 
 
 def _repeated(transaction: Callable[[], T]) -> T:

@@ -29,6 +29,6 @@ class MotorConnection:
     supervisor: str = ""
 
 
-def usual_latency(rate: float) -> float:
-    """Return the latency (s) with which a cycle that loses both replies still ends in time. rate: Hz."""
-    return max(SHARE / rate - REST, REST)
+def usual_latency(rate: float, replies: int = 2) -> float:
+    """Return the latency (s) with which a cycle that loses all its replies still ends in time. rate: Hz."""
+    return max(2.0 * SHARE / replies / rate - REST, REST)

@@ -14,6 +14,7 @@ from rsea_ros.hardware.device import Wrench
 from rsea_ros.hardware.netft.calibration import Calibration, fetch
 from rsea_ros.hardware.netft.rdt import SET_BIAS, trouble
 from rsea_ros.hardware.netft.receiver import Arrival, DatagramReceiver
+from rsea_ros.hardware.netft.stillness import Stillness
 
 AVERAGING_TIME, FIRST = 0.1, 3.0
 """s over which noise and tare are measured; s that the first record may take."""
@@ -47,6 +48,7 @@ class ForceTorqueSensor:
         self._calibration = Calibration(1.0, 1.0)
         self.noise: Wrench = (0.0,) * 6
         self._quiet = 0
+        self._stillness = Stillness()
         self._seen: Mapping[str, int] = {}
 
     def open(self) -> None:
@@ -54,11 +56,12 @@ class ForceTorqueSensor:
         self._calibration = fetch(self._settings.host, self._settings.page_port)
         self._receiver.open()
         try:
-            values = self._collect()
+            arrivals = self._collect()
         except DeviceError:
             self._receiver.close()
             raise
-        self.noise = _six(values.std(axis=0))
+        self.noise = _six(self._values(arrivals).std(axis=0))
+        self._stillness.calibrate(arrivals)
         self._restart_watch()
 
     def gather(self) -> None:
@@ -69,14 +72,15 @@ class ForceTorqueSensor:
         """Return the records since the last call as (monotonic ns, wrench), and the fault: '' none."""
         arrivals = self._receiver.take()
         wrong = self._silence(arrivals) or self._jump() or _complaint(arrivals)
+        wrong = wrong or self._stillness.take(arrivals)
         return [(a.instant, self._calibration.wrench(a.record.counts)) for a in arrivals], wrong
 
     def zero(self) -> None:
         """Let the sensor take its present load for zero. Raises DeviceError when the load is not at rest."""
-        self._expect_small(np.ptp(self._collect(), axis=0), 2.0, "swings by", "before the tare")
+        self._expect_small(np.ptp(self._values(self._collect()), axis=0), 2.0, "swings by", "before the tare")
         self._receiver.send(SET_BIAS)
         time.sleep(STREAM_AGAIN)
-        self._expect_small(np.abs(self._collect().mean(axis=0)), 1.0, "is", "after the tare")
+        self._expect_small(np.abs(self._values(self._collect()).mean(axis=0)), 1.0, "is", "after the tare")
         self._restart_watch()
 
     def _expect_small(self, values: Values, times: float, verb: str, when: str) -> None:
@@ -90,9 +94,10 @@ class ForceTorqueSensor:
 
     def recover(self) -> None:
         """Return when the stream is sound, at once where it continues. Raises DeviceError otherwise."""
-        if self._age() > self._settings.timeout * 1e9 or self._complains():
-            self._collect()
-        if complaint := self._complains():
+        stopped = ""
+        if self._age() > self._settings.timeout * 1e9 or self._complains() or self._stillness.stopped:
+            stopped = self._stillness.judge(self._collect())
+        if complaint := self._complains() or stopped:
             raise DeviceError(f"F/T sensor: {complaint} is still there, expected it to be over")
         self._restart_watch()
 
@@ -109,8 +114,12 @@ class ForceTorqueSensor:
         """End the stream."""
         self._receiver.close()
 
-    def _collect(self) -> Values:
-        """Return the wrenches of the next AVERAGING_TIME, one a row. Raises DeviceError without any."""
+    def _values(self, arrivals: list[Arrival]) -> Values:
+        """Return the wrenches, one a row."""
+        return np.array([self._calibration.wrench(a.record.counts) for a in arrivals])
+
+    def _collect(self) -> list[Arrival]:
+        """Return the records of the next AVERAGING_TIME. Raises DeviceError without any."""
         deadline = time.monotonic() + FIRST
         while not self._receiver.collect(0.005):
             if time.monotonic() > deadline:
@@ -119,9 +128,10 @@ class ForceTorqueSensor:
         arrivals = self._receiver.collect(AVERAGING_TIME)
         if not arrivals:
             raise DeviceError(f"F/T sensor {self._settings.host}: the stream has ended, expected it to go on")
-        return np.array([self._calibration.wrench(a.record.counts) for a in arrivals])
+        return arrivals
 
     def _restart_watch(self) -> None:
+        self._stillness.restart()
         self._quiet, self._seen = 0, dict(self._receiver.sequence.counts)
 
     def _silence(self, arrivals: list[Arrival]) -> str:

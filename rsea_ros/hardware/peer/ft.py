@@ -76,7 +76,8 @@ class ForceSensor:
         due = self._client is not None and self._due <= now
         while self._client and self._due <= now:
             self._due += self._period
-            self._counts = _counts(self._plant)
+            counts = _counts(self._plant)
+            self._counts = self._counts if self._wrong.happens("ft_stuck") else counts
             self._ft = (self._ft + 1) % (1 << 32)
             self._rdt = (self._rdt + 1) % (1 << 32)
             if self._wrong.happens("ft_silent"):

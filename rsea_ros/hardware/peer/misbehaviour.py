@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 class Misbehaviour:
     """drop, delay, corrupt, truncate, wrong_crc: shares of the motor's replies. late: of the delay, s.
 
-    unstuffed, silent: whether. ft_drop: share of the sensor's records; ft_silent: whether it sends none.
+    unstuffed, silent: whether. ft_drop: share of the sensor's records; ft_silent: whether it sends none;
+    ft_stuck: whether they repeat one value, while the counters go on.
     """
 
     drop: float = 0.0
@@ -23,6 +24,7 @@ class Misbehaviour:
     silent: bool = False
     ft_drop: float = 0.0
     ft_silent: bool = False
+    ft_stuck: bool = False
     seed: int = 0
     done: dict[str, int] = field(default_factory=dict)
 

@@ -7,7 +7,7 @@ from collections import deque
 from typing import Protocol
 
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.peer.registers import EEPROM, MODELS, READ_ONLY, TABLE_SIZE
+from rsea_ros.hardware.peer.registers import EEPROM, ENCODER, MODELS, READ_ONLY, TABLE_SIZE
 
 FAILED, UNKNOWN, RANGE, LENGTH, LIMIT, ACCESS = 1, 2, 4, 5, 6, 7
 TORQUE_MODE = 0
@@ -43,7 +43,7 @@ class EmulatedMotor:
         origin: int = 1234,
         kept: int = KEPT,
     ) -> None:
-        self.model, self._plant = MODELS[number], plant
+        self.model, self._plant = MODELS.get(number, ENCODER), plant
         self._constant, self._origin = torque_constant or self.model.constant, origin
         self.memory = bytearray(TABLE_SIZE)
         self.history: deque[tuple[int, int, bool]] = deque(maxlen=kept)

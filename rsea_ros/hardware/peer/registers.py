@@ -139,9 +139,26 @@ def _models() -> dict[int, MotorModel]:
         (1120, 2.69e-3, 2047, _V12, 2.409), (1130, 2.69e-3, 2047, _V12, 1.659),
         (1140, 2.69e-3, 2047, _V24, 3.833), (1150, 2.69e-3, 2047, _V24, 2.667),
         (1170, 2.69e-3, 2047, _V12, 1.939), (1180, 2.69e-3, 2047, _V12, 1.408),
+        (1001, 2.69e-3, 648, _V12, 2.6), (1011, 2.69e-3, 648, _V12, 1.9), (1101, 2.69e-3, 2047, _V12, 2.0),
+        (1111, 2.69e-3, 2047, _V12, 1.4), (1270, 2.69e-3, 2047, _V12, 2.0), (1280, 2.69e-3, 2047, _V12, 1.4),
     ):  # fmt: skip
         made[number] = MotorModel(number, _x(current, voltage), unit, 0.229 * _RPM, 4096, constant)
     return made
 
 
 MODELS = _models()
+ENCODER = MotorModel(
+    1,
+    {
+        "id": Register(7, 1, EEPROM, 0, 252, 1),
+        "return_delay": Register(9, 1, EEPROM, 0, 254),
+        "homing_offset": Register(20, 4, EEPROM, -(2**31), 2**31 - 1, signed=True),
+        "status_level": Register(68, 1, RAM, 0, 2, 2),
+        "hardware_error": Register(70, 1, READ_ONLY),
+        "position": Register(132, 4, READ_ONLY, signed=True),
+    },
+    0.0,
+    0.0,
+    1 << 20,
+)
+"""A microcontroller with an encoder of 20 bits, whose angle is where an X motor has its position."""

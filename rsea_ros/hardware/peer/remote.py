@@ -30,6 +30,7 @@ class RemoteBench:
         )  # fmt: skip
         place = self._receive()
         self.port, self.ft_port, self.page_port = str(path), int(place["ft_port"]), int(place["page_port"])
+        self._encoder = {name: value for name, value in place.items() if name.startswith("encoder")}
 
     def __enter__(self) -> RemoteBench:
         return self
@@ -41,6 +42,8 @@ class RemoteBench:
 
     def parameters(self) -> dict[str, object]:
         """Return the parameters that a driver node needs to find it."""
+        if self._encoder:
+            return {"device": "dynamixel_netft", "port": self.port, "ft_host": "", **self._encoder}
         return {
             "device": "dynamixel_netft", "port": self.port, "ft_host": "127.0.0.1",
             "ft_port": self.ft_port, "ft_page_port": self.page_port,

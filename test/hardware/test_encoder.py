@@ -1,0 +1,185 @@
+"""A second encoder on the motor's bus in place of an F/T sensor: its deflection, its zero, its loss."""
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.hardware.device import NoReply
+from rsea_ros.hardware.dynamixel.encoder import LINK, EncoderConnection, SpringEncoder
+from rsea_ros.hardware.dynamixel.line import Line
+from rsea_ros.hardware.dynamixel.line_motor import LineMotor
+from rsea_ros.hardware.dynamixel.motor import Motor
+from rsea_ros.hardware.dynamixel.settings import MotorConnection, usual_latency
+from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
+from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.peer.peer_encoder import IDENTITY
+from rsea_ros.hardware.peer.registers import ENCODER
+from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.hardware.spring_sensor import Spring
+from rsea_ros.hardware.together import cycle
+from rsea_ros.nodes import driver
+from rsea_ros.nodes._devices import dynamixel_netft, limits_of
+from test.hardware.conftest import LATENCY, PERIOD, STIFFNESS, WATCHDOG
+
+TURN = 2.0 * math.pi
+DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
+
+
+class Answers:
+    """A bus that gives the counts of a list, and keeps the sizes that were read."""
+
+    def __init__(self, *counts):
+        self.counts, self.sizes, self.latency = list(counts), [], 0.0
+
+    def read(self, address, size):
+        self.sizes.append((address, size))
+        if (count := self.counts.pop(0)) is None:
+            raise NoReply("no reply")
+        return count.to_bytes(4, "little", signed=True).ljust(size, b"\7")
+
+    def patiently(self, transaction):
+        return transaction()
+
+
+def encoder(*counts, **settings):
+    made = SpringEncoder(EncoderConnection(100, **settings), SimpleNamespace(latency=0.0, return_delay=0.0))
+    made._bus = Answers(*counts)
+    return made
+
+
+def sample(position=0.0, velocity=0.0, instant=0):
+    return SimpleNamespace(position=position, velocity=velocity, instant=instant)
+
+
+def test_it_counts_from_where_it_is_opened_unless_its_own_zero_counts():
+    for absolute, zero in ((False, 1000), (True, 0)):
+        made = encoder(1000, 1100, -300, pulses=4096.0)
+        made.open(sample(), absolute=absolute)
+        read = [made.deflection(sample()) for _ in range(2)]
+        assert read == pytest.approx([TURN * (counts - zero) / 4096.0 for counts in (1100, -300)])
+
+
+def test_negative_pulses_reverse_it():
+    made = encoder(0, 1024, pulses=-4096.0)
+    made.open(sample(), absolute=False)
+    assert made.deflection(sample()) == pytest.approx(-TURN / 4.0)
+
+
+def test_an_encoder_of_the_link_is_compared_with_the_output_at_its_own_instant(monkeypatch):
+    made = encoder(0, 100, pulses=4096.0, place=LINK)
+    made.open(sample(position=0.5), absolute=True)
+    monkeypatch.setattr("time.monotonic_ns", lambda: 3_000_000)
+    read = made.deflection(sample(position=0.5, velocity=2.0, instant=1_000_000))
+    assert read == pytest.approx(0.5 + 2.0 * 0.002 - TURN * 100 / 4096.0)
+
+
+def test_the_next_read_after_a_lost_reply_has_another_size():
+    """A reply that comes late would be taken for the new one."""
+    made = encoder(0, None, 5, None, 5)
+    made.open(sample(), absolute=False)
+    for _ in range(2):
+        with pytest.raises(NoReply):
+            made.deflection(sample())
+        assert made.deflection(sample()) == pytest.approx(TURN * 5 / 4096.0)
+    assert made._bus.sizes == [(132, 4), (132, 4), (132, 5), (132, 5), (132, 4)]
+
+
+def test_a_cycle_that_loses_three_replies_still_ends_in_time():
+    assert 3.0 * usual_latency(280.0, 3) < 1.0 / 280.0 and usual_latency(280.0, 3) < usual_latency(280.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ({"encoder_id": 1}, "encoder_id = 1, expected another than that of the motor"),
+        ({"encoder_id": 5, "encoder_pulses": 0.0}, "encoder_pulses = 0, expected counts of a turn"),
+    ],
+)
+def test_impossible_settings_are_refused(values, told):
+    with pytest.raises(ParameterError, match=told):
+        dynamixel_netft(DEFAULTS | {"ft_host": ""} | values)
+
+
+def test_the_limits_of_a_free_end_apply_where_an_encoder_feels_it():
+    free = DEFAULTS | {"device": "dynamixel_netft", "rig": "paper_moving_output", "ft_host": ""}
+    with pytest.raises(ParameterError, match=r"deflection_limit = 0\.0873 cannot be applied"):
+        limits_of(free)
+    assert limits_of(free | {"encoder_id": 5}).ft == pytest.approx(110.0)
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    with RemoteBench(tmp_path_factory.mktemp("encoder") / "tty", "--deflection") as made:
+        yield made
+
+
+@pytest.fixture
+def joint(bench):
+    """An enabled joint without an F/T sensor that makes 10 N m."""
+    motor = Motor(MotorConnection(bench.port, 4_000_000, latency=LATENCY, watchdog=WATCHDOG))
+    settings = EncoderConnection(IDENTITY, pulses=ENCODER.counts_per_turn, latency=LATENCY)
+    device = DynamixelNetft(motor, None, Limits(68.0, ft=60.0), STIFFNESS, encoder=settings)
+    made = GuardedDevice(device, Limits(68.0, ft=60.0), 1.0 / PERIOD, Spring(STIFFNESS))
+    made.open()
+    made.enable()
+    yield made
+    bench.ask("set", motor=1, id=IDENTITY)
+    device.close()
+
+
+def run(joint, cycles=200):
+    return [joint.cycle(10.0, 0.0) for _ in range(cycles)]
+
+
+def test_the_torque_is_stiffness_times_deflection(joint):
+    state = run(joint)[-1]
+    assert joint.fault is None and joint.ft_source.startswith("stiffness of 1530 N m/rad times")
+    assert state.inferred and state.wrench[5] == pytest.approx(STIFFNESS * state.deflection)
+    assert state.wrench[5] == pytest.approx(10.0, abs=3.0)  # it still swings
+    assert state.deflection == pytest.approx(state.position, abs=2e-4)  # the other end is clamped
+
+
+def test_an_encoder_that_does_not_answer_ends_the_torque_and_is_named(joint, bench):
+    run(joint, 20)
+    since = bench.ask("set", motor=1, id=50)["t"]
+    run(joint, 10)
+    assert joint.fault.cause == "no_reply" and "encoder ID 100" in str(joint.fault)
+    assert bench.log(since)["torque"][-1][1] == 0
+    with pytest.raises(DeviceError, match="encoder ID 100"):
+        joint.clear()
+    bench.ask("set", motor=1, id=IDENTITY)
+    assert joint.clear()
+    assert run(joint, 30)[-1].motor_torque > 9.0 and joint.fault is None
+
+
+def test_a_configure_without_the_encoder_is_refused(bench):
+    motor = Motor(MotorConnection(bench.port, 4_000_000, latency=LATENCY))
+    device = DynamixelNetft(motor, None, Limits(68.0), STIFFNESS, encoder=EncoderConnection(77, latency=1e-3))
+    with pytest.raises(NoReply, match="encoder ID 77"):
+        device.open()
+    assert bench.torque() == (0, False)
+
+
+def test_it_is_read_beside_several_motors_of_a_line(tmp_path):
+    with RemoteBench(tmp_path / "tty", "--model", 1020, 1120, "--deflection") as bench:
+        line = Line(bench.port, 4_000_000, LATENCY)
+        small = Limits(3.0, deflection=math.inf)
+        settings = EncoderConnection(IDENTITY, pulses=ENCODER.counts_per_turn, latency=LATENCY)
+        members = []
+        for identity, felt in ((1, settings), (2, None)):
+            motor = LineMotor(MotorConnection(bench.port, 4_000_000, identity, latency=LATENCY), line)
+            device = DynamixelNetft(motor, None, small, math.inf, encoder=felt)
+            members.append(GuardedDevice(device, small, 1.0 / PERIOD, Spring(STIFFNESS)))
+        for member in members:
+            member.open()
+            member.enable()
+        for _ in range(100):
+            states = cycle(members, [(2.0, 0.0), (1.0, 0.0)], [line])
+        assert [member.fault for member in members] == [None, None]
+        assert states[0].deflection == pytest.approx(states[0].position, abs=2e-3)
+        assert math.isnan(states[1].deflection) and states[1].wrench is None
+        for member in members:
+            member.device.close()

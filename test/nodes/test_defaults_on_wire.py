@@ -1,0 +1,145 @@
+"""Faults on the wire with the defaults of config/nodes; the other tests there have patient limits.
+
+How long a torque acts is counted in the driver's writes, from the bench's log: no machine stretches that. A
+machine that stalls latches faults of its own with these limits: then the trial is repeated.
+"""
+
+import os
+import signal
+import subprocess
+import threading
+import time
+
+import pytest
+
+from msg_adapters.ros import torque_command_message
+from rsea_ros.hardware.peer.remote import RemoteBench
+from test.nodes.on_wire import Driven, newest_value
+from test.nodes.stalls import is_stall
+
+TRIALS = 12
+SECOND, MOST_STUCK = 280, 90
+
+
+class Commanded(Driven):
+    """A driver that a thread commands at 280 Hz. torque: N m; None: nothing."""
+
+    def __init__(self, bench, listener, name, begin):
+        super().__init__(bench, listener, name, begin, {"autostart": True})
+        self.torque, self._over = 10.0, threading.Event()
+        self._thread = threading.Thread(target=self._command, daemon=True)
+        self._thread.start()
+
+    def _command(self):
+        while not self._over.wait(1.0 / SECOND):
+            if self.torque is not None:
+                self._commands.publish(torque_command_message(time.time_ns(), self.torque))
+
+    def close(self):
+        """Command no more."""
+        self._over.set()
+        self._thread.join()
+
+    def latched(self):
+        """The fault that was published last, once there is one."""
+        fault = newest_value(self._health, self.name, "fault")
+        return None if fault in (None, "none") else fault
+
+    def ready(self):
+        """Wait until the motor has all of its torque and no fault is latched."""
+        self.torque = 10.0
+
+        def driving():
+            self._listener.until(lambda: True)
+            if self.latched():
+                self.clear()
+            return self.goal() == (self.counts(10.0), True) and not self.latched()
+
+        self._listener.until(driving)
+
+    def clear(self):
+        """Clear the fault, by a reboot where that is necessary; return the answers."""
+        answers = [self.trigger("clear_fault")]
+        if not answers[0].success and "expected a reboot" in answers[0].message:
+            answers.append(self.trigger("reboot"))
+        self._health.clear()
+        return answers
+
+    def children(self):
+        """The processes that the driver has started."""
+        found = subprocess.run(["pgrep", "-P", str(self.process.pid)], capture_output=True, text=True)
+        return [int(pid) for pid in found.stdout.split()]
+
+
+@pytest.fixture(scope="module")
+def wire(tmp_path_factory, start, listener):
+    with RemoteBench(tmp_path_factory.mktemp("defaults") / "tty") as bench:
+        bench.hurry()
+        made = Commanded(bench, listener, "defaults", start)
+        yield made
+        made.close()
+
+
+def ask(what, **values):
+    return lambda wire: wire.bench.ask(what, **values)
+
+
+def silence(wire):
+    wire.torque = None
+
+
+def kill_supervisor(wire):
+    for pid in wire.children():
+        os.kill(pid, signal.SIGKILL)
+
+
+CALM = ask("misbehave", silent=False, drop=0.0, delay=0.0, ft_silent=False, ft_stuck=False)
+HEALTHY = ask("set", temperature=32, voltage=240, mode=0)
+FAULTS = {
+    "no reply": (ask("misbehave", silent=True), CALM, "no_reply", 5),
+    "every reply 20 ms late": (ask("misbehave", delay=1.0, late=0.02), CALM, "no_reply", 5),
+    "hot": (ask("set", temperature=71), HEALTHY, "temperature", 2),
+    "supply too low": (ask("set", voltage=190), HEALTHY, "voltage", 2),
+    "torque switched off": (ask("set", torque_enable=0), HEALTHY, ("effort", "motor_state"), 1),
+    "mode changed": (ask("set", mode=3), HEALTHY, "motor_state", SECOND),
+    "alert": (ask("alert", bits=32), HEALTHY, "hardware_error", 1),
+    "F/T saturated": (ask("ft_status"), ask("ft_status", bits=0), "ft", 3),
+    "F/T silent": (ask("misbehave", ft_silent=True), CALM, "ft", 8),
+    "F/T stands still": (ask("misbehave", ft_stuck=True), CALM, "ft: all six values", MOST_STUCK),
+    "F/T restarted": (ask("ft_restart"), CALM, "ft", 90),
+    "commands cease": (silence, CALM, "command_timeout", 25),
+    "supervisor killed": (kill_supervisor, CALM, "supervisorlost", 8),
+}
+"""How it is provoked and ended, the cause that is latched, the most writes of a torque until then."""
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_ends_the_torque_within_its_cycles_and_is_over_by_its_service(wire, listener, name):
+    provoke, end, cause, most = FAULTS[name]
+    for _ in range(TRIALS):
+        wire.ready()
+        since = wire.bench.ask("torque")["t"]
+        provoke(wire)
+        fault = listener.until(wire.latched)
+        writes = [goal != 0 and on for _, goal, on in wire.bench.log(since)["torque"]]
+        end(wire)
+        if fault.startswith(cause):
+            break
+        assert is_stall(fault) or fault.startswith("command_timeout"), fault
+    assert fault.startswith(cause)
+    zero = writes.index(False) if False in writes else len(writes)
+    assert zero <= most, writes
+    assert not any(writes[zero:]), "a torque acts after the fault"
+    listener.until(lambda: wire.clear()[-1].success)
+    wire.ready()
+
+
+def test_the_first_torque_after_a_fault_is_small(wire):
+    wire.ready()
+    assert wire.trigger("stop").success
+    since = wire.bench.ask("torque")["t"]
+    assert not any(goal for _, goal, _ in wire.bench.log(since)["torque"])
+    wire.clear()
+    wire.ready()
+    torques = [abs(goal) for _, goal, on in wire.bench.log(since)["torque"] if goal and on]
+    assert torques[0] <= wire.counts(500.0 / SECOND) + 1, "soft_start, N m/s"
