@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from bench.torque_control_baselines import baselines
 from bench.torque_control_stiffest import stiffest as limited
 from rsea_ros.cli.control import motors
-from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.harness import Arrivals, irregular
 from rsea_ros.control.human import measured
 from rsea_ros.control.impedance import moved
@@ -36,6 +36,7 @@ from rsea_ros.control.large_signal import largest
 from rsea_ros.control.link import link_share
 from rsea_ros.control.loads import LOCKED, load_range, locked
 from rsea_ros.control.robustness import robustness
+from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
 from rsea_ros.control.trials import LEARNED, sine, tracked

@@ -23,9 +23,10 @@ from functools import partial
 
 import numpy as np
 
-from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import LOCKED, load_range
+from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.trials import amplitude_of, disturbed
 from rsea_ros.control.uncertainty import BenchVariant, bench

@@ -13,13 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.control.controller import TorqueController, TorqueLimits
+from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.following import Following, Step, fall, step_response
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.large_signal import largest
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LOCKED, locked
 from rsea_ros.control.robustness import Robustness
+from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.spread import Spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
 from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench
@@ -253,6 +254,7 @@ def restlessness(rig: Rig, design: ControllerDesign, gap: float = 5.0 * ARCMIN) 
 def _held(true: Rig, model: Rig, design: ControllerDesign, torque: float) -> float:
     t = np.arange(round(LEARNED.seconds * design.rate)) / design.rate
     wanted = np.where(t < BRIEF.counted_from, AMPLITUDE * np.sin(2.0 * np.pi * HZ * t), torque)
-    controller = TorqueController(model, design.rate, design.gains, compensate=())
+    settings = ControllerSettings(compensate=())
+    controller = TorqueController(model, design.rate, design.gains, settings=settings)
     ft = closed_loop(true, design.rate, controller, wanted).ft[t >= LEARNED.counted_from]
     return float(np.std(ft))
