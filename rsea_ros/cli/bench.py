@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="number of the motor; several form a line with the IDs 1, 2, …, the sensor on the first")
     add("--rig", default=RIG, help="rig of the plant: a name in config/rigs, or a file")
     add("--ft-rate", type=float, default=1000.0, help="record rate of the F/T sensor, Hz, 1 to 7000")
-    add("--torque-constant", type=float, default=0.0, help="N m at the output per A; 0: that of the model")
+    add("--torque-constant", type=float, default=0.0, help="N·m at the output per A; 0: that of the model")
     add("--return-delay", type=int, default=0, help="delay of each reply, unit 2 µs, 0 to 254")
     add("--seed", type=seed, default=0, help="seed of the sensor noise and of the misbehaviour")
     add("--requests", action="store_true", help="read requests to misbehave from stdin, JSON lines")

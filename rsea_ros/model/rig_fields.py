@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from rsea_ros.errors import RigError
+from rsea_ros.units import plain
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Limits of the size of a nonzero value; beyond them the equations have no accurate digit."""
@@ -83,7 +84,7 @@ def unit_of(name: str) -> str:
 
 def check_value(name: str, value: float, where: str = "rig") -> None:
     """Raise RigError when a value is not a possible one for its field."""
-    unit = unit_of(name)
+    unit = plain(unit_of(name))
     low, allowed = FIELDS[name].low, FIELDS[name].low_allowed
     infinite_ok = FIELDS[name].default == math.inf
     possible = (value >= low if allowed else value > low) and (math.isfinite(value) or infinite_ok)

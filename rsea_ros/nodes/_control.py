@@ -100,7 +100,7 @@ def summary(designed: ControllerDesign) -> list[str]:
     g = designed.gains
     head = (
         f"k_p {g.k_p:.3f}, k_d {1e3 * g.k_d:.2f} ms, k_i {g.k_i:.2f}, Q {g.q_frequency:.1f} Hz, "
-        f"k_w {g.k_w:.1f} N m s/rad at {designed.rate:g} Hz; "
+        f"k_w {g.k_w:.1f} N·m·s/rad at {designed.rate:g} Hz; "
         f"largest sensitivity of the set {designed.sensitivity:.2f}"
     )
     return [head] + [

@@ -69,7 +69,7 @@ WRONG = {
     ),
     "plant": ({"rate": 5000}, "parameter rate = 5000.0, expected a number from 10 to 1000 Hz"),
     "driver": ({"device": "motor"}, "parameter device = 'motor', expected one of simulated"),
-    "excite": ({"amplitude": 60.0, "duration": 5.0}, "expected at most 68 N m either way"),
+    "excite": ({"amplitude": 60.0, "duration": 5.0}, "expected at most 68 N·m either way"),
     "experiment": ({"limits": "velocity=1"}, "no torque, expected at least torque="),
     "record": ({"out": "/dev/null/bag"}, "/dev/null"),
     "replay": ({"bag": "no/such/bag"}, "no/such/bag: no such bag"),

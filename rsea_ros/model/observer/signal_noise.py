@@ -61,7 +61,7 @@ def noise_of(rig: Rig, noise_rms: Mapping[str, float] = NOTHING,
     unexplained = residual_rms.get("ft", 0.0) ** 2 - (ft**2 if math.isfinite(ft) else 0.0)
     sigma = max(known[0] if known else 0.0, math.sqrt(max(0.0, unexplained)))
     if sigma == 0.0:
-        raise RigError(f"rig {rig.name}: sensors has no torque, expected motor_torque or ft with noise, N m")
+        raise RigError(f"rig {rig.name}: sensors has no torque, expected motor_torque or ft with noise, N·m")
     return Noise(position, ft, torque if math.isfinite(torque) else 0.0, sigma, 1.0 / slowest_rate(rig))
 
 
