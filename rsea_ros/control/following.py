@@ -55,11 +55,10 @@ class Following:
     def phase(self) -> FloatArray:
         """The phase of T_d / desired, deg, shape (n,), continuous from the sine that is followed best.
 
-        That one is near 0. What is hardly followed has any phase, so the slowest sine is no place to begin.
+        That one is near 0. Slower ones, which a free load may leave to feedback, have any phase within 180.
         """
         angle, best = np.angle(self.torque), int(np.argmin(np.abs(self.torque - 1.0)))
-        below, above = np.unwrap(angle[best::-1])[::-1], np.unwrap(angle[best:])
-        return np.asarray(np.degrees(np.concatenate([below[:-1], above])))
+        return np.asarray(np.degrees(np.concatenate([angle[:best], np.unwrap(angle[best:])])))
 
     @property
     def peak(self) -> float:

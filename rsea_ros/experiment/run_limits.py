@@ -70,7 +70,8 @@ def limits_from(text: str) -> RunLimits:
             near = did_you_mean(name, UNITS)
             raise ParameterError(f"--limits: {shown(name)}, expected one of {', '.join(UNITS)}{near}")
         if not is_decimal(value):
-            raise ParameterError(f"--limits: {name} = {shown(value)}, expected a number in {UNITS[name]}")
+            expected = f"expected a number in {plain(UNITS[name])}"
+            raise ParameterError(f"--limits: {name} = {shown(value)}, {expected}")
         if name in values:
             raise ParameterError(f"--limits: {name} is given twice, expected once")
         values[name] = float(value)

@@ -99,7 +99,7 @@ def _quantity(name: str, item: Any) -> Quantity:
 
 def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
     if not isinstance(item, list) or len(item) != 2:
-        raise RigError(f"{name} = {shown(item)}, expected [low, high] in {unit_name}", name)
+        raise RigError(f"{name} = {shown(item)}, expected [low, high] in {plain(unit_name)}", name)
     low, high = (number(v, name, unit_name) for v in item)
     return low, high
 

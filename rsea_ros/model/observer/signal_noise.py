@@ -25,6 +25,7 @@ from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.signals import UNITS
+from rsea_ros.units import plain
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
 
@@ -79,6 +80,7 @@ def _sigma(rig: Rig, channel: str, noise_rms: Mapping[str, float]) -> float:
     sigma = noise_rms.get(channel, math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0)))
     if not sigma > 0.0:
         raise RigError(
-            f"rig {rig.name}: sensors.{channel}.noise = {sigma:g} {UNITS[channel]}, expected > 0, as measured"
+            f"rig {rig.name}: sensors.{channel}.noise = {sigma:g} {plain(UNITS[channel])}, "
+            "expected > 0, as measured"
         )
     return sigma

@@ -62,12 +62,12 @@ def _crossover(at: AtRate) -> float:
 def _keys(study: Study) -> list[tuple[str, str]]:
     at = study.rates[0]
     value = {trial.what: trial for trial in at.trials}
-    errors = [(f"{t.value:.1f} %", f"error: {name}") for name, t in value.items() if t.unit == "%"][:1]
+    errors = [(f"{t.value:.1f} %", f"error, {name}") for name, t in value.items() if t.unit == "%"][:1]
     return [
         (f"{study.resonance:.1f} Hz", "open-loop resonance"),
         (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz"),
         (f"{at.design.margins['locked'].phase:.0f}°", "phase margin, locked"),
-        (f"{at.swept.margins.phase:.0f}°", "phase margin, least of the set"),
+        (f"{at.swept.margins.phase:.0f}°", "phase margin, worst"),
         *errors,
     ]
 
@@ -89,10 +89,10 @@ def _free_title(study: Study) -> str:
     first = study.rates[0].free
     followed = np.nonzero(np.abs(first.gain) < 3.0)[0]
     if not len(followed):
-        return "On a free load that it does not know, small torques are not followed"
+        return "On an unknown free load small torques are not followed"
     return (
-        "On a free load that it does not know, small torques are followed from "
-        f"{first.hz[followed[0]]:g} Hz to {first.bandwidth:.0f} Hz at {study.rates[0].design.rate:g} Hz"
+        f"On an unknown free load small torques are followed from {first.hz[followed[0]]:g} to "
+        f"{first.bandwidth:.0f} Hz at {study.rates[0].design.rate:g} Hz"
     )
 
 
