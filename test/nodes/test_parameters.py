@@ -73,7 +73,7 @@ WRONG = {
     "experiment": ({"limits": "velocity=1"}, "no torque, expected at least torque="),
     "record": ({"out": "/dev/null/bag"}, "/dev/null"),
     "replay": ({"bag": "no/such/bag"}, "no/such/bag: no such bag"),
-    "model": ({"tolerance_deg": 91.0}, "tolerance_deg = 91.0, expected a number from 0.1 to 90 deg"),
+    "model": ({"tolerance_deg": 91.0}, "tolerance_deg = 91.0, expected a number from 0.1 to 90 °"),
     "watch": ({"host": "192.0.2.7"}, "page on 192.0.2.7, port 8270: Cannot assign requested address"),
     "identify": ({"rigg": "x"}, "parameter rigg: no such parameter, expected one of rig, out"),
 }
