@@ -116,7 +116,7 @@ def _tried(
     done = f"; done {again} times before: the wire alone makes such faults" if again else ""
     return [
         (f"{name}: error", f"≤ {kind.asked:g} %" if not load else "", trial.told + done),
-        (f"{name}: largest |ft|", f"≤ {1.3 * kind.amplitude:.3g} N m", f"{trial.largest:.2f} N m"),
+        (f"{name}: largest |ft|", f"≤ {1.3 * kind.amplitude:.3g} N·m", f"{trial.largest:.2f} N·m"),
         (f"{name}: the two requests alone, {ALONE:g} s", "", trial.alone),
     ]
 

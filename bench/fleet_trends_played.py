@@ -195,7 +195,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 _kept(args.log, done, rounded(step(plan)))
     told = [sum(key in e for e in done.values()) for key in ("outcome", "identified")]
     print(f"of {len(every)} recordings {told[0]} diagnosed, {told[1]} identified")
-    print(f"healthy joints have {COULOMB:g} N m of dry friction")
+    print(f"healthy joints have {COULOMB:g} N·m of dry friction")
     if args.write:
         kept = [json.dumps(done[p.name]) for p in every if "outcome" in done.get(p.name, {})]
         SAMPLE.write_text("[\n" + ",\n".join(kept) + "\n]\n")

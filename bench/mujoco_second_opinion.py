@@ -111,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     torque, velocity = by_mujoco(rig, command)
     ours = by_plant(rig, command)
     hz, gain, phase = agreement(torque, ours)
-    print(f"train: {rig.train}, n = {train_ratio(rig):+g}; inner inertia {inner_inertia(rig):+.5f} kg m^2")
+    print(f"train: {rig.train}, n = {train_ratio(rig):+g}; inner inertia {inner_inertia(rig):+.5f} kg·m²")
     print(f"{rig.name}: T_d/T_m, MuJoCo {mujoco.__version__} beside our plant, sweep {LOW:g} to {HIGH:g} Hz")
     print("      Hz     gain, dB   MuJoCo, %   phase, deg")
     response = frequency_response(rig, outputs.end_torque(rig, "spring_end"), np.array(LINES))

@@ -48,7 +48,7 @@ def rigs(args: argparse.Namespace) -> Iterator[str]:
     The lumped one takes encoder and F/T, which contradict each other there, or the F/T alone.
     """
     heads = f"{'unlumped T_d':>14}{'T_p':>9}{'lumped T_d':>12}{'T_p':>9}{'by ft T_d':>12}{'T_p':>9}"
-    yield f"{'RMS error, N m':24}{'T_p itself':>11}{heads}"
+    yield f"{'RMS error, N·m':24}{'T_p itself':>11}{heads}"
     for name in RIGS:
         rig = load_rig(name)
         truth = true_run(rig, command(), RATE, seed=2)
@@ -66,7 +66,7 @@ def effects(args: argparse.Namespace) -> Iterator[str]:
     """Compare the nominal with the extended model, with each effect of the catalogue at its typical size."""
     rig = load_rig("paper_moving_output")
     heads = f"{'nominal T_d':>12}{'T_p':>8}{'extended T_d':>14}{'T_p':>8}"
-    yield f"{'RMS error, N m':24}{heads}  nominal is denied by"
+    yield f"{'RMS error, N·m':24}{heads}  nominal is denied by"
     for name, effect in catalogue().items():
         extended = rig.with_effects(EffectSetting(name, effect.typical))
         truth = true_run(extended, command(), RATE, seed=2)
@@ -80,9 +80,9 @@ def walk(args: argparse.Namespace) -> Iterator[str]:
     friction = rig.with_effects(EffectSetting("coulomb_friction", {"torque": 2.0}))
     runs = {
         "right model": true_run(rig, command(), RATE),
-        "2 N m friction unmodelled": true_run(friction, command(), RATE),
+        "2 N·m friction unmodelled": true_run(friction, command(), RATE),
     }
-    yield f"{'RMS error of T_p, N m':24}" + "".join(f"{name:>28}" for name in runs)
+    yield f"{'RMS error of T_p, N·m':24}" + "".join(f"{name:>28}" for name in runs)
     for factor in (0.01, 0.1, 1.0, 10.0, 100.0):
         noise = noise_of(rig)
         noise = replace(noise, disturbance=noise.disturbance * factor**0.5)

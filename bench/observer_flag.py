@@ -30,7 +30,7 @@ def settled(rig: Rig, rate: float) -> ErrorModel:
 
 def sines(args: argparse.Namespace) -> Iterator[str]:
     """Print the time to the right verdict over what is allowed: worst of 16 phases, 3 beginnings."""
-    yield "worst time to the right verdict over what is allowed (3 periods or 50 ms), sine of 5 N m"
+    yield "worst time to the right verdict over what is allowed (3 periods or 50 ms), sine of 5 N·m"
     yield f"{'f / edge':34}" + "".join(f"{part:7.2f}" for part in PARTS)
     for name in ("paper_high_impedance", "prototype_knee"):
         for rate in (280.0, 1000.0):
@@ -79,7 +79,7 @@ def noise(args: argparse.Namespace) -> Iterator[str]:
         record = synthesize(rig, Channel(t, amplitude * np.sin(2.0 * np.pi * 1.0 * t)), seed=1)
         observer, flag = Observer(rig), PureTorque(rig)
         changes = _changes(observer, flag, 0, *(record[n].y for n in ("position", "motor_torque", "ft")))
-        yield f"1 Hz, {amplitude:g} N m, ten minutes: {changes} changes of the flag, then {flag.verdict}"
+        yield f"1 Hz, {amplitude:g} N·m, ten minutes: {changes} changes of the flag, then {flag.verdict}"
 
 
 def _changes(observer: Observer, flag: PureTorque, first: int, position: FloatArray, torque: FloatArray,

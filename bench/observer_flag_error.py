@@ -57,7 +57,7 @@ def signals(rate: float, edge: float, rng: np.random.Generator) -> Mapping[str, 
             made[f"flat to {top:g} Hz"] = flat(len(t), rate, top, rng)
     made["work: steps of a gait, 1 Hz"] = gait(t)
     made["work with knocks"] = gait(t) + knocks(t, rate, edge)
-    made["steps of 10 N m"] = 10.0 * smooth(np.sign(np.sin(2 * np.pi * 0.7 * t)), rate, 60.0)
+    made["steps of 10 N·m"] = 10.0 * smooth(np.sign(np.sin(2 * np.pi * 0.7 * t)), rate, 60.0)
     made["chirp, 1 Hz to twice the edge"] = chirp(t, 1.0, min(2.0 * edge, 0.45 * rate))
     return made
 

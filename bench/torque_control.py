@@ -28,14 +28,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from bench.torque_control_baselines import baselines
 from bench.torque_control_stiffest import stiffest as limited
 from rsea_ros.cli.control import motors
-from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.harness import Arrivals, irregular
 from rsea_ros.control.human import measured
 from rsea_ros.control.impedance import moved
 from rsea_ros.control.large_signal import largest
-from rsea_ros.control.link import link_share
+from rsea_ros.control.link import LinkShare, link_share, linked_set
 from rsea_ros.control.loads import LOCKED, load_range, locked
 from rsea_ros.control.robustness import robustness
+from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
 from rsea_ros.control.trials import LEARNED, sine, tracked
@@ -113,7 +114,7 @@ def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
                 for part in (1.0, 0.3)
             ]
             cells = ", ".join(f"{100.0 * error:.1f}" for error in errors)
-            yield f"{found.rate:g} Hz, {hz:g} Hz, {most:.1f} N m: error {cells} % (all, 0.3 of it; with link)"
+            yield f"{found.rate:g} Hz, {hz:g} Hz, {most:.1f} N·m: error {cells} % (all, 0.3 of it; with link)"
 
 
 def linked(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
@@ -123,10 +124,12 @@ def linked(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
         share = link_share(rig, loads, found)
         yield f"{found.rate:g} Hz: {share}"
         spring = np.abs(moved(rig, found.rate, SWEEP).spring)
-        for link in (None, share):
+        benches = linked_set(rig, loads, found)
+        for name, link in (("without", LinkShare()), ("with", share)):
             over = np.abs(measured(rig, found, Virtual(0.0, 0.0), SWEEP, link)) / spring
             cells = [f"{f:g} Hz {r:.2f}" for f, r in zip(SWEEP, over, strict=True)]
-            yield f"{'with' if link else 'without'}: |Z| over the spring's {', '.join(cells)}"
+            most = benches.sensitivity(link).max()
+            yield f"{name}: |Z| over the spring's {', '.join(cells)}; largest |S| of the set {most:.2f}"
 
 
 def outer(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
@@ -136,7 +139,7 @@ def outer(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
             most = stiffest(rig, found, damping, 20.0)
             to = passive_to(rig, found, Virtual(0.9 * most, damping))
             yield (
-                f"{found.rate:g} Hz, D_v {damping:g}: Re Z > 0 to 20 Hz for K_v <= {most:.0f} N m/rad; "
+                f"{found.rate:g} Hz, D_v {damping:g}: Re Z > 0 to 20 Hz for K_v <= {most:.0f} N·m/rad; "
                 f"0.9 of that to {to:.0f} Hz"
             )
         for virtual in (Virtual(0.0, 0.0), Virtual(200.0, 2.0)):
@@ -156,7 +159,7 @@ def late(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
             after = run.t > 1.0
             ft, command = np.abs(run.ft[after]).max(), np.abs(run.command[after]).max()
             error = f"error {run.error(1.0):.1%}"
-            yield f"{found.rate:g} Hz, {name}: |ft| {ft:.1f}, command {command:.1f} N m, {error}"
+            yield f"{found.rate:g} Hz, {name}: |ft| {ft:.1f}, command {command:.1f} N·m, {error}"
 
 
 def _kinds(n: int) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:

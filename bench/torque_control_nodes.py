@@ -30,7 +30,7 @@ import rclpy
 from bench.bare_loop import permitted
 from msg_adapters.ros import DiagnosticArray, JointState, torque_command_message
 from msg_adapters.topic_map import AXES, JOINT_STATE, WRENCH
-from rsea_ros.control.controller import TorqueLimits
+from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes._cycle import SECOND
@@ -158,11 +158,11 @@ def cases() -> Sequence[Case]:
     rough = clamped.with_effects(EffectSetting("coulomb_friction", {"torque": 3.0}))
     worn = clamped.with_effects(EffectSetting("backlash", {"gap": 5.0 / 60.0 * np.pi / 180.0}))
     return (
-        Case("locked, 10 N m", clamped, clamped, 10.0, 2.0),
-        Case("free, load unknown, 4.7 N m", free, clamped, 4.7, 4.0),
-        Case("free, 10 N m, motor of 150 N m", free, clamped, 10.0, 4.0, 150.0),
-        Case("3 N m friction, not in the model", rough, clamped, 10.0, 6.0),
-        Case("3 N m friction, in the model", rough, rough, 10.0, 2.5),
+        Case("locked, 10 N·m", clamped, clamped, 10.0, 2.0),
+        Case("free, load unknown, 4.7 N·m", free, clamped, 4.7, 4.0),
+        Case("free, 10 N·m, motor of 150 N·m", free, clamped, 10.0, 4.0, 150.0),
+        Case("3 N·m friction, not in the model", rough, clamped, 10.0, 6.0),
+        Case("3 N·m friction, in the model", rough, rough, 10.0, 2.5),
         Case("5 arcmin backlash, in the model", worn, worn, 10.0, None),
     )
 

@@ -77,5 +77,5 @@ def _row(rig: Rig, loads: Mapping[str, Rig], rate: float, set_of: Sequence[Moved
     worst = _worst(rig, rate, set_of, gains)
     return (
         f"|Z| over the spring's at most {found.impedance:.2f}, worst of the set {worst:.2f}; at {at}; "
-        f"friction left {found.friction_left:.2f} N m per N m; |S| {found.sensitivity:.2f}; {gains}"
+        f"friction left {found.friction_left:.2f} N·m per N·m; |S| {found.sensitivity:.2f}; {gains}"
     )

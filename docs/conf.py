@@ -15,6 +15,7 @@ from rsea_ros import DOOR  # noqa: E402
 from rsea_ros.effects import scale  # noqa: E402
 from rsea_ros.effects._page import EffectPage  # noqa: E402
 from rsea_ros.effects.catalogue import catalogue  # noqa: E402
+from rsea_ros.units import plain  # noqa: E402
 
 project = "rsea_ros"
 author = "The rsea_ros founders"
@@ -38,13 +39,13 @@ def effects_page() -> str:
         "Every cause that a diagnosis can name. `rsea effects NAME` prints this text.", "",
         f"Bounds and sizes are for {scale.MACHINE}: largest torque, spring, reflected inertia, largest "
         "speed, and rate of the paper's actuator in its high-impedance test. On another machine they are as "
-        "many times larger as the column *grows with* says, in powers of four: 2 N m of friction are typical "
-        "where the largest torque is 30 N m, 2 mN m where it is 30 mN m. Bounds in s and Hz only widen.", "",
+        "many times larger as the column *grows with* says, in powers of four: 2 N·m of friction are typical "
+        "where the largest torque is 30 N·m, 2 mN·m where it is 30 mN·m. Bounds in s and Hz only widen.", "",
     ]  # fmt: skip
     for name, effect in sorted(catalogue().items()):
         page = EffectPage(effect)
         rows = [
-            f"| `{p.name}` | {p.unit} | {p.typical:g} | {p.null:g} | {p.low:g} to {p.high:g} | "
+            f"| `{p.name}` | {plain(p.unit) or 1} | {p.typical:g} | {p.null:g} | {p.low:g} to {p.high:g} | "
             f"{page.grows_with(p)} | {p.reason} |"
             for p in page.parameters.values()
         ]

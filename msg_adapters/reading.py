@@ -132,7 +132,7 @@ def _held(contents: Contents) -> str:
 def _require_values(source: str, series: Mapping[str, FieldSamples], strict: bool, report: Contents) -> None:
     """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
     if strict and "command" not in series and "reference" not in series:
-        raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N m")
+        raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N·m")
     if not set(series) - ({"command", "reference"} if strict else set()):
         raise BagError(
             f"{source}: no measurement is left{report.remarks()}, expected joint states or F/T with values, "

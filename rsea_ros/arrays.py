@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from rsea_ros.errors import ChannelError
 from rsea_ros.signals import UNITS, Channel, FloatArray, Record
+from rsea_ros.units import plain
 
 ALIASES: Mapping[str, str] = MappingProxyType(
     {
@@ -95,7 +96,7 @@ def _vector(name: str, values: npt.ArrayLike, source: str) -> FloatArray:
         raise ChannelError(f"{source}: {name} is not an array of numbers: {error}") from None
     if numbers.dtype.kind in _NO_NUMBERS:
         unit = "s" if name == "t" else UNITS[_channel(name, source)]
-        raise ChannelError(f"{source}: {name} holds {numbers.dtype}, expected real numbers in {unit}")
+        raise ChannelError(f"{source}: {name} holds {numbers.dtype}, expected real numbers in {plain(unit)}")
     if numbers.ndim != 1 or len(numbers) < FEWEST:
         raise ChannelError(
             f"{source}: {name} has shape {numbers.shape}, expected (n,) with n >= {FEWEST} samples"
@@ -106,7 +107,7 @@ def _vector(name: str, values: npt.ArrayLike, source: str) -> FloatArray:
 
 def _check_finite(name: str, unit: str, values: FloatArray, source: str) -> None:
     for k in np.flatnonzero(~np.isfinite(values))[:1]:
-        raise ChannelError(f"{source}: {name}[{k}] = {values[k]}, expected a finite value in {unit}")
+        raise ChannelError(f"{source}: {name}[{k}] = {values[k]}, expected a finite value in {plain(unit)}")
 
 
 def _check_stamps(stamps: FloatArray, source: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsea_ros.errors import FieldError
-from rsea_ros.units import same_unit
+from rsea_ros.units import plain, same_unit
 from rsea_ros.wording import did_you_mean, shown
 
 
@@ -19,7 +19,7 @@ def number(value: Any, name: str, unit: str) -> float:
     except OverflowError:
         converted = math.nan
     if math.isnan(converted):
-        raise FieldError(f"{name} = {shown(value)}, expected a number ({unit})", name)
+        raise FieldError(f"{name} = {shown(value)}, expected a number ({plain(unit) or 1})", name)
     return converted
 
 

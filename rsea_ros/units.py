@@ -40,6 +40,11 @@ def plain(unit: str) -> str:
     return "" if unit == "1" else "°" if unit == "deg" else unit.replace("^2", "²").replace(" ", "·")
 
 
+def with_unit(number: str, unit: str) -> str:
+    """Return a number with its unit as people write it, `3.9 N·m·s/rad`; a bare number without one."""
+    return f"{number} {plain(unit)}".rstrip()
+
+
 def same_unit(text: object, unit: str) -> bool:
     """Return whether a text means a unit, which is written as in `N m s/rad`.
 

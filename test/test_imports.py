@@ -64,7 +64,7 @@ OWN = {
     "hardware": BASE,
     "hardware.simulated": BASE | {"model"},
     "msg_adapters": BASE,
-    "arrays": {"errors", "signals"},
+    "arrays": {"errors", "signals", "units"},
     "one_thread": set(),
     "report": CORE | AROUND | {"paper"},
     "library": CORE | AROUND | {"report", "msg_adapters"},

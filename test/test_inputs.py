@@ -111,13 +111,13 @@ def test_a_missing_value_does_not_change_the_initial_motion_and_the_angle():
 
 
 REFUSALS = {
-    "a zero command": ("identify", {"command": "zero"}, "the command stays at 0 N m and nothing moves"),
+    "a zero command": ("identify", {"command": "zero"}, "the command stays at 0 N·m and nothing moves"),
     "a drive without a spring beyond all numbers": (
         "predict", {"rig": "bare_drive", "dead": "all 1e300"}, "position has 0 samples, expected at least 64"
     ),
     "a dead bench": ("identify", {"dead": "all still"}, "no sensor answers to the machine"),
     "too few samples": ("identify", {"dead": "few"}, "position or velocity with motion"),
-    "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N m, expected a number"),
+    "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N·m, expected a number"),
     "sensors of another day": ("diagnose", {"stamps": "apart"}, "differs from the command's"),
     "sensors of another day to a fit": ("identify", {"stamps": "apart"}, "stamped by the command's clock"),
     "no measurement": ("identify", {"channels": ()}, "record one, or name its topic with --topic"),

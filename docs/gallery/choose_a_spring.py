@@ -12,7 +12,7 @@ import rsea_ros as rsea
 from rsea_ros.model.bandwidth import inner_inertia, undamped_band
 
 rig = rsea.load_rig("paper_high_impedance")
-stiffness = np.linspace(200.0, 4000.0, 200)  # N m/rad
+stiffness = np.linspace(200.0, 4000.0, 200)  # N·m/rad
 printed = undamped_band(stiffness, rig["chassis.inertia"])  # Hz, Eq. (7)
 exact = undamped_band(stiffness, inner_inertia(rig))  # Hz
 

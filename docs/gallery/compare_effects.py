@@ -11,7 +11,7 @@ import rsea_ros as rsea
 
 rig = rsea.load_rig("paper_high_impedance")
 t = np.arange(560) / 280.0  # s
-command = 15.0 * np.sin(2.0 * np.pi * 3.0 * t)  # N m
+command = 15.0 * np.sin(2.0 * np.pi * 3.0 * t)  # N·m
 effects = {
     "backlash": {"gap": 4e-3},
     "coulomb_friction": {"torque": 2.0},
@@ -21,7 +21,7 @@ effects = {
 
 
 def torque(bench):
-    """Return the F/T torque of a bench without sensor noise, N m."""
+    """Return the F/T torque of a bench without sensor noise, N·m."""
     return rsea.simulate(bench, command, rate=280.0, noise=False)["ft"].y
 
 

@@ -10,7 +10,7 @@ import rsea_ros as rsea
 
 rig = rsea.load_rig("paper_high_impedance")
 bench = rig.with_values({"spring.stiffness": 1400.0, "rotor.reflected_damping": 18.0})
-command = 15.0 * np.random.default_rng(1).standard_normal(2800)  # N m, at 280 Hz
+command = 15.0 * np.random.default_rng(1).standard_normal(2800)  # N·m, at 280 Hz
 fit = rsea.identify(rsea.simulate(bench, command, rate=280.0), rig)
 print(fit.summary())
 

@@ -10,7 +10,7 @@ import numpy as np
 import rsea_ros as rsea
 
 rig = rsea.load_rig("paper_high_impedance")
-command = 12.0 * np.random.default_rng(2).standard_normal(2800)  # N m, at 280 Hz
+command = 12.0 * np.random.default_rng(2).standard_normal(2800)  # N·m, at 280 Hz
 run = rsea.simulate(rig.with_effect("coulomb_friction", torque=4.0), command, rate=280.0)
 diagnosis = rsea.diagnose(run, rig)
 print(diagnosis.summary())

@@ -8,6 +8,7 @@ from rsea_ros.checks.moved_spans import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.fault_kinds import FAULT_KINDS
 from rsea_ros.signals import UNITS, Channel, Record
+from rsea_ros.units import plain
 
 SHORTEST = 4.0
 """s of commands: four blocks of every set (diagnosis/data_split.py) of a quarter of a second each."""
@@ -55,7 +56,7 @@ def require_motion(record: Record) -> None:
         return
     unit = UNITS["command" if "command" in record else "reference"]
     raise IdentificationError(
-        f"{record.source}: the command stays at {command.y[0]:g} {unit} and nothing moves, "
+        f"{record.source}: the command stays at {command.y[0]:g} {plain(unit)} and nothing moves, "
         "expected a run in which the command excites the machine"
     )
 

@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 def motors(rig: Rig) -> list[MotorLimits]:
     """Return the limit of the driver, and those of the catalogue unit with the gear ratio of the rig."""
-    from rsea_ros.control.controller import TorqueLimits
+    from rsea_ros.control.settings import TorqueLimits
     from rsea_ros.control.study import MotorLimits
     from rsea_ros.design.motor_gear_units import catalogue
 

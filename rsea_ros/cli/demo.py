@@ -32,6 +32,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.new_files import unused
 from rsea_ros.report.fault_words import fault_lines
+from rsea_ros.units import plain
 
 HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and write a report"
 EXAMPLE = "rsea demo --out first_demo"
@@ -184,7 +185,7 @@ def table(start: Rig, true: Rig, identified: Rig) -> str:
                 f"{quantity.value:.5g}",
                 interval,
                 f"{start[name]:.5g}",
-                identified.unit(name),
+                plain(identified.unit(name)),
             )
         )
     return columns(rows)

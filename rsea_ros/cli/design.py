@@ -17,9 +17,9 @@ from rsea_ros.report.file_names import DESIGN_JSON, REPORT
 HELP = "compute spring stiffness and spring rate from torque, bandwidth and inertia by the paper's method"
 EXAMPLE = "rsea design --torque 200 --bandwidth 50 --inertia 0.01"
 SIZES = {
-    "torque": "largest torque, N m",
+    "torque": "largest torque, N·m",
     "bandwidth": "bandwidth, Hz",
-    "inertia": "inertia of the spring chassis, kg m^2",
+    "inertia": "inertia of the spring chassis, kg·m²",
     "mass": "mass of the chassis, kg",
     "diameter": "diameter of the chassis, m",
     "separation": "distance between two springs, m",
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--stiffness",
         type=float,
         default=STIFFNESS,
-        help="stiffness to test, N m/rad (default %(default)s, the paper's)",
+        help="stiffness to test, N·m/rad (default %(default)s, the paper's)",
     )
     parser.add_argument("--unit", default=UNIT, help="motor-gear unit of the catalogue (default %(default)s)")
     parser.add_argument("--train", choices=TRAINS, help="gear train, if it differs from that of the unit")

@@ -32,8 +32,9 @@ NO_RUN = "no_run"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     from rsea_ros.experiment.run_limits import UNITS
+    from rsea_ros.units import plain
 
-    units = ", ".join(f"{name} ({unit})" for name, unit in UNITS.items())
+    units = ", ".join(f"{name} ({plain(unit)})" for name, unit in UNITS.items())
     add = parser.add_argument
     what = "model.yaml of each cause (its last effect), a diagnosis.json beside its model.yaml, or a rig"
     add("models", nargs="+", metavar="MODEL", help=what)

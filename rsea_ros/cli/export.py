@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--no-play", action="store_true", help="write the file without verifying it")
     played = "duration of the chirp that verifies --mjcf and --fmu, s"
     add("--duration", type=positive, default=DURATION, help=f"{played} (default %(default)s)")
-    add("--amplitude", type=positive, help="its amplitude, N m, position loop: rad (default 10, 0.4)")
+    add("--amplitude", type=positive, help="its amplitude, N·m, position loop: rad (default 10, 0.4)")
     limit = "exit status 1 if a channel differs by more than TIMES times its noise"
     add("--limit", type=positive, metavar="TIMES", help=limit)
     add("--json", action="store_true", help="print content, omissions and differences as JSON")

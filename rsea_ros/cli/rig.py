@@ -63,8 +63,10 @@ def _check(args: argparse.Namespace) -> int:
 
 def _row(rig: Rig, name: str) -> tuple[str, ...]:
     """Return name, number, unit, spread and source of a value."""
+    from rsea_ros.units import plain
+
     doubt = f"+-{100.0 * rig.spread(name):g} %" if name in rig.free() else "fixed"
-    return name, f"{rig[name]:.6g}", rig.unit(name), doubt, rig.quantities[name].source
+    return name, f"{rig[name]:.6g}", plain(rig.unit(name)), doubt, rig.quantities[name].source
 
 
 def remarks(rig: Rig) -> list[str]:

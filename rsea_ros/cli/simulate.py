@@ -60,12 +60,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--duration", type=float, default=60.0, help="duration, s (default %(default)s)")
     parser.add_argument("--rate", type=float, help=f"rate of the commands, Hz {_default('rate')}")
     parser.add_argument(
-        "--amplitude", type=float, help=f"amplitude, N m, for a position loop rad {_default('amplitude')}"
+        "--amplitude", type=float, help=f"amplitude, N·m, for a position loop rad {_default('amplitude')}"
     )
     parser.add_argument(
         "--deviation",
         type=float,
-        help=f"standard deviation of noise on a chirp, N m, for a position loop rad {_default('noise')}",
+        help=f"standard deviation of noise on a chirp, N·m, for a position loop rad {_default('noise')}",
     )
     parser.add_argument("--low", type=float, help=f"lowest frequency, Hz {_default('low')}")
     parser.add_argument("--high", type=float, help=f"highest frequency, Hz {_default('high')}")
@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="period of multisine and steps, s (default %(default)s)",
     )
     add = parser.add_argument
-    add("--limit", type=float, help="largest command allowed (default 100 N m, for a position loop 3.2 rad)")
+    add("--limit", type=float, help="largest command allowed (default 100 N·m, for a position loop 3.2 rad)")
     parser.add_argument(
         "--seed", type=seed, default=0, help="seed of command and sensor noise (default %(default)s)"
     )

@@ -18,7 +18,6 @@ samples is compared with the model at its own instant.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,24 +31,13 @@ from rsea_ros.control.loads import lightest, load_range, locked
 from rsea_ros.control.prediction import Prediction
 from rsea_ros.control.reference import Reference
 from rsea_ros.control.sampled import sampled
+from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import design
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
 FOLLOWED = 0.25
 """Of the largest torque: the most that the link's motion may take."""
-
-CORNER = 80.0
-"""Hz: what a desired torque does faster is not predicted. At 280 Hz 5 Hz are predicted within 0.9 %."""
-
-
-@dataclass(frozen=True)
-class TorqueLimits:
-    """torque: N m. slew: N m/s. ramp: s in which the limit grows after the start."""
-
-    torque: float = 68.0
-    slew: float = 40_000.0
-    ramp: float = 0.25
 
 
 @dataclass(frozen=True)
@@ -87,27 +75,31 @@ class TorqueController:
     Method: docs/control.md. Not to be confused with the node `controller`, which runs it on topics.
     """
 
-    def __init__(self, rig: Rig, rate: float, gains: Gains | None = None, *,
-                 limits: TorqueLimits | None = None, compensate: Collection[str] | None = None,
-                 preview: bool = False, learn: bool = True, corner: float = CORNER,
-                 link: LinkShare | None = None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        rig: Rig,
+        rate: float,
+        gains: Gains | None = None,
+        *,
+        limits: TorqueLimits | None = None,
+        link: LinkShare | None = None,
+        settings: ControllerSettings | None = None,
+    ) -> None:
         """rate: Hz. gains: by default those of `synthesis.design`, which takes 2 to 3 s.
 
-        limits: torque, slew and ramp. compensate: effects of the rig to compensate, by default all that have
-        a law for it. preview: the desired torque is known two samples ahead, so it is not predicted. corner:
-        of the prediction, Hz. link: share of the motion in `Measurement.link` that is fed forward
-        (link.link_share), by default nothing. learn: learn load and drive; use False inside an outer loop
-        whose desired torque follows the motion (virtual.py), because learning would change its impedance.
-        Raises ParameterError for a rig whose torque cannot be controlled.
+        link: share of the motion in `Measurement.link` that is fed forward (link.link_share), by default
+        nothing. Raises ParameterError for a rig whose torque cannot be controlled.
         """
+        limits, link = limits or TorqueLimits(), link or LinkShare()
+        settings = settings or ControllerSettings()
         gains = gains or design(rig, load_range(rig, lightest(rig)), rate).gains
         self._law: FeedbackLaw = law_of(rig, rate, gains)
         self.learned = Learning(rig, self._law)
         self._reference = Reference(sampled(locked(rig), rate), self._law, self.learned)
-        self._compensation: Compensation = compensation(rig, compensate)
-        self._prediction, self._acted = Prediction(corner, 1.0 / rate), Acted(1.0 / rate)
-        self._preview, self._learn, self._limits = preview, learn, limits or TorqueLimits()
-        self._link = LinkMotion(self._law, link or LinkShare(), FOLLOWED * self._limits.torque)
+        self._compensation: Compensation = compensation(rig, settings.compensate)
+        self._prediction, self._acted = Prediction(settings.corner, 1.0 / rate), Acted(1.0 / rate)
+        self._preview, self._learn, self._limits = settings.preview, settings.learn, limits
+        self._link = LinkMotion(self._law, link, FOLLOWED * limits.torque)
         self.start(Measurement(0.0, 0.0, 0.0))
 
     def start(self, reading: Measurement, desired: float = 0.0) -> None:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.control.controller import TorqueController, TorqueLimits
+from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.loads import locked
+from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
@@ -49,6 +50,15 @@ class Following:
     def gain_at(self, hz: FloatArray) -> FloatArray:
         """Return the gain, dB, between the sines, shape of hz."""
         return np.interp(np.log(hz), np.log(self.hz), self.gain)
+
+    @property
+    def phase(self) -> FloatArray:
+        """The phase of T_d / desired, deg, shape (n,), continuous from the sine that is followed best.
+
+        That one is near 0. Slower ones, which a free load may leave to feedback, have any phase within 180.
+        """
+        angle, best = np.angle(self.torque), int(np.argmin(np.abs(self.torque - 1.0)))
+        return np.asarray(np.degrees(np.concatenate([angle[:best], np.unwrap(angle[best:])])))
 
     @property
     def peak(self) -> float:
@@ -97,7 +107,8 @@ def _sine(
     rate = design.rate
     n = round((WAIT + max((PERIODS if hz > FEW else FEW) / hz, 0.25)) * rate)
     wanted = np.sin(2.0 * np.pi * hz * np.arange(n) / rate)
-    controller = TorqueController(model, rate, design.gains, limits=UNLIMITED, learn=learn)
+    settings = ControllerSettings(learn=learn)
+    controller = TorqueController(model, rate, design.gains, limits=UNLIMITED, settings=settings)
     run = closed_loop(true, rate, controller, wanted, noise=False, late=late)
     turn = np.exp(-2j * np.pi * hz * run.t) * (run.t >= WAIT)
     scale = np.sum(wanted * turn)

@@ -14,6 +14,7 @@ from scipy.linalg import expm
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.following import UNLIMITED
 from rsea_ros.control.link import LinkShare
+from rsea_ros.control.settings import ControllerSettings
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.virtual import Virtual
 from rsea_ros.model import outputs
@@ -68,7 +69,8 @@ def measured(
 def _felt(rig: Rig, design: ControllerDesign, virtual: Virtual, hz: float, link: LinkShare | None) -> complex:
     rate, k_s = design.rate, rig["spring.stiffness"]
     bench = Held(rig, rate)
-    controller = TorqueController(rig, rate, design.gains, limits=UNLIMITED, learn=False, link=link)
+    settings = ControllerSettings(learn=False)
+    controller = TorqueController(rig, rate, design.gains, limits=UNLIMITED, link=link, settings=settings)
     pending, n = 0.0, round((WAIT + max(PERIODS / hz, 0.5)) * rate)
     rows = np.empty((n, 2))
     reading, distal = bench.step(0.0, 0.0)

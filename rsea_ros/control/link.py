@@ -26,7 +26,7 @@ from rsea_ros.control.sampled import LINK
 from rsea_ros.control.synthesis import SOFT, ControllerDesign, DesignLimits, grid
 from rsea_ros.control.uncertainty import Uncertainty, corners, family
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.signals import BoolArray, ComplexArray, FloatArray
 
 INERTIAS, DAMPINGS = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 0.2, 0.4)
 """Parts of J_m and b_m that are tried. Half of b_m is the least that a bench of the set has."""
@@ -87,29 +87,55 @@ class LinkMotion:
         return self._torque
 
 
+@dataclass(frozen=True)
+class LinkedSet:
+    """The benches of the set with the link's motion fed forward. hz: shape (n,). path, memory, alone, the
+    link's response to the command: shape (m, n); memory, alone: of `loop.returns`."""
+
+    law: FeedbackLaw
+    hz: FloatArray
+    nominal: BoolArray
+    path: ComplexArray
+    link: ComplexArray
+    memory: ComplexArray
+    alone: ComplexArray
+
+    def whole(self, share: LinkShare) -> ComplexArray:
+        """Return 1 + L with a share, shape (m, n)."""
+        return self.alone - self.path * self.on_link(share) * self.link
+
+    def on_link(self, share: LinkShare) -> ComplexArray:
+        """Return the torque for the angle of the link, N m/rad, shape (n,)."""
+        return linked(self.law, share.inertia, share.damping, share.corner, self.hz)
+
+    def sensitivity(self, share: LinkShare) -> FloatArray:
+        """Return the largest sensitivity of each bench, shape (m,)."""
+        peaks: FloatArray = (np.maximum(np.abs(self.memory), 1.0) / np.abs(self.whole(share))).max(axis=1)
+        return peaks
+
+
+def linked_set(rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign) -> LinkedSet:
+    """Return the corners of the set with every load."""
+    law, u, hz = law_of(rig, design.rate, design.gains), Uncertainty(), grid(design.rate, 60)
+    f = family(loads, corners(tuple(loads), u), u, design.rate, hz)
+    memory, alone = returns(law, f.plant, hz, f.path, f.current)
+    return LinkedSet(law, hz, f.nominal, f.path, f.plant[LINK], memory, alone)
+
+
 def link_share(
     rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign, demand: DesignLimits | None = None
 ) -> LinkShare:
     """Return the parts that make the output softest with every bench of the set as robust as demanded."""
-    demand, law, u = demand or DesignLimits(), law_of(rig, design.rate, design.gains), Uncertainty()
-    hz = grid(design.rate, 60)
-    f = family(loads, corners(tuple(loads), u), u, design.rate, hz)
-    still = moved(rig, design.rate, hz)
-    memory, alone = returns(law, f.plant, hz, f.path, f.current)
-    before = _peaks(memory, alone)
-    allowed = np.maximum(MORE * np.where(f.nominal, demand.sensitivity, demand.robust), before)
+    demand, benches = demand or DesignLimits(), linked_set(rig, loads, design)
+    still = moved(rig, design.rate, benches.hz)
+    demanded = MORE * np.where(benches.nominal, demand.sensitivity, demand.robust)
+    allowed = np.maximum(demanded, benches.sensitivity(LinkShare()))
     best, softest = LinkShare(), math.inf
     for share in (LinkShare(*parts) for parts in product(INERTIAS, DAMPINGS, CORNERS)):
-        on_link = linked(law, share.inertia, share.damping, share.corner, hz)
-        whole, ratio = alone - f.path * on_link * f.plant[LINK], still.ratio(law, on_link)
-        soft = float(np.mean(np.log(np.interp(SOFTEST, hz, ratio))))
-        robust = (_peaks(memory, whole) <= allowed).all() and (encirclements(whole) < 0.5).all()
+        ratio = still.ratio(benches.law, benches.on_link(share))
+        soft = float(np.mean(np.log(np.interp(SOFTEST, benches.hz, ratio))))
+        robust = (benches.sensitivity(share) <= allowed).all()
+        robust = robust and (encirclements(benches.whole(share)) < 0.5).all()
         if robust and soft < softest and ratio.max() <= MORE * demand.impedance:
             best, softest = share, soft
     return best
-
-
-def _peaks(memory: ComplexArray, whole: ComplexArray) -> FloatArray:
-    """Return the largest sensitivity of each bench, shape (m,)."""
-    peaks: FloatArray = (np.maximum(np.abs(memory), 1.0) / np.abs(whole)).max(axis=1)
-    return peaks

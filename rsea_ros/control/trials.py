@@ -13,13 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.control.controller import TorqueController, TorqueLimits
+from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.following import Following, Step, fall, step_response
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.large_signal import largest
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LOCKED, locked
 from rsea_ros.control.robustness import Robustness
+from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.spread import Spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
 from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench
@@ -123,8 +124,8 @@ def trials(
     yield from _bandwidth(near, far, apart)
     yield from _stepped(step_response(rig, rig, design), step_response(hard(loads), rig, design, late=1))
     rough = rig.with_effects(EFFECTS[0])
-    yield TrialResult("3 N m friction, not in the model", 100.0 * sine(rough, rig, design), "%", 6.0)
-    yield TrialResult("3 N m friction, in the model", 100.0 * sine(rough, rough, design), "%", 2.5)
+    yield TrialResult("3 N·m friction, not in the model", 100.0 * sine(rough, rig, design), "%", 6.0)
+    yield TrialResult("3 N·m friction, in the model", 100.0 * sine(rough, rough, design), "%", 2.5)
     yield TrialResult(
         "held with 5 arcmin of backlash: torque RMS over that without", restlessness(rig, design), "1", 1.1
     )
@@ -134,13 +135,13 @@ def _followed(rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign) -> I
     near = list(loads)[1:4]
     errors = {case: 100.0 * tracked(rig, loads, case, design) for case in hardest(loads)}
     yield TrialResult(
-        "5 Hz, 10 N m, locked", 100.0 * sine(rig, rig, design), "%", 2.0,
+        "5 Hz, 10 N·m, locked", 100.0 * sine(rig, rig, design), "%", 2.0,
         worst=max(errors.values()), allowed=8.0,
     )  # fmt: skip
     for name in near:
         error, amplitude = 100.0 * tracked(rig, loads, BenchVariant(name), design), amplitude_of(loads[name])
         worst = max(error, *(errors[case] for case in lagging_corners(name)))
-        yield TrialResult(f"5 Hz, {amplitude:.1f} N m, {name}, load unknown", error, "%", 5.0,
+        yield TrialResult(f"5 Hz, {amplitude:.1f} N·m, {name}, load unknown", error, "%", 5.0,
                           worst=worst, allowed=5.0)  # fmt: skip
 
 
@@ -151,13 +152,13 @@ def _bandwidth(near: Following, far: Following, apart: Spread) -> Iterator[Trial
     yield TrialResult("T_d / desired, largest", near.peak, "dB", 3.0, worst=max(far.peak, float(most.max())))
     at = min(near.bandwidth, float(near.hz[-1]))
     yield TrialResult(
-        "motor torque per N m at that bandwidth", near.motor_at(at), "1", worst=far.motor_at(at)
+        "motor torque per N·m at that bandwidth", near.motor_at(at), "1", worst=far.motor_at(at)
     )
-    yield TrialResult("motor torque per N m at 20 Hz", near.motor_at(20.0), "1", worst=far.motor_at(20.0))
+    yield TrialResult("motor torque per N·m at 20 Hz", near.motor_at(20.0), "1", worst=far.motor_at(20.0))
 
 
 def _stepped(near: Step, far: Step) -> Iterator[TrialResult]:
-    yield TrialResult("step of 5 N m: 10 to 90 %", 1e3 * near.rise, "ms", worst=1e3 * far.rise)
+    yield TrialResult("step of 5 N·m: 10 to 90 %", 1e3 * near.rise, "ms", worst=1e3 * far.rise)
     yield TrialResult("its overshoot", 100.0 * near.overshoot, "%", worst=100.0 * far.overshoot)
     yield TrialResult("within 5 % after", 1e3 * near.settling, "ms", worst=1e3 * far.settling)
 
@@ -253,6 +254,7 @@ def restlessness(rig: Rig, design: ControllerDesign, gap: float = 5.0 * ARCMIN) 
 def _held(true: Rig, model: Rig, design: ControllerDesign, torque: float) -> float:
     t = np.arange(round(LEARNED.seconds * design.rate)) / design.rate
     wanted = np.where(t < BRIEF.counted_from, AMPLITUDE * np.sin(2.0 * np.pi * HZ * t), torque)
-    controller = TorqueController(model, design.rate, design.gains, compensate=())
+    settings = ControllerSettings(compensate=())
+    controller = TorqueController(model, design.rate, design.gains, settings=settings)
     ft = closed_loop(true, design.rate, controller, wanted).ft[t >= LEARNED.counted_from]
     return float(np.std(ft))

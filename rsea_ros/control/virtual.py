@@ -19,10 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.control.controller import CORNER, Measurement
+from rsea_ros.control.controller import Measurement
 from rsea_ros.control.impedance import moved
 from rsea_ros.control.law import law_of
 from rsea_ros.control.prediction import prediction_response, smoothed_response
+from rsea_ros.control.settings import CORNER
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray

@@ -66,7 +66,7 @@ class SpringDesign:
 def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> SpringDesign:
     """Return the design of a stiffness (N m/rad). Raises ParameterError unless it is above 0."""
     if not (math.isfinite(stiffness) and stiffness > 0.0):
-        raise ParameterError(f"stiffness = {stiffness:g} N m/rad, expected a finite value > 0 N m/rad")
+        raise ParameterError(f"stiffness = {stiffness:g} N·m/rad, expected a finite value > 0 N·m/rad")
     inner = requirement.inertia + unit.spin
     function = end_over_end(rig_of(requirement, unit, stiffness))
     exact = flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
@@ -146,7 +146,7 @@ def rig_of(requirement: Requirement, unit: MotorGear, stiffness: float) -> Rig:
         "spring.damping": damping,
     }
     return Rig(
-        name=f"{unit.name}, {stiffness:.0f} N m/rad",
+        name=f"{unit.name}, {stiffness:.0f} N·m/rad",
         quantities={name: Quantity(value) for name, value in values.items()},
         clamped=frozenset(END_NAMES),
         train=unit.train,

@@ -17,6 +17,7 @@ from rsea_ros.checked import mapping, number, only_keys, text, unit
 from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.model.rig_file import rig_folders
 from rsea_ros.model.train import TRAINS, Train, rotor_turns, spin_inertia
+from rsea_ros.units import plain
 from rsea_ros.wording import shown
 
 FILE = "motor_gear_units.yaml"
@@ -115,7 +116,7 @@ def _unit(name: str, item: Any) -> MotorGear:
     only_keys(body, {"train", *UNITS}, name)
     for key in REQUIRED:
         if key not in body:
-            expected = f"a value in {UNITS[key]}" if key in UNITS else f"one of {', '.join(TRAINS)}"
+            expected = f"a value in {plain(UNITS[key])}" if key in UNITS else f"one of {', '.join(TRAINS)}"
             raise FieldError(f"{name}.{key} is missing, expected {expected}", name)
     trains, origin = _trains(f"{name}.train", body.pop("train"))
     entries = {key: _entry(f"{name}.{key}", UNITS[key], entry) for key, entry in body.items()}
@@ -159,7 +160,7 @@ def _entry(name: str, symbol: str, item: Any) -> tuple[float, str, float]:
     value, source = number(body.get("value"), name, symbol), text(body.get("source", ""), f"{name}.source")
     if not 0.0 < value < math.inf or not source:
         raise FieldError(
-            f"{name} = {value:g} {symbol}, source {source!r}, expected a value > 0 and a source", name
+            f"{name} = {value:g} {plain(symbol)}, source {source!r}, expected a value > 0 and a source", name
         )
     spread = number(body.get("spread", 0.0), f"{name}.spread", "relative, one sigma")
     if not 0.0 <= spread < 10.0:

@@ -136,7 +136,7 @@ def _body(
     weight: m g l, N m. turned: how far from hanging it is at angle zero, rad.
     """
     if not inertia > 0.0:
-        raise RigError(f"mjcf: {name} has inertia {inertia:g} kg m^2, expected a value > 0 kg m^2")
+        raise RigError(f"mjcf: {name} has inertia {inertia:g} kg·m², expected a value > 0 kg·m²")
     arm = 0.5 * inertia * GRAVITY / weight if weight else 0.0
     mass = weight / (GRAVITY * arm) if weight else 1.0
     about_mass = inertia - mass * arm**2

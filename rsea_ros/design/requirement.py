@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.units import plain
 
 _LARGEST = 45.0
 _RANGE = (1e-9, 1e6)
@@ -73,4 +74,5 @@ def gyration(requirement: Requirement) -> float:
 def check_magnitude(name: str, value: float, unit: str) -> None:
     """Raise ParameterError for a value that is not finite and positive, or of no possible size."""
     if not _RANGE[0] <= value <= _RANGE[1]:
+        unit = plain(unit)
         raise ParameterError(f"{name} = {value:g} {unit}, expected {_RANGE[0]:g} to {_RANGE[1]:g} {unit}")

@@ -10,6 +10,7 @@ from html import escape
 from rsea_ros.effects.effect import Effect, Parameter
 from rsea_ros.effects.equation import without_equation
 from rsea_ros.effects.scale import powers_of
+from rsea_ros.units import plain
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class EffectPage:
     def __repr__(self) -> str:
         """Return name, meaning, equation and parameters as text."""
         rows = [
-            f"  {p.name} ({p.unit}): typical {p.typical:g}, vanishes at {p.null:g}, "
+            f"  {p.name} ({plain(p.unit) or 1}): typical {p.typical:g}, vanishes at {p.null:g}, "
             f"fitted within {p.low:g} to {p.high:g}" + _after(", growing with ", self.grows_with(p))
             + f": {p.reason}"
             for p in self.effect.parameters
@@ -67,7 +68,8 @@ class EffectPage:
         head = "<tr><th>parameter</th><th>unit</th><th>typical</th><th>vanishes at</th><th>bounds</th>"
         head += "<th>grows with</th><th>why</th></tr>"
         rows = "".join(
-            f"<tr><td>{escape(p.name)}</td><td>{escape(p.unit)}</td><td>{p.typical:g}</td><td>{p.null:g}</td>"
+            f"<tr><td>{escape(p.name)}</td><td>{escape(plain(p.unit) or '1')}</td>"
+            f"<td>{p.typical:g}</td><td>{p.null:g}</td>"
             f"<td>{p.low:g} to {p.high:g}</td><td>{self.grows_with(p)}</td>"
             f"<td>{escape(p.reason)}</td></tr>"
             for p in self.effect.parameters

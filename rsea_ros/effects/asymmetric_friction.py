@@ -2,8 +2,8 @@
 
     T = -offset - ½ viscous_difference · |ω|
 
-ω is the speed of the gear output against the housing. offset (N m) is the one-sided part: the torque that the
-drive needs more forward than backward. viscous_difference (N m s/rad) is how much the viscous coefficient
+ω is the speed of the gear output against the housing. offset (N·m) is the one-sided part: the torque that the
+drive needs more forward than backward. viscous_difference (N·m·s/rad) is how much the viscous coefficient
 forward exceeds the one backward; their mean is b_m, and it counts up to 2 b_m, where one of them is zero.
 Source: Janot, Gautier, Brunot, Data set and reference models of EMPS, 2019 (offset).
 """
@@ -30,7 +30,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "viscous_difference", "N m s/rad", null=0.0, low=-100.0, high=100.0, typical=5.0,
-            reason="it counts up to 2 b_m: four times the paper's 23 N m s/rad",
+            reason="it counts up to 2 b_m: four times the paper's 23 N·m·s/rad",
         ),
     ),
     claims=Claims("position", "even", amplitude_exponent=None),

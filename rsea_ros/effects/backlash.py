@@ -6,7 +6,7 @@ y is the chassis, which has its own inertia, d the gear output, both against the
 only push: C >= 0 at the forward one. The impact is inelastic, see _chassis.py. With e = y - d the gear
 feels J_sc e'' + b_s e' + K_s e beside the torque of the nominal spring, the F/T sensor all but the first.
 The error of a step is corrected in the next one, so an unforeseen impact at its end loses no momentum.
-With the housing free, 4 mrad, 30 N m of noise or chirp at 280 Hz, the torque is within 0.1 to 0.7 % RMS of
+With the housing free, 4 mrad, 30 N·m of noise or chirp at 280 Hz, the torque is within 0.1 to 0.7 % RMS of
 an event-driven model in 28 of 30 records (1 mrad: 0.2 %), but for samples within 0.1 ms of an impact, where
 the damper's torque jumps: one of them makes it 3 to 4 %. Where flanks barely graze, exact solvers part too.
 Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft with play), with inertia.

@@ -20,6 +20,7 @@ from rsea_ros.effects.parameter import Parameter as Parameter  # files of effect
 from rsea_ros.effects.scale import Scale
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
+from rsea_ros.units import with_unit
 from rsea_ros.wording import shown
 
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
@@ -152,9 +153,8 @@ class Effect:
             low, high = p.possible
             margin = _ROUNDING * max(abs(low), abs(high))
             if not (low - margin <= value <= high + margin or value == p.null):
-                raise ParameterError(
-                    f"effect {self.name}: {p.name} = {value:g} {p.unit}, expected {p.bounds}"
-                )
+                stated = with_unit(f"{p.name} = {value:g}", p.unit)
+                raise ParameterError(f"effect {self.name}: {stated}, expected {p.bounds}")
 
     def complete(self, parameters: Mapping[str, float]) -> dict[str, float]:
         """Return parameters with the optional ones that were left out at their null value."""

@@ -55,7 +55,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "bristle_damping", "N m s/rad", null=0.0, low=0.0, high=100.0, typical=5.0, optional=True,
-            reason="four times the paper's viscous 23 N m s/rad",
+            reason="four times the paper's viscous 23 N·m·s/rad",
         ),
     ),
     claims=Claims(

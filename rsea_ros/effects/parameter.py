@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from rsea_ros.effects.scale import Scale, widest
+from rsea_ros.units import with_unit
 
 _WIDENED = {"s", "Hz"}
 """Units of lags and modes: what a record shows goes with its samples, how large it is does not."""
@@ -77,4 +78,4 @@ class Parameter:
     def bounds(self) -> str:
         """Return the possible values for people."""
         low, high = self.possible
-        return f"{low:g} to {high:g} {self.unit}"
+        return with_unit(f"{low:g} to {high:g}", self.unit)

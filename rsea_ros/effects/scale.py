@@ -1,7 +1,7 @@
 """The size of a machine and of its record, beside the machine for which the catalogue states its numbers.
 
 Similar machines move alike (Buckingham, Phys. Rev. 4, 1914): where torques, stiffnesses and inertias are all
-s times as large, angles and times stay the same, and 2 N m of friction on one are 2 s N m on the other. So
+s times as large, angles and times stay the same, and 2 N·m of friction on one are 2 s N·m on the other. So
 bounds, sizes and starts of an effect go with their units as powers of five numbers of the machine.
 """
 
@@ -15,7 +15,7 @@ TORQUE, STIFFNESS, INERTIA, SPEED, PERIOD = 30.0, 1500.0, 1.0, 0.6, 1.0 / 280.0
 spring, N m/rad, reflected inertia, kg m^2, largest speed, rad/s, and time between samples, s. The paper's
 actuator in its high-impedance test."""
 MACHINE = (
-    f"a machine of {TORQUE:g} N m, {STIFFNESS:g} N m/rad, {INERTIA:g} kg m^2, {SPEED:g} rad/s "
+    f"a machine of {TORQUE:g} N·m, {STIFFNESS:g} N·m/rad, {INERTIA:g} kg·m², {SPEED:g} rad/s "
     f"and {1.0 / PERIOD:.0f} samples a second"
 )
 _GRID = 4.0

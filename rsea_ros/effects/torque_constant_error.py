@@ -3,7 +3,7 @@
     T_motor = gain · T_command
 
 The measured current is turned into torque with the same wrong constant, so it does not show this. For one
-motor the maker's framework states 6.826 N m/A and its data sheet 4.81 N m/A. Source: Hughes, Drury, Electric
+motor the maker's framework states 6.826 N·m/A and its data sheet 4.81 N·m/A. Source: Hughes, Drury, Electric
 Motors and Drives, 2013, ch. 3 (torque and current).
 """
 

@@ -11,6 +11,7 @@ import numpy as np
 from rsea_ros.decimal_number import is_decimal
 from rsea_ros.errors import ParameterError
 from rsea_ros.signals import FloatArray
+from rsea_ros.units import plain
 from rsea_ros.wording import did_you_mean, shown
 
 UNITS: Mapping[str, str] = {
@@ -49,10 +50,10 @@ class RunLimits:
         for name, unit in UNITS.items():
             value = getattr(self, name)
             if not value > 0.0:
-                raise ParameterError(f"limit {name} = {value:g} {unit}, expected > 0 {unit}")
+                raise ParameterError(f"limit {name} = {value:g} {plain(unit)}, expected > 0 {plain(unit)}")
         if math.isinf(self.torque):
             raise ParameterError(
-                "limit torque = inf N m, expected a finite torque: nothing else bounds a run"
+                "limit torque = inf N·m, expected a finite torque: nothing else bounds a run"
             )
 
     def stated(self) -> dict[str, float]:
@@ -69,12 +70,13 @@ def limits_from(text: str) -> RunLimits:
             near = did_you_mean(name, UNITS)
             raise ParameterError(f"--limits: {shown(name)}, expected one of {', '.join(UNITS)}{near}")
         if not is_decimal(value):
-            raise ParameterError(f"--limits: {name} = {shown(value)}, expected a number in {UNITS[name]}")
+            expected = f"expected a number in {plain(UNITS[name])}"
+            raise ParameterError(f"--limits: {name} = {shown(value)}, {expected}")
         if name in values:
             raise ParameterError(f"--limits: {name} is given twice, expected once")
         values[name] = float(value)
     if "torque" not in values:
-        raise ParameterError("--limits: no torque, expected at least torque=… in N m")
+        raise ParameterError("--limits: no torque, expected at least torque=… in N·m")
     return RunLimits(**values)
 
 

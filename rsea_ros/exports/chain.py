@@ -135,7 +135,7 @@ def _chassis(rig: Rig) -> Link:
         load = _end(rig, "spring_end", "distal")
         inertia += load.inertia
     if not inertia > 0.0:
-        raise RigError(f"rig {rig.name}: chassis has inertia {inertia:g} kg m^2, expected > 0 kg m^2")
+        raise RigError(f"rig {rig.name}: chassis has inertia {inertia:g} kg·m², expected > 0 kg·m²")
     return Link("chassis", inertia, load.weight, load.turned) if load else Link("chassis", inertia)
 
 

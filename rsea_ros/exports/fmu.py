@@ -33,7 +33,7 @@ def export_fmu(rig: Rig) -> Export:
     represented = [Represented("bench", how)]
     represented += [Represented(one.name, "in the step; its sizes are parameters") for one in rig.effects]
     if rig.linear:
-        represented.append(Represented("linear rig", "m and N stand in the place of rad and N m"))
+        represented.append(Represented("linear rig", "m and N stand in the place of rad and N·m"))
     omitted = [Omitted("sensor noise", "outputs are what perfect instruments read")] if rig.sensors else []
     with tempfile.TemporaryDirectory() as folder:
         files = {"rig.yaml": rig_text(rig), "coverage.txt": "\n".join(coverage_lines(represented, omitted))}

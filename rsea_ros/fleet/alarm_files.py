@@ -22,6 +22,7 @@ from rsea_ros.fleet.store import Store
 from rsea_ros.fleet.store_columns import history, recordings
 from rsea_ros.new_files import write_text
 from rsea_ros.trends import Alarm, alarms
+from rsea_ros.units import with_unit
 
 FOLDER = "alarms"
 
@@ -84,9 +85,9 @@ def sentence(alarm: Alarm) -> str:
     since = f" since {_time(alarm.since_s)[:10]}" if math.isfinite(alarm.since_s) else ""
     if alarm.size is None:
         return f"{alarm.joint}: {alarm.about} ({alarm.kind}){since}"
-    unit = "" if alarm.unit == "1" else f" {alarm.unit}"
-    interval = f"{alarm.size.low:.4g} to {alarm.size.high:.4g}{unit}"
-    return f"{alarm.joint}: {alarm.about} ({alarm.kind}) {alarm.size.value:+.4g}{unit}, {interval}{since}"
+    size = with_unit(f"{alarm.size.value:+.4g}", alarm.unit)
+    interval = f"{alarm.size.low:.4g} to " + with_unit(f"{alarm.size.high:.4g}", alarm.unit)
+    return f"{alarm.joint}: {alarm.about} ({alarm.kind}) {size}, {interval}{since}"
 
 
 def _time(seconds: float) -> str:

@@ -31,6 +31,7 @@ from rsea_ros.report.file_names import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODE
 from rsea_ros.report.identification.json import identification_json
 from rsea_ros.report.json_values import finite, json_text
 from rsea_ros.signals import UNITS, Fault, Record
+from rsea_ros.units import with_unit
 
 _MAIN = ("ft", "deflection", "position", "velocity")
 """Channels that judge a fit, the first one there speaks for the row."""
@@ -153,5 +154,5 @@ def faults(listed: Iterable[Fault]) -> list[dict[str, Any]]:
 
 def _place(fault: Fault) -> str:
     share = f"{100.0 * fault.share:.3g} %" if math.isfinite(fault.share) else ""
-    size = f"{fault.size:.4g} {fault.unit}".strip() if fault.size is not None else ""
+    size = with_unit(f"{fault.size:.4g}", fault.unit) if fault.size is not None else ""
     return ": ".join(filter(None, (fault.channel, ", ".join(filter(None, (share, size, fault.detail))))))

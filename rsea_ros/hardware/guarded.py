@@ -155,7 +155,7 @@ class GuardedDevice:
     def zero_ft(self) -> None:
         """Tare the F/T sensor, beside the cycles. Raises DeviceError while torque is commanded."""
         if self.guard.torque != 0.0:
-            raise DeviceError(f"zero_ft: {self.guard.torque:.4g} N m is commanded, expected 0 N m")
+            raise DeviceError(f"zero_ft: {self.guard.torque:.4g} N·m is commanded, expected 0 N·m")
         self._taring = True
         try:
             self.device.zero_ft()

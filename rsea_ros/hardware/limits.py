@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
+from rsea_ros.units import plain
 
 COMMAND_TIMEOUT = "command_timeout"
 HEARD_LATE = 3
@@ -75,14 +76,15 @@ class DeviceFault:
     detail: str = ""
 
     def __str__(self) -> str:
-        measured = f" {self.value:.4g} {self.unit}, limit {self.limit:.4g} {self.unit}"
+        unit = plain(self.unit)
+        measured = f" {self.value:.4g} {unit}, limit {self.limit:.4g} {unit}"
         return f"{self.cause}:" + ("" if math.isnan(self.value) else measured) + f" {self.detail}".rstrip()
 
 
 def complaint(limits: Limits, state: State) -> DeviceFault | None:
     """Return the first fault in a reading."""
     if not math.isfinite(state.position + state.velocity + state.motor_torque):
-        reading = f"{state.position} rad, {state.velocity} rad/s, {state.motor_torque} N m"
+        reading = f"{state.position} rad, {state.velocity} rad/s, {state.motor_torque} N·m"
         return DeviceFault("reading", detail=f"{reading}, expected finite values")
     for cause, words in (
         ("hardware_error", state.hardware_error),
@@ -233,12 +235,12 @@ def check_limits(limits: Limits, motor_limit: float, stiffness: float) -> None:
     """
     if limits.torque > motor_limit * (1.0 + 1e-9):
         raise ParameterError(
-            f"parameter torque_limit = {limits.torque:g} N m, expected at most {motor_limit:.4g} N m,"
+            f"parameter torque_limit = {limits.torque:g} N·m, expected at most {motor_limit:.4g} N·m,"
             " the motor's own limit"
         )
     if limits.torque / stiffness > limits.deflection:
         raise ParameterError(
-            f"parameter torque_limit = {limits.torque:g} N m deflects the rig's spring"
-            f" of {stiffness:.4g} N m/rad by {limits.torque / stiffness:.4g} rad,"
+            f"parameter torque_limit = {limits.torque:g} N·m deflects the rig's spring"
+            f" of {stiffness:.4g} N·m/rad by {limits.torque / stiffness:.4g} rad,"
             f" expected at most deflection_limit = {limits.deflection:.4g} rad"
         )

@@ -73,7 +73,7 @@ class SimulatedDevice:
     def write(self, torque: float) -> None:
         """Hold a torque (N m) from now on. Raises DeviceError for one that is not finite."""
         if not np.isfinite(torque):
-            raise DeviceError(f"torque of {torque} N m, expected a finite value")
+            raise DeviceError(f"torque of {torque} N·m, expected a finite value")
         self._writes.append((self._clock(), float(torque)))
 
     def enable(self) -> None:

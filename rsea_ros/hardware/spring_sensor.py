@@ -21,7 +21,7 @@ class Spring:
     sign: float = 1.0
 
     def __str__(self) -> str:
-        return f"stiffness of {self.stiffness:.4g} N m/rad times measured deflection"
+        return f"stiffness of {self.stiffness:.4g} N·m/rad times measured deflection"
 
     def felt(self, state: State) -> State:
         """Return a reading with the wrench of its deflection, unless it has a wrench or no deflection."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.units import plain
 
 NYQUIST_SHARE = 0.95
 """No excitation goes above this share of half the sample rate."""
@@ -202,6 +203,7 @@ def check_limits(command: FloatArray, limit: float, rate: float, unit: str = "N 
     """Raise ParameterError for the first sample above the limit (in unit) or not finite. rate: Hz."""
     bad = ~(np.abs(command) <= limit)
     if bad.any():
+        unit = plain(unit)
         first = int(np.argmax(bad))
         largest = np.max(np.abs(command))
         raise ParameterError(

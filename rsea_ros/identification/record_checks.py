@@ -34,7 +34,7 @@ def check_excited(records: Sequence[Record]) -> None:
     """Raise IdentificationError where no record has a command that changes."""
     commands = [record["command"].y for record in records if "command" in record]
     if commands and all(len(y) == 0 or np.ptp(y) == 0.0 for y in commands):
-        held = f"{commands[0][0]:.4g} N m throughout" if len(commands[0]) else "empty"
+        held = f"{commands[0][0]:.4g} N·m throughout" if len(commands[0]) else "empty"
         raise IdentificationError(
             f"{records[0].source}: torque_command is {held}, expected an excitation (chirp, multisine, noise)"
         )

@@ -27,7 +27,7 @@ def simulate(
     given = np.asarray(command)
     if given.dtype.kind not in "iuf" or given.ndim != 1 or len(given) < 2 or not np.isfinite(given).all():
         kind = f"shape {given.shape} of {given.dtype}"
-        raise ParameterError(f"command: {kind}, expected (n,) finite torques in N m with n >= 2 samples")
+        raise ParameterError(f"command: {kind}, expected (n,) finite torques in N·m with n >= 2 samples")
     values = given.astype(np.float64)
     if not (math.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"rate = {rate:g} Hz, expected a finite rate > 0")

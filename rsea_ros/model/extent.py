@@ -60,7 +60,7 @@ def check_command(record: Record) -> None:
     back = np.diff(command.t, prepend=-np.inf) <= 0.0
     for k in np.flatnonzero(bad | back)[:1]:
         value = (
-            f"{command.y[k]} N m"
+            f"{command.y[k]} N·m"
             if bad[k]
             else f"stamped {command.t[k]:.6g} s after {command.t[k - 1]:.6g} s"
         )

@@ -18,6 +18,7 @@ from rsea_ros.model.rig_fields import FIELDS, check_value, unit_of
 from rsea_ros.model.rig_structure import check_structure
 from rsea_ros.model.train import Train
 from rsea_ros.signals import FloatArray
+from rsea_ros.units import plain
 
 CLOCK_DOUBT = 1e-4
 """s, one sigma of the time offset of a sensor if the rig states none."""
@@ -126,7 +127,8 @@ class Rig:
             return self.quantities[name].value
         default = FIELDS[name].default if name in FIELDS else None
         if default is None:
-            raise RigError(f"rig {self.name}: {name} is missing, expected a value in {unit_of(name)}", name)
+            expected = f"expected a value in {plain(unit_of(name))}"
+            raise RigError(f"rig {self.name}: {name} is missing, {expected}", name)
         return default
 
     def values(self) -> dict[str, float]:

@@ -25,6 +25,7 @@ from rsea_ros.model.rig_keys import (
     TOP,
 )
 from rsea_ros.model.rig_sensors import sensors_from
+from rsea_ros.units import plain
 from rsea_ros.wording import shown
 
 
@@ -98,7 +99,7 @@ def _quantity(name: str, item: Any) -> Quantity:
 
 def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
     if not isinstance(item, list) or len(item) != 2:
-        raise RigError(f"{name} = {shown(item)}, expected [low, high] in {unit_name}", name)
+        raise RigError(f"{name} = {shown(item)}, expected [low, high] in {plain(unit_name)}", name)
     low, high = (number(v, name, unit_name) for v in item)
     return low, high
 
@@ -152,9 +153,10 @@ def _controller(item: Any) -> PositionLoop | None:
     limit = number(body.get("limit", math.inf), "controller.limit", "N m")
     for name, value, symbol in (("controller.k_p", k_p, "1/s"), ("controller.k_v", k_v, "N m s/rad")):
         if not 0.0 <= value < math.inf:
-            raise RigError(f"{name} = {value:g} {symbol}, expected a finite value >= 0 {symbol}", name)
+            stated, least = (f"{v:g} {plain(symbol)}" for v in (value, 0.0))
+            raise RigError(f"{name} = {stated}, expected a finite value >= {least}", name)
     if limit <= 0.0:
-        raise RigError(f"controller.limit = {limit:g} N m, expected a value > 0 N m", "controller.limit")
+        raise RigError(f"controller.limit = {limit:g} N·m, expected a value > 0 N·m", "controller.limit")
     return PositionLoop(k_p, k_v, limit)
 
 

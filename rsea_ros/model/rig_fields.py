@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from rsea_ros.errors import RigError
+from rsea_ros.units import with_unit
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Limits of the size of a nonzero value; beyond them the equations have no accurate digit."""
@@ -83,13 +84,13 @@ def unit_of(name: str) -> str:
 
 def check_value(name: str, value: float, where: str = "rig") -> None:
     """Raise RigError when a value is not a possible one for its field."""
-    unit = unit_of(name)
+    unit, stated = unit_of(name), f"{where}: {name} = {value:g}"
     low, allowed = FIELDS[name].low, FIELDS[name].low_allowed
     infinite_ok = FIELDS[name].default == math.inf
     possible = (value >= low if allowed else value > low) and (math.isfinite(value) or infinite_ok)
     if possible and math.isfinite(value) and value != 0.0 and not LEAST_SIZE <= abs(value) <= GREATEST_SIZE:
-        sizes = f"a size between {LEAST_SIZE:g} and {GREATEST_SIZE:g} {unit}"
-        raise RigError(f"{where}: {name} = {value:g} {unit}, expected {sizes}", name)
+        sizes = with_unit(f"a size between {LEAST_SIZE:g} and {GREATEST_SIZE:g}", unit)
+        raise RigError(f"{with_unit(stated, unit)}, expected {sizes}", name)
     if not possible:
-        bound = f">= {low:g}" if allowed else f"> {low:g}"
-        raise RigError(f"{where}: {name} = {value:g} {unit}, expected a finite value {bound} {unit}", name)
+        bound = with_unit(f">= {low:g}" if allowed else f"> {low:g}", unit)
+        raise RigError(f"{with_unit(stated, unit)}, expected a finite value {bound}", name)

@@ -10,6 +10,7 @@ from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.model.rig_fields import END_NAMES, FIELDS, LOOP_FIELDS, LOOP_LIMITS, Field
 from rsea_ros.model.train import TRAINS
 from rsea_ros.signals import UNITS
+from rsea_ros.units import plain
 
 _END = {
     "inertia": "inertia of the load",
@@ -54,7 +55,7 @@ TOP = (
     Key("proximal", "`housing_end` or `spring_end`", "`housing_end`", "the paper's proximal end"),
     Key("encoder_end", "`gear_output` or `spring_end`", "`gear_output`", "the part that the encoder reads"),
     Key("ft_end", "`housing_end` or `spring_end`", "`spring_end`", "the end that carries the F/T sensor"),
-    Key("linear", "true or false", "false", "m, N, kg replace rad, N m, kg m^2"),
+    Key("linear", "true or false", "false", "m, N, kg replace rad, N·m, kg·m²"),
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may change"),
     Key("sensors", "mapping, a key for each channel", "perfect sensors", "noise, steps, clocks"),
     Key("controller", "mapping", "none", "position loop that was active during the record, see below"),
@@ -104,8 +105,8 @@ _LOOP_MEANINGS = {
 }
 CONTROLLER = (
     Key("k_p", "1/s, >= 0", NEEDED, "command = k_v (k_p (reference - q) - dq/dt)"),
-    Key("k_v", "N m s/rad, >= 0", NEEDED),
-    Key("limit", "N m, > 0", "no limit", "largest command"),
+    Key("k_v", "N·m·s/rad, >= 0", NEEDED),
+    Key("limit", "N·m, > 0", "no limit", "largest command"),
     Key("source", "text", "empty", "source of the values"),
 )
 EFFECT = (
@@ -123,7 +124,8 @@ def tables() -> str:
         fields = [(name, field) for name, field in FIELDS.items() if name.startswith(f"{group}.")]
         parts.append(table(group, [*(_key(name, field) for name, field in fields), *SWITCHES.get(group, ())]))
     parts.append(table("sensors.CHANNEL", SENSOR))
-    parts.append("Channels and their units: " + ", ".join(f"`{n}` {u}" for n, u in UNITS.items()) + ".\n")
+    channels = ", ".join(f"`{n}` {plain(u)}" for n, u in UNITS.items())
+    parts.append(f"Channels and their units: {channels}.\n")
     parts += [table("sensors.CHANNEL.clock", CLOCK)]
     parts += [_loop_table(kind) for kind in LOOP_FIELDS]
     parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT), table("GROUP.FIELD", QUANTITY)]
@@ -147,6 +149,7 @@ def _key(name: str, field: Field) -> Key:
 def _expected(field: Field) -> tuple[str, str]:
     """Return the expected value of a field, and its default."""
     bound = f", {'>=' if field.low_allowed else '>'} {field.low:g}" if math.isfinite(field.low) else ""
+    expects = f"{plain(field.unit) or 1}{bound}"
     if field.default is None:
-        return f"{field.unit}{bound}", NEEDED
-    return f"{field.unit}{bound}", "infinite" if math.isinf(field.default) else f"{field.default:g}"
+        return expects, NEEDED
+    return expects, "infinite" if math.isinf(field.default) else f"{field.default:g}"

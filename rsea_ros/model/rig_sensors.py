@@ -12,6 +12,7 @@ from rsea_ros.keys import names
 from rsea_ros.model.rig import CLOCK_DOUBT, Sensor
 from rsea_ros.model.rig_keys import CLOCK, CLOCK_RATE, SENSOR
 from rsea_ros.signals import UNITS
+from rsea_ros.units import plain
 
 _LATEST = 0.01
 """s. A clock further off than this is no clock error but a delay of the bench."""
@@ -32,7 +33,7 @@ def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
         )
         if not (0 <= noise < math.inf and 0 <= quantum < math.inf):
             raise RigError(
-                f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0",
+                f"sensors.{name} = {noise:g}, {quantum:g} {plain(UNITS[name])}, expected finite values >= 0",
                 f"sensors.{name}",
             )
         floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)

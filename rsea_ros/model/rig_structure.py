@@ -55,7 +55,7 @@ def _check_sensor_end(rig: Rig) -> None:
     if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
         raise RigError(
             f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
-            "sensor, N m/rad"
+            "sensor, N·m/rad"
         )
 
 
@@ -67,7 +67,7 @@ def _check_spring(rig: Rig) -> None:
     if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
         value = "= inf" if "spring.stiffness" in rig.quantities else "is missing"
         raise RigError(
-            f"rig {rig.name}: spring.stiffness {value}, expected a value in N m/rad or `rigid: true`",
+            f"rig {rig.name}: spring.stiffness {value}, expected a value in N·m/rad or `rigid: true`",
             "spring.stiffness",
         )
 

@@ -16,7 +16,7 @@ def spring_radius(k_s: float, k: float, radius: float) -> float:
     square = 3.0 * (k_s / (2.0 * k) - radius**2)
     if square < 0.0:
         least = 2.0 * k * radius**2
-        raise ParameterError(f"K_s = {k_s:g} N m/rad, expected at least 2 K R^2 = {least:g} N m/rad")
+        raise ParameterError(f"K_s = {k_s:g} N·m/rad, expected at least 2 K R^2 = {least:g} N·m/rad")
     return math.sqrt(square)
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.control.controller import CORNER, TorqueController, TorqueLimits
+from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LIGHTEST, lightest, load_range
+from rsea_ros.control.settings import CORNER, ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, design
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
@@ -78,17 +79,19 @@ def design_of(values: Values) -> ControllerDesign:
 def controller_of(values: Values, designed: ControllerDesign, link: LinkShare) -> TorqueController:
     """Return the controller for the parameters. link: what of the link's motion it feeds forward."""
     limits = TorqueLimits(values["torque_limit"], values["slew_limit"], values["ramp"])
-    options: dict[str, Any] = {} if values["compensate"] else {"compensate": ()}
+    settings = ControllerSettings(
+        compensate=None if values["compensate"] else (),
+        preview=values["preview"],
+        corner=values["prediction"],
+        learn=values["learn"],
+    )
     return TorqueController(
         load_rig(values["rig"]),
         values["rate"],
         designed.gains,
         limits=limits,
-        preview=values["preview"],
-        learn=values["learn"],
-        corner=values["prediction"],
         link=link,
-        **options,
+        settings=settings,
     )
 
 
@@ -97,7 +100,7 @@ def summary(designed: ControllerDesign) -> list[str]:
     g = designed.gains
     head = (
         f"k_p {g.k_p:.3f}, k_d {1e3 * g.k_d:.2f} ms, k_i {g.k_i:.2f}, Q {g.q_frequency:.1f} Hz, "
-        f"k_w {g.k_w:.1f} N m s/rad at {designed.rate:g} Hz; "
+        f"k_w {g.k_w:.1f} N·m·s/rad at {designed.rate:g} Hz; "
         f"largest sensitivity of the set {designed.sensitivity:.2f}"
     )
     return [head] + [

@@ -17,6 +17,7 @@ from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.file_names import REPORT
 from rsea_ros.signals import Record
+from rsea_ros.units import with_unit
 
 _POLL = 0.02
 """s that the executor rests between two looks at a thread that still works."""
@@ -99,7 +100,8 @@ def report_of(diagnosis: Diagnosis, report: Path) -> NodeHealth:
         "causes": ", ".join(c.name for c in diagnosis.causes),
     }
     for cause in diagnosis.causes:
-        values |= {f"{cause.name}.{name}": f"{p.value:.6g} {p.unit}" for name, p in cause.parameters.items()}
+        sizes = {name: with_unit(f"{p.value:.6g}", p.unit) for name, p in cause.parameters.items()}
+        values |= {f"{cause.name}.{name}": size for name, size in sizes.items()}
         values[f"{cause.name}.gain"] = f"{cause.gain_holdout:.4f}"
         values[f"{cause.name}.status"] = cause.status
         values[f"{cause.name}.probability"] = f"{cause.probability:.2f}"

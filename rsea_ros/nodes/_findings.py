@@ -15,6 +15,7 @@ from rsea_ros.health.health_finding import HealthFinding
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import STEADY
 from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.units import with_unit
 
 SEVERE = ("RSEA_SENSOR_FROZEN", "RSEA_SENSOR_MISSING")
 """Codes whose level is ERROR: nobody must trust what such a sensor says."""
@@ -69,7 +70,8 @@ def sentence(finding: HealthFinding) -> str:
     if not math.isfinite(finding.size):
         return finding.name or finding.code
     low, high = finding.ci95
-    return f"{finding.name} changed by {finding.size:.4g} {finding.unit} ({low:.4g} to {high:.4g})"
+    size = with_unit(f"{finding.size:.4g}", finding.unit)
+    return f"{finding.name} changed by {size} ({low:.4g} to {high:.4g})"
 
 
 def instant(stamp: int) -> str:

@@ -91,7 +91,7 @@ class DrivenJoint:
             self._health.publish()
         if limited > before[1]:
             limits = self.guarded.guard.limits
-            text = f"{limited} commands limited to {limits.torque:g} N m and {limits.slew:g} N m/s so far"
+            text = f"{limited} commands limited to {limits.torque:g} N·m and {limits.slew:g} N·m/s so far"
             self._node.get_logger().warning(self.named(text), throttle_duration_sec=1.0)
 
     def fail(self, error: Exception) -> None:

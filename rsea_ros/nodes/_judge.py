@@ -47,11 +47,11 @@ class Judge:
         error = abs(ft - desired)
         self._off = max(0, self._off + (1 if error > self._error_limit else -1))
         if abs(ft) > self._ft_limit:
-            return f"ft of {ft:.4g} N m, expected at most ft_limit = {self._ft_limit:g} N m"
+            return f"ft of {ft:.4g} N·m, expected at most ft_limit = {self._ft_limit:g} N·m"
         if self._off > self._longest:
             return (
-                f"ft is {error:.4g} N m off the desired torque, expected at most"
-                f" error_limit = {self._error_limit:g} N m for error_time"
+                f"ft is {error:.4g} N·m off the desired torque, expected at most"
+                f" error_limit = {self._error_limit:g} N·m for error_time"
             )
         if self.lateness.persists:
             tolerance = self.lateness.tolerance

@@ -42,7 +42,7 @@ def link_of(values: Mapping[str, Any], designed: ControllerDesign) -> LinkFeedfo
         return LinkFeedforward(share, None, "no part of it keeps the demands")
     loud, most = _noise(rig, designed, share), LOUD * values["torque_limit"]
     if loud > most:
-        reason = f"noise of {loud:.2g} N m of motor torque, expected at most {most:.2g}"
+        reason = f"noise of {loud:.2g} N·m of motor torque, expected at most {most:.2g}"
         return LinkFeedforward(LinkShare(), None, reason)
     return LinkFeedforward(share, SpringEncoder(rig, designed.rate), "")
 

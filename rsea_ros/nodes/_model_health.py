@@ -100,7 +100,7 @@ class ModelHealth:
     def _silence(self) -> list[str]:
         if not self._inputs.ft_silent or self.estimate is None:
             return []
-        doubt = f"sigma of the distal torque {self.estimate.sigma_distal:.3g} N m"
+        doubt = f"sigma of the distal torque {self.estimate.sigma_distal:.3g} N·m"
         return [f"no ft for {self._inputs.ft_age:.2f} s: estimated without it, {doubt}"]
 
     def _band(self) -> dict[str, object]:

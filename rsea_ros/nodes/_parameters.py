@@ -12,6 +12,7 @@ from rclpy.node import Node
 from msg_adapters.ros import parameter_descriptor
 from msg_adapters.topic_map import AXES
 from rsea_ros.errors import ParameterError
+from rsea_ros.units import plain
 from rsea_ros.wording import did_you_mean
 
 Value = bool | int | float | str | list[str]
@@ -43,7 +44,7 @@ class NodeParameter:
         kind = {bool: "true or false", int: "a whole number", float: "a number", str: "a text",
                 list: "a list of texts"}[type(self.default)]  # fmt: skip
         bounds = "" if self.low is None else f" from {self.low:g} to {self.high:g}"
-        return f"{kind}{bounds}{f' {self.unit}' if self.unit else ''}"
+        return f"{kind}{bounds}{f' {plain(self.unit)}' if self.unit else ''}"
 
     def checked(self, value: Any) -> Value:
         """Return a value that fits, in the type of the default. Raises ParameterError for any other."""
@@ -115,7 +116,7 @@ def _descriptor(parameter: NodeParameter) -> Any:
 
 
 def _described(parameter: NodeParameter) -> str:
-    return f"{parameter.description}, {parameter.unit}" if parameter.unit else parameter.description
+    return f"{parameter.description}, {plain(parameter.unit)}" if parameter.unit else parameter.description
 
 
 def usage(name: str, table: Sequence[NodeParameter]) -> str:

@@ -135,5 +135,5 @@ def check_followed(record: Record) -> None:
     away = float(np.sqrt(np.mean((measured.y - asked) ** 2)))
     if away > FOLLOWED * size + 0.2:
         raise DeviceError(
-            f"the motor torque was {away:.3g} N m RMS off the command of {size:.3g} N m"
+            f"the motor torque was {away:.3g} N·m RMS off the command of {size:.3g} N·m"
         )

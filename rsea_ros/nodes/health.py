@@ -25,6 +25,7 @@ from rsea_ros.nodes._kept import Keeper, Ring
 from rsea_ros.nodes._model_noise import noise_from
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._run import NAMESPACE, run_node
+from rsea_ros.units import with_unit
 
 TABLE = (
     NodeParameter(
@@ -132,7 +133,8 @@ class HealthNode:
         monitor, inputs = self._monitor, self._inputs
         values: dict[str, object] = {}
         for e in monitor.estimates():
-            values[e.name] = f"{e.value:.5g} {e.unit}, 95 %: {e.ci95[0]:.5g} to {e.ci95[1]:.5g}"
+            size = with_unit(f"{e.value:.5g}", e.unit)
+            values[e.name] = f"{size}, 95 %: {e.ci95[0]:.5g} to {e.ci95[1]:.5g}"
             values[f"{e.name}.held"] = str(e.held).lower()
         values |= {"looks": monitor.looks, "still_looks": monitor.still}
         values["learning"] = str(monitor.learning).lower()

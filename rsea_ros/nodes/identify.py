@@ -32,6 +32,7 @@ from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.file_names import IDENTIFICATION
 from rsea_ros.report.identification.words import verdict_sentence
 from rsea_ros.signals import Record
+from rsea_ros.units import with_unit
 
 DEFAULT = "out/identify"
 TABLE = (
@@ -135,7 +136,8 @@ class IdentifyNode:
         for line in fault_lines(result.faults):
             log.warning(f"data: {line}")
         for p in result.parameters:
-            log.info(f"{p.name} = {p.value:.6g} {p.unit}, 95 %: {p.ci95[0]:.6g} to {p.ci95[1]:.6g}")
+            size = with_unit(f"{p.value:.6g}", p.unit)
+            log.info(f"{p.name} = {size}, 95 %: {p.ci95[0]:.6g} to {p.ci95[1]:.6g}")
         log.info(f"report: {report}")
 
     def _record(self, strict: bool = True) -> Record:
@@ -177,7 +179,7 @@ class IdentifyNode:
 def report_of(result: Identification, report: Path) -> NodeHealth:
     """Return verdict, parameters and faults of the data as the values of a diagnostic."""
     values: dict[str, object] = {"verdict": result.verdict, "faults": "; ".join(fault_lines(result.faults))}
-    values |= {p.name: f"{p.value:.6g} {p.unit}" for p in result.parameters}
+    values |= {p.name: with_unit(f"{p.value:.6g}", p.unit) for p in result.parameters}
     level = OK if result.verdict == "adequate" and not result.faults else WARN
     return NodeHealth(level, verdict_sentence(result), {**values, "report": report})
 

@@ -64,7 +64,7 @@ def limits(rig: Rig) -> tuple[Limit, ...]:
     lumped, star = replace(clamped, train="lumped"), replace(clamped, train="star")
     return (
         Limit("Both ends clamped: T_d/T_m lumped is T_d/T_m unlumped", "", (1.0,), (_off(lumped, clamped),)),
-        _limit("A heavy load is a clamp: T_d/T_m of the free housing becomes Eq. (4)", "load, kg m^2",
+        _limit("A heavy load is a clamp: T_d/T_m of the free housing becomes Eq. (4)", "load, kg·m²",
                (1e2, 1e4, 1e6), lambda v: _off(rig.with_values({"housing_end.inertia": v}), clamped)),
         _limit("A large ratio at the same J_m: T_p/T_m becomes Eq. (5), planetary", "N",
                (5e1, 5e3, 5e5), lambda v: _off_eq_5(clamped.with_values({"gear.ratio": v}))),
@@ -72,7 +72,7 @@ def limits(rig: Rig) -> tuple[Limit, ...]:
                (5e1, 5e3, 5e5), lambda v: _off_eq_5(star.with_values({"gear.ratio": v}))),
         _limit("A large ratio: star and planetary train are one, housing free", "N",
                (5e1, 5e3, 5e5), lambda v: _trains_apart(rig.with_values({"gear.ratio": v}))),
-        _limit("A stiff spring: T_d/T_p becomes 1", "K_s, N m/rad",
+        _limit("A stiff spring: T_d/T_p becomes 1", "K_s, N·m/rad",
                (1e6, 1e8, 1e10), lambda v: _end_to_end_off(clamped.with_values({"spring.stiffness": v}))),
     )  # fmt: skip
 

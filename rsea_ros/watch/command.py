@@ -52,7 +52,7 @@ def checked(wish: Wish, bounds: Bounds) -> Wish:
     if wish.kind not in KINDS:
         raise ParameterError(f"kind {wish.kind!r}, expected one of {', '.join(KINDS)}")
     if not abs(wish.amplitude) <= bounds.torque:  # also what is not a number
-        raise ParameterError(f"amplitude {wish.amplitude:g} N m, expected at most {bounds.torque:g} N m")
+        raise ParameterError(f"amplitude {wish.amplitude:g} N·m, expected at most {bounds.torque:g} N·m")
     if wish.kind != "constant" and not LOWEST < wish.frequency <= HIGHEST:
         raise ParameterError(
             f"frequency {wish.frequency:g} Hz, expected above {LOWEST:g} and at most {HIGHEST:g} Hz"
@@ -60,8 +60,8 @@ def checked(wish: Wish, bounds: Bounds) -> Wish:
     slew = 2.0 * math.pi * wish.shape[1] * abs(wish.amplitude)
     if slew > bounds.slew:
         raise ParameterError(
-            f"{wish.amplitude:g} N m at {wish.frequency:g} Hz change by {slew:.0f} N m/s,"
-            f" expected at most {bounds.slew:g} N m/s, the driver's slew_limit"
+            f"{wish.amplitude:g} N·m at {wish.frequency:g} Hz change by {slew:.0f} N·m/s,"
+            f" expected at most {bounds.slew:g} N·m/s, the driver's slew_limit"
         )
     return wish
 

@@ -111,7 +111,7 @@ def test_a_command_that_never_changes_is_one_red_line(bench, level):
 
 def test_a_record_in_which_nothing_moves_is_refused_in_one_line():
     record = record_command(BENCH, np.zeros(N), np.random.default_rng(5))
-    with pytest.raises(IdentificationError, match="the command stays at 0 N m and nothing moves"):
+    with pytest.raises(IdentificationError, match="the command stays at 0 N·m and nothing moves"):
         check_diagnosable(record)
 
 

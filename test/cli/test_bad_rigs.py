@@ -16,9 +16,9 @@ RIG = (ROOT / "config/rigs/paper_high_impedance.yaml").read_text(encoding="utf-8
         (
             "value: 0.953",
             "value: -0.953",
-            ("rotor.reflected_inertia = -0.953 kg m^2", "expected a finite value > 0"),
+            ("rotor.reflected_inertia = -0.953 kg·m²", "expected a finite value > 0"),
         ),
-        ("value: 0.953", "value: heavy", ("rotor.reflected_inertia = 'heavy'", "expected a number (kg m^2)")),
+        ("value: 0.953", "value: heavy", ("rotor.reflected_inertia = 'heavy'", "expected a number (kg·m²)")),
         (
             "unit: kg m^2, spread",
             "unit: g m^2, spread",

@@ -36,9 +36,9 @@ def test_fail_on_makes_the_result_of_a_design_an_exit_status(here):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--stiffness", "0"], "stiffness = 0 N m/rad, expected 1e-09 to 1e+06 N m/rad"),
+        (["--stiffness", "0"], "stiffness = 0 N·m/rad, expected 1e-09 to 1e+06 N·m/rad"),
         (["--unit", "none"], "unit 'none', expected one of h54-200-s500-r, rd85x13-hd_cpl-25a-160"),
-        (["--torque", "nan"], "torque = nan N m, expected 1e-09 to 1e+06 N m"),
+        (["--torque", "nan"], "torque = nan N·m, expected 1e-09 to 1e+06 N·m"),
         (
             ["--catalogue", "absent.yaml"],
             "absent.yaml: No such file or directory, expected a catalogue in YAML",

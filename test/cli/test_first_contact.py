@@ -116,7 +116,7 @@ def test_a_new_rig_is_valid_as_written_and_replaces_nothing(tmp_path, monkeypatc
     capsys.readouterr()
     assert cli.main(["rig", "check", "left_knee.yaml"]) == 0
     shown = capsys.readouterr().out
-    assert "spring.stiffness" in shown and "N m/rad" in shown and "identify fits: " in shown
+    assert "spring.stiffness" in shown and "N·m/rad" in shown and "identify fits: " in shown
 
 
 def test_an_axis_with_a_minus_sign_is_accepted_as_typed(capsys):

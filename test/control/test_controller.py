@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.compensation import compensation
-from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.feedforward import inverse, inverse_poles
 from rsea_ros.control.following import following
 from rsea_ros.control.harness import closed_loop
@@ -14,6 +14,7 @@ from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import load_range
 from rsea_ros.control.prediction import AHEAD, Prediction, prediction_response
 from rsea_ros.control.sampled import sampled
+from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.trials import EFFECTS, Span, restlessness, sine, tracked
 from rsea_ros.control.uncertainty import BenchVariant
@@ -76,8 +77,10 @@ def test_an_effect_costs_little_known_or_learned(effect, hz, without, with_model
 def test_small_motion_teaches_no_load_that_is_not_there(hz, amplitude):
     """Samples above a limit were those with the most noise: held at both ends, half a N m was 52 % off."""
     wanted = amplitude * np.sin(2.0 * np.pi * hz * np.arange(560) / RATE)
-    errors = [closed_loop(RIG, RATE, TorqueController(RIG, RATE, GAINS, learn=learn), wanted).error(1.0)
-              for learn in (True, False)]  # fmt: skip
+    errors = []
+    for learn in (True, False):
+        controller = TorqueController(RIG, RATE, GAINS, settings=ControllerSettings(learn=learn))
+        errors.append(closed_loop(RIG, RATE, controller, wanted).error(1.0))
     assert errors[0] < 1.5 * errors[1]
 
 

@@ -133,11 +133,11 @@ def test_an_error_that_stays_is_a_fault_and_a_step_is_not():
     assert not any(judge.fault(0.0, 40.0) for _ in range(60))
     assert not any(judge.fault(40.0, 40.0) for _ in range(100))
     faults = [judge.fault(0.0, 40.0) for _ in range(150)]
-    assert faults[139] == "" and "40 N m off the desired torque" in faults[-1]
+    assert faults[139] == "" and "40 N·m off the desired torque" in faults[-1]
 
 
 def test_a_torque_beyond_the_sensor_is_a_fault_at_once():
-    assert "ft of -111 N m" in _judge.Judge(VALUES).fault(-111.0, -111.0)
+    assert "ft of -111 N·m" in _judge.Judge(VALUES).fault(-111.0, -111.0)
 
 
 def test_a_motor_without_torque_is_noticed_and_a_late_one_is_not():

@@ -13,6 +13,7 @@ from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
 from rsea_ros.control.loads import load_range
 from rsea_ros.control.loop import linked
+from rsea_ros.control.settings import ControllerSettings
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.trials import disturbed, lagging_corners
 from rsea_ros.control.virtual import Virtual
@@ -55,7 +56,7 @@ def test_a_free_load_with_little_drag_and_all_of_the_lag_comes_to_rest(load):
     loads = load_range(RIG, FREE)
     true = disturbed(loads, lagging_corners(load, every=True)[2])
     wanted = np.where(np.arange(1120) < 60, 2.0, 0.0)
-    controller = TorqueController(RIG, RATE, GAINS, link=SHARE, learn=False)
+    controller = TorqueController(RIG, RATE, GAINS, link=SHARE, settings=ControllerSettings(learn=False))
     ft = closed_loop(true, RATE, controller, wanted, noise=False, late=1).ft
     assert np.std(ft[-280:]) < 0.05 * np.std(ft[60:340])
 

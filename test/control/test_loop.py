@@ -4,13 +4,14 @@ import control
 import numpy as np
 import pytest
 
-from rsea_ros.control.controller import TorqueController, TorqueLimits
+from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.law import FeedbackState, Gains, feedback, hold, law_of
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.loop import largest_pole, open_loop
 from rsea_ros.control.margins import margins
 from rsea_ros.control.sampled import FT, VELOCITY, responses, sampled
+from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import check, grid
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import EffectSetting

@@ -14,6 +14,7 @@ from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.grid import Grid
 from rsea_ros.control.law import Gains
 from rsea_ros.control.prediction import Prediction
+from rsea_ros.control.settings import ControllerSettings
 from rsea_ros.hardware.peer.peer_motor import EmulatedMotor
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
@@ -62,13 +63,13 @@ class Wire:
         return get("velocity") * model.radian_per_second, turned, get("current") * self._unit
 
 
-def errors(rate, shift, **options):
+def errors(rate, shift, settings=None):
     """Return gain - 1 and phase (rad) of a sine's fundamental, and its error (RMS, relative).
 
     shift: samples by which the grid of the desired torques lies behind the sensor's first record.
     """
     wire, grid, period = Wire(), Grid(1e9 / rate), 1e9 / rate
-    controller = TorqueController(load_rig("paper_high_impedance"), rate, GAINS[rate], **options)
+    controller = TorqueController(load_rig("paper_high_impedance"), rate, GAINS[rate], settings=settings)
     start, command, rows = BEGIN + shift * period, 0.0, []
     for k in range(1, round(1.6 * rate)):
         wire.at(round(BEGIN + k * period + WRITES))
@@ -101,7 +102,7 @@ def test_a_sine_comes_out_in_size_and_in_time(rate, shift):
 
 
 def test_an_outer_loop_that_learns_no_load_learns_the_timing_all_the_same():
-    gain, phase, _ = errors(280.0, 0.0, learn=False)
+    gain, phase, _ = errors(280.0, 0.0, settings=ControllerSettings(learn=False))
     assert abs(gain) < 0.015 and abs(math.degrees(phase)) < 1.5
 
 

@@ -176,7 +176,7 @@ def test_bad_catalogues_are_refused(tmp_path, text, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"torque": -1.0}, r"torque = -1 N m, expected 1e-09 to 1e"),
+        ({"torque": -1.0}, r"torque = -1 N·m, expected 1e-09 to 1e"),
         ({"bandwidth": math.nan}, r"bandwidth = nan Hz"),
         ({"deflection": 1.0}, r"deflection = 57.2958 deg, expected at most 45 deg"),
         ({"separation": 0.2}, r"separation = 0.2 m, expected within the diameter of 0.12 m"),

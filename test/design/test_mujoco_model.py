@@ -127,7 +127,7 @@ def test_a_rig_that_mujoco_cannot_represent_is_refused():
     with pytest.raises(RigError, match="lumped train cannot be exported"):
         mjcf(lumped(load_rig("paper_moving_output")))
     light = replace(load_rig("paper_moving_output")).with_values({"chassis.inertia": 0.0})
-    with pytest.raises(RigError, match="chassis has inertia 0 kg m"):
+    with pytest.raises(RigError, match="chassis has inertia 0 kg·m²"):
         mjcf(light)
 
 

@@ -144,7 +144,7 @@ def test_an_outside_effect_has_a_page_and_a_line_in_the_catalogue(capsys):
     assert "a paddle in oil" in repr(effects) and "of the paddle" in effects["paddle"]._repr_html_()
     assert main(["effects", "paddle"]) == 0
     shown = capsys.readouterr().out
-    assert "coefficient (N m): typical 8" in shown and "Source: this test." in shown
+    assert "coefficient (N·m): typical 8" in shown and "Source: this test." in shown
 
 
 @pytest.mark.parametrize("export", [export_mjcf, export_urdf, export_bam], ids=lambda e: e.__name__)

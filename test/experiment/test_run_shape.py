@@ -53,7 +53,7 @@ def test_a_file_of_another_form_is_refused(tmp_path, text, message):
     ("text", "message"),
     [
         ("velocity=1", "no torque"),
-        ("torque=ten", "expected a number in N m"),
+        ("torque=ten", "expected a number in N·m"),
         ("torque=1,torque=2", "given twice"),
         ("torque=1,speed=2", "expected one of torque"),
         ("torque=-1", "expected > 0"),

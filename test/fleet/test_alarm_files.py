@@ -28,7 +28,7 @@ def worn(store, folder, monkeypatch):
 
 def test_an_alarm_is_sent_once(worn):
     (first,) = alarm_files.write_alarms(worn)
-    assert "knee: spring.stiffness" in first.text and "-250 to -150 N m/rad" in first.text
+    assert "knee: spring.stiffness" in first.text and "-250 to -150 N·m/rad" in first.text
     assert alarm_files.write_alarms(worn) == []
     assert [file.name for file in (worn.path / "alarms").iterdir()] == [first.file.name]
 

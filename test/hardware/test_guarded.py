@@ -214,7 +214,7 @@ SPRING = Spring(1500.0)
         (None, {"deflection": 0.01}, "none"),
         (SPRING, {}, "none"),
         (SPRING, {"wrench": WRENCH}, "sensor"),
-        (SPRING, {"deflection": 0.01}, "stiffness of 1500 N m/rad times measured deflection"),
+        (SPRING, {"deflection": 0.01}, "stiffness of 1500 N·m/rad times measured deflection"),
         (SPRING, {"wrench": WRENCH, "deflection": 0.01}, "sensor"),
     ],
 )

@@ -76,7 +76,7 @@ def test_the_sensor_is_tared_only_without_torque_and_none_is_made_meanwhile(join
     joint.zero_ft()
     assert written == [0.0]
     assert joint.write(9.0, 0.0) == 4.0, "a soft start begins anew"
-    with pytest.raises(DeviceError, match="zero_ft: 4 N m is commanded, expected 0 N m"):
+    with pytest.raises(DeviceError, match="zero_ft: 4 N·m is commanded, expected 0 N·m"):
         joint.zero_ft()
     assert device.log.count("zero_ft") == 1
 

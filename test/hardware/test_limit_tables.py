@@ -144,7 +144,7 @@ def test_a_fault_without_a_measured_value_has_no_unit():
         (Limits(68.0, deflection=0.0454), None),
         (Limits(68.19), None),  # the motor's limit itself, as its register rounds it
         (Limits(68.19 * (1.0 + 5e-10)), None),
-        (Limits(68.2), r"torque_limit = 68\.2 N m, expected at most 68\.19 N m, the motor's own limit"),
+        (Limits(68.2), r"torque_limit = 68\.2 N·m, expected at most 68\.19 N·m, the motor's own limit"),
         (Limits(68.0, deflection=0.0453), r"by 0\.04533 rad, expected at most .* = 0\.0453 rad"),
     ],
 )

@@ -154,7 +154,7 @@ def test_a_motor_that_does_not_make_its_torque_for_long_enough_is_a_fault():
         watched.allowed(10.0, 0.0)
         assert watched.fault is None, k
         watched.look(State(0, 0.0, 0.0, 3.0))
-    assert str(watched.fault) == "effort: 7 N m, limit 6 N m between commanded and measured torque"
+    assert str(watched.fault) == "effort: 7 N·m, limit 6 N·m between commanded and measured torque"
 
 
 def test_a_changing_torque_that_is_measured_late_is_no_fault():
@@ -170,8 +170,8 @@ def test_a_changing_torque_that_is_measured_late_is_no_fault():
     [
         ({"velocity": 2.0}, {"velocity": -2.5}, "velocity: 2.5 rad/s, limit 2 rad/s"),
         ({"position": 0.05}, {"position": -0.06}, "position: 0.06 rad, limit 0.05 rad"),
-        ({"ft": 50.0}, {"wrench": (0, 0, 0, 0, 0, -51.0)}, "ft_torque: 51 N m, limit 50 N m"),
-        ({"ft": 50.0, "ft_axis": 0}, {"wrench": (60, 0, 0, 0, 0, 0)}, "ft_torque: 60 N m, limit 50 N m"),
+        ({"ft": 50.0}, {"wrench": (0, 0, 0, 0, 0, -51.0)}, "ft_torque: 51 N·m, limit 50 N·m"),
+        ({"ft": 50.0, "ft_axis": 0}, {"wrench": (60, 0, 0, 0, 0, 0)}, "ft_torque: 60 N·m, limit 50 N·m"),
         ({"power": 100.0}, {"velocity": 3.0, "motor_torque": -40.0}, "power: 120 W, limit 100 W"),
         ({}, {"motor_trouble": "torque_enable is 0, expected 1"},
          "motor_state: torque_enable is 0, expected 1"),

@@ -10,8 +10,8 @@ from rsea_ros.hardware.limits import Limits
 WRONG = {
     "another model": ({"model": 54025}, Limits(68.0), "model 54024, expected 54025"),
     "another ID": ({"identity": 7}, Limits(68.0), "motor ID 7 on .*: no reply to ping"),
-    "more than the motor's limit": ({}, Limits(100.0), "100 N m, expected at most 68.19 N m"),
-    "more than the spring bears": ({}, Limits(68.0, deflection=0.02), "the rig's spring of 1530 N m/rad"),
+    "more than the motor's limit": ({}, Limits(100.0), "100 N·m, expected at most 68.19 N·m"),
+    "more than the spring bears": ({}, Limits(68.0, deflection=0.02), "the rig's spring of 1530 N·m/rad"),
 }
 
 

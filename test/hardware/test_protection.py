@@ -114,7 +114,7 @@ def test_the_springs_deflection_is_a_wrench_where_no_sensor_measures_one(toy):
     states = [loop.cycle(10.0, 0.0) for _ in range(3)]
     assert states[-1].wrench == pytest.approx((0, 0, 0, 0, 0, -1500.0 * 0.01))
     assert states[-1].inferred and states[-1].ft_stamp == states[-1].stamp
-    assert loop.ft_source == "stiffness of 1500 N m/rad times measured deflection"
+    assert loop.ft_source == "stiffness of 1500 N·m/rad times measured deflection"
     assert loop.fault is None, "the drive stands at 3 rad: what counts is the spring's deflection"
     loop.cycle(66.0, 0.0)
     assert loop.fault.cause in ("deflection", "ft_torque")

@@ -123,7 +123,7 @@ def test_each_series_makes_the_torque_and_says_what_it_is(benches, model):
         ({"startup": 1}, "startup 1: its torque is on when the power comes, expected 0"),
         ({"temperature_limit": 60}, "temperature_limit = 70 °C, expected at most 60 °C"),
         ({"max_voltage": 85}, "voltage_limit = 9 V, expected less than 8.5 V"),
-        ({"torque_limit": 300}, "torque_limit = 2 N m, expected at most 1.439 N m, the motor's own limit"),
+        ({"torque_limit": 300}, "torque_limit = 2 N·m, expected at most 1.439 N·m, the motor's own limit"),
     ],
 )
 def test_the_settings_of_the_motor_are_compared_with_the_drivers_limits(benches, values, told):
@@ -173,7 +173,7 @@ def test_a_motor_without_a_known_constant_needs_one(benches):
     bench = benches(2120)
     bench.ask("model", number=2100)
     try:
-        with pytest.raises(RseaError, match="torque_constant = 0, expected N m/A: no source gives"):
+        with pytest.raises(RseaError, match="torque_constant = 0, expected N·m/A: no source gives"):
             device_on(bench, SMALL).open()
     finally:
         bench.ask("model", number=2120)

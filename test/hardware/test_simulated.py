@@ -109,7 +109,7 @@ def test_a_rigid_drive_has_no_ft():
 
 def test_a_closed_device_and_an_impossible_torque_are_refused():
     device, _ = _device(load_rig("paper_high_impedance"))
-    with pytest.raises(DeviceError, match="torque of nan N m"):
+    with pytest.raises(DeviceError, match="torque of nan N·m"):
         device.write(float("nan"))
     device.close()
     device.close()

@@ -111,7 +111,7 @@ def test_limit_names_value_unit_limit_and_time():
     command = np.zeros(100)
     command[50] = -30.0
     check_limits(command, 30.0, 100.0)
-    with pytest.raises(ParameterError, match=r"-30 N m at 0\.500 s .* at most 29 N m"):
+    with pytest.raises(ParameterError, match=r"-30 N·m at 0\.500 s .* at most 29 N·m"):
         check_limits(command, 29.0, 100.0)
     command[20] = np.nan
     with pytest.raises(ParameterError, match=r"at 0\.200 s"):

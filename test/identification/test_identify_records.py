@@ -157,7 +157,7 @@ def test_a_constant_torque_is_refused_in_words(torque):
         name: Channel(t, np.full(len(t), value))
         for name, value in (("command", torque), ("ft", torque), ("position", torque / 1530.0))
     }
-    with pytest.raises(IdentificationError, match=f"is {torque:g} N m throughout, expected an excitation"):
+    with pytest.raises(IdentificationError, match=f"is {torque:g} N·m throughout, expected an excitation"):
         identify([Record(channels, source="held")], load_rig("paper_high_impedance"))
 
 

@@ -182,5 +182,5 @@ def test_gains_come_from_what_identification_measured():
     assert 1.0 / quiet.tau == pytest.approx(2.0 * np.pi * 6.365, rel=0.01)
     told = noise_of(rig, {"ft": 0.3, "position": 1e-4}, {"ft": 0.5})
     assert (told.ft, told.position, told.disturbance) == (0.3, 1e-4, pytest.approx(0.4))
-    with pytest.raises(RigError, match=r"sensors\.ft\.noise = 0 N m, expected > 0"):
+    with pytest.raises(RigError, match=r"sensors\.ft\.noise = 0 N·m, expected > 0"):
         noise_of(replace(rig, sensors={"ft": Sensor()}))

@@ -60,7 +60,7 @@ def test_a_sensor_without_a_spring_is_refused():
         replace(load_rig("paper_moving_output"), ft_end="housing_end")
     with pytest.raises(RigError, match=r"ft_end = 'gear', expected one of housing_end, spring_end"):
         replace(RIG, ft_end="gear")
-    with pytest.raises(RigError, match=r"proximal_spring.stiffness = 0 N m/rad"):
+    with pytest.raises(RigError, match=r"proximal_spring.stiffness = 0 N·m/rad"):
         replace(RIG, quantities={**RIG.quantities, "proximal_spring.stiffness": Quantity(0.0)})
 
 

@@ -82,11 +82,11 @@ def test_infinite_is_for_rigid_parts_only(name):
         ({"clamped": frozenset({"left"})}, "clamped end 'left', expected one of housing_end, spring_end"),
         (
             {"clamped": frozenset({"housing_end"})},
-            r"spring_end.inertia is missing, expected a value in kg m\^2",
+            r"spring_end.inertia is missing, expected a value in kg·m²",
         ),
         (
             {"clamped": frozenset({"spring_end"})},
-            r"housing_end.inertia is missing, expected a value in kg m\^2",
+            r"housing_end.inertia is missing, expected a value in kg·m²",
         ),
     ],
 )

@@ -39,5 +39,5 @@ def test_stiffness_is_nearly_constant_within_the_travel():
 
 
 def test_a_spring_softer_than_its_arm_is_refused():
-    with pytest.raises(ParameterError, match=r"K_s = 100 N m/rad, expected at least 2 K R\^2 = 1672"):
+    with pytest.raises(ParameterError, match=r"K_s = 100 N·m/rad, expected at least 2 K R\^2 = 1672"):
         spring_radius(100.0, 207350.0, 0.0635)

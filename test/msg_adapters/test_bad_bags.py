@@ -55,7 +55,7 @@ REFUSED = {
     ),
     "empty command": (
         [(name, at, joint_state(at) if "command" in name else m) for name, at, m in run_rows(4)],
-        "the command's messages hold no effort, expected the torque in N m",
+        "the command's messages hold no effort, expected the torque in N·m",
     ),
 }
 

@@ -56,7 +56,7 @@ def test_the_driver_publishes_what_the_bench_sent_and_follows_commands(wire, lis
 
 def test_commands_beyond_the_limit_are_cut_down_and_counted(wire, listener):
     wire.push(lambda: wire.goal()[0] == wire.counts(68.0), torque=500.0)
-    listener.until(lambda: any("commands limited to 68 N m" in line for line in wire.process.output))
+    listener.until(lambda: any("commands limited to 68 N·m" in line for line in wire.process.output))
     wire.push(lambda: wire.goal()[0] == wire.counts(10.0))
 
 
@@ -72,7 +72,7 @@ def test_not_a_number_and_strange_stamps_change_nothing_and_are_counted(wire, li
 def test_zero_ft_is_refused_under_torque_and_takes_the_offset_away_without(wire, listener):
     wire.drive()
     answer = wire.trigger("zero_ft")
-    assert not answer.success and "N m is commanded, expected 0 N m" in answer.message
+    assert not answer.success and "N·m is commanded, expected 0 N·m" in answer.message
     wire.push(lambda: wire.goal()[0] == 0, torque=0.0)
     wire.push(lambda: wire.trigger("zero_ft").success, torque=0.0)  # refused while the load still swings
 

@@ -54,7 +54,7 @@ def test_the_deflection_is_published_also_as_an_ft_marked_as_such(drive, listene
     assert wrenches[-1].header.frame_id == "spring_deflection"
     values = program.joints[0].report().values
     assert str(values["dead_host_protection"]) == "none"
-    assert values["ft_source"] == "stiffness of 1530 N m/rad times measured deflection"
+    assert values["ft_source"] == "stiffness of 1530 N·m/rad times measured deflection"
     assert "toy" in values
 
 

@@ -69,11 +69,11 @@ WRONG = {
     ),
     "plant": ({"rate": 5000}, "parameter rate = 5000.0, expected a number from 10 to 1000 Hz"),
     "driver": ({"device": "motor"}, "parameter device = 'motor', expected one of simulated"),
-    "excite": ({"amplitude": 60.0, "duration": 5.0}, "expected at most 68 N m either way"),
+    "excite": ({"amplitude": 60.0, "duration": 5.0}, "expected at most 68 N·m either way"),
     "experiment": ({"limits": "velocity=1"}, "no torque, expected at least torque="),
     "record": ({"out": "/dev/null/bag"}, "/dev/null"),
     "replay": ({"bag": "no/such/bag"}, "no/such/bag: no such bag"),
-    "model": ({"tolerance_deg": 91.0}, "tolerance_deg = 91.0, expected a number from 0.1 to 90 deg"),
+    "model": ({"tolerance_deg": 91.0}, "tolerance_deg = 91.0, expected a number from 0.1 to 90 °"),
     "watch": ({"host": "192.0.2.7"}, "page on 192.0.2.7, port 8270: Cannot assign requested address"),
     "identify": ({"rigg": "x"}, "parameter rigg: no such parameter, expected one of rig, out"),
 }

@@ -81,12 +81,12 @@ def test_another_shape_begins_at_zero():
 @pytest.mark.parametrize(
     ("wish", "message"),
     [
-        (Wish("constant", 10.1), "amplitude 10.1 N m, expected at most 10 N m"),
+        (Wish("constant", 10.1), "amplitude 10.1 N·m, expected at most 10 N·m"),
         (Wish("constant", math.nan), "amplitude nan"),
         (Wish("noise", 1.0), "kind 'noise', expected one of constant, sine, chirp"),
         (Wish("sine", 1.0, 400.0), "frequency 400 Hz"),
         (Wish("chirp", 1.0, math.nan), "frequency nan Hz"),
-        (Wish("sine", 9.0, 50.0), "expected at most 2000 N m/s, the driver's slew_limit"),
+        (Wish("sine", 9.0, 50.0), "expected at most 2000 N·m/s, the driver's slew_limit"),
     ],
 )
 def test_a_forbidden_command_is_refused(wish, message):

@@ -151,7 +151,7 @@ def test_a_page_whose_socket_is_lost_lets_go_at_once(server, commander):
         ("no json", "Expecting value"),
         ("[]", "expected do: one of hold, release"),
         ('{"do": "reboot"}', "expected do: one of hold, release"),
-        (json.dumps({**HOLD, "amplitude": 10.5}), "expected at most 10 N m"),
+        (json.dumps({**HOLD, "amplitude": 10.5}), "expected at most 10 N·m"),
         (json.dumps({**HOLD, "amplitude": "x"}), "amplitude = 'x', expected a number"),
         (json.dumps({**HOLD, "amplitude": None}), "amplitude = None, expected a number"),
         ('{"do": "hold", "kind": "constant"}', "amplitude = None"),

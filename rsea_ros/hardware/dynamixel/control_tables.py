@@ -46,7 +46,7 @@ class TorqueConstant:
     source: str
 
     def __str__(self) -> str:
-        return f"{self.value:g} N m/A ({self.low:g} to {self.high:g}: {self.source})"
+        return f"{self.value:g} N·m/A ({self.low:g} to {self.high:g}: {self.source})"
 
 
 @dataclass(frozen=True)

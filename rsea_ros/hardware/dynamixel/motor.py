@@ -235,6 +235,6 @@ def _constant(table: ControlTable, settings: MotorConnection) -> TorqueConstant:
         return TorqueConstant(given, given, given, "parameter torque_constant")
     if table.torque_constant is None:
         raise ParameterError(
-            f"parameter torque_constant = 0, expected N m/A: no source gives that of {table.name}"
+            f"parameter torque_constant = 0, expected N·m/A: no source gives that of {table.name}"
         )
     return table.torque_constant

@@ -23,7 +23,7 @@ TARED = 6.0
 """Standard deviations that the mean may be off after a tare: the bias is one record, with its noise."""
 STREAM_AGAIN = 0.02
 """s until records come with the new bias."""
-AXES = ("Fx in N", "Fy in N", "Fz in N", "Tx in N m", "Ty in N m", "Tz in N m")
+AXES = ("Fx in N", "Fy in N", "Fz in N", "Tx in N·m", "Ty in N·m", "Tz in N·m")
 
 Values = NDArray[np.float64]
 

@@ -25,6 +25,7 @@ from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.signals import UNITS
+from rsea_ros.units import plain
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
 
@@ -61,7 +62,7 @@ def noise_of(rig: Rig, noise_rms: Mapping[str, float] = NOTHING,
     unexplained = residual_rms.get("ft", 0.0) ** 2 - (ft**2 if math.isfinite(ft) else 0.0)
     sigma = max(known[0] if known else 0.0, math.sqrt(max(0.0, unexplained)))
     if sigma == 0.0:
-        raise RigError(f"rig {rig.name}: sensors has no torque, expected motor_torque or ft with noise, N m")
+        raise RigError(f"rig {rig.name}: sensors has no torque, expected motor_torque or ft with noise, N·m")
     return Noise(position, ft, torque if math.isfinite(torque) else 0.0, sigma, 1.0 / slowest_rate(rig))
 
 
@@ -79,6 +80,7 @@ def _sigma(rig: Rig, channel: str, noise_rms: Mapping[str, float]) -> float:
     sigma = noise_rms.get(channel, math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0)))
     if not sigma > 0.0:
         raise RigError(
-            f"rig {rig.name}: sensors.{channel}.noise = {sigma:g} {UNITS[channel]}, expected > 0, as measured"
+            f"rig {rig.name}: sensors.{channel}.noise = {sigma:g} {plain(UNITS[channel])}, "
+            "expected > 0, as measured"
         )
     return sigma

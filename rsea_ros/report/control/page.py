@@ -62,12 +62,12 @@ def _crossover(at: AtRate) -> float:
 def _keys(study: Study) -> list[tuple[str, str]]:
     at = study.rates[0]
     value = {trial.what: trial for trial in at.trials}
-    errors = [(f"{t.value:.1f} %", name) for name, t in value.items() if t.unit == "%"][:1]
+    errors = [(f"{t.value:.1f} %", f"error, {name}") for name, t in value.items() if t.unit == "%"][:1]
     return [
         (f"{study.resonance:.1f} Hz", "open-loop resonance"),
         (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz"),
         (f"{at.design.margins['locked'].phase:.0f}°", "phase margin, locked"),
-        (f"{at.swept.margins.phase:.0f}°", "least of the whole set"),
+        (f"{at.swept.margins.phase:.0f}°", "phase margin, worst"),
         *errors,
     ]
 
@@ -89,10 +89,10 @@ def _free_title(study: Study) -> str:
     first = study.rates[0].free
     followed = np.nonzero(np.abs(first.gain) < 3.0)[0]
     if not len(followed):
-        return "On a free load that it does not know, small torques are not followed"
+        return "On an unknown free load small torques are not followed"
     return (
-        "On a free load that it does not know, small torques are followed from "
-        f"{first.hz[followed[0]]:g} Hz to {first.bandwidth:.0f} Hz at {study.rates[0].design.rate:g} Hz"
+        f"On an unknown free load small torques are followed from {first.hz[followed[0]]:g} to "
+        f"{first.bandwidth:.0f} Hz at {study.rates[0].design.rate:g} Hz"
     )
 
 
@@ -104,7 +104,15 @@ def _following(
     more: str = "",
 ) -> Figure:
     curves = [
-        ResponseCurve(f"{at.design.rate:g} Hz", colour, curve.hz, curve.torque, 2.0, band=_band(curve, apart))
+        ResponseCurve(
+            f"{at.design.rate:g} Hz",
+            colour,
+            curve.hz,
+            curve.torque,
+            2.0,
+            band=_band(curve, apart),
+            phase=curve.phase,
+        )
         for (at, curve, apart), colour in zip(seen, _COLOURS, strict=False)
     ]
     hz = np.geomspace(1.0, 0.45 * max(at.design.rate for at in study.rates), 300)
@@ -119,7 +127,7 @@ def _band(curve: Following, apart: Spread) -> Band:
     """Return what the set makes of a curve, from its first sine to its last."""
     inside = (apart.hz >= curve.hz[0]) & (apart.hz <= curve.hz[-1])
     hz = apart.hz[inside]
-    turned = np.degrees(np.interp(np.log(hz), np.log(curve.hz), np.unwrap(np.angle(curve.torque))))
+    turned = np.interp(np.log(hz), np.log(curve.hz), curve.phase)
     low, high = (curve.gain_at(hz) + edge[inside] for edge in apart.gain)
     late, early = (turned + np.degrees(edge[inside]) for edge in apart.phase)
     return Band(hz, (low, high), (late, early))

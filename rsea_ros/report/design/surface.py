@@ -18,13 +18,14 @@ _SHADES = [[0.0, "#eef3f8"], [0.5, "#7fa8cf"], [1.0, "#123f6d"]]
 @dataclass(frozen=True)
 class Point:
     """An actuator. stiffness: K_s, N m/rad. inertia: between its ends, kg m^2, of either sign. pole: of its
-    name, Hz. A negative inertia stands at its magnitude, above the surface."""
+    name, Hz. side: of the name at its pole. A negative inertia stands at its magnitude, above the surface."""
 
     name: str
     stiffness: float
     inertia: float
     colour: str
     pole: float = 60.0
+    side: str = "top center"
 
 
 def bandwidth_surface(title: str, points: Sequence[Point], caption: str = "") -> Figure:
@@ -53,8 +54,8 @@ def _flag(p: Point) -> Json:
         "x": [p.stiffness] * 2,
         "y": [1e3 * abs(p.inertia)] * 2,
         "z": [z, z + p.pole],
-        "text": ["", f"<b>{p.name}</b>"],
-        "textposition": "top center",
+        "text": ["", f"<b>{p.name.replace(', n', ',<br>n')}</b>"],
+        "textposition": p.side,
         "textfont": {"size": 12, "color": p.colour},
         "line": {"color": p.colour, "width": 3},
         "marker": {"size": [6, 0.1], "color": p.colour},

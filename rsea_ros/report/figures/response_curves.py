@@ -23,7 +23,10 @@ class Band:
 
 @dataclass(frozen=True)
 class ResponseCurve:
-    """A curve: name in the legend at its end, hz and values of shape (n,)."""
+    """A curve: name in the legend at its end, hz and values of shape (n,).
+
+    phase: deg, shape (n,); by default that of the values, continuous from the first.
+    """
 
     name: str
     colour: str
@@ -32,6 +35,12 @@ class ResponseCurve:
     width: float = 1.8
     dash: str = "solid"
     band: Band | None = None
+    phase: FloatArray | None = None
+
+    @property
+    def degrees(self) -> FloatArray:
+        """The phase that is drawn, deg, shape (n,)."""
+        return np.degrees(np.unwrap(np.angle(self.values))) if self.phase is None else self.phase
 
 
 @dataclass(frozen=True)
@@ -62,9 +71,8 @@ def response_figure(
         parts: Json = {"line": {"color": r.colour, "width": r.width, "dash": r.dash}}
         data.append(line(r.hz, gain, r.name, r.colour, hovertemplate="%{y:.2f} dB", **parts))
         if phase:
-            degrees = np.degrees(np.unwrap(np.angle(r.values)))
             parts |= {"hovertemplate": "%{y:.1f}°", "yaxis": "y2"}
-            data.append(line(r.hz, degrees, r.name, r.colour, **parts))
+            data.append(line(r.hz, r.degrees, r.name, r.colour, **parts))
     return Figure(title, caption, data, _layout(responses, marks, decibel, phase), 560 if phase else 380)
 
 
@@ -92,7 +100,7 @@ def _layout(
 
 def _phase_tick(responses: Sequence[ResponseCurve]) -> float:
     """Return 90 degrees, or 180 where that would be more than eight marks."""
-    turned = [np.degrees(np.ptp(np.unwrap(np.angle(r.values)))) for r in responses]
+    turned = [np.ptp(r.degrees) for r in responses]
     turned += [np.ptp(np.concatenate(r.band.phase)) for r in responses if r.band is not None]
     return 90.0 if max(turned) <= 720.0 else 180.0
 

@@ -37,12 +37,13 @@ def figure_9() -> list[Figure]:
         ("prototype", "prototype_knee", TRUTH),
     ):
         rig = load_rig(rig_name)
-        points.append(Point(name, rig["spring.stiffness"], rig["chassis.inertia"], colour))
+        k_s = rig["spring.stiffness"]
+        points.append(Point(name, k_s, rig["chassis.inertia"], colour, side="middle right"))
         for train, pole in _senses(rig):
             turned = replace(rig, train=train)
             sign = "" if rig.train == "planetary" else f", n = {words.signed(train_ratio(turned), 0)}"
             inner = inner_inertia(turned)
-            points.append(Point(f"{name}, with spin{sign}", rig["spring.stiffness"], inner, BEFORE, pole))
+            points.append(Point(f"{name}, with spin{sign}", k_s, inner, BEFORE, pole, "middle left"))
     whole = bandwidth_surface(
         "Fig. 9 (a): bandwidth over stiffness and inertia, Eq. (7)", points,
         "Drag to turn. Points: what the paper has (blue, green), and with the rotor's spin (orange). A "
@@ -58,7 +59,7 @@ def _senses(rig: Rig) -> list[tuple[Train, float]]:
     """Return the trains that an actuator of the paper may have, and the pole of each one's name, Hz."""
     if rig.train == "planetary":
         return [(rig.train, 110.0)]
-    return list(zip(PROTOTYPE_TRAINS, (150.0, 100.0), strict=True))
+    return list(zip(PROTOTYPE_TRAINS, (155.0, 95.0), strict=True))
 
 
 def figure_15(measured: FrequencyResponse) -> Figure:
