@@ -35,13 +35,23 @@ def run(args: argparse.Namespace) -> int:
         for action in args.action:
             print(caller.call(args.node, action), flush=True)
         if not args.action:
-            every = caller.callable_nodes(args.seconds)
-            _list(caller, [caller.full_name(args.node)] if args.node else every)
+            name = args.node
+            _list(caller, [caller.full_name(name)] if name else caller.callable_nodes(args.seconds))
     return 0
 
 
 def _list(caller: Caller, nodes: Sequence[str]) -> None:
     from rsea_ros.cli._columns import columns
 
-    rows = [(node, caller.state(node) or "-", ", ".join(caller.actions(node))) for node in nodes]
+    rows = [(node, *offer_of(caller, node)) for node in nodes]
     print(columns([("node", "state", "actions"), *rows]) if rows else "no node that can be called")
+
+
+def offer_of(caller: Caller, node: str) -> tuple[str, str]:
+    """Return the state of a node and what it would do now; a node that hangs does not hide the others."""
+    from rsea_ros.nodes._caller import CallRefused
+
+    try:
+        return caller.state(node) or "-", ", ".join(caller.actions(node))
+    except CallRefused:
+        return "no answer", "-"

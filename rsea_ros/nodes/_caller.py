@@ -38,9 +38,9 @@ class Caller:
         self._node = node
 
     def callable_nodes(self, seconds: float) -> list[str]:
-        """Return the full names of the nodes that offer an action; looks for some seconds."""
+        """Return the full names of the nodes with a lifecycle or a trigger; looks for some seconds."""
         time.sleep(seconds)
-        return [name for name in self._nodes() if self.actions(name)]
+        return [name for name in self._nodes() if self._has_lifecycle(name) or self._triggers(name)]
 
     def actions(self, name: str) -> tuple[str, ...]:
         """Return what a node would do now: its triggers, and the transitions that its state allows."""

@@ -7,17 +7,21 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from rclpy.lifecycle import LifecycleNode
 
 from rsea_ros.cli import main as cli
 from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli._together import together
+from rsea_ros.cli.call import offer_of
 from rsea_ros.cli.run import node_names, ros_arguments
 from rsea_ros.errors import ParameterError
+from rsea_ros.nodes import _caller, _visitor
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -103,6 +107,30 @@ def test_a_launched_graph_hears_the_documented_controller_and_one_signal_ends_it
 
 def call(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(rsea("call", *words), cwd=ROOT, capture_output=True, text=True, timeout=60)
+
+
+@pytest.fixture
+def visitor():
+    """A node beside /rsea/mute, whose lifecycle never answers, as that of a node that hangs."""
+    with _visitor.visiting("visitor") as node:
+        mute = LifecycleNode("mute", namespace="rsea")
+        yield node
+        mute.destroy_node()
+
+
+def test_a_node_that_hangs_is_listed_as_such(visitor, monkeypatch):
+    monkeypatch.setattr(_caller, "DISCOVERY", 0.1)
+    caller = _caller.Caller(visitor)
+    assert _caller._await(lambda: caller.callable_nodes(0.0) == ["/rsea/mute"])
+    assert offer_of(caller, "/rsea/mute") == ("no answer", "-")
+
+
+def test_a_named_node_is_listed_without_a_question_to_the_others(visitor, monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(_visitor, "visiting", lambda name: nullcontext(visitor))
+    monkeypatch.setattr(_caller.Caller, "actions", lambda self, name: asked.append(name) or ("stop",))
+    assert cli.main(["call", "visitor"]) == 0
+    assert set(asked) == {"/rsea/visitor"} and "stop" in capsys.readouterr().out
 
 
 def test_a_driver_is_activated_stopped_and_cleared_by_calls(tmp_path):
