@@ -32,6 +32,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.pace import is_too_fast
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
@@ -73,7 +74,8 @@ def check_record(
             every += excitation(checked.record, rig)
             every += jump_findings(checked.record)
             every += [] if _bridged(checked) else standstill_findings(checked.record)
-            every += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
+            if is_commanded(checked.record) and not is_too_fast(checked.record):
+                every += _against_rig(checked, rig, axis, values)
         every += _other_axes(checked, rig, axis, wrench)
     idle = (replace(f, kind="no_excitation") for f in every if (f.kind, f.light) == ("excitation", "red"))
     doubts = (*(f for f in every if f.kind in FAULTY and f.light != "green"), *idle)

@@ -7,6 +7,7 @@ import numpy as np
 from rsea_ros.checks.moved_spans import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.fault_kinds import FAULT_KINDS
+from rsea_ros.model.pace import check_pace
 from rsea_ros.signals import UNITS, Channel, Record
 
 SHORTEST = 4.0
@@ -27,6 +28,7 @@ def check_diagnosable(record: Record) -> None:
                 f"{record.source}: {name}: {len(channel)} samples, expected rising stamps: "
                 "stamp each message when its value takes effect or was measured"
             )
+    check_pace(record)
     length = float(np.ptp(driving.t))
     if length < SHORTEST:
         raise IdentificationError(

@@ -15,8 +15,8 @@ from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.measured_motion import zero_unknown
+from rsea_ros.model.pace import SKIPPED_START
 from rsea_ros.model.position_loop import commanded
-from rsea_ros.model.prediction_errors import SKIPPED_START
 from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives

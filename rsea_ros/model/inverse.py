@@ -23,6 +23,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.extent import check_extent
+from rsea_ros.model.pace import check_slow
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
@@ -90,6 +91,7 @@ def motion_from(record: Record) -> Motion:
             f"{record.source}: position has {len(position)} samples, expected at least {FEWEST}"
         )
     check_extent(record, float(position.t[0]), record.stop)
+    check_slow(record)
     period = 1.0 / position.rate
     finer = max(1, math.ceil(period / FINE))
     step = period / finer

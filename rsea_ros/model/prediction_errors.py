@@ -12,6 +12,7 @@ import numpy.typing as npt
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import bounded, check_command
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
+from rsea_ros.model.pace import SKIPPED_START, check_pace
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.restarts import outside_gaps
@@ -20,9 +21,6 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
-
-SKIPPED_START = 0.3
-"""s at the start of a record that no comparison or fit uses, because the bench may not have been at rest."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +67,7 @@ def predict(rig: Rig | str, record: Record) -> Mapping[str, Comparison]:
     rig = load_rig(rig)
     record = bounded(commanded(record, rig))
     check_command(record)
+    check_pace(record)
     record = replace(record, channels={n: c for n, c in record.channels.items() if len(c)})
     if is_inverse(rig):
         motion = motion_from(record)
