@@ -22,7 +22,13 @@ from rsea_ros.checks.moved_spans import is_commanded
 from rsea_ros.checks.offset_findings import angle_offset_findings, offset_findings
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.rig_values import value_findings
-from rsea_ros.checks.running_clock import at_rates, clock_rates, with_rates
+from rsea_ros.checks.running_clock import (
+    at_rates,
+    clock_rates,
+    drift_findings,
+    lag_lines,
+    with_rates,
+)
 from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
@@ -137,12 +143,24 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
     findings, linear = _compared(checked, both, rig, axis, {}, values)
     if linear is None or not linear.is_clear:
         start = float(checked.record["command"].t[0])
-        rates = clock_rates({n: s for n, s in both.items() if n in _whole(checked)}, start)
+        lines = lag_lines({n: s for n, s in both.items() if n in _whole(checked)}, start)
+        rates = clock_rates(lines)
         if rates:
             even = replace(checked, record=at_rates(checked.record, rates))
-            again, linear = _compared(even, sides(even.record, rig), rig, axis, rates, values)
-            return again if linear is not None and linear.is_clear else findings
+            again, cleared = _compared(even, sides(even.record, rig), rig, axis, rates, values)
+            if cleared is not None and cleared.is_clear:
+                return again
+        if linear is not None:
+            return _with_drifts(findings, drift_findings(lines))
     return findings
+
+
+def _with_drifts(findings: list[Finding], drifts: list[Finding]) -> list[Finding]:
+    """Return the findings with drifts that were followed from second to second in place of the fit's."""
+    followed = {f.channel for f in drifts}
+    fitted = [f for f in findings if f.kind == "clock_drift" and f.channel in followed]
+    vague = [f for f in findings if drifts and f.kind == "clock_offset" and not f.channel]
+    return [*(f for f in findings if f not in fitted and f not in vague), *drifts]
 
 
 def _compared(
