@@ -14,7 +14,7 @@ from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.checks.gain_findings import gain_findings, strangers
 from rsea_ros.checks.gains import Readings, readings_of
-from rsea_ros.checks.lag import in_step, lag_findings, lags
+from rsea_ros.checks.lag import far_off, in_step, lag_findings
 from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.linearised_rig import LinearisedFit, linear_of
 from rsea_ros.checks.machine_impedance import impedance_findings
@@ -30,6 +30,7 @@ from rsea_ros.checks.running_clock import (
     with_rates,
 )
 from rsea_ros.checks.signal_findings import excitation, noises
+from rsea_ros.checks.slow_lag import lag_behind, open_findings
 from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
 from rsea_ros.checks.standstill import standstill_findings
@@ -177,10 +178,12 @@ def _compared(
     """
     record, findings, whole = checked.record, list[Finding](), _whole(checked)
     compared = {n: s for n, s in both.items() if n in whole}
-    late = lags(compared)
+    lag_by_channel = {n: lag_behind(record, rig, n, side) for n, side in compared.items()}
+    late = far_off(lag_by_channel)
+    findings += open_findings(lag_by_channel, record)
     if late:
         record = in_step(record, late)
-        findings = lag_findings(late, len(compared))
+        findings += lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
     if elsewhere := angle_offset_findings(rig, compared):
         return [*findings, *elsewhere], None
@@ -213,7 +216,7 @@ def _matched(
     silent = set(related) - set(readings.channels if readings else ())
     findings = strangers([q for n, q in related.items() if n in silent or q.related < _IN_COMMON])
     findings += gain_findings(readings, rig, axis) if readings else []
-    findings += smoothing_findings(related, 1.0 / record["ft"].rate) if "ft" in record else []
+    findings += smoothing_findings(related, {n: 1.0 / record[n].rate for n in related})
     another = _another(record, compared, rig)
     return readings, [*another, *(f for f in findings if not (another and f.kind == "wrong_rig"))]
 
