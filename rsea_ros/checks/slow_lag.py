@@ -56,7 +56,8 @@ def _lag(channel: Channel, t: FloatArray, p: FloatArray) -> float | None:
     shifted = shifted - shifted.mean(axis=1, keepdims=True)
     y = y - y.mean()
     size = np.linalg.norm(shifted, axis=1) * np.linalg.norm(y)
-    return clear_lag(lag, np.asarray(np.abs(shifted @ y) / np.maximum(size, 1e-300), np.float64))
+    alike: FloatArray = np.abs(shifted @ y) / np.maximum(size, 1e-300)
+    return clear_lag(np.asarray(lag, np.float64), alike)
 
 
 def open_findings(lags: Mapping[str, float | None], record: Record) -> list[Finding]:
