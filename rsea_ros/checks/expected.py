@@ -54,7 +54,8 @@ def _inverse(record: Record, rig: Rig) -> Mapping[str, Side]:
     if "position" not in record:
         return {}
     motion = motion_from(record)
-    return {"motor_torque": Side(motion.t, motion.torque, inverse_torque(rig, motion))}
+    known = motion.counts if motion.counts.any() else np.ones(len(motion.t), bool)
+    return {"motor_torque": Side(motion.t[known], motion.torque[known], inverse_torque(rig, motion)[known])}
 
 
 def is_full_of_gaps(record: Record) -> bool:

@@ -72,7 +72,7 @@ def predict(rig: Rig | str, record: Record) -> Mapping[str, Comparison]:
     if is_inverse(rig):
         motion = motion_from(record)
         torque = inverse_torque(rig, motion)
-        return {"motor_torque": _comparison(motion.t, motion.torque, torque, edges=True)}
+        return {"motor_torque": _comparison(motion.t, motion.torque, torque, motion.counts)}
     rig = in_phase(rig, record)
     compared = {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
     known = {n: outside_gaps(record, c.t, SKIPPED_START) for n, c in compared.items()}
@@ -96,8 +96,7 @@ def _on_measured_zero(c: Comparison) -> Comparison:
 
 
 def _comparison(
-    t: FloatArray, measured: FloatArray, predicted: FloatArray, edges: bool = False
+    t: FloatArray, measured: FloatArray, predicted: FloatArray, known: npt.NDArray[np.bool_] | None = None
 ) -> Comparison:
-    last = t[-1] - SKIPPED_START if edges else t[-1]
-    counts = np.isfinite(measured) & np.isfinite(t) & (t >= t[0] + SKIPPED_START) & (t <= last)
-    return Comparison(t, measured, predicted, counts)
+    counts = np.isfinite(measured) & np.isfinite(t) & (t >= t[0] + SKIPPED_START)
+    return Comparison(t, measured, predicted, counts if known is None else counts & known)
