@@ -111,3 +111,19 @@ def test_identify_fits_no_sample_that_it_reports(damage, kind, record):
     low, high = next(p.ci95 for p in fit.result.parameters if p.name == "spring.stiffness")
     assert low < rsea.load_rig(RIG)["spring.stiffness"] < high
     assert high - low < 2.0
+
+
+@pytest.mark.parametrize("names", [("position",), ("ft",), ("position", "velocity")])
+def test_the_verdict_says_that_an_average_biases_the_values(names, record):
+    """Of 20 fits none had the inertia and the stiffness within their intervals, and no line said so."""
+    window = np.ones(9) / 9
+    averaged = {n: Channel(record[n].t, np.convolve(record[n].y, window, "same")) for n in names}
+    fit = rsea.identify(record.with_channels(**averaged), RIG)
+    missed = [n for n, p in fit.parameters.items() if n[:5] != "clock" and not _holds(p.ci95, n)]
+    assert missed
+    assert "averaged before logging, which biases values beyond their intervals" in fit.summary()
+    assert "biases" not in rsea.identify(record, RIG).summary()
+
+
+def _holds(interval, name):
+    return interval[0] < rsea.load_rig(RIG)[name] < interval[1]
