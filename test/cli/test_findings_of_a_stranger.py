@@ -125,5 +125,16 @@ def test_the_verdict_says_that_an_average_biases_the_values(names, record):
     assert "biases" not in rsea.identify(record, RIG).summary()
 
 
+def test_messages_recorded_twice_are_diagnosed_too(record, tmp_path):
+    """Every other verb left the second ones out; diagnose asked for rising stamps."""
+    twice = {n: Channel(np.repeat(c.t, 2), np.repeat(c.y, 2)) for n, c in record.channels.items()}
+    bag = tmp_path / "bag.mcap"
+    write_record(record.with_channels(**twice), bag)
+    assert main(["diagnose", str(bag), "--out", str(tmp_path / "out")]) == 0
+    result = json.loads((tmp_path / "out" / "diagnosis.json").read_text(encoding="utf-8"))
+    assert result["verdict"] == "nothing_wrong"
+    assert {"duplicate_stamps"} == {f["kind"] for f in result["data"]["faults"]}
+
+
 def _holds(interval, name):
     return interval[0] < rsea.load_rig(RIG)[name] < interval[1]
