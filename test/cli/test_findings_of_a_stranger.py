@@ -136,5 +136,15 @@ def test_messages_recorded_twice_are_diagnosed_too(record, tmp_path):
     assert {"duplicate_stamps"} == {f["kind"] for f in result["data"]["faults"]}
 
 
+def test_a_prediction_tells_of_a_turned_sign_and_of_a_zero_that_is_off(record, tmp_path, capsys):
+    """A turned command was predicted at -100 % with no fault, an F/T sensor 300 N m off at -8780 %."""
+    ft, torque = record["ft"], record["motor_torque"]
+    bad = record.with_channels(ft=Channel(ft.t, ft.y + 300.0), motor_torque=Channel(torque.t, -torque.y))
+    write_record(bad, tmp_path / "bag.mcap")
+    assert main(["predict", RIG, str(tmp_path / "bag.mcap")]) == 0
+    faults = json.loads(capsys.readouterr().out)["data"]["faults"]
+    assert {("offset", "ft"), ("sign", "motor_torque")} == {(f["kind"], f["channel"]) for f in faults}
+
+
 def _holds(interval, name):
     return interval[0] < rsea.load_rig(RIG)[name] < interval[1]
