@@ -65,6 +65,20 @@ class Stops:
 
 
 @contextmanager
+def deaf_to_interrupts() -> Iterator[None]:
+    """Let no thread or process that begins in this block receive the Ctrl-C of the terminal.
+
+    The terminal sends it to every process of the verb at once; the one that runs the verb ends the others.
+    Here it counts after the block.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
 def undisturbed() -> Iterator[None]:
     """Hold signals back until the block is over; the first of them counts then."""
     if threading.current_thread() is not threading.main_thread():

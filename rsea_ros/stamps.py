@@ -91,12 +91,17 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
     for name, channel in record.channels.items():
         channels[name], stray = _without_stray_parts(channel, name)
         faults += stray
-    pauses = {name: np.abs(np.diff(c.t)) > LONGEST_PAUSE for name, c in channels.items()}
+    pauses = {name: np.abs(np.diff(c.t)) > _pause(c.t) for name, c in channels.items()}
     if all(at.any() for at in pauses.values()):
         for name, at in pauses.items():
             channels[name], jump = _taken_out(channels[name], name, at)
             faults += jump
     return record.with_channels(**channels), faults
+
+
+def _pause(t: FloatArray) -> float:
+    """Return from which step on a channel pauses, s."""
+    return max(LONGEST_PAUSE, _SHORTEST_JUMP * median_period(t))
 
 
 def _without_stray_parts(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:

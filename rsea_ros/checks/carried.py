@@ -14,6 +14,7 @@ from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
 from rsea_ros.held_samples import without_held_samples
 from rsea_ros.mixed_rows import without_mixed_rows
+from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Record
 from rsea_ros.torque_edge import behind_the_edge
@@ -31,6 +32,7 @@ def held_against(record: Record, rig: Rig, axis: str = "torque.z", *, masks: boo
     axis: of the wrench that `ft` was read from. masks: see with_faults.
     Raises IdentificationError where nothing moves.
     """
+    check_pace(record)
     require_motion(record)
     return with_faults(noted(record, rig), check_record(record, rig, axis), masks=masks)
 

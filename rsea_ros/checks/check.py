@@ -14,7 +14,7 @@ from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.checks.gain_findings import gain_findings, strangers
 from rsea_ros.checks.gains import Readings, readings_of
-from rsea_ros.checks.lag import in_step, lag_findings, lags
+from rsea_ros.checks.lag import far_off, in_step, lag_findings
 from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.linearised_rig import LinearisedFit, linear_of
 from rsea_ros.checks.machine_impedance import impedance_findings
@@ -22,8 +22,15 @@ from rsea_ros.checks.moved_spans import is_commanded
 from rsea_ros.checks.offset_findings import angle_offset_findings, offset_findings
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.rig_values import value_findings
-from rsea_ros.checks.running_clock import at_rates, clock_rates, with_rates
+from rsea_ros.checks.running_clock import (
+    at_rates,
+    clock_rates,
+    drift_findings,
+    lag_lines,
+    with_rates,
+)
 from rsea_ros.checks.signal_findings import excitation, noises
+from rsea_ros.checks.slow_lag import lag_behind, open_findings
 from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
 from rsea_ros.checks.standstill import standstill_findings
@@ -32,6 +39,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.pace import is_too_fast
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
@@ -73,7 +81,8 @@ def check_record(
             every += excitation(checked.record, rig)
             every += jump_findings(checked.record)
             every += [] if _bridged(checked) else standstill_findings(checked.record)
-            every += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
+            if is_commanded(checked.record) and not is_too_fast(checked.record):
+                every += _against_rig(checked, rig, axis, values)
         every += _other_axes(checked, rig, axis, wrench)
     idle = (replace(f, kind="no_excitation") for f in every if (f.kind, f.light) == ("excitation", "red"))
     doubts = (*(f for f in every if f.kind in FAULTY and f.light != "green"), *idle)
@@ -135,12 +144,24 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
     findings, linear = _compared(checked, both, rig, axis, {}, values)
     if linear is None or not linear.is_clear:
         start = float(checked.record["command"].t[0])
-        rates = clock_rates({n: s for n, s in both.items() if n in _whole(checked)}, start)
+        lines = lag_lines({n: s for n, s in both.items() if n in _whole(checked)}, start)
+        rates = clock_rates(lines)
         if rates:
             even = replace(checked, record=at_rates(checked.record, rates))
-            again, linear = _compared(even, sides(even.record, rig), rig, axis, rates, values)
-            return again if linear is not None and linear.is_clear else findings
+            again, cleared = _compared(even, sides(even.record, rig), rig, axis, rates, values)
+            if cleared is not None and cleared.is_clear:
+                return again
+        if linear is not None:
+            return _with_drifts(findings, drift_findings(lines))
     return findings
+
+
+def _with_drifts(findings: list[Finding], drifts: list[Finding]) -> list[Finding]:
+    """Return the findings with drifts that were followed from second to second in place of the fit's."""
+    followed = {f.channel for f in drifts}
+    fitted = [f for f in findings if f.kind == "clock_drift" and f.channel in followed]
+    vague = [f for f in findings if drifts and f.kind == "clock_offset" and not f.channel]
+    return [*(f for f in findings if f not in fitted and f not in vague), *drifts]
 
 
 def _compared(
@@ -157,10 +178,12 @@ def _compared(
     """
     record, findings, whole = checked.record, list[Finding](), _whole(checked)
     compared = {n: s for n, s in both.items() if n in whole}
-    late = lags(compared)
+    lag_by_channel = {n: lag_behind(record, rig, n, side) for n, side in compared.items()}
+    late = far_off(lag_by_channel)
+    findings += open_findings(lag_by_channel, record)
     if late:
         record = in_step(record, late)
-        findings = lag_findings(late, len(compared))
+        findings += lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
     if elsewhere := angle_offset_findings(rig, compared):
         return [*findings, *elsewhere], None
@@ -193,7 +216,7 @@ def _matched(
     silent = set(related) - set(readings.channels if readings else ())
     findings = strangers([q for n, q in related.items() if n in silent or q.related < _IN_COMMON])
     findings += gain_findings(readings, rig, axis) if readings else []
-    findings += smoothing_findings(related, 1.0 / record["ft"].rate) if "ft" in record else []
+    findings += smoothing_findings(related, {n: 1.0 / record[n].rate for n in related})
     another = _another(record, compared, rig)
     return readings, [*another, *(f for f in findings if not (another and f.kind == "wrong_rig"))]
 

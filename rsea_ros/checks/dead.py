@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from rsea_ros.checks.expected import Side, quotients
-from rsea_ros.checks.lag import lag_of
 from rsea_ros.checks.moved_spans import is_commanded
+from rsea_ros.checks.slow_lag import lag_behind
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import MEASURED, Channel, Fault, Record
@@ -37,7 +37,7 @@ def dead_channels(
     judged = {} if is_inverse(rig) else quotients(compared)  # a torque also has friction that no motion shows
     for n, q in judged.items():
         shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
-        alone = shows and q.is_unrelated and lag_of(compared[n]) == 0.0
+        alone = shows and q.is_unrelated and not lag_behind(record, rig, n, compared[n])
         if n in constant and not constant[n] and n not in frozen and alone and not _is_confirmed(record, n):
             constant[n] = "noise that has nothing to do with the command"
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in constant.items() if detail]

@@ -10,6 +10,7 @@ import numpy as np
 from rsea_ros.checks.channel_spectra import Quotient, quotient
 from rsea_ros.errors import RseaError
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
+from rsea_ros.model.pace import is_too_fast
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.signals import FloatArray, Record
@@ -33,7 +34,9 @@ def sides(record: Record, rig: Rig) -> Mapping[str, Side]:
     record: with finite values and rising stamps. A rig without a spring has one side, the torque that the
     measured motion takes (model/inverse.py).
     """
-    if "command" not in record or len(record["command"]) < 64 or is_full_of_gaps(record):
+    if "command" not in record or len(record["command"]) < 64:
+        return {}
+    if is_full_of_gaps(record) or is_too_fast(record):
         return {}
     try:
         with np.errstate(all="ignore"):
@@ -51,7 +54,8 @@ def _inverse(record: Record, rig: Rig) -> Mapping[str, Side]:
     if "position" not in record:
         return {}
     motion = motion_from(record)
-    return {"motor_torque": Side(motion.t, motion.torque, inverse_torque(rig, motion))}
+    known = motion.counts if motion.counts.any() else np.ones(len(motion.t), bool)
+    return {"motor_torque": Side(motion.t[known], motion.torque[known], inverse_torque(rig, motion)[known])}
 
 
 def is_full_of_gaps(record: Record) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from rsea_ros.checks.moved_spans import MotionBeside, motion_beside, witness_of
 from rsea_ros.identification.quantum import step_of
-from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
+from rsea_ros.signals import MEASURED, BoolArray, Channel, FloatArray, Record
 
 SMALLEST_SHARE = 1e-3
 """Of a channel's samples: fewer repeats are no fault."""
@@ -20,6 +20,8 @@ _MOVED = 0.3
 """Share of the suspect samples that must fall into motion; a sensor that freezes at any time reaches more."""
 _MOVED_OF_NOISY = 0.1
 """The same for long runs of a sensor whose noise would change its value even at standstill."""
+_COMMANDED = 0.8
+"""Of a run that two sensors hold: the share in which the command changes; at rest it does not."""
 _STEADY = 0.1
 """Of the turned angle: a velocity and a position that agree so well both measure a steady speed."""
 _LONG_RUN = 20.0
@@ -64,11 +66,46 @@ def frozen(channel: Channel, name: str) -> BoolArray:
 
 def in_long_runs(repeat: BoolArray, rate: float) -> BoolArray:
     """Return which samples lie in a run of repeats far longer than the usual one. rate: Hz."""
+    return _in_runs(repeat, _LONGEST_RUN * rate)
+
+
+def _in_runs(repeat: BoolArray, least: float) -> BoolArray:
+    """Return which samples lie in a run of repeats far longer than the usual one and than some samples."""
     number = np.cumsum(~repeat)
     length = np.bincount(number)
     usual = float(np.quantile(length[length > 0], 0.95))
-    long: BoolArray = length[number] > max(_LONG_RUN * usual, _LONGEST_RUN * rate)
+    long: BoolArray = length[number] > max(_LONG_RUN * usual, least)
     return long
+
+
+def held_together(record: Record, name: str) -> BoolArray:
+    """Return the samples at which a sensor and another one hold their values while the command changes.
+
+    Both have noise, which never holds two sensors at once, so nothing need have moved.
+    """
+    channel, driving = record[name], record.driving
+    held = _held_runs(record, name)
+    if not held.any() or driving is None:
+        return np.zeros(len(held), bool)
+    changes = np.diff(driving.y, append=driving.y[-1:]) != 0.0
+    commanded = changes[np.clip(np.searchsorted(driving.t, channel.t, side="right") - 1, 0, len(changes) - 1)]
+    run = np.cumsum(np.diff(held, prepend=False) & held)
+    share = np.bincount(run[held], commanded[held]) / np.maximum(np.bincount(run[held]), 1)
+    held = held & (share[np.minimum(run, len(share) - 1)] > _COMMANDED)
+    together = np.zeros(len(channel), bool)
+    for other in (n for n in MEASURED if n in record and n != name):
+        runs = _held_runs(record, other)
+        nearest = np.clip(np.searchsorted(record[other].t, channel.t), 0, len(runs) - 1)
+        together |= runs[nearest]
+    return held & together
+
+
+def _held_runs(record: Record, name: str) -> BoolArray:
+    """Return the long runs of repeats of a sensor with noise; none for any other channel."""
+    channel = record[name]
+    repeat: BoolArray = np.diff(channel.y, prepend=np.nan) == 0.0
+    runs = _in_runs(repeat, _LONG_RUN) if name in MEASURED and repeat.any() else np.zeros(len(repeat), bool)
+    return runs & repeat if runs.any() and _dithers(channel) else np.zeros(len(repeat), bool)
 
 
 def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str) -> BoolArray:
@@ -117,7 +154,8 @@ def _motion(record: Record, name: str, suspect: BoolArray, kind: str) -> MotionB
     """
     if kind != "frozen_samples":
         return motion_beside(record, name, witness_of(record, name))
-    at = record[name].t[suspect]
+    long = suspect & in_long_runs(suspect, record[name].rate)
+    at = record[name].t[long if long.any() else suspect]  # a quantum repeats values by chance
     held = {n for n in record.channels if n != "command" and _is_held(record[n], at)}
     witness = witness_of(record, name, but=held - {name})
     others = witness_of(record, name)

@@ -34,10 +34,9 @@ _SHORTEST = 4.0
 """Times the reach, down to which a record lasts long enough for all of it."""
 
 
-def lags(compared: Mapping[str, Side]) -> dict[str, float]:
-    """Return the lag of every channel that clearly comes later (positive) or earlier than predicted, s."""
-    lag_by_channel = {n: lag_of(side) for n, side in compared.items()}
-    return {n: lag for n, lag in lag_by_channel.items() if abs(lag) > NEAR}
+def far_off(lags: Mapping[str, float | None]) -> dict[str, float]:
+    """Return the lags (s) of channels that clearly come later (positive) or earlier than predicted."""
+    return {n: lag for n, lag in lags.items() if lag is not None and abs(lag) > NEAR}
 
 
 def lag_of(side: Side) -> float:
@@ -48,11 +47,21 @@ def lag_of(side: Side) -> float:
     if len(even) < 64 or reach < period:
         return 0.0
     y, p = (np.interp(even, side.t, v) for v in (side.y, side.p))
-    lag, alike = _correlation(y, p, period, reach)
+    return clear_lag(*_correlation(y, p, period, reach)) or 0.0
+
+
+def clear_lag(lag: FloatArray, alike: FloatArray) -> float | None:
+    """Return the lag (s) of the best correlation, 0 for a near one, None where it does not stand out.
+
+    lag: s, shape (n,). alike: correlations from 0 to 1, shape (n,).
+    """
     best = int(np.argmax(alike))
     aside = alike[np.abs(lag - lag[best]) > _AROUND]
-    unclear = abs(lag[best]) <= NEAR or alike[best] < _PEAK or len(aside) == 0
-    return 0.0 if unclear or aside.max() > _BESIDE * alike[best] else float(lag[best])
+    if alike[best] < _PEAK or len(aside) == 0:
+        return None
+    if abs(lag[best]) <= NEAR:
+        return 0.0
+    return None if aside.max() > _BESIDE * alike[best] else float(lag[best])
 
 
 def _correlation(y: FloatArray, p: FloatArray, period: float, reach: float) -> tuple[FloatArray, FloatArray]:

@@ -10,7 +10,7 @@ from rsea_ros.model.rig import CLOCK_DOUBT
 
 _ALLOWED = 3.0 * CLOCK_DOUBT
 """s. As far as a fit lets a sensor's clock move."""
-_SURE = 4.0
+SURE = 4.0
 """Sigmas."""
 _OPEN = 10.0 * _ALLOWED
 """s. One sigma from which a number would say nothing of a clock."""
@@ -40,7 +40,7 @@ def _offset(name: str, offset: Number, linear: LinearisedFit) -> Finding:
     if name == "ft" and others:
         best = min(others, key=lambda n: linear.offset[n].sd)
         apart = offset.value - linear.offset[best].value
-        sure = abs(apart) > _SURE * (offset.sd**2 + linear.offset[best].sd ** 2) ** 0.5
+        sure = abs(apart) > SURE * (offset.sd**2 + linear.offset[best].sd ** 2) ** 0.5
         if sure and abs(apart) > _ALLOWED and _is_clear(linear, tuple(linear.misfit)):
             light, detail = "amber", f"{1e6 * apart:.4g} µs later than {best}, {_RELATIVE}"
     remedy = "stamp both at acquisition by one clock" if light == "amber" else ""
@@ -61,11 +61,16 @@ def _offset(name: str, offset: Number, linear: LinearisedFit) -> Finding:
 def _drift(name: str, drift: Number, linear: LinearisedFit, duration: float) -> Finding:
     if drift.sd * duration > _OPEN:
         return _left_open("clock_drift", name, drift.sd * duration)
+    sure = abs(drift.value) > SURE * drift.sd and abs(drift.value) * duration > _ALLOWED
+    light: Light = "amber" if sure and _is_clear(linear, (name,)) else "green"
+    return drift_finding(light, name, drift, duration, _beside(linear, name).removeprefix("; "))
+
+
+def drift_finding(light: Light, name: str, drift: Number, duration: float, beside: str) -> Finding:
+    """Return the finding of a drift (s/s). duration: of the record, s. beside: what else it may be."""
     low, high = drift.ci95
-    sure = abs(drift.value) > _SURE * drift.sd and abs(drift.value) * duration > _ALLOWED
-    amber = sure and _is_clear(linear, (name,))
     return Finding(
-        "amber" if amber else "green",
+        light,
         "clock_drift",
         name,
         1e6 * drift.value,
@@ -73,8 +78,8 @@ def _drift(name: str, drift: Number, linear: LinearisedFit, duration: float) -> 
         1e6 * low,
         1e6 * high,
         expected=f"within {1e6 * _ALLOWED / duration:.3g} ppm",
-        detail=f"of its clock against the command's{_beside(linear, name)}",
-        remedy="discipline the clocks (PTP, chrony), or stamp by one" if amber else "",
+        detail="; ".join(filter(None, ("of its clock against the command's", beside))),
+        remedy="discipline the clocks (PTP, chrony), or stamp by one" if light == "amber" else "",
     )
 
 

@@ -54,7 +54,9 @@ def left_of(motion: Motion) -> tuple[float, float]:
     sign = np.tanh(motion.v / max(_SHARP * float(np.std(motion.v)), 1e-300))
     holding = [motion.q, np.sin(motion.q), np.cos(motion.q)]
     moving = [motion.a, motion.v, sign, np.ones_like(motion.v)]
-    return _left(moving, motion.torque), _left([*moving, *holding], motion.torque)
+    known = motion.counts if motion.counts.any() else np.ones(len(motion.t), bool)
+    without, held = ([c[known] for c in columns] for columns in (moving, [*moving, *holding]))
+    return _left(without, motion.torque[known]), _left(held, motion.torque[known])
 
 
 def _left(columns: list[FloatArray], torque: FloatArray) -> float:

@@ -1,6 +1,6 @@
-"""An F/T channel that was smoothed before it was logged: a moving average is tried, never guessed.
+"""A channel that was smoothed before it was logged: a moving average is tried, never guessed.
 
-Measured over predicted of the F/T torque, over the same of the joint, is the sensor's own response H times a
+Measured over predicted of a channel, over the same of another one, is the response H of its sensor times a
 gain: errors of drive, inertia and damping are in both. An average of the last n samples has
 
     H(f) = sin(pi f n T) / (n sin(pi f T)) exp(-i pi f (n - 1) T)
@@ -16,7 +16,7 @@ import numpy as np
 
 from rsea_ros.checks.channel_spectra import Quotient, usable
 from rsea_ros.checks.finding import Finding
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.signals import SENSED, ComplexArray, FloatArray
 
 _MOST = 60
 """Samples of the longest average that is tried."""
@@ -29,33 +29,43 @@ _FITS = 0.15
 _FEWEST = 8
 
 
-def smoothing_findings(related: Mapping[str, Quotient], period: float) -> list[Finding]:
-    """Return the finding of an F/T channel that is a moving average. period: of its samples, s."""
-    joint = next((related[n] for n in ("position", "velocity") if n in related), None)
-    ft = related.get("ft")
-    if ft is None or joint is None or not np.array_equal(ft.frequency, joint.frequency):
-        return []
-    keep = usable(ft) & usable(joint)
-    if np.count_nonzero(keep) < _FEWEST:
-        return []
-    response, sd = ft.value / joint.value, np.hypot(ft.sd, joint.sd)
-    number, centred = _average(ft.frequency[keep], response[keep], sd[keep], period)
-    if number < 2:
-        return []
+def smoothing_findings(related: Mapping[str, Quotient], periods: Mapping[str, float]) -> list[Finding]:
+    """Return the findings of channels that are moving averages. periods: of the samples by channel, s."""
+    by_channel = {n: _average_of(n, related, periods[n]) for n in SENSED if n in related}
+    return [
+        _finding(n, number, centred, periods[n]) for n, (number, centred) in by_channel.items() if number > 1
+    ]
+
+
+def _finding(name: str, number: int, centred: bool, period: float) -> Finding:
     of = "a centred moving average" if centred else "a moving average"
     takes = "spring and damping that are not the machine's" if centred else "its lag for the machine's"
-    return [
-        Finding(
-            "amber",
-            "smoothing",
-            "ft",
-            1e3 * number * period,
-            "ms",
-            expected="none",
-            detail=f"looks like {of} of {number} samples",
-            remedy=f"log the sensor unfiltered: a fit takes {takes}",
-        )
-    ]
+    return Finding(
+        "amber",
+        "smoothing",
+        name,
+        1e3 * number * period,
+        "ms",
+        expected="none",
+        detail=f"looks like {of} of {number} samples",
+        remedy=f"log the sensor unfiltered: a fit takes {takes}",
+    )
+
+
+def _average_of(name: str, related: Mapping[str, Quotient], period: float) -> tuple[int, bool]:
+    """Return over how many samples a channel was averaged beside any other, and whether without a lag."""
+    own = related[name]
+    for other in (related[n] for n in SENSED if n in related and n != name):
+        if not np.array_equal(own.frequency, other.frequency):
+            continue
+        keep = usable(own) & usable(other)
+        if np.count_nonzero(keep) < _FEWEST:
+            continue
+        response, sd = own.value / other.value, np.hypot(own.sd, other.sd)
+        number, centred = _average(own.frequency[keep], response[keep], sd[keep], period)
+        if number > 1:
+            return number, centred
+    return 1, False
 
 
 def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: float) -> tuple[int, bool]:

@@ -7,13 +7,12 @@ import math
 import numpy as np
 
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.model.drive import SLOW
+from rsea_ros.model.pace import AS_SECONDS, FAST, SKIPPED_START, SLOW, is_slow, is_too_fast
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
 from rsea_ros.stamp_gaps import polls_unevenly
 
-_AS_SECONDS = "are the stamps in s, not in ms or µs? If so, "
 _RED_SHARE = 0.2
 """Of a channel's samples: more bad ones make the channel, not some samples, doubtful."""
 _PER_CYCLE = 4.0
@@ -69,8 +68,20 @@ def rates(record: Record, rig: Rig) -> list[Finding]:
     """Return the sample rate of every channel, and where it is too low for the rig."""
     natural, command = natural_frequency(rig), record["command"].rate if "command" in record else math.nan
     timed = {n: c for n, c in record.channels.items() if len(c) > 2}
-    slow = not any(c.rate > SLOW for c in timed.values())
+    if is_too_fast(record):
+        expected = f"more than {SKIPPED_START:g} s at up to {FAST:g} Hz"
+        return [_other_unit(n, c, expected, "") for n, c in timed.items()]
+    slow = is_slow(record)
+    if slow and natural is None:
+        return [_other_unit(n, c, f"> {SLOW:g} Hz", "record faster") for n, c in timed.items()]
     return [_rate(n, c, natural, command, slow) for n, c in timed.items()]
+
+
+def _other_unit(name: str, channel: Channel, expected: str, else_: str) -> Finding:
+    """Return the finding of a rate that speaks of stamps in another unit. else_: what helps otherwise."""
+    lasts = f"{float(np.ptp(channel.t)):.3g} s of it"
+    remedy = f"{AS_SECONDS}{f' If so, {else_}' if else_ else ''}"
+    return Finding("red", "rate", name, channel.rate, "Hz", expected=expected, detail=lasts, remedy=remedy)
 
 
 def _rate(name: str, channel: Channel, natural: float | None, command: float, slow: bool) -> Finding:
@@ -82,6 +93,7 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float, sl
         low, high = 1e3 * np.quantile(steps, (0.05, 0.95))
         longest = f"uneven, mostly {low:.3g} to {high:.3g} ms; {longest}"
     if natural is not None and rate < _PER_CYCLE * natural:
+        doubt = f"{AS_SECONDS} If so, " if slow else ""
         expected = f"> {_PER_CYCLE * natural:.3g} Hz, four samples to a cycle of the rig's {natural:.3g} Hz"
         return Finding(
             "red",
@@ -91,7 +103,7 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float, sl
             "Hz",
             expected=expected,
             detail=longest,
-            remedy=f"{_AS_SECONDS if slow else ''}record faster, or name the right rig with --rig",
+            remedy=f"{doubt}record faster, or name the right rig with --rig",
         )
     if rate < _SLOW * command:
         return Finding(

@@ -21,7 +21,7 @@ _GOES_ON = 0.3
 def standstill_findings(record: Record) -> list[Finding]:
     """Return the finding of the longest standstill under a command. record: finite values, rising stamps."""
     sensors = [record[n] for n in SENSED if n in record and np.ptp(record[n].y) > 0.0]
-    if "command" not in record or not sensors:
+    if "command" not in record or not sensors or np.ptp(record["command"].t) < _LONGEST:
         return []
     command, t = moves(record["command"]), record["command"].t
     still = np.ones(len(t), bool)
@@ -29,7 +29,7 @@ def standstill_findings(record: Record) -> list[Finding]:
         moved = moves(channel)
         covered = (t >= channel.t[0]) & (t <= channel.t[-1])
         still &= covered & ~moved[np.clip(np.searchsorted(channel.t, t), 0, len(moved) - 1)]
-    around = max(_FEWEST, round(_AROUND * record["command"].rate))
+    around = min(max(_FEWEST, round(_AROUND * record["command"].rate)), len(t))
     mostly = np.convolve(still, np.full(around, 1.0 / around), "same") > _MOSTLY
     first, last = _longest(mostly, t)
     length = float(t[last] - t[first])

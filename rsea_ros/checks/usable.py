@@ -7,9 +7,12 @@ import numpy as np
 from rsea_ros.checks.moved_spans import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.fault_kinds import FAULT_KINDS
+from rsea_ros.model.pace import check_pace
 from rsea_ros.signals import UNITS, Channel, Record
 from rsea_ros.units import plain
 
+_FEWEST = 0.1
+"""Of a channel's stamps: where fewer rise the clock stood, and the messages were not each sent ten times."""
 SHORTEST = 4.0
 """s of commands: four blocks of every set (diagnosis/data_split.py) of a quarter of a second each."""
 
@@ -23,11 +26,12 @@ def check_diagnosable(record: Record) -> None:
             f"{record.source}: no command, expected the torques that drove the run beside {have}"
         )
     for name, channel in record.channels.items():
-        if len(channel) < 2 or np.median(np.diff(channel.t)) <= 0.0:
+        if len(channel) < 2 or _rises_rarely(channel):
             raise IdentificationError(
                 f"{record.source}: {name}: {len(channel)} samples, expected rising stamps: "
                 "stamp each message when its value takes effect or was measured"
             )
+    check_pace(record)
     length = float(np.ptp(driving.t))
     if length < SHORTEST:
         raise IdentificationError(
@@ -59,6 +63,13 @@ def require_motion(record: Record) -> None:
         f"{record.source}: the command stays at {command.y[0]:g} {plain(unit)} and nothing moves, "
         "expected a run in which the command excites the machine"
     )
+
+
+def _rises_rarely(channel: Channel) -> bool:
+    """Return whether most stamps neither rise nor repeat the one before, or hardly any differ."""
+    step = np.diff(channel.t)
+    rising = np.count_nonzero(step > 0.0)
+    return bool(rising < np.count_nonzero(step < 0.0) or rising < _FEWEST * len(channel))
 
 
 def _constant(channel: Channel) -> bool:

@@ -11,6 +11,7 @@ from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.cli._lines import say
 from rsea_ros.model.inverse import is_inverse, require_position
+from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.report.check.terminal import warnings
 from rsea_ros.signals import Record
@@ -23,6 +24,7 @@ def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, mask
     Raises IdentificationError if nothing moves, or a position is lacking that the rig is judged by.
     """
     for record in records:
+        check_pace(record)
         require_motion(record)
         if is_inverse(rig):
             require_position(record)

@@ -12,7 +12,7 @@ from typing import NoReturn
 import numpy as np
 
 from msg_adapters import read_record
-from rsea_ros.checks.faults import check
+from rsea_ros.checks.check import check_record
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.model.prediction_errors import Comparison, predict
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         n: numbers({"rms_error": c.rms_error, "fit_percent": c.fit_percent}) for n, c in comparisons.items()
     }
     with np.errstate(all="ignore"):
-        faults_json = [fault_json(fault) for fault in check(record, rig).faults]
+        faults_json = [fault_json(fault) for fault in check_record(record, rig, args.axis).faults]
     print(json.dumps({"channels": errors, "data": {"faults": faults_json}}, indent=2))
     return 0
 

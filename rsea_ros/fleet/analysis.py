@@ -24,6 +24,7 @@ from rsea_ros.fleet.row import Row
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.model.extent import bounded
+from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
@@ -47,6 +48,7 @@ def analyse(row: Row, path: Path, url: str, joint: MappedJoint) -> dict[str, str
     record = run.lenient
     row |= {"time": run.time, "temperature": run.temperature, "duration": float(record.stop - record.start)}
     row |= {"excitation": excitation(record), "faults": faults(record.faults)}
+    check_pace(record)
     require_motion(record)
     findings = check_record(bounded(record), rig, joint.topics.axis)
     row["faults"] = faults(findings.faults)

@@ -22,6 +22,7 @@ from distributed.scheduler import KilledWorker
 
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
 from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.interrupts import deaf_to_interrupts
 
 SETTINGS: Mapping[str, Any] = {
     "distributed.worker.preload": ["rsea_ros.fleet.worker"],
@@ -118,15 +119,16 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
     memory: bytes that each worker may have. dashboard: host and port, port 0 for any.
     """
     with dask.config.set(SETTINGS):
-        cluster = distributed.LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            memory_limit=memory,
-            host="127.0.0.1",
-            dashboard_address=dashboard,
-            silence_logs=logging.CRITICAL,
-        )
+        with deaf_to_interrupts():
+            cluster = distributed.LocalCluster(  # type: ignore[no-untyped-call]
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=memory,
+                host="127.0.0.1",
+                dashboard_address=dashboard,
+                silence_logs=logging.CRITICAL,
+            )
         client = distributed.Client(cluster, set_as_default=False)  # type: ignore[no-untyped-call]
         with cluster, client:
             yield OnDask(client, partial(cluster.scale, workers)), cluster.dashboard_link

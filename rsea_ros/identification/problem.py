@@ -15,8 +15,8 @@ from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.measured_motion import zero_unknown
+from rsea_ros.model.pace import SKIPPED_START
 from rsea_ros.model.position_loop import commanded
-from rsea_ros.model.prediction_errors import SKIPPED_START
 from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
@@ -134,13 +134,12 @@ def _inverse_case(record: Record, rig: Rig) -> Case:
     level, is_flat = top_of_band(torque.y)
     stated = 0.0 if is_flat else rig.sensors.get("motor_torque", Sensor()).noise
     noise = max(level, stated) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
-    edges = (motion.t < motion.t[0] + SKIPPED_START) | (motion.t > motion.t[-1] - SKIPPED_START)
     return Case(
         drive=motion,
         t={"motor_torque": motion.t},
         measured={"motor_torque": motion.torque},
         noise={"motor_torque": max(noise, 1e-6 * float(np.std(torque.y)), 1e-300)},
-        mask={"motor_torque": ~edges},
+        mask={"motor_torque": motion.counts},
         source=record.source,
     )
 

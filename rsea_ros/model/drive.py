@@ -15,6 +15,7 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import check_extent
 from rsea_ros.model.held_command import beside_mean, in_steps, mean_of_curve, mean_of_held, mean_of_line
 from rsea_ros.model.measured_motion import angle_at, first_state, initial_state
+from rsea_ros.model.pace import AS_SECONDS, check_slow
 from rsea_ros.model.restarts import Restart, restarts
 from rsea_ros.model.rig import Hold
 from rsea_ros.model.step import OUTPUTS
@@ -25,10 +26,6 @@ LONGEST_STEP = 4.5e-4
 
 MOST_STEPS = 5e7
 """Of a record, six hours: a longer one needs more memory than most computers have."""
-
-SLOW, MOST_SLOW_STEPS = 4.0, 2e6
-"""Hz of the fastest channel below which a record is slow, and the steps of a slow one, 15 minutes: stamps in
-ms make of 10 s at 280 Hz such a record of three hours, of which every simulation would last for minutes."""
 
 LONGEST_OF_JOINTS = 1e-3
 """s, where targets at tens of Hz command a position loop, whose firmware samples about as often."""
@@ -118,12 +115,12 @@ def drive_from(
     start = float(command.t[0])
     stop = max(record.stop, float(command.t[-1]) + period)
     check_extent(record, start, stop)
+    check_slow(record)
     count = math.ceil((stop - start) / step - 1e-6)
-    most = MOST_STEPS if _is_fast(record) else refine * MOST_SLOW_STEPS
-    if count > most:
+    if count > MOST_STEPS:
         raise IdentificationError(
-            f"{record.source}: lasts {stop - start:.4g} s, expected up to {most * step:.4g} s at "
-            f"{1.0 / period:.3g} Hz: are the stamps in s, not in ms or µs? If so, cut the record"
+            f"{record.source}: lasts {stop - start:.4g} s, expected up to {MOST_STEPS * step:.4g} s: "
+            f"{AS_SECONDS} If so, cut the record"
         )
     knots, torque = in_steps(command.t, start, step), command.y
     if closed_loop:
@@ -148,11 +145,6 @@ def drive_from(
         jumps=jumps,
         restarts=restarts(record, start, step, from_rest=from_rest),
     )
-
-
-def _is_fast(record: Record) -> bool:
-    """Return whether any channel has the rate of a control loop, rather than stamps in another unit."""
-    return any(channel.rate > SLOW for channel in record.channels.values() if len(channel) > 1)
 
 
 def coarser(drive: Drive) -> Drive:

@@ -23,11 +23,13 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.extent import check_extent
+from rsea_ros.model.pace import SKIPPED_START, check_slow
+from rsea_ros.model.restarts import gaps
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
 from rsea_ros.model.structure import structured
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
 
 CUT_OFF = 20.0
 """Hz, of the Butterworth filter of fourth order that runs both ways over motion and torque."""
@@ -37,6 +39,9 @@ FINE = 5e-4
 
 FEWEST = 64
 """Samples of a position, from which the filter has settled somewhere in the middle."""
+
+_AT_EDGE = 0.01
+"""Of a command's period: stamps so near are one, rounded to nanoseconds in one of the two channels."""
 
 _SIGN = 1e-5
 """rad/s. Along a measured motion the sign of the speed needs no smoothing."""
@@ -53,6 +58,7 @@ _COMMAND, _MOTOR, _GEAR, _SENSOR = (
 class Motion:
     """A measured motion on a uniform grid, filtered: t (s), q (rad), v (rad/s), a (rad/s^2), torque (N m).
 
+    counts: where the filter has settled, outside the gaps of the record, shape of t.
     commanded: the torque is the command, not a measurement.
     """
 
@@ -61,6 +67,7 @@ class Motion:
     v: FloatArray
     a: FloatArray
     torque: FloatArray
+    counts: BoolArray
     commanded: bool = False
 
 
@@ -79,7 +86,10 @@ def require_position(record: Record) -> None:
 
 
 def motion_from(record: Record) -> Motion:
-    """Return the filtered motion and the torque that acted. Raises IdentificationError without a position."""
+    """Return the filtered motion and the torque that acted. Raises IdentificationError without a position.
+
+    Each side of a gap is filtered by itself, and a gap has a straight line.
+    """
     require_position(record)
     from scipy.interpolate import CubicSpline  # with its like in `smoothed`, 0.4 s that a spring saves
 
@@ -90,15 +100,33 @@ def motion_from(record: Record) -> Motion:
             f"{record.source}: position has {len(position)} samples, expected at least {FEWEST}"
         )
     check_extent(record, float(position.t[0]), record.stop)
+    check_slow(record)
     period = 1.0 / position.rate
     finer = max(1, math.ceil(period / FINE))
     step = period / finer
     t = np.arange(position.t[0], position.t[-1] + 0.5 * step, step)
-    q = smoothed(CubicSpline(position.t, position.y)(t), step)
-    v = np.gradient(q, step)
-    all_five = (t, q, v, np.gradient(v, step), smoothed(_torque_at(record, t), step))
-    t, q, v, a, torque = (values[::finer] for values in all_five)
-    return Motion(t, q, v, a, torque, commanded="motor_torque" not in record)
+    q, torque = np.interp(t, position.t, position.y), _torque_at(record, t)
+    v, a = np.zeros(len(t)), np.zeros(len(t))
+    counts = np.zeros(len(t), bool)
+    for begin, end in _sampled(record, float(t[0]), float(t[-1])):
+        part = slice(*np.searchsorted(t, [begin - 0.5 * step, end + 0.5 * step]))
+        known = position.between(begin, end + 0.5 * step)
+        q[part] = smoothed(CubicSpline(known.t, known.y)(t[part]), step)
+        v[part] = np.gradient(q[part], step)
+        a[part], torque[part] = np.gradient(v[part], step), smoothed(torque[part], step)
+        counts[part] = (t[part] >= t[part][0] + SKIPPED_START) & (t[part] <= t[part][-1] - SKIPPED_START)
+    t, q, v, a, torque = (np.asarray(values[::finer], np.float64) for values in (t, q, v, a, torque))
+    return Motion(t, q, v, a, torque, counts[::finer], commanded="motor_torque" not in record)
+
+
+def _sampled(record: Record, start: float, stop: float) -> list[tuple[float, float]]:
+    """Return begin and end (s) of the parts between gaps of the motion or its torque; short ones are gaps."""
+    each = [Record({n: c}) for n, c in record.channels.items() if n in ("position", "motor_torque")]
+    lost = sorted(gap for one in each for gap in gaps(one))
+    ends, begins = [*(a for a, _ in lost), stop], [start, *(b for _, b in lost)]
+    parts = [(max(begins[: k + 1]), min(ends[k:])) for k in range(len(ends))]
+    long = [(begin, end) for begin, end in parts if end - begin > 2.0 * SKIPPED_START]
+    return long or [(start, stop)]
 
 
 def _finite(record: Record) -> Record:
@@ -122,11 +150,12 @@ def _torque_at(record: Record, t: FloatArray) -> FloatArray:
     at the end of a hold, and counts for the whole hold; any other counts at its stamp.
     """
     command = record["command"]
-    hold = np.searchsorted(command.t, t, side="right") - 1
+    edge = _AT_EDGE / command.rate
+    hold = np.searchsorted(command.t, t + edge) - 1
     if "motor_torque" not in record:
         return command.y[np.maximum(hold, 0)]
     torque = record["motor_torque"]
-    ended, begun = (np.searchsorted(command.t, torque.t, side=side) - 1 for side in ("left", "right"))
+    ended, begun = (np.searchsorted(command.t, torque.t + side * edge) - 1 for side in (-1.0, 1.0))
     off = [float(np.std(torque.y - command.y[np.maximum(k, 0)])) for k in (ended, begun)]
     if off[1] <= off[0]:
         return np.interp(t, torque.t, torque.y)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import bounded, check_command
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
+from rsea_ros.model.pace import SKIPPED_START, check_pace
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.restarts import outside_gaps
@@ -20,9 +21,6 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
-
-SKIPPED_START = 0.3
-"""s at the start of a record that no comparison or fit uses, because the bench may not have been at rest."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +67,12 @@ def predict(rig: Rig | str, record: Record) -> Mapping[str, Comparison]:
     rig = load_rig(rig)
     record = bounded(commanded(record, rig))
     check_command(record)
+    check_pace(record)
     record = replace(record, channels={n: c for n, c in record.channels.items() if len(c)})
     if is_inverse(rig):
         motion = motion_from(record)
         torque = inverse_torque(rig, motion)
-        return {"motor_torque": _comparison(motion.t, motion.torque, torque, edges=True)}
+        return {"motor_torque": _comparison(motion.t, motion.torque, torque, motion.counts)}
     rig = in_phase(rig, record)
     compared = {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
     known = {n: outside_gaps(record, c.t, SKIPPED_START) for n, c in compared.items()}
@@ -97,8 +96,7 @@ def _on_measured_zero(c: Comparison) -> Comparison:
 
 
 def _comparison(
-    t: FloatArray, measured: FloatArray, predicted: FloatArray, edges: bool = False
+    t: FloatArray, measured: FloatArray, predicted: FloatArray, known: npt.NDArray[np.bool_] | None = None
 ) -> Comparison:
-    last = t[-1] - SKIPPED_START if edges else t[-1]
-    counts = np.isfinite(measured) & np.isfinite(t) & (t >= t[0] + SKIPPED_START) & (t <= last)
-    return Comparison(t, measured, predicted, counts)
+    counts = np.isfinite(measured) & np.isfinite(t) & (t >= t[0] + SKIPPED_START)
+    return Comparison(t, measured, predicted, counts if known is None else counts & known)

@@ -121,6 +121,22 @@ def test_a_centred_average_has_no_lag_and_is_named_too(samples):
     assert f"centred moving average of {samples} samples" in smoothed.detail
 
 
+@pytest.mark.parametrize("centred", [False, True])
+@pytest.mark.parametrize("samples", [5, 9])
+@pytest.mark.parametrize("names", [("position",), ("velocity",), ("position", "velocity")])
+def test_an_averaged_joint_is_named_as_the_f_t_sensor_is(names, samples, centred):
+    """Only the F/T channel was tried: an averaged encoder gave a stiffness without a word of why."""
+    window, before = np.ones(samples) / samples, samples // 2 if centred else samples - 1
+    averaged = {
+        n: Channel(c.t, np.convolve(np.pad(c.y, (before, samples - 1 - before), "edge"), window, "valid"))
+        for n in names
+        for c in [good()[n]]
+    }
+    findings = check_record(good().with_channels(**averaged), RIG)
+    assert {f.channel for f in findings.of("smoothing")} == set(names)
+    assert all(f"average of {samples} samples" in f.detail for f in findings.of("smoothing"))
+
+
 @pytest.mark.parametrize(
     ("effect", "parameters"),
     [("ft_sensor_lag", {"time_constant": 5e-3}), ("command_delay", {"delay": 8e-3}), (None, {})],

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_run
 
+import rsea_ros as rsea
 from msg_adapters import write_record
 from rsea_ros.checks.check import check_record
 from rsea_ros.cli.main import main
@@ -69,3 +70,38 @@ def test_a_shift_of_nothing_is_refused_in_one_line(shift, tmp_path, capsys):
     write_record(good(), bag)
     assert main(["check", bag, "--shift", shift]) == 2
     assert f"--shift {shift}: expected CHANNEL=S" in capsys.readouterr().err
+
+
+@functools.cache
+def played(seconds):
+    command = 10.0 * np.random.default_rng(3).standard_normal(int(280 * seconds))
+    return rsea.simulate(RIG, command, 280.0, seed=3)
+
+
+def slow(record, hz, seconds, *names):
+    """Return the record with every n-th sample of some channels, stamped later by some seconds."""
+    n = round(280 / hz)
+    return record.with_channels(
+        **{c: Channel(record[c].t[n - 1 :: n] + seconds, record[c].y[n - 1 :: n]) for c in names}
+    )
+
+
+@pytest.mark.parametrize("seconds", [-1.0, -0.73])
+@pytest.mark.parametrize("hz", [1, 2.5, 10])
+@pytest.mark.parametrize("name", ["motor_torque", "ft"])
+def test_the_clock_of_a_slow_channel_is_a_number_too(name, hz, seconds):
+    """At 1 Hz there were too few samples for a word; 0.73 s at 10 Hz was a dead channel."""
+    findings = check_record(slow(played(90.0), hz, seconds, name), RIG)
+    assert off(findings) == {name: pytest.approx(seconds, abs=0.005)}
+    assert not findings.of("dead_channel")
+
+
+@pytest.mark.parametrize("seconds", [-1.0, 0.0])
+def test_a_clock_that_few_samples_leave_open_is_said_to_be_open(seconds):
+    findings = check_record(slow(played(12.0), 1, seconds, "motor_torque"), RIG)
+    (clock,) = (f for f in findings.of("clock_offset") if f.channel == "motor_torque")
+    assert clock.value is None and "not determined: 12 samples at 1 Hz" in clock.detail
+
+
+def test_a_slow_channel_in_time_has_no_offset():
+    assert off(check_record(slow(played(90.0), 2.5, 0.0, "ft", "motor_torque"), RIG)) == {}

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from bad_input import ROOT, rsea
 
+from rsea_ros.interrupts import deaf_to_interrupts
+
 LONG = ("simulate", "paper_high_impedance", "--duration", "600", "--out")
 
 
@@ -42,3 +44,13 @@ def test_ctrl_c_ends_a_verb_in_one_line_and_leaves_no_result(verb, long_bag, tmp
     assert process.returncode in (130, -signal.SIGINT)
     assert (stdout, stderr) == ("", f"rsea {verb}: interrupted\n")
     assert not out.exists() or not list(out.iterdir())
+
+
+def test_processes_of_a_cluster_do_not_hear_the_terminal():
+    """Dask's workers that were still importing printed 50 lines of tracebacks at a Ctrl-C of a fleet run."""
+    with deaf_to_interrupts():
+        child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    blocked = int(Path(f"/proc/{child.pid}/status").read_text().split("SigBlk:")[1].split()[0], 16)
+    child.communicate(b"\n")
+    assert blocked & 1 << (signal.SIGINT - 1)
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, set())

@@ -111,3 +111,40 @@ def test_identify_fits_no_sample_that_it_reports(damage, kind, record):
     low, high = next(p.ci95 for p in fit.result.parameters if p.name == "spring.stiffness")
     assert low < rsea.load_rig(RIG)["spring.stiffness"] < high
     assert high - low < 2.0
+
+
+@pytest.mark.parametrize("names", [("position",), ("ft",), ("position", "velocity")])
+def test_the_verdict_says_that_an_average_biases_the_values(names, record):
+    """Of 20 fits none had the inertia and the stiffness within their intervals, and no line said so."""
+    window = np.ones(9) / 9
+    averaged = {n: Channel(record[n].t, np.convolve(record[n].y, window, "same")) for n in names}
+    fit = rsea.identify(record.with_channels(**averaged), RIG)
+    missed = [n for n, p in fit.parameters.items() if n[:5] != "clock" and not _holds(p.ci95, n)]
+    assert missed
+    assert "averaged before logging, which biases values beyond their intervals" in fit.summary()
+    assert "biases" not in rsea.identify(record, RIG).summary()
+
+
+def test_messages_recorded_twice_are_diagnosed_too(record, tmp_path):
+    """Every other verb left the second ones out; diagnose asked for rising stamps."""
+    twice = {n: Channel(np.repeat(c.t, 2), np.repeat(c.y, 2)) for n, c in record.channels.items()}
+    bag = tmp_path / "bag.mcap"
+    write_record(record.with_channels(**twice), bag)
+    assert main(["diagnose", str(bag), "--out", str(tmp_path / "out")]) == 0
+    result = json.loads((tmp_path / "out" / "diagnosis.json").read_text(encoding="utf-8"))
+    assert result["verdict"] == "nothing_wrong"
+    assert {"duplicate_stamps"} == {f["kind"] for f in result["data"]["faults"]}
+
+
+def test_a_prediction_tells_of_a_turned_sign_and_of_a_zero_that_is_off(record, tmp_path, capsys):
+    """A turned command was predicted at -100 % with no fault, an F/T sensor 300 N m off at -8780 %."""
+    ft, torque = record["ft"], record["motor_torque"]
+    bad = record.with_channels(ft=Channel(ft.t, ft.y + 300.0), motor_torque=Channel(torque.t, -torque.y))
+    write_record(bad, tmp_path / "bag.mcap")
+    assert main(["predict", RIG, str(tmp_path / "bag.mcap")]) == 0
+    faults = json.loads(capsys.readouterr().out)["data"]["faults"]
+    assert {("offset", "ft"), ("sign", "motor_torque")} == {(f["kind"], f["channel"]) for f in faults}
+
+
+def _holds(interval, name):
+    return interval[0] < rsea.load_rig(RIG)[name] < interval[1]

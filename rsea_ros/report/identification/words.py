@@ -11,7 +11,15 @@ from rsea_ros.wording import listed
 
 def verdict_sentence(identification: Identification) -> str:
     """Return whether the model fits, by the worst channel's residual over its noise, and the rig by name."""
-    return "; ".join(filter(None, (_verdict(identification), values_off(identification.remarks))))
+    parts = (_verdict(identification), values_off(identification.remarks), _biased(identification))
+    return "; ".join(filter(None, parts))
+
+
+def _biased(identification: Identification) -> str:
+    """Return that the intervals do not hold where a channel was averaged: the values make up for it."""
+    averaged = [words.channel(f.channel) for f in identification.faults if f.kind == "smoothing"]
+    biased = "averaged before logging, which biases values beyond their intervals"
+    return f"{listed(averaged)} {biased}" if averaged else ""
 
 
 def _verdict(identification: Identification) -> str:
