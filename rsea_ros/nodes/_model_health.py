@@ -80,7 +80,7 @@ class ModelHealth:
         limit = self._error.settings.tolerance * self._error.torque
         off = {name: tests[name].ratio * self._errors[name] for name in self._errors.keys() & tests.keys()}
         return [
-            f"{name} differs from model and other sensors by {rms:.3g} N m RMS, limit {limit:.3g} N m"
+            f"{name} differs from model and other sensors by {rms:.3g} N·m RMS, limit {limit:.3g} N·m"
             for name, rms in sorted(off.items())
             if rms > limit and tests[name].broken
         ]
