@@ -81,7 +81,9 @@ def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[Floa
     if any(s is None for s in signals):
         return []
     parts = [
-        _spline(s, effect, _hold(c)) for s, c in zip(signals, problem.cases, strict=True) if s is not None
+        _spline(s, effect, _hold(c), _spans(c, s))
+        for s, c in zip(signals, problem.cases, strict=True)
+        if s is not None
     ]
     zero = problem.residual_of(base)
     moved = ([_with_part(problem, theta, base, effect, [p[k] for p in parts])] for k in range(len(parts[0])))
@@ -90,6 +92,13 @@ def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[Floa
 
 def _hold(case: Case) -> int:
     return case.drive.hold if isinstance(case.drive, Drive) else 1
+
+
+def _spans(case: Case, signal: FloatArray) -> Sequence[tuple[int, int]]:
+    """Return the parts of a signal that are simulated: all of one at the samples of a channel."""
+    drive = case.drive
+    on_steps = isinstance(drive, Drive) and len(signal) == len(drive.command)
+    return drive.simulated if isinstance(drive, Drive) and on_steps else ((0, len(signal)),)
 
 
 def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArray | None:
@@ -113,13 +122,18 @@ def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArra
     return np.asarray(np.interp(middles, case.t[read], out[read]))
 
 
-def _spline(signal: FloatArray, effect: Effect, hold: int) -> list[FloatArray]:
-    """Return the parts of the spline along a signal: hats over its size for either sign, or its past."""
+def _spline(
+    signal: FloatArray, effect: Effect, hold: int, spans: Sequence[tuple[int, int]]
+) -> list[FloatArray]:
+    """Return the parts of the spline along a signal: hats over its size for either sign, or its past.
+
+    spans: parts of the signal that count.
+    """
     if effect.main.unit in ("s", "Hz") and effect.port in (st.Port.COMMAND, st.Port.SENSOR):
         step = hold if effect.port is st.Port.COMMAND else 1
         return [np.concatenate([np.full(k * step, signal[0]), signal[: -k * step]]) - signal for k in _LAGS]
     size = np.abs(signal)
-    knots = np.unique(np.quantile(size, _KNOTS))
+    knots = np.unique(np.quantile(np.concatenate([size[a:b] for a, b in spans]), _KNOTS))
     if len(knots) < 2:
         return []
     hats = [np.interp(size, knots, np.eye(len(knots))[k]) for k in range(len(knots))]

@@ -51,6 +51,22 @@ class PieceSettings:
 
 
 @dataclass(frozen=True)
+class StretchSettings:
+    """The stretches of a long record to which models are fitted and on which they are tested."""
+
+    enough: float = number(
+        160.0, "s", "data of all records that are used; the rest of longer ones is left out",
+        "10 min at 280 Hz are diagnosed within a minute; more data narrow an interval by half at most",
+    )  # fmt: skip
+    blocks: int = number(
+        16, "1", "blocks in a row, a multiple of four", "every one holds all sets in their shares"
+    )
+    run_up: float = number(
+        4.0, "s", "simulated and not compared before a stretch", "a swinging load forgets its start within it"
+    )
+
+
+@dataclass(frozen=True)
 class FloorSettings:
     """Levels of a residual: RMS over the noise of its channel."""
 

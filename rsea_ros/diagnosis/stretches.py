@@ -1,0 +1,162 @@
+"""The stretches of a long record that a diagnosis fits and tests on, so that its cost has an end.
+
+A record is cut into slots of whole blocks, four by four: each slot holds training, validation and test blocks
+in their shares. Of a record with more slots than `settings.stretches` has room for, half of the slots are
+spread evenly from its beginning to its end, for what changes slowly; the others are those that the nominal
+model simulates worst, for what acts rarely. Times stay those of the record: blocks, drifts and clocks are as
+in the whole of it. A channel that is faster than the commands keeps a sample per command.
+
+Checks of the data and the first estimate of the noise see the whole record.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
+from rsea_ros.diagnosis.data_split import as_often_as_commands, block_length, misfit_between, state_at
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.remark import Remark
+from rsea_ros.identification.solver import Map
+from rsea_ros.model.drive import Drive
+from rsea_ros.signals import BoolArray, FloatArray, IntArray
+
+
+def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Problem:
+    """Return a nominal problem on the stretches of its long records; itself where none is long."""
+    room = settings.stretches.enough / max(sum(c.duration for c in problem.cases), 1e-300)
+    rooms = [_slots(case, room * case.duration, settings) for case in problem.cases]
+    if all(_is_whole(c, r, settings) for c, r in zip(problem.cases, rooms, strict=True)):
+        return problem
+    thinner = replace(problem, cases=tuple(as_often_as_commands(c) for c in problem.cases))
+    whole = list(zip(thinner.cases, rooms, strict=True))
+    spread = [spread_slots(_slots(c, c.duration, settings), max(1, room // 2)) for c, room in whole]
+    outputs = _fitted_outputs(thinner, spread, settings, run)
+    chosen = [
+        on_slots(c, with_worst(slots, slot_misfits(c, out, settings), room), settings)
+        for (c, room), slots, out in zip(whole, spread, outputs, strict=True)
+    ]
+    return replace(problem, cases=tuple(chosen))
+
+
+def stretches_of(used: Problem, nominal: Problem, settings: DiagnosisSettings) -> tuple[Remark, ...]:
+    """Return the remark on how much of its records a problem uses; none where that is all."""
+    if used is nominal:
+        return ()
+    seconds = sum(simulated_time(c, settings) for c in used.cases)
+    return (Remark("stretches", values=(seconds, sum(c.duration for c in nominal.cases)), unit="s"),)
+
+
+def spread_over(case: Case, settings: DiagnosisSettings) -> Case:
+    """Return a case on slots that are spread evenly over it; itself where it is not long."""
+    room = _slots(case, settings.stretches.enough, settings)
+    if _is_whole(case, room, settings):
+        return case
+    thinner = as_often_as_commands(case)
+    return on_slots(thinner, spread_slots(_slots(case, case.duration, settings), room), settings)
+
+
+def spread_slots(slots: int, count: int) -> IntArray:
+    """Return `count` of a number of slots, spread evenly, the first and the last among them."""
+    return np.unique(np.linspace(0, slots - 1, count).round().astype(np.int64))
+
+
+def with_worst(spread: IntArray, misfit: FloatArray, count: int) -> IntArray:
+    """Return slots with those of the largest misfit beside them, `count` in all, in time."""
+    others = np.array([k for k in np.argsort(-misfit, kind="stable") if k not in spread], np.int64)
+    return np.sort(np.concatenate([spread, others[: max(0, count - len(spread))]]))
+
+
+def slot_misfits(case: Case, outputs: Mapping[str, FloatArray], settings: DiagnosisSettings) -> FloatArray:
+    """Return the power of a residual in each slot of a case, each channel over its power in all, summed."""
+    length = slot_length(case, settings)
+    slots = _slots(case, case.duration, settings)
+    return np.array([misfit_between(case, outputs, k * length, length) for k in range(slots)])
+
+
+def slot_length(case: Case, settings: DiagnosisSettings) -> float:
+    """Return the length of a slot of a case, s."""
+    return settings.stretches.blocks * block_length(case, settings.blocks)
+
+
+def on_slots(case: Case, slots: Sequence[int] | IntArray, settings: DiagnosisSettings) -> Case:
+    """Return a case with the samples of some slots alone, simulated a run-up before and through them."""
+    drive, length = case.drive, slot_length(case, settings)
+    if not isinstance(drive, Drive):
+        return case
+    times = [(a * length, b * length) for a, b in _runs(slots)]
+    spans = tuple(_span(drive, a, b, settings.stretches.run_up) for a, b in times)
+    anew = [(first, _state(case, drive, first)) for first, _ in spans if first > 0]
+    keep = {n: _inside(t - case.start, times) for n, t in case.t.items()}
+    cut = replace(
+        drive,
+        at={n: at[keep[n]] for n, at in drive.at.items()},
+        impulse={n: i[keep[n]] for n, i in drive.impulse.items()},
+        restarts=tuple(sorted([*drive.restarts, *anew])),
+        spans=spans,
+    )
+    return replace(
+        case,
+        drive=cut,
+        t={n: t[keep[n]] for n, t in case.t.items()},
+        measured={n: y[keep[n]] for n, y in case.measured.items()},
+        mask={n: m[keep[n]] for n, m in case.mask.items()},
+    )
+
+
+def simulated_time(case: Case, settings: DiagnosisSettings) -> float:
+    """Return for how long a case is compared with its simulation, s."""
+    drive = case.drive
+    if not isinstance(drive, Drive) or not drive.spans:
+        return case.duration
+    run_up = settings.stretches.run_up
+    return sum((end - first) * drive.step - run_up * (first > 0) for first, end in drive.spans)
+
+
+def _fitted_outputs(
+    problem: Problem, slots: Sequence[IntArray], settings: DiagnosisSettings, run: Map
+) -> list[dict[str, FloatArray]]:
+    """Return the channels on the whole records of a model that is fitted to some of their slots."""
+    cases = tuple(on_slots(c, k, settings) for c, k in zip(problem.cases, slots, strict=True))
+    model = fit_candidate(FitSetup(cases, settings, run), replace(problem, cases=cases))
+    return problem.outputs(model.solution.theta)
+
+
+def _slots(case: Case, seconds: float, settings: DiagnosisSettings) -> int:
+    """Return how many slots of a case fit into a time, one at least."""
+    return max(1, int(seconds / slot_length(case, settings)))
+
+
+def _is_whole(case: Case, room: int, settings: DiagnosisSettings) -> bool:
+    """Return whether a case has no more slots than it has room for; a measured motion costs little."""
+    return not isinstance(case.drive, Drive) or _slots(case, case.duration, settings) <= room
+
+
+def _runs(slots: Sequence[int] | IntArray) -> list[tuple[int, int]]:
+    """Return first and end of each run of neighbouring slots."""
+    slots = [int(k) for k in slots]
+    breaks = [i for i, (a, b) in enumerate(pairwise(slots), start=1) if b != a + 1]
+    edges = [0, *breaks, len(slots)]
+    return [(slots[a], slots[b - 1] + 1) for a, b in pairwise(edges)]
+
+
+def _span(drive: Drive, begin: float, end: float, run_up: float) -> tuple[int, int]:
+    """Return the steps from a run-up before a stretch to a command period behind it."""
+    first = max(0, int((begin - run_up) / drive.step) // drive.hold * drive.hold)
+    return first, min(len(drive.command), math.ceil(end / drive.step) + drive.hold)
+
+
+def _state(case: Case, drive: Drive, first: int) -> tuple[float, float]:
+    """Return position (rad) and velocity (rad/s) before a step; the former since the start without a zero."""
+    (position, velocity), (zero, _) = (state_at(case, drive.start + k * drive.step) for k in (first, 0))
+    return position - zero * ("position" in case.floating), velocity
+
+
+def _inside(t: FloatArray, times: Sequence[tuple[float, float]]) -> BoolArray:
+    return np.asarray(np.any([(t >= a) & (t < b) for a, b in times], axis=0))
