@@ -27,16 +27,18 @@ from rsea_ros.identification.solver import Map
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
 
+_ROUNDING = 1e-6
+"""Of a slot: so much less is a whole one."""
 
 def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Problem:
     """Return a nominal problem on the stretches of its long records; itself where none is long."""
-    room = settings.stretches.enough / max(sum(c.duration for c in problem.cases), 1e-300)
-    rooms = [_slots(case, room * case.duration, settings) for case in problem.cases]
-    if all(_is_whole(c, r, settings) for c, r in zip(problem.cases, rooms, strict=True)):
+    if _is_whole(problem.cases, settings):
         return problem
     thinner = replace(problem, cases=tuple(as_often_as_commands(c) for c in problem.cases))
-    whole = list(zip(thinner.cases, rooms, strict=True))
-    spread = [spread_slots(_slots(c, c.duration, settings), max(1, room // 2)) for c, room in whole]
+    if _is_whole(thinner.cases, settings):
+        return thinner
+    whole = list(zip(thinner.cases, rooms(thinner.cases, settings), strict=True))
+    spread = [spread_slots(slots_of(c, settings), max(1, room // 2)) for c, room in whole]
     outputs = _fitted_outputs(thinner, spread, settings, run)
     chosen = [
         on_slots(c, with_worst(slots, slot_misfits(c, out, settings), room), settings)
@@ -45,21 +47,35 @@ def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Pro
     return replace(problem, cases=tuple(chosen))
 
 
+def spread_over(case: Case, settings: DiagnosisSettings) -> Case:
+    """Return a case on slots that are spread evenly over it; itself where it is not long."""
+    if _is_whole([case], settings):
+        return case
+    thinner = as_often_as_commands(case)
+    (room,) = rooms([thinner], settings)
+    return on_slots(thinner, spread_slots(slots_of(thinner, settings), room), settings)
+
+
 def stretches_of(used: Problem, nominal: Problem, settings: DiagnosisSettings) -> tuple[Remark, ...]:
     """Return the remark on how much of its records a problem uses; none where that is all."""
-    if used is nominal:
+    if not any(isinstance(c.drive, Drive) and c.drive.spans for c in used.cases):
         return ()
     seconds = sum(simulated_time(c, settings) for c in used.cases)
     return (Remark("stretches", values=(seconds, sum(c.duration for c in nominal.cases)), unit="s"),)
 
 
-def spread_over(case: Case, settings: DiagnosisSettings) -> Case:
-    """Return a case on slots that are spread evenly over it; itself where it is not long."""
-    room = _slots(case, settings.stretches.enough, settings)
-    if _is_whole(case, room, settings):
-        return case
-    thinner = as_often_as_commands(case)
-    return on_slots(thinner, spread_slots(_slots(case, case.duration, settings), room), settings)
+def rooms(cases: Sequence[Case], settings: DiagnosisSettings) -> list[int]:
+    """Return how many slots of each case are used: one at least, all where there is room for them."""
+    rule = settings.stretches
+    seconds = sum(c.duration for c in cases)
+    samples = sum(max(map(len, c.t.values())) for c in cases)
+    share = min(1.0, rule.enough / max(seconds, 1e-300), rule.samples / samples)
+    return [_slots_in(c, share * c.duration, settings) for c in cases]
+
+
+def slots_of(case: Case, settings: DiagnosisSettings) -> int:
+    """Return how many slots a case has."""
+    return _slots_in(case, case.duration, settings)
 
 
 def spread_slots(slots: int, count: int) -> IntArray:
@@ -76,8 +92,8 @@ def with_worst(spread: IntArray, misfit: FloatArray, count: int) -> IntArray:
 def slot_misfits(case: Case, outputs: Mapping[str, FloatArray], settings: DiagnosisSettings) -> FloatArray:
     """Return the power of a residual in each slot of a case, each channel over its power in all, summed."""
     length = slot_length(case, settings)
-    slots = _slots(case, case.duration, settings)
-    return np.array([misfit_between(case, outputs, k * length, length) for k in range(slots)])
+    slots = range(slots_of(case, settings))
+    return np.array([misfit_between(case, outputs, k * length, length) for k in slots])
 
 
 def slot_length(case: Case, settings: DiagnosisSettings) -> float:
@@ -88,7 +104,7 @@ def slot_length(case: Case, settings: DiagnosisSettings) -> float:
 def on_slots(case: Case, slots: Sequence[int] | IntArray, settings: DiagnosisSettings) -> Case:
     """Return a case with the samples of some slots alone, simulated a run-up before and through them."""
     drive, length = case.drive, slot_length(case, settings)
-    if not isinstance(drive, Drive):
+    if not isinstance(drive, Drive) or len(slots) == slots_of(case, settings):
         return case
     times = [(a * length, b * length) for a, b in _runs(slots)]
     spans = tuple(_span(drive, a, b, settings.stretches.run_up) for a, b in times)
@@ -128,14 +144,15 @@ def _fitted_outputs(
     return problem.outputs(model.solution.theta)
 
 
-def _slots(case: Case, seconds: float, settings: DiagnosisSettings) -> int:
+def _slots_in(case: Case, seconds: float, settings: DiagnosisSettings) -> int:
     """Return how many slots of a case fit into a time, one at least."""
-    return max(1, int(seconds / slot_length(case, settings)))
+    return max(1, int(seconds / slot_length(case, settings) + _ROUNDING))
 
 
-def _is_whole(case: Case, room: int, settings: DiagnosisSettings) -> bool:
-    """Return whether a case has no more slots than it has room for; a measured motion costs little."""
-    return not isinstance(case.drive, Drive) or _slots(case, case.duration, settings) <= room
+def _is_whole(cases: Sequence[Case], settings: DiagnosisSettings) -> bool:
+    """Return whether all slots of cases are used; a measured motion costs little and has no limit."""
+    needed = (slots_of(c, settings) if isinstance(c.drive, Drive) else 0 for c in cases)
+    return all(n <= room for n, room in zip(needed, rooms(cases, settings), strict=True))
 
 
 def _runs(slots: Sequence[int] | IntArray) -> list[tuple[int, int]]:

@@ -117,6 +117,19 @@ def test_the_samples_of_a_problem_do_not_grow_with_the_record(seconds):
     assert rows <= 32.0 * RATE + 16
 
 
+def test_several_records_share_the_time_by_their_lengths(drifting):
+    _, case = drifting
+    used = in_stretches(Problem((case, case), RIG, (), MEASURED), SHORT, serial)
+    assert [simulated_time(c, SHORT) for c in used.cases] == pytest.approx([16.0, 16.0], abs=0.1)
+
+
+def test_a_fast_record_is_used_for_a_shorter_time(drifting):
+    _, case = drifting
+    few = replace(SHORT, stretches=replace(SHORT.stretches, samples=round(16.0 * RATE)))
+    (used,) = in_stretches(problem_of(case), few, serial).cases
+    assert simulated_time(used, few) == pytest.approx(16.0, abs=0.1)
+
+
 def test_a_short_record_is_left_as_it_is(drifting):
     _, case = drifting
     problem = problem_of(case)

@@ -54,8 +54,10 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: ContributionR
     if not responses:
         return None
     matrix = np.column_stack([*responses, rows.others])
+    del responses  # of a long record they are as large as the matrix
     size = np.sqrt(np.sum(matrix**2, axis=0))
-    matrix = matrix[:, size > 0.0] / size[size > 0.0]
+    matrix = matrix[:, size > 0.0]
+    matrix /= size[size > 0.0]
     fits = ~rows.tests
     normal = matrix[fits].T @ matrix[fits] + _RIDGE * np.eye(matrix.shape[1])
     weights = np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]

@@ -58,6 +58,10 @@ class StretchSettings:
         160.0, "s", "data of all records that are used; the rest of longer ones is left out",
         "10 min at 280 Hz are diagnosed within a minute; more data narrow an interval by half at most",
     )  # fmt: skip
+    samples: int = number(
+        170_000, "1", "samples of the fastest channel that are used, at one per command",
+        "160 s at 1 kHz and a little are diagnosed within 1.5 GB",
+    )  # fmt: skip
     blocks: int = number(
         16, "1", "blocks in a row, a multiple of four", "every one holds all sets in their shares"
     )

@@ -20,6 +20,8 @@ _MEASURED, _RESIDUAL = 1.0 / 2000.0, 1.0 / 64.0
 """Steps of the drawn values, of their standard deviation: an eighth of a pixel, also of a tenfold zoom."""
 _MICROSECOND = 1e-6
 _FIRST_VIEW = 6.0
+_PAUSE, _PERIODS = 1.0, 10.0
+"""s, and sample periods: a longer pause of the samples shows as a gap of the line."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,11 @@ def overlay_figure(
     unit = words.unit(UNITS[channel])
     extra = {
         "t": packed(t[keep] - t[0], _MICROSECOND),
-        "measured": {"colour": MEASURED, "y": packed(measured[keep], _fineness(measured, _MEASURED))},
-        "residuals": [_residual(s, (measured - s.values)[keep]) for s in simulations],
+        "measured": {
+            "colour": MEASURED,
+            "y": packed(broken(t[keep], measured[keep]), _fineness(measured, _MEASURED)),
+        },
+        "residuals": [_residual(s, broken(t[keep], (measured - s.values)[keep])) for s in simulations],
         "unit": unit,
     }
     return Figure(
@@ -58,6 +63,13 @@ def overlay_figure(
         kind="overlay",
         extra=extra,
     )
+
+
+def broken(t: FloatArray, values: FloatArray) -> FloatArray:
+    """Return values with a gap, so that no line crosses it, behind each pause of the samples."""
+    steps = np.diff(t)
+    pauses = steps > max(_PAUSE, _PERIODS * float(np.median(steps))) if len(steps) else steps > 0.0
+    return np.where(np.concatenate([[False], pauses]), np.nan, values)
 
 
 def _residual(simulated: Simulated, values: FloatArray) -> Json:

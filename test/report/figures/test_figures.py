@@ -11,7 +11,7 @@ import pytest
 from rsea_ros.identification.result import Identification
 from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import Figure
-from rsea_ros.report.figures.overlay import MOST_SAMPLES, Simulated, overlay_figure, sampled
+from rsea_ros.report.figures.overlay import MOST_SAMPLES, Simulated, broken, overlay_figure, sampled
 from rsea_ros.report.figures.palette import AFTER, BEFORE
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
 from rsea_ros.report.figures.thinned import thinned
@@ -87,3 +87,11 @@ def test_the_overlay_shows_two_simulations() -> None:
     figure = overlay_figure("Before and after", "ft", t, np.sin(t), simulations)
     assert [r["name"] for r in figure.extra["residuals"]] == ["before", "after"]
     as_json(figure)
+
+
+def test_no_line_crosses_a_pause_of_the_samples():
+    """Between two stretches of a long record lies a minute without a sample."""
+    t = np.array([0.0, 0.1, 0.2, 60.0, 60.1])
+    np.testing.assert_array_equal(broken(t, np.ones(5)), [1.0, 1.0, 1.0, np.nan, 1.0])
+    slow = np.array([0.0, 2.0, 4.0, 8.0])
+    np.testing.assert_array_equal(broken(slow, np.ones(4)), np.ones(4))
