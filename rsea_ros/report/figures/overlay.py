@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,13 +44,14 @@ def overlay_figure(
     """Return the figure of one channel. t: s."""
     keep = sampled(measured, measured - simulations[-1].values)
     unit = words.unit(UNITS[channel])
+    pauses = pauses_of(t[keep])
+    shown = measured[keep]
+    shown[list(pauses)] = np.nan
     extra = {
-        "t": packed(t[keep] - t[0], _MICROSECOND),
-        "measured": {
-            "colour": MEASURED,
-            "y": packed(broken(t[keep], measured[keep]), _fineness(measured, _MEASURED)),
-        },
-        "residuals": [_residual(s, broken(t[keep], (measured - s.values)[keep])) for s in simulations],
+        "t": packed(without(pauses, t[keep] - t[0]), _MICROSECOND),
+        "pauses": list(pauses.items()),
+        "measured": {"colour": MEASURED, "y": packed(shown, _fineness(measured, _MEASURED))},
+        "residuals": [_residual(s, shown - s.values[keep]) for s in simulations],
         "unit": unit,
     }
     return Figure(
@@ -65,11 +66,22 @@ def overlay_figure(
     )
 
 
-def broken(t: FloatArray, values: FloatArray) -> FloatArray:
-    """Return values with a gap, so that no line crosses it, behind each pause of the samples."""
+def pauses_of(t: FloatArray) -> dict[int, float]:
+    """Return the length (s) of each pause of the samples by the number of the sample behind it.
+
+    That sample is not drawn, so that no line crosses a pause.
+    """
     steps = np.diff(t)
-    pauses = steps > max(_PAUSE, _PERIODS * float(np.median(steps))) if len(steps) else steps > 0.0
-    return np.where(np.concatenate([[False], pauses]), np.nan, values)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    behind = np.flatnonzero(steps > max(_PAUSE, _PERIODS * usual))
+    return {int(k) + 1: float(steps[k]) for k in behind}
+
+
+def without(pauses: Mapping[int, float], t: FloatArray) -> FloatArray:
+    """Return stamps less the pauses before them: those of ten minutes' stretches lie on no line to pack."""
+    lost = np.zeros(len(t))
+    lost[list(pauses)] = list(pauses.values())
+    return np.asarray(t - np.cumsum(lost))
 
 
 def _residual(simulated: Simulated, values: FloatArray) -> Json:
