@@ -79,7 +79,7 @@ class HeldOut:
         if self.record is None:
             return None
         case = case_from(self.record.record, self.nominal, self.record.masked)
-        return spread_over(replace(case, noise=self.cases[0].noise), self.settings)
+        return spread_over(replace(case, noise=self.cases[0].noise), self.nominal, self.settings)
 
     def score(
         self, problem: Problem, theta: FloatArray, outputs: list[dict[str, FloatArray]] | None = None

@@ -24,21 +24,26 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Map
-from rsea_ros.model.drive import Drive
+from rsea_ros.model.drive import LONGEST_STEP, Drive
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import build
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
 
 _ROUNDING = 1e-6
 """Of a slot: so much less is a whole one."""
+_LASTS = 1e-5
+"""Share of a motion that a step takes away, from which it ends within a record: 45 s."""
 
 def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Problem:
     """Return a nominal problem on the stretches of its long records; itself where none is long."""
+    settings = suited_to(problem.rig, settings)
     if _is_whole(problem.cases, settings):
         return problem
     thinner = replace(problem, cases=tuple(as_often_as_commands(c) for c in problem.cases))
     if _is_whole(thinner.cases, settings):
         return thinner
     whole = list(zip(thinner.cases, rooms(thinner.cases, settings), strict=True))
-    spread = [spread_slots(slots_of(c, settings), max(1, room // 2)) for c, room in whole]
+    spread = [spread_slots(slots_of(c, settings), (room + 1) // 2) for c, room in whole]
     outputs = _fitted_outputs(thinner, spread, settings, run)
     chosen = [
         on_slots(c, with_worst(slots, slot_misfits(c, out, settings), room), settings)
@@ -47,8 +52,24 @@ def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Pro
     return replace(problem, cases=tuple(chosen))
 
 
-def spread_over(case: Case, settings: DiagnosisSettings) -> Case:
-    """Return a case on slots that are spread evenly over it; itself where it is not long."""
+def suited_to(rig: Rig, settings: DiagnosisSettings) -> DiagnosisSettings:
+    """Return settings with a run-up in which a rig forgets its start, and slots that are no shorter."""
+    rule = settings.stretches
+    run_up = max(rule.run_up, rule.decays * slowest_decay(rig))
+    fours = math.ceil(max(run_up / settings.blocks.longest, rule.blocks) / 4)
+    return replace(settings, stretches=replace(rule, run_up=run_up, blocks=4 * fours))
+
+
+def slowest_decay(rig: Rig) -> float:
+    """Return the longest time constant, s, of a rig's motions; those that never end are measured."""
+    remaining = np.abs(np.linalg.eigvals(build(rig, LONGEST_STEP, 1.0).linear.phi))
+    fading = remaining[(remaining > 0.0) & (remaining < 1.0 - _LASTS)]
+    return max((-LONGEST_STEP / math.log(r) for r in fading), default=0.0)
+
+
+def spread_over(case: Case, rig: Rig, settings: DiagnosisSettings) -> Case:
+    """Return a case of a rig on slots that are spread evenly over it; itself where it is not long."""
+    settings = suited_to(rig, settings)
     if _is_whole([case], settings):
         return case
     thinner = as_often_as_commands(case)
@@ -60,7 +81,8 @@ def stretches_of(used: Problem, nominal: Problem, settings: DiagnosisSettings) -
     """Return the remark on how much of its records a problem uses; none where that is all."""
     if not any(isinstance(c.drive, Drive) and c.drive.spans for c in used.cases):
         return ()
-    seconds = sum(simulated_time(c, settings) for c in used.cases)
+    suited = suited_to(nominal.rig, settings)
+    seconds = sum(simulated_time(c, suited) for c in used.cases)
     return (Remark("stretches", values=(seconds, sum(c.duration for c in nominal.cases)), unit="s"),)
 
 

@@ -10,7 +10,15 @@ import pytest
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, blocks_of, set_of, short_pieces_of
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings, StretchSettings
-from rsea_ros.diagnosis.stretches import in_stretches, on_slots, simulated_time, spread_slots, with_worst
+from rsea_ros.diagnosis.stretches import (
+    in_stretches,
+    on_slots,
+    simulated_time,
+    slowest_decay,
+    spread_slots,
+    suited_to,
+    with_worst,
+)
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.noise_level import reestimate_noise
@@ -128,6 +136,21 @@ def test_a_fast_record_is_used_for_a_shorter_time(drifting):
     few = replace(SHORT, stretches=replace(SHORT.stretches, samples=round(16.0 * RATE)))
     (used,) = in_stretches(problem_of(case), few, serial).cases
     assert simulated_time(used, few) == pytest.approx(16.0, abs=0.1)
+
+
+def test_a_swinging_load_has_run_ups_in_which_it_forgets_its_start():
+    """Between two swinging ends 4 s left 30 times the noise of the encoder in every stretch."""
+    rig = load_rig("two_moving_outputs")
+    assert slowest_decay(rig) == pytest.approx(7.28, rel=1e-2)
+    assert suited_to(RIG, DiagnosisSettings()).stretches.run_up == 4.0
+    suited = suited_to(rig, replace(SHORT, stretches=replace(SHORT.stretches, enough=96.0)))
+    assert suited.stretches.run_up == pytest.approx(6.0 * 7.28, rel=1e-2)
+    case = case_from(record_of(command(256.0), rig), rig)
+    (cut,) = in_stretches(problem_of(case, rig), suited, serial).cases
+    (out,) = problem_of(cut, rig).outputs(np.zeros(0))
+    left = (cut.measured["position"] - out["position"])[cut.mask["position"]] / cut.noise["position"]
+    assert len(cut.drive.spans) > 1
+    assert float(np.sqrt(np.mean(left**2))) < 1.1
 
 
 def test_a_short_record_is_left_as_it_is(drifting):

@@ -63,11 +63,15 @@ class StretchSettings:
         "160 s at 1 kHz and a little are diagnosed within 1.5 GB",
     )  # fmt: skip
     blocks: int = number(
-        16, "1", "blocks in a row, a multiple of four", "every one holds all sets in their shares"
+        16, "1", "blocks in a row at least, a multiple of four", "every one holds all sets in their shares"
     )
     run_up: float = number(
-        4.0, "s", "simulated and not compared before a stretch", "a swinging load forgets its start within it"
+        4.0, "s", "simulated and not compared before a stretch, at least", "friction and play settle in it"
     )
+    decays: float = number(
+        6.0, "1", "time constants of the rig's slowest motion that a run-up lasts at least",
+        "of a swing of a tenth of a radian less is left than the noise of an encoder; slots are as long",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
