@@ -36,9 +36,9 @@ _LASTS = 1e-5
 
 def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Problem:
     """Return a nominal problem on the stretches of its long records; itself where none is long."""
-    settings = suited_to(problem.rig, settings)
     if _is_whole(problem.cases, settings):
         return problem
+    settings = suited_to(problem.rig, settings)
     thinner = replace(problem, cases=tuple(as_often_as_commands(c) for c in problem.cases))
     if _is_whole(thinner.cases, settings):
         return thinner
@@ -69,9 +69,9 @@ def slowest_decay(rig: Rig) -> float:
 
 def spread_over(case: Case, rig: Rig, settings: DiagnosisSettings) -> Case:
     """Return a case of a rig on slots that are spread evenly over it; itself where it is not long."""
-    settings = suited_to(rig, settings)
     if _is_whole([case], settings):
         return case
+    settings = suited_to(rig, settings)
     thinner = as_often_as_commands(case)
     (room,) = rooms([thinner], settings)
     return on_slots(thinner, spread_slots(slots_of(thinner, settings), room), settings)
