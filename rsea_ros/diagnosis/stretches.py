@@ -87,17 +87,20 @@ def stretches_of(used: Problem, nominal: Problem, settings: DiagnosisSettings) -
 
 
 def rooms(cases: Sequence[Case], settings: DiagnosisSettings) -> list[int]:
-    """Return how many slots of each case are used: one at least, all where there is room for them."""
+    """Return how many slots of each case are used, their run-ups paid: one at least, all of short records."""
     rule = settings.stretches
     seconds = sum(c.duration for c in cases)
     samples = sum(max(map(len, c.t.values())) for c in cases)
     share = min(1.0, rule.enough / max(seconds, 1e-300), rule.samples / samples)
-    return [_slots_in(c, share * c.duration, settings) for c in cases]
+    if share == 1.0:
+        return [slots_of(c, settings) for c in cases]
+    paid = ((share * c.duration + rule.run_up) / (slot_length(c, settings) + rule.run_up) for c in cases)
+    return [max(1, int(n)) for n in paid]
 
 
 def slots_of(case: Case, settings: DiagnosisSettings) -> int:
-    """Return how many slots a case has."""
-    return _slots_in(case, case.duration, settings)
+    """Return how many slots a case has, one at least."""
+    return max(1, int(case.duration / slot_length(case, settings) + _ROUNDING))
 
 
 def spread_slots(slots: int, count: int) -> IntArray:
@@ -164,11 +167,6 @@ def _fitted_outputs(
     cases = tuple(on_slots(c, k, settings) for c, k in zip(problem.cases, slots, strict=True))
     model = fit_candidate(FitSetup(cases, settings, run), replace(problem, cases=cases))
     return problem.outputs(model.solution.theta)
-
-
-def _slots_in(case: Case, seconds: float, settings: DiagnosisSettings) -> int:
-    """Return how many slots of a case fit into a time, one at least."""
-    return max(1, int(seconds / slot_length(case, settings) + _ROUNDING))
 
 
 def _is_whole(cases: Sequence[Case], settings: DiagnosisSettings) -> bool:

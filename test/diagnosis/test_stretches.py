@@ -31,8 +31,8 @@ from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import MEASURED, Channel
 
 RATE = 280.0
-SHORT = DiagnosisSettings(stretches=StretchSettings(enough=32.0, blocks=8, run_up=1.0))
-"""Four slots of 8 s, a quarter of a record of 128 s."""
+SHORT = DiagnosisSettings(stretches=StretchSettings(enough=35.0, blocks=8, run_up=1.0))
+"""Four slots of 8 s with three run-ups, a quarter of a record of 128 s."""
 RIG = load_rig("paper_high_impedance")
 
 
@@ -133,7 +133,7 @@ def test_several_records_share_the_time_by_their_lengths(drifting):
 
 def test_a_fast_record_is_used_for_a_shorter_time(drifting):
     _, case = drifting
-    few = replace(SHORT, stretches=replace(SHORT.stretches, samples=round(16.0 * RATE)))
+    few = replace(SHORT, stretches=replace(SHORT.stretches, samples=round(18.0 * RATE)))
     (used,) = in_stretches(problem_of(case), few, serial).cases
     assert simulated_time(used, few) == pytest.approx(16.0, abs=0.1)
 
@@ -143,8 +143,8 @@ def test_a_swinging_load_has_run_ups_in_which_it_forgets_its_start():
     rig = load_rig("two_moving_outputs")
     assert slowest_decay(rig) == pytest.approx(7.28, rel=1e-2)
     assert suited_to(RIG, DiagnosisSettings()).stretches.run_up == 4.0
-    suited = suited_to(rig, replace(SHORT, stretches=replace(SHORT.stretches, enough=96.0)))
-    assert suited.stretches.run_up == pytest.approx(6.0 * 7.28, rel=1e-2)
+    suited = suited_to(rig, replace(SHORT, stretches=replace(SHORT.stretches, enough=160.0)))
+    assert suited.stretches.run_up == pytest.approx(4.0 * 7.28, rel=1e-2)
     case = case_from(record_of(command(256.0), rig), rig)
     (cut,) = in_stretches(problem_of(case, rig), suited, serial).cases
     (out,) = problem_of(cut, rig).outputs(np.zeros(0))

@@ -55,7 +55,7 @@ class StretchSettings:
     """The stretches of a long record to which models are fitted and on which they are tested."""
 
     enough: float = number(
-        160.0, "s", "data of all records that are used; the rest of longer ones is left out",
+        200.0, "s", "of all records that are simulated, run-ups included; longer records are cut",
         "10 min at 280 Hz are diagnosed within a minute; more data narrow an interval by half at most",
     )  # fmt: skip
     samples: int = number(
@@ -69,8 +69,8 @@ class StretchSettings:
         4.0, "s", "simulated and not compared before a stretch, at least", "friction and play settle in it"
     )
     decays: float = number(
-        6.0, "1", "time constants of the rig's slowest motion that a run-up lasts at least",
-        "of a swing of a tenth of a radian less is left than the noise of an encoder; slots are as long",
+        4.0, "1", "time constants of the rig's slowest motion that a run-up lasts at least",
+        "after 3 a sound rig with two swinging ends is at its floor; slots are as long, and so are fewer",
     )  # fmt: skip
 
 
