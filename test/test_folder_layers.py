@@ -12,7 +12,7 @@ DIAGNOSIS = (
     {"result", "data_split", "coherence", "screening"},
     {"score", "problem_variants", "residual_analysis", "initial_guess"},
     {"candidate", "criteria", "next_experiment"},
-    {"selection", "step_fits"},
+    {"selection", "step_fits", "stretches"},
     {"forward_step", "backward_elimination", "evaluation"},
     {"stepwise", "naming"},
     {"diagnose"},

@@ -71,22 +71,23 @@ def short_pieces_of(
     """
     rule, blocks = settings.pieces, settings.blocks
     fit = part(case, TRAIN, blocks)
-    thinner = _as_often_as_commands(fit)
+    thinner = as_often_as_commands(fit)
     drive = thinner.drive
     if not isinstance(drive, Drive) or drive.duration < 2.0 * rule.enough:
         return (thinner,)
     length = 2.0 * block_length(case, blocks)
-    starts = train_starts(case, blocks)[1:]
+    pairs = train_starts(case, blocks)[1:]
+    starts = pairs[[_is_covered(drive, t - rule.run_up, t + length) for t in pairs]]
     half = round(0.5 * rule.enough / length)
     spread = np.unique(np.linspace(0, len(starts) - 1, 2 * half + 1).round().astype(int)[1::2])
-    misfit = np.array([_misfit(fit, outputs, float(t), length) for t in starts])
+    misfit = np.array([misfit_between(fit, outputs, float(t), length) for t in starts])
     misfit[spread] = -1.0
     worst = np.argsort(misfit)[len(spread) - 2 * half :]
     chosen = starts[np.sort(np.concatenate([spread, worst]))]
     return tuple(_piece(thinner, drive, float(t), float(t) + length, rule.run_up) for t in chosen)
 
 
-def _as_often_as_commands(case: Case) -> Case:
+def as_often_as_commands(case: Case) -> Case:
     """Return a case with every k-th sample of a channel that has k or more to a command.
 
     A response to a command shows at the command's rate; more samples add only noise at several times the
@@ -117,7 +118,13 @@ def _samples_in(period: float, t: FloatArray) -> int:
     return max(1, int(period / max(between, 1e-3 * period) + _ROUNDING))
 
 
-def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float, length: float) -> float:
+def _is_covered(drive: Drive, begin: float, end: float) -> bool:
+    """Return whether one span of a drive holds all from one time since its start to another, s."""
+    spans = [(first * drive.step, last * drive.step) for first, last in drive.spans]
+    return not spans or any(first <= begin and end <= last for first, last in spans)
+
+
+def misfit_between(case: Case, outputs: Mapping[str, FloatArray], begin: float, length: float) -> float:
     """Return the power of a residual in a piece, each channel over its power in all, summed."""
     total = 0.0
     for n in case.measured.keys() & outputs.keys():
@@ -142,10 +149,11 @@ def _piece(case: Case, drive: Drive, begin: float, end: float, run_up: float) ->
         impulse={n: drive.impulse[n][keep] for n, keep in inside.items()},
         reference=drive.reference[first:last],
         angle=drive.angle[first:last],
-        initial=_state_at(case, start),
+        initial=state_at(case, start),
         origin=drive.origin + first * drive.step,
         whole=drive.drift_time,
         restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last),
+        spans=(),
     )
     return replace(
         case,
@@ -156,7 +164,7 @@ def _piece(case: Case, drive: Drive, begin: float, end: float, run_up: float) ->
     )
 
 
-def _state_at(case: Case, t: float) -> tuple[float, float]:
+def state_at(case: Case, t: float) -> tuple[float, float]:
     """Return measured position (rad) and velocity (rad/s) at a time."""
     position, velocity = (
         float(np.interp(t, case.t[n], case.measured[n])) if n in case.measured else 0.0

@@ -19,6 +19,7 @@ from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
+from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import torque_scale
@@ -64,10 +65,13 @@ def diagnose(
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
     examined = Examined(records, checked, tested, rig)
     with worker_pools() as pools:
-        selection, stages = search(nominal, checked[0].record, tested, pools, tell, settings)
+        tell("choosing stretches", 0.0)
+        used = in_stretches(nominal, settings, pools.run)
+        selection, stages = search(used, checked[0].record, tested, pools, tell, settings)
         tell("weighing the causes", 0.97)
         result = conclude(selection, stages, examined, pools, settings)
-    return replace(result, remarks=(*remarks, *torque_scale(nominal), *result.remarks))
+    cut = stretches_of(used, nominal, settings)
+    return replace(result, remarks=(*remarks, *cut, *torque_scale(nominal), *result.remarks))
 
 
 def nominal_problem(checked: Sequence[Checked], rig: Rig) -> Problem:

@@ -11,7 +11,8 @@ from rsea_ros.diagnosis.candidate import Candidate, FitSetup, fit_candidate
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
 from rsea_ros.diagnosis.score import Score, score, score_on
 from rsea_ros.diagnosis.selection import Selection
-from rsea_ros.diagnosis.settings import BlockSettings, DiagnosisSettings
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.stretches import spread_over
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import Case, Problem, case_from, simulated
 from rsea_ros.identification.solver import Solution
@@ -65,31 +66,32 @@ class Evaluated:
 class HeldOut:
     """The data that test models: the test blocks of the cases, or a record in their place.
 
-    nominal: the rig without causes, by which the record is prepared. rule: how records are cut into blocks.
+    nominal: the rig without causes, by which the record is prepared. settings: how records are cut.
     """
 
     cases: tuple[Case, ...]
     nominal: Rig
     record: Checked | None
-    rule: BlockSettings
+    settings: DiagnosisSettings
 
     @cached_property
     def _case(self) -> Case | None:
         if self.record is None:
             return None
         case = case_from(self.record.record, self.nominal, self.record.masked)
-        return replace(case, noise=self.cases[0].noise)
+        return spread_over(replace(case, noise=self.cases[0].noise), self.nominal, self.settings)
 
     def score(
         self, problem: Problem, theta: FloatArray, outputs: list[dict[str, FloatArray]] | None = None
     ) -> Score:
         """Return the score of a model. outputs: its channels on the cases, where simulated already."""
+        rule = self.settings.blocks
         if self.record is None or (case := self._case) is None:
             everything = replace(problem, cases=self.cases)
-            return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta), self.rule)
+            return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta), rule)
         rig, offsets = apply(problem.rig, problem.unknowns, theta)
         phased = in_phase(rig, self.record.record)
-        return score(problem, (case,), simulated((case,), phased, offsets, ride=problem.ride), self.rule)
+        return score(problem, (case,), simulated((case,), phased, offsets, ride=problem.ride), rule)
 
     def score_of(self, model: Candidate) -> Score:
         """Return the score of a model that is fitted and simulated on the cases."""
@@ -98,8 +100,7 @@ class HeldOut:
 
 def held_out_of(selection: Selection, record: Checked | None) -> HeldOut:
     """Return the data that test the models of a selection. record: replaces the test blocks."""
-    rule = selection.last.settings.blocks
-    return HeldOut(selection.cases, selection.models[0].problem.rig, record, rule)
+    return HeldOut(selection.cases, selection.models[0].problem.rig, record, selection.last.settings)
 
 
 def evaluate(

@@ -14,6 +14,7 @@ from scipy import signal
 
 from rsea_ros.diagnosis.residual_peaks import (
     angle_errors,
+    on_even_clock,
     peaks,
     refined,
     residual_of,
@@ -146,6 +147,8 @@ class RecordView:
         """Return the highest peaks of a residual's spectrum, Hz. is_sharp: as sharp as the record is long."""
         t, residual = self.case.t[channel], residual_of(self.case, self.outputs, channel)
         rate = 1.0 / float(np.median(np.diff(t)))
+        if is_sharp and isinstance(self.case.drive, Drive) and self.case.drive.spans:
+            residual = on_even_clock(t, residual, rate)
         if is_sharp:
             bins, level = signal.periodogram(residual, rate, window="hann")
             apart = max(3, int(_SHARP_APART / (bins[1] - bins[0])))

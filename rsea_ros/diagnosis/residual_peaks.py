@@ -125,6 +125,14 @@ def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> 
     return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
 
 
+def on_even_clock(t: FloatArray, values: FloatArray, rate: float) -> FloatArray:
+    """Return values at a rate (Hz) from the first stamp to the last, zero where none is near."""
+    place = np.rint((t - t[0]) * rate).astype(np.int64)
+    even = np.zeros(place[-1] + 1)
+    even[place] = values
+    return even
+
+
 def peaks(level: FloatArray, apart: int) -> list[int]:
     """Return the places of the largest values that are more than a number of bins apart."""
     level, largest = level.copy(), []

@@ -28,6 +28,7 @@ _SLIDES = 12.0  # in creep velocities: 1 - tanh(12) = 8e-11
 _TURNS = 3.0  # in creep velocities: below it the motion may reverse, and its speed is not linear in time
 _STRAIGHT = 0.3  # friction's own change of speed times the whole: below it the speed goes nearly straight
 _PARTS = 4  # of a step in which it does not
+_SHRINKS = 0.9  # of Newton's last change: larger ones come from swinging about the knee of tanh
 
 
 @njit(inline="always")
@@ -60,16 +61,22 @@ def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
-    """Return the mean of tanh over the path from start to end = free - gain * mean."""
+    """Return the mean of tanh over the path from start to end = free - gain * mean.
+
+    Where Newton's step leaves the bracket, or swings between both sides of the knee of tanh, rest comes next.
+    """
     low, high, fade = free - abs(gain), free + abs(gain), math.exp(-2.0 * abs(start))
-    end = free - gain * math.copysign((1.0 - fade) / (1.0 + fade), start)
+    end, last = free - gain * math.copysign((1.0 - fade) / (1.0 + fade), start), math.inf
     for _ in range(40):
         mean, slope = mean_tanh(start, end, fade)
         change = (end + gain * mean - free) / (1.0 + gain * slope)
         if abs(change) < 1e-3:
             break
         low, high = (low, end) if change > 0.0 else (end, high)
-        end = end - change if low < end - change < high else 0.5 * (low + high)
+        if low < end - change < high and abs(change) < _SHRINKS * last:
+            end, last = end - change, abs(change)
+        else:
+            end, last = 0.0 if low < 0.0 < high else 0.5 * (low + high), math.inf
     return mean - slope * change
 
 

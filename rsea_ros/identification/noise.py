@@ -10,13 +10,14 @@ residual.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from rsea_ros.identification.quantum import step_of
 from rsea_ros.identification.spectra import segment_spectra
 from rsea_ros.model.rig import Sensor
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.signals import BoolArray, Channel, ComplexArray, FloatArray, IntArray, Record
 
 _TINY = 1e-300
 TOP_OF_BAND = (0.62, 0.98)
@@ -62,10 +63,22 @@ def least_noise(values: FloatArray, sensor: Sensor) -> float:
     return max(stated, coarse, _ROUNDING * float(np.std(values)), _TINY)
 
 
-def top_of_band(values: FloatArray) -> tuple[float, bool]:
-    """Return the RMS of white noise as high as the top of the band of values, and whether that is flat."""
-    power = np.mean(np.abs(segment_spectra(values, _LONGEST, _SEGMENTS)) ** 2, axis=0)
+def top_of_band(values: FloatArray, seams: Sequence[int] | IntArray = ()) -> tuple[float, bool]:
+    """Return the RMS of white noise as high as the top of the band of values, and whether that is flat.
+
+    seams: samples before which values are missing. A jump there would pass for noise.
+    """
+    spectra = segment_spectra(values, _LONGEST, _SEGMENTS)
+    power = np.mean(np.abs(spectra[_seamless(spectra, seams)]) ** 2, axis=0)
     return math.sqrt(float(np.median(power[_top(power)]))), _is_flat(power)
+
+
+def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray) -> BoolArray:
+    """Return which of half-overlapping segments have no seam inside; all where each has one."""
+    half = spectra.shape[1] - 1
+    first = half * np.arange(len(spectra))
+    whole = np.searchsorted(seams, first, side="right") == np.searchsorted(seams, first + 2 * half)
+    return whole if whole.any() else np.ones(len(spectra), bool)
 
 
 def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:

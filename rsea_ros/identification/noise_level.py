@@ -16,7 +16,7 @@ from rsea_ros.identification.coloured import is_noise, residual_of
 from rsea_ros.identification.noise import top_of_band
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import FloatArray, IntArray
 
 ABOVE = 1.04
 """RMS of a residual over the noise, above which it is asked whether all of it is noise."""
@@ -42,7 +42,7 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     rms = {n: float(np.sqrt(np.mean(left[n][case.mask[n]] ** 2))) for n in channels}
     noise = dict(case.noise)
     for n in channels:
-        white, is_white = top_of_band(left[n])
+        white, is_white = top_of_band(left[n], _seams(case, n))
         seen = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
         noise[n] = max(min(noise[n], seen), case.least.get(n, 0.0))
     above = [n for n in channels if rms[n] > ABOVE * noise[n]]
@@ -52,6 +52,15 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     for n in above:
         noise[n] = rms[n] * (1.0 + 2.0 * _doubt(case, left[n], n) if n in coloured else 1.0)
     return replace(case, noise=noise, coloured=coloured)
+
+
+def _seams(case: Case, channel: str) -> IntArray:
+    """Return the samples of a channel with which a span of a record begins, but for the first."""
+    drive = case.drive
+    if not isinstance(drive, Drive):
+        return np.empty(0, np.int64)
+    ends = [drive.start + drive.step * end for _, end in drive.spans[:-1]]
+    return np.searchsorted(case.t[channel], ends)
 
 
 def _surely_above(case: Case, channel: str) -> float:

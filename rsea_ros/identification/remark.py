@@ -21,6 +21,7 @@ Code = Literal[
     "on_measured_angle",
     "coloured_noise",
     "off_rig",
+    "stretches",
 ]
 """What a remark says.
 
@@ -37,6 +38,7 @@ coherence_lost: of a channel with the command, above a frequency (Hz).
 on_measured_angle: an effect was simulated on the measured rotor angle.
 coloured_noise: of channels, taken from the residual.
 off_rig: the rig states a value, the data another (that, 95 % interval), so many of its stated spreads away.
+stretches: of long records so many s were used, of so many.
 """
 
 

@@ -43,7 +43,9 @@ class Drive:
     initial: position (rad) and velocity (rad/s) at the start. hold: steps in a command period.
     origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
     `duration` when the drive is a piece of one. jumps: the command is held, not a line between its stamps.
-    restarts: where it begins anew, behind gaps of the whole record.
+    restarts: where it begins anew, behind gaps of the whole record and with each span.
+    spans: first step and end of the parts that are simulated, in time; empty for all of it. No channel is
+    wanted elsewhere.
     """
 
     step: float
@@ -59,6 +61,12 @@ class Drive:
     whole: float = math.nan
     jumps: bool = True
     restarts: tuple[Restart, ...] = ()
+    spans: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def simulated(self) -> tuple[tuple[int, int], ...]:
+        """First step and end of each part that is simulated."""
+        return self.spans or ((0, len(self.command)),)
 
     @cached_property
     def kinks(self) -> FloatArray:
@@ -174,6 +182,7 @@ def coarser(drive: Drive) -> Drive:
         angle=drive.angle[1:steps:2],
         hold=drive.hold // 2,
         restarts=tuple((k // 2, state) for k, state in drive.restarts),
+        spans=tuple((first // 2, end // 2) for first, end in drive.spans),
     )
 
 

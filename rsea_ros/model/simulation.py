@@ -5,6 +5,7 @@ Fixed step, deterministic; the same compiled step (step.py) serves both.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -98,25 +99,41 @@ def simulate_drives(rig: Rig, drives: Sequence[Drive], *, ride: bool = False) ->
 def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, FloatArray]:
     """Return the channels of a drive at their sampling instants, from its own beginning."""
     ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
-    out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
-    torque, reference = drive.command, drive.reference
-    if rig.loop is not None:
-        torque, reference = np.zeros(len(drive.command)), drive.command
-    begins = [(0, drive.initial), *(r for r in drive.restarts if 0 < r[0] < len(torque))]
-    ends = [*(k for k, _ in begins[1:]), len(torque)]
-    for (k, state), end in zip(begins, ends, strict=True):
-        machine.begin(state)
-        out[k] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
-        span = slice(k, end)
-        run(machine, torque[span], out[k + 1 : end + 1], start=drive.origin + k * drive.step,
-            reference=reference[span], ridden=ridden[span])  # fmt: skip
-        out[k, 2] = out[k + 1, 2]
     channels = [n for n in drive.at if rig.measures(n)]
     at = {n: _instants(rig, drive, n) for n in channels}
-    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.kinks) for n in channels}
+    sampled = {n: np.empty(len(at[n])) for n in channels}
+    spans = drive.simulated
+    edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
+    for k, (first, end) in enumerate(spans):
+        out = _over_span(machine, rig, drive, ridden, first, end)
+        for n in channels:
+            inside = np.searchsorted(edges, at[n]) == k if edges else slice(None)
+            values, kinks = out[:, OUTPUTS.index(n)], drive.kinks[first:end]
+            sampled[n][inside] = sample(n, values, at[n][inside] - first, kinks)
     for n in drive.impulsive.intersection(channels):
         sampled[n] += _kick(machine, n) * drive.impulse[n]
     return sampled
+
+
+def _over_span(
+    machine: Machine, rig: Rig, drive: Drive, ridden: FloatArray, first: int, end: int
+) -> FloatArray:
+    """Return OUTPUTS at the ends of the steps of a span, those at its beginning first."""
+    out = np.empty((end - first + 1, len(OUTPUTS)))
+    torque, reference = drive.command, drive.reference
+    if rig.loop is not None:
+        torque, reference = np.zeros(len(drive.command)), drive.command
+    anew = [r for r in drive.restarts if r[0] > 0 and first <= r[0] < end]
+    begins = [*([(first, drive.initial)] if first == 0 else []), *anew]
+    ends = [*(k for k, _ in begins[1:]), end]
+    for (k, state), stop in zip(begins, ends, strict=True):
+        machine.begin(state)
+        start = k - first
+        out[start] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
+        run(machine, torque[k:stop], out[start + 1 : stop - first + 1], start=drive.origin + k * drive.step,
+            reference=reference[k:stop], ridden=ridden[k:stop])  # fmt: skip
+        out[start, 2] = out[start + 1, 2]
+    return out
 
 
 def _instants(rig: Rig, drive: Drive, channel: str) -> FloatArray:

@@ -120,6 +120,14 @@ def _off_rig(remark: Remark) -> str:
     )
 
 
+def _stretches(remark: Remark) -> str:
+    used, whole = remark.values
+    return (
+        f"Models were fitted and tested on {used:.0f} s of the {whole:.0f} s recorded: on stretches spread "
+        "evenly, and on those that the nominal model simulates worst. The data were checked in full."
+    )
+
+
 _WORDS: Mapping[Code, Callable[[Remark], str]] = {
     "even_clocks": _even_clocks,
     "clocks_taken_as_right": _clocks_taken_as_right,
@@ -136,4 +144,5 @@ _WORDS: Mapping[Code, Callable[[Remark], str]] = {
     "on_measured_angle": lambda remark: _ON_MEASURED_ANGLE,
     "coloured_noise": lambda remark: coloured_noise(remark.names),
     "off_rig": _off_rig,
+    "stretches": _stretches,
 }

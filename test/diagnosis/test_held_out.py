@@ -28,9 +28,9 @@ def checked(stiffer=1.0, seed=1):
 def test_a_held_out_record_takes_the_place_of_the_test_blocks():
     nominal = nominal_problem([checked()], RIG)
     theta = start_vector(nominal.unknowns)
-    on_blocks = HeldOut(nominal.cases, RIG, None, DEFAULT.blocks).score(nominal, theta)
-    alike = HeldOut(nominal.cases, RIG, checked(seed=2), DEFAULT.blocks).score(nominal, theta)
-    stiffer = HeldOut(nominal.cases, RIG, checked(1.05, seed=2), DEFAULT.blocks).score(nominal, theta)
+    on_blocks = HeldOut(nominal.cases, RIG, None, DEFAULT).score(nominal, theta)
+    alike = HeldOut(nominal.cases, RIG, checked(seed=2), DEFAULT).score(nominal, theta)
+    stiffer = HeldOut(nominal.cases, RIG, checked(1.05, seed=2), DEFAULT).score(nominal, theta)
     assert on_blocks.ratio("position") == pytest.approx(1.0, abs=0.1)
     assert alike.ratio("position") == pytest.approx(1.0, abs=0.1)
     assert stiffer.ratio("position") > 5.0
@@ -40,6 +40,6 @@ def test_a_held_out_record_takes_the_place_of_the_test_blocks():
 def test_a_simulation_of_the_cases_is_reused_for_their_test_blocks():
     nominal = nominal_problem([checked()], RIG)
     theta = start_vector(nominal.unknowns)
-    held_out = HeldOut(nominal.cases, RIG, None, DEFAULT.blocks)
+    held_out = HeldOut(nominal.cases, RIG, None, DEFAULT)
     again = held_out.score(nominal, theta, nominal.outputs(theta))
     assert again.sums["ft"] == pytest.approx(held_out.score(nominal, theta).sums["ft"])

@@ -10,8 +10,9 @@ the command, one in the spring also shows in the F/T sensor, and a sensor's own 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -53,8 +54,10 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: ContributionR
     if not responses:
         return None
     matrix = np.column_stack([*responses, rows.others])
+    del responses  # of a long record they are as large as the matrix
     size = np.sqrt(np.sum(matrix**2, axis=0))
-    matrix = matrix[:, size > 0.0] / size[size > 0.0]
+    matrix = matrix[:, size > 0.0]
+    matrix /= size[size > 0.0]
     fits = ~rows.tests
     normal = matrix[fits].T @ matrix[fits] + _RIDGE * np.eye(matrix.shape[1])
     weights = np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
@@ -81,15 +84,24 @@ def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[Floa
     if any(s is None for s in signals):
         return []
     parts = [
-        _spline(s, effect, _hold(c)) for s, c in zip(signals, problem.cases, strict=True) if s is not None
+        _spline(s, effect, _hold(c), _spans(c, s))
+        for s, c in zip(signals, problem.cases, strict=True)
+        if s is not None
     ]
     zero = problem.residual_of(base)
-    moved = ([_with_part(problem, theta, base, effect, [p[k] for p in parts])] for k in range(len(parts[0])))
-    return [problem.residual_of(m[0]) - zero for m in moved]
+    made = ([make() for make in alike] for alike in zip(*parts, strict=False))
+    return [problem.residual_of(_with_part(problem, theta, base, effect, p)) - zero for p in made]
 
 
 def _hold(case: Case) -> int:
     return case.drive.hold if isinstance(case.drive, Drive) else 1
+
+
+def _spans(case: Case, signal: FloatArray) -> Sequence[tuple[int, int]]:
+    """Return the parts of a signal that are simulated: all of one at the samples of a channel."""
+    drive = case.drive
+    on_steps = isinstance(drive, Drive) and len(signal) == len(drive.command)
+    return drive.simulated if isinstance(drive, Drive) and on_steps else ((0, len(signal)),)
 
 
 def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArray | None:
@@ -113,17 +125,32 @@ def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArra
     return np.asarray(np.interp(middles, case.t[read], out[read]))
 
 
-def _spline(signal: FloatArray, effect: Effect, hold: int) -> list[FloatArray]:
-    """Return the parts of the spline along a signal: hats over its size for either sign, or its past."""
+def _spline(
+    signal: FloatArray, effect: Effect, hold: int, spans: Sequence[tuple[int, int]]
+) -> list[Callable[[], FloatArray]]:
+    """Return what makes each part of the spline along a signal: hats over its size, by sign, or its past.
+
+    spans: parts of the signal that count. One part of a long record is large: all at once are too many.
+    """
     if effect.main.unit in ("s", "Hz") and effect.port in (st.Port.COMMAND, st.Port.SENSOR):
         step = hold if effect.port is st.Port.COMMAND else 1
-        return [np.concatenate([np.full(k * step, signal[0]), signal[: -k * step]]) - signal for k in _LAGS]
+        return [partial(_since, signal, k * step) for k in _LAGS]
     size = np.abs(signal)
-    knots = np.unique(np.quantile(size, _KNOTS))
+    knots = np.unique(np.quantile(np.concatenate([size[a:b] for a, b in spans]), _KNOTS))
     if len(knots) < 2:
         return []
-    hats = [np.interp(size, knots, np.eye(len(knots))[k]) for k in range(len(knots))]
-    return [hat * side for side in (signal > 0.0, signal < 0.0) for hat in hats]
+    return [partial(_hat, signal, side, knots, k) for side in (1.0, -1.0) for k in range(len(knots))]
+
+
+def _since(signal: FloatArray, samples: int) -> FloatArray:
+    """Return what a signal was some samples ago, less what it is."""
+    return np.concatenate([np.full(samples, signal[0]), signal[:-samples]]) - signal
+
+
+def _hat(signal: FloatArray, side: float, knots: FloatArray, k: int) -> FloatArray:
+    """Return the hat at a knot over the size of a signal where its sign is that of `side`, zero elsewhere."""
+    hat = np.interp(np.abs(signal), knots, np.eye(len(knots))[k])
+    return np.asarray(hat * (side * signal > 0.0))
 
 
 def _with_part(

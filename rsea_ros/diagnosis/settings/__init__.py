@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 
 from rsea_ros.diagnosis.settings.cause_names import EvidenceSettings, NamingSettings, SizeSettings
-from rsea_ros.diagnosis.settings.data import BlockSettings, FloorSettings, PieceSettings
+from rsea_ros.diagnosis.settings.data import BlockSettings, FloorSettings, PieceSettings, StretchSettings
 from rsea_ros.diagnosis.settings.next_run import NextRunSettings
 from rsea_ros.diagnosis.settings.number import Setting
 from rsea_ros.diagnosis.settings.search import AcceptanceSettings, FitSettings, ForwardSettings
@@ -33,6 +33,7 @@ __all__ = [
     "PieceSettings",
     "Setting",
     "SizeSettings",
+    "StretchSettings",
 ]
 
 
@@ -52,6 +53,7 @@ class DiagnosisSettings:
     floor: FloorSettings = field(default_factory=FloorSettings)
     acceptance: AcceptanceSettings = field(default_factory=AcceptanceSettings)
     fits: FitSettings = field(default_factory=FitSettings)
+    stretches: StretchSettings = field(default_factory=StretchSettings)
     pieces: PieceSettings = field(default_factory=PieceSettings)
     forward: ForwardSettings = field(default_factory=ForwardSettings)
     evidence: EvidenceSettings = field(default_factory=EvidenceSettings)

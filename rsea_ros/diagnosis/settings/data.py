@@ -51,6 +51,30 @@ class PieceSettings:
 
 
 @dataclass(frozen=True)
+class StretchSettings:
+    """The stretches of a long record to which models are fitted and on which they are tested."""
+
+    enough: float = number(
+        200.0, "s", "of all records that are simulated, run-ups included; longer records are cut",
+        "10 min at 280 Hz are diagnosed within a minute; more data narrow an interval by half at most",
+    )  # fmt: skip
+    samples: int = number(
+        170_000, "1", "samples of the fastest channel that are used, at one per command",
+        "160 s at 1 kHz and a little are diagnosed within 1.5 GB",
+    )  # fmt: skip
+    blocks: int = number(
+        16, "1", "blocks in a row at least, a multiple of four", "every one holds all sets in their shares"
+    )
+    run_up: float = number(
+        4.0, "s", "simulated and not compared before a stretch, at least", "friction and play settle in it"
+    )
+    decays: float = number(
+        4.0, "1", "time constants of the rig's slowest motion that a run-up lasts at least",
+        "after 3 a sound rig with two swinging ends is at its floor; slots are as long, and so are fewer",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class FloorSettings:
     """Levels of a residual: RMS over the noise of its channel."""
 

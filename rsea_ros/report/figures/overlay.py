@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,8 @@ _MEASURED, _RESIDUAL = 1.0 / 2000.0, 1.0 / 64.0
 """Steps of the drawn values, of their standard deviation: an eighth of a pixel, also of a tenfold zoom."""
 _MICROSECOND = 1e-6
 _FIRST_VIEW = 6.0
+_PAUSE, _PERIODS = 1.0, 10.0
+"""s, and sample periods: a longer pause of the samples shows as a gap of the line."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,14 @@ def overlay_figure(
     """Return the figure of one channel. t: s."""
     keep = sampled(measured, measured - simulations[-1].values)
     unit = words.unit(UNITS[channel])
+    pauses = pauses_of(t[keep])
+    shown = measured[keep]
+    shown[list(pauses)] = np.nan
     extra = {
-        "t": packed(t[keep] - t[0], _MICROSECOND),
-        "measured": {"colour": MEASURED, "y": packed(measured[keep], _fineness(measured, _MEASURED))},
-        "residuals": [_residual(s, (measured - s.values)[keep]) for s in simulations],
+        "t": packed(without(pauses, t[keep] - t[0]), _MICROSECOND),
+        "pauses": list(pauses.items()),
+        "measured": {"colour": MEASURED, "y": packed(shown, _fineness(measured, _MEASURED))},
+        "residuals": [_residual(s, shown - s.values[keep]) for s in simulations],
         "unit": unit,
     }
     return Figure(
@@ -58,6 +64,24 @@ def overlay_figure(
         kind="overlay",
         extra=extra,
     )
+
+
+def pauses_of(t: FloatArray) -> dict[int, float]:
+    """Return the length (s) of each pause of the samples by the number of the sample behind it.
+
+    That sample is not drawn, so that no line crosses a pause.
+    """
+    steps = np.diff(t)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    behind = np.flatnonzero(steps > max(_PAUSE, _PERIODS * usual))
+    return {int(k) + 1: float(steps[k]) for k in behind}
+
+
+def without(pauses: Mapping[int, float], t: FloatArray) -> FloatArray:
+    """Return stamps less the pauses before them: those of ten minutes' stretches lie on no line to pack."""
+    lost = np.zeros(len(t))
+    lost[list(pauses)] = list(pauses.values())
+    return np.asarray(t - np.cumsum(lost))
 
 
 def _residual(simulated: Simulated, values: FloatArray) -> Json:

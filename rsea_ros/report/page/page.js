@@ -29,6 +29,7 @@ function coarse(t, y, from, to) {
   for (let i = from; i < to; i += block) {
     let low = i, high = i;
     for (let k = i; k < Math.min(i + block, to); k++) {
+      if (Number.isNaN(y[k])) { low = high = k; break; }
       if (y[k] < y[low]) low = k;
       if (y[k] > y[high]) high = k;
     }
@@ -43,10 +44,16 @@ function below(t, value) {
   return low;
 }
 
-async function traces({ t, measured, residuals }) {
+/* Stamps with the pauses that report/figures/overlay.py has taken out of them. */
+function paused(t, pauses) {
+  for (const [k, seconds] of pauses) for (let i = k; i < t.length; i++) t[i] += seconds;
+  return t;
+}
+
+async function traces({ t, pauses, measured, residuals }) {
   const y = await unpacked(measured.y);
   const off = await Promise.all(residuals.map((r) => unpacked(r.y)));
-  return { t: await unpacked(t), all: [
+  return { t: paused(await unpacked(t), pauses), all: [
     { name: "measured", colour: measured.colour, y, axis: "y" },
     ...residuals.map((r, i) => ({ name: r.name, colour: r.colour, axis: "y", y: y.map((v, k) => v - off[i][k]) })),
     ...residuals.map((r, i) => ({ name: "residual, " + r.name, colour: r.colour, axis: "y2", y: off[i] })),

@@ -11,7 +11,14 @@ import pytest
 from rsea_ros.identification.result import Identification
 from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import Figure
-from rsea_ros.report.figures.overlay import MOST_SAMPLES, Simulated, overlay_figure, sampled
+from rsea_ros.report.figures.overlay import (
+    MOST_SAMPLES,
+    Simulated,
+    overlay_figure,
+    pauses_of,
+    sampled,
+    without,
+)
 from rsea_ros.report.figures.palette import AFTER, BEFORE
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
 from rsea_ros.report.figures.thinned import thinned
@@ -87,3 +94,16 @@ def test_the_overlay_shows_two_simulations() -> None:
     figure = overlay_figure("Before and after", "ft", t, np.sin(t), simulations)
     assert [r["name"] for r in figure.extra["residuals"]] == ["before", "after"]
     as_json(figure)
+
+
+def test_a_pause_of_the_samples_is_not_drawn_and_keeps_its_length() -> None:
+    """Between two stretches of a long record lies a minute without a sample."""
+    t = np.concatenate([np.arange(300) / 280.0, 60.0 + np.arange(300) / 280.0])
+    assert pauses_of(np.array([0.0, 2.0, 4.0, 8.0])) == {}
+    ((at, seconds),) = pauses_of(t).items()
+    assert (at, seconds) == (300, pytest.approx(60.0 - 299.0 / 280.0))
+    joined = np.diff(without({at: seconds}, t))[298:301]
+    np.testing.assert_allclose(joined, [1.0 / 280.0, 0.0, 1.0 / 280.0], atol=1e-12)
+    figure = overlay_figure("Paused", "ft", t, np.sin(t), [Simulated("simulated", BEFORE, 0.9 * np.sin(t))])
+    assert figure.extra["pauses"] == [(at, seconds)]
+    assert figure.extra["t"]["step"] < 2e-6
