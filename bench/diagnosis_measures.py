@@ -63,6 +63,15 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
         _at_least(
             "unexplained, effect removed from the catalogue, %", _right(groups.get("taken_out", ())), 90.0
         ),
+        _at_least(
+            "no name confirmed, effect outside the catalogue or removed, %",
+            [
+                "confirmed" not in o.statuses and not o.error
+                for g in ("off_catalogue", "taken_out")
+                for o in groups.get(g, ())
+            ],
+            95.0,
+        ),
         _at_least("unexplained, effect that is not searched, %", _right(groups.get("unsearched", ())), 90.0),
         _at_least("fault found and cause right, faulty data, %", _right(groups.get("faulty", ())), 90.0),
         _at_most("main parameter, median error, %", [100.0 * f.error for f in found], 3.0),
