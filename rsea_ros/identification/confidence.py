@@ -123,7 +123,7 @@ def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, flo
     return unknown.outer(coordinate - Z95 * sd), unknown.outer(coordinate + Z95 * sd)
 
 
-def undetermined(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[Remark, ...]:
+def undetermined_remarks(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[Remark, ...]:
     """Return remarks on values that the data cannot determine.
 
     The eigenvectors of the data's information, in units of the prior, whose information is less than the

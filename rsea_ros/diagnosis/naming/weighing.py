@@ -58,7 +58,7 @@ def weigh(
     """Weigh every accepted cause and its rivals, and one more that surely helps where the floor is far."""
     accepted = len(stages)
     if not is_at_floor(stages[-1].test, settings.floor):
-        selection, stages = promoted(selection, stages, held_out, pools, settings)
+        selection, stages = promote_best(selection, stages, held_out, pools, settings)
     contested = contests(selection, stages, held_out, pools, settings.floor.far)
     claims = [c for contest in contested for c in (contest.cause, *contest.rivals)]
     weigh_claim = partial(evidence_for, cases=selection.cases, settings=settings, run=pools.run)
@@ -75,7 +75,7 @@ def weigh(
     return Weighing(selection, list(stages), places)
 
 
-def promoted(
+def promote_best(
     selection: Selection,
     stages: Sequence[Evaluated],
     held_out: HeldOut,
