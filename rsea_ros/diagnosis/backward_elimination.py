@@ -59,7 +59,7 @@ class ReducedModels:
     def with_rivals(
         self, model: Candidate, trials: Sequence[Trial] = ()
     ) -> list[tuple[str, str, Candidate]]:
-        """Return cause, another effect that it is said to be confused with, and the model with that.
+        """Return a cause, one of its listed look-alikes, and the model with the look-alike.
 
         The other is simpler, or as simple where the choice between them was made without the other causes
         and the model is near the floor: far from it priors say nothing.
@@ -130,7 +130,7 @@ def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
 
 
 def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
-    """Put in a cause's place one that it is said to be confused with, if that is simpler or likelier."""
+    """Replace a cause by one of its listed look-alikes, if that is simpler or likelier."""
     last = selection.last
     for name, rival, other in models.with_rivals(last, selection.trials):
         if models.is_needed(last, other):

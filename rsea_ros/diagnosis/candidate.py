@@ -165,7 +165,7 @@ def is_at_bound(solution: Solution, name: str, near: float) -> bool:
 
 
 def is_within_clocks(solution: Solution, name: str) -> bool:
-    """Return whether an effect is a time that a clock's error may make, which no record tells from zero."""
+    """Return whether an effect is a time that an error of a clock can imitate: no record excludes zero."""
     unknown, at = _main(solution, name)
     error = Z95 * min(solution.problem.rig.clock_doubt(n) for n in solution.problem.channels)
     return unknown.unit == "s" and abs(unknown.outer(at) - effect_named(name).main.null) < error

@@ -98,7 +98,7 @@ def missing_torque(
 def _along(
     motion: Motion, case: Case, outputs: Mapping[str, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the angles of a measured motion (rad), and the torque that its motor did not need there, N m."""
+    """Return the angles of a measured motion (rad), and the torque that its motor did not need, N m."""
     keep = case.mask["motor_torque"]
     return motion.q[keep], (outputs["motor_torque"] - case.measured["motor_torque"])[keep]
 

@@ -1,7 +1,7 @@
 """Screening: every effect of the catalogue tried on the residual, cheaply and generously.
 
 From each initial guess one simulation and one derivative for each of the effect's parameters; the nominal
-values move along with the derivatives that they already have. Two such steps show what a full fit would gain.
+values change too, by the derivatives that are already known. Two such steps show what a full fit would gain.
 A mode is too sharp for that, and so is a guess that moves the nominal values: these need new derivatives, and
 more steps.
 """

@@ -119,7 +119,7 @@ class StepFits:
         return [s for s, is_sure in zip(left_out, helps, strict=True) if is_sure]
 
     def nearly_as_good(self, left_out: Sequence[ScreenedEffect], chosen: Candidate) -> list[ScreenedEffect]:
-        """Return those of the effects left out that bring nearly what the chosen one brings.
+        """Return those of the effects left out that remove nearly as much as the chosen one.
 
         On the validation blocks, as fitted so far. In a part of the band many laws are one; which of them was
         fitted on is then chance.
@@ -159,7 +159,7 @@ class StepFits:
         return replace(screened, theta=solution.theta, cost=solution.cost)
 
     def _fit_all(self, screened: ScreenedEffect) -> Candidate:
-        self.say(f"fitting {screened.name} on everything", 0.8)
+        self.say(f"fitting {screened.name} to all training blocks", 0.8)
         present, fits = self.present, self.settings.fits
         setup = FitSetup(
             present.cases, self.settings, self.pools.run, present.validation, iterations=fits.full_iterations,
@@ -215,7 +215,7 @@ class StepFits:
 
 
 def _rough(effect: Effect) -> Effect:
-    """Return an effect whose parameters with a prior stay there: from afar they lead a fit astray."""
+    """Return an effect whose parameters with a prior stay at it: from afar they lead a fit astray."""
     held = tuple(p.name for p in effect.parameters if math.isfinite(p.spread))
     return replace(effect, idle=lambda rig: held) if held else effect
 

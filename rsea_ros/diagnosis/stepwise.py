@@ -6,7 +6,7 @@ Models are fitted to the training blocks and chosen on the validation blocks; th
 Where no effect helps any more, a cause's place is offered to the more detailed effects that it may be
 confused with. The first causes were chosen while the others still hid in the residual: a hardening
 spring stands in for a stop, Coulomb friction for Stribeck's. Beside the causes that came later the right one
-does better.
+fits better.
 """
 
 from __future__ import annotations

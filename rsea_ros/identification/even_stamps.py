@@ -36,7 +36,7 @@ _TINY = 1e-30
 
 @dataclass(frozen=True)
 class Evened:
-    """Records on the even clock where it is right, and the RMS scatter of stamps there, s by channel."""
+    """Records on the even clock where that is right, and the RMS scatter of its stamps, s by channel."""
 
     records: tuple[Record, ...]
     scatter: Mapping[str, float]

@@ -72,7 +72,7 @@ class Motion:
 
 
 def is_inverse(rig: Rig) -> bool:
-    """Return whether a rig is judged by torque: neither spring nor position loop holds it, so it drifts."""
+    """Return whether a rig is compared by torque: neither spring nor position loop holds it, so it drifts."""
     return rig.rigid_spring and rig.loop is None
 
 

@@ -123,7 +123,7 @@ def _with_close_ones_fitted(
 def _fit_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Trial:
     """Return a trial fitted as the models that are tested: the steps of the search stop far earlier.
 
-    Where laws are nearly the same a fit is long: the values of one make up for what the other does.
+    Nearly equal laws need long fits: the values of one compensate for the other.
     """
     settings = selection.last.settings
     blocks, gain = (*TRAIN, *VALIDATION), settings.fits.final_gain

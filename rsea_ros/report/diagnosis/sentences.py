@@ -80,7 +80,7 @@ def evidence(cause: Cause) -> str:
 
 
 def next_run(experiment: Experiment) -> str:
-    """Return what a run would decide, or why none is recommended, as one sentence without its full stop."""
+    """Return the question that a run would decide, or why none is recommended, without a full stop."""
     rivals = f"{experiment.cause} and {listed(experiment.rivals)}"
     alike = f"{rivals} do as well on these data"
     if experiment.reason == "other_amplitude":
