@@ -40,5 +40,8 @@ def test_only_what_is_masked_is_called_masked():
     assert "masked" not in faults(DISORDER)
     sentence = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, DISORDER)
     assert sentence.endswith(" The data have faults: out of order in position, velocity and motor_torque.")
+    missing = [Fault("missing_topic", name, 1.0) for name in ("velocity", "position", "velocity")]
+    lacking = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, missing)
+    assert lacking.endswith(" The data have faults: velocity and position missing.")
     both = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, [*DISORDER, NAN])
     assert both.endswith(" Samples were masked: nan in ft.")
