@@ -101,7 +101,7 @@ def propose(
 
 
 def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
-    """Return which pairs no shape tried separates either way, in the longest run, shape (k, k)."""
+    """Return which pairs no tried shape separates in the longest run, in either direction, shape (k, k)."""
     stack, asked = np.array(tables), rater.asked
     apart = np.eye(len(rater.hypotheses), dtype=bool)
     for a, b in combinations(range(len(apart)), 2):
@@ -117,7 +117,7 @@ def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[Float
 def _per_second(
     rater: ShapeRater, table: FloatArray, apart: BoolArray, asked: DesignRequest
 ) -> list[tuple[float, float]]:
-    """Return the share that a shape decides per second, and the length, for several lengths of the run."""
+    """Return the share of cases that a shape decides per second, and the length, for several run lengths."""
     lengths = np.geomspace(asked.shortest, asked.longest, 7)
     scaled = [(decided(table * s / asked.probe, rater.probability, apart), float(s)) for s in lengths]
     return [(share / (_PER_RUN + s), s) for share, s in scaled]

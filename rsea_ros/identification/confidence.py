@@ -91,7 +91,7 @@ def inverse_of(matrix: FloatArray) -> FloatArray:
 
 
 def _alike(case: Case) -> float:
-    """Return how many samples of a case equal one independent sample: a filter correlates them."""
+    """Return how many samples of a case count as one independent sample: a filter correlates them."""
     drive = case.drive
     return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
 

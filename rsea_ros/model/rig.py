@@ -178,7 +178,7 @@ class Rig:
         return not (self.rigid_spring and channel in ("ft", "deflection"))
 
     def zero_unknown(self, channel: str) -> bool:
-        """Return whether a channel's sensor has another zero in every record."""
+        """Return whether the zero of a channel's sensor differs from record to record."""
         return channel in self.sensors and self.sensors[channel].zero_unknown
 
     def clock(self, channel: str, since: FloatArray | float = 0.0) -> FloatArray | float:

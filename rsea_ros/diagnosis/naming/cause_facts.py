@@ -88,7 +88,7 @@ def size_of(effect: str, last: Evaluated, rule: SizeSettings) -> CauseParameter:
 
 
 def is_known(size: CauseParameter, rule: SizeSettings) -> bool:
-    """Return whether a size is known: its interval has one sign, and its ends are not far from each other."""
+    """Return whether a size is known: its interval has one sign, and its ends are not far apart."""
     low, high = sorted(map(abs, size.ci95))
     return size.ci95[0] * size.ci95[1] > 0.0 and high < rule.widest * low
 

@@ -63,7 +63,7 @@ def contests(
 
 
 def beside(selection: Selection, model: Candidate) -> list[Trial]:
-    """Return the trials beside a model that were fitted to everything, each effect's last."""
+    """Return the trials beside a model that were fitted to all training blocks, the last of each effect."""
     full = {t.name: t for t in selection.trials if t.is_full and t.beside.causes == model.causes}
     return list(full.values())
 

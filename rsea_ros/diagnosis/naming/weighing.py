@@ -32,7 +32,7 @@ class Weighed:
 
 @dataclass(frozen=True)
 class CauseAndRivals:
-    """A cause and its rivals, each with its evidence. is_late: the steps of the search had left it out."""
+    """A cause and its rivals, each with its evidence. is_late: the search had left it out."""
 
     cause: Weighed
     rivals: tuple[Weighed, ...]
