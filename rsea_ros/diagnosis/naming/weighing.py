@@ -1,8 +1,8 @@
 """Weighing: the evidence for every accepted cause and its rivals, and for one more that surely helps.
 
 A step of the search requires that the residual of some channel falls by `acceptance.fall`, and by more far
-from the floor. Where several small effects overlap, none may gain that much. An effect that nevertheless surely
-helps on unused blocks is promoted to a cause to be weighed.
+from the floor. Where several small effects overlap, none may gain that much. An effect that nevertheless
+surely helps on unused blocks is promoted to a cause to be weighed.
 """
 
 from __future__ import annotations
