@@ -130,10 +130,10 @@ def brier(causes: Sequence[Said]) -> float:
 def table(causes: Sequence[Said]) -> list[str]:
     """Return the score of the probabilities as lines of Markdown."""
     lines = [f"{len(causes)} causes and rivals weighed, Brier score {brier(causes):.3f}", ""]
-    lines += ["| probability said | causes | mean said | right |", "|---|--:|--:|--:|"]
+    lines += ["| stated probability | causes | mean stated | right |", "|---|--:|--:|--:|"]
     for b in reliability(causes):
         lines.append(f"| {b.low:.2f} to {b.high:.2f} | {b.count} | {b.said:.2f} | {b.right:.2f} |")
-    lines += ["", "| status | causes | right | wrong | wrong, % | of these, law not in the catalogue |"]
+    lines += ["", "| status | causes | right | wrong | wrong, % | of the wrong, law not in the catalogue |"]
     lines += ["|---|--:|--:|--:|--:|--:|"]
     return [*lines, *(_status_line(causes, status) for status in ("confirmed", "leading", "one_of", None))]
 
@@ -149,7 +149,7 @@ def _status_line(causes: Sequence[Said], status: str | None) -> str:
 
 
 def diagram(bins: Sequence[Bin]) -> str:
-    """Return the reliability diagram as SVG: share that is right over probability said, size by count."""
+    """Return the reliability diagram as SVG: share that is right over stated probability, size by count."""
     size, edge = 320.0, 40.0
     at = [(edge + size * b.said, edge + size * (1.0 - b.right)) for b in bins]
     dots = "".join(
@@ -168,6 +168,7 @@ def diagram(bins: Sequence[Bin]) -> str:
         f'font-size="12"><rect width="{whole:g}" height="{whole:g}" fill="#fff"/>'
         f'<rect x="{edge:g}" y="{edge:g}" width="{size:g}" height="{size:g}" fill="none" stroke="#999"/>'
         f'<path d="M{edge:g} {edge + size:g}L{edge + size:g} {edge:g}" stroke="#999" stroke-dasharray="4 4"/>'
-        f'{marks}{dots}<text x="{edge + size / 2:g}" y="{whole - 8:g}" text-anchor="middle">probability said'
-        f'</text><text x="{edge:g}" y="{edge - 12:g}">share that is right; area by count</text></svg>\n'
+        f'{marks}{dots}<text x="{edge + size / 2:g}" y="{whole - 8:g}" text-anchor="middle">'
+        f'stated probability</text>'
+        f'<text x="{edge:g}" y="{edge - 12:g}">share that is right; area by count</text></svg>\n'
     )

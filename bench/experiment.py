@@ -42,7 +42,7 @@ from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, u
 from rsea_ros.experiment.run_shape import at_rest_around  # noqa: E402
 from rsea_ros.experiment.weighed_causes import USUAL  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
-from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramped  # noqa: E402
+from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramp_ends  # noqa: E402
 from rsea_ros.identification.workers import worker_pools  # noqa: E402
 from rsea_ros.model.rig_file import load_rig, save_rig  # noqa: E402
 from rsea_ros.model.simulation import synthesize  # noqa: E402
@@ -100,7 +100,7 @@ class Fixed:
         size = max(self._shortest, self._at)
         piece = self._command[self._at : self._at + size]
         self._at += len(piece)
-        return _Played(ramped(piece, min(round(0.25 * RATE), len(piece) // 4)))
+        return _Played(ramp_ends(piece, min(round(0.25 * RATE), len(piece) // 4)))
 
 
 class _Played:

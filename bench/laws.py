@@ -30,7 +30,7 @@ from rsea_ros.diagnosis.score import Score, score
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lent
 from rsea_ros.identification.fit import fit
-from rsea_ros.identification.problem import simulated
+from rsea_ros.identification.problem import simulate_cases
 from rsea_ros.laws.fitting import gain_of
 from rsea_ros.laws.learn import learn
 from rsea_ros.laws.result import LawResult
@@ -132,7 +132,7 @@ def _score(fitted: tuple[Rig, object], fresh: Record, rig: Rig) -> Score:
     """Return the score on all of a fresh record."""
     model, clocks = fitted
     problem = nominal_problem([check(fresh, rig)], rig)
-    outputs = simulated(problem.cases, model, clocks)  # type: ignore[arg-type]
+    outputs = simulate_cases(problem.cases, model, clocks)  # type: ignore[arg-type]
     return score(replace(problem, rig=rig), problem.cases, outputs, DEFAULT.blocks)
 
 

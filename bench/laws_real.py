@@ -3,7 +3,7 @@
     .venv/bin/python bench/laws_real.py emps --out out/laws-real      a diagnosis, then a law on its model
     .venv/bin/python bench/laws_real.py --table --out out/laws-real    the machines that are done, as a table
 
-Data: ../shared/realdata, beside the repository; its README has origins and licences.
+Data: ../shared/realdata, beside the repository; origins and licences: CONTRIBUTING.md.
 """
 
 from __future__ import annotations

@@ -170,10 +170,10 @@ def restless(rig: Rig) -> tuple[float, float]:
     for top in np.arange(10.0, 120.0, 8.0):
         torque = flat(count, rate, float(top), rng)
         other = np.fft.irfft(np.fft.rfft(torque) * inverse, count)
-        judge = ErrorFlag(rig)
+        flag = ErrorFlag(rig)
         pairs = zip(torque.tolist(), other.tolist(), strict=True)
         said = [
-            judge.take(k / rate, TorqueEstimate(d, p, 0.0, 0.01, 0.01, 0.01))
+            flag.take(k / rate, TorqueEstimate(d, p, 0.0, 0.01, 0.01, 0.01))
             for k, (d, p) in enumerate(pairs)
         ]
         worst = max(worst, (np.count_nonzero(np.diff(said[1000:])) / 59.0, float(top)))

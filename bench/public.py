@@ -3,7 +3,7 @@
     .venv/bin/python -m bench.public            the table, with seconds
     .venv/bin/python -m bench.public --write    into docs/public.md too
 
-Data: ../shared/realdata, beside the repository; its README has origins and licences.
+Data: ../shared/realdata, beside the repository; download and licences: nonlinearbenchmark.org.
 """
 
 from __future__ import annotations

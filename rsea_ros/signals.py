@@ -43,9 +43,9 @@ reference     target position of a controller that was active during the record
 """
 
 SENSED = ("ft", "deflection", "position", "velocity")
-"""Channels that judge a model, in the order in which verdicts speak of them."""
+"""Channels that a verdict uses, in the order in which it names them."""
 MEASURED = (*SENSED, "motor_torque")
-"""All channels that a fit sees: the motor torque only echoes the command, and judges where no other can."""
+"""All channels that a fit sees. The motor torque repeats the command: a verdict uses it as the only one."""
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def _with_even_clocks(record: Record, findings: Findings) -> Record:
 
 
 def _repaired(record: Record) -> Record:
-    """Return the record as the check saw it, whose faults it has reported."""
+    """Return the record as the check used it, with its reported faults repaired."""
     for repair in (without_mixed_rows, without_held_samples, behind_the_edge):
         record, _ = repair(record)
     return record

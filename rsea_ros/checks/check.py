@@ -157,7 +157,7 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
 
 
 def _with_drifts(findings: list[Finding], drifts: list[Finding]) -> list[Finding]:
-    """Return the findings with drifts that were followed from second to second in place of the fit's."""
+    """Return the findings with drifts estimated second by second in place of those of the fit."""
     followed = {f.channel for f in drifts}
     fitted = [f for f in findings if f.kind == "clock_drift" and f.channel in followed]
     vague = [f for f in findings if drifts and f.kind == "clock_offset" and not f.channel]

@@ -100,7 +100,7 @@ def _without(record: Record, names: Collection[str]) -> Record:
 
 
 def missing(record: Record, rig: Rig) -> tuple[str, ...]:
-    """Return the channels that the rig's sensors would give and the record has not."""
+    """Return the channels of the rig's sensors that the record lacks."""
     return tuple(n for n in rig.sensors if n not in record)
 
 

@@ -173,7 +173,7 @@ def _oddness(readings: Mapping[str, ChannelCorrection]) -> tuple[int, float]:
 
 
 def _named(channel: str, sign: float, gain: float, rig: Rig) -> ChannelCorrection:
-    """Return the reading with the factor that comes nearest to a gain, none for a gain that is allowed."""
+    """Return the reading whose factor is nearest to a gain; without a factor for an allowed gain."""
     if abs(gain) < ALLOWED:
         return ChannelCorrection(channel, sign, None, gain)
     known = sorted(factors(channel, rig), key=lambda f: abs(math.log(f.value) - gain))

@@ -32,9 +32,9 @@ class MotionBeside(NamedTuple):
 
 
 def witness_of(record: Record, name: str, but: Collection[str] = ()) -> str | None:
-    """Return the channel that says best whether another had something to measure, None without any.
+    """Return the channel that shows best whether another had something to measure, None for none.
 
-    but: channels that are not to be trusted.
+    but: channels that cannot be trusted.
     """
     able = (n for n in WITNESSES.get(name, ()) if n in record and n not in but and _is_witness(record[n]))
     return next(able, None)

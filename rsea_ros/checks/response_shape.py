@@ -147,14 +147,14 @@ class ShapeFit:
         return slope
 
     def phase_cost(self, channel: str, sign: float) -> float:
-        """Return how badly the best delay of a channel explains its phases under a sign."""
+        """Return the cost of the phases of a channel at its best delay, for a sign."""
         of = self._of == self.channels.index(channel)
         return float(np.min(self._phase_costs(of, np.full(len(of), sign))))
 
     def _delays(self, sign: FloatArray) -> FloatArray:
-        """Return for each channel the delay of a coarse grid that turns its phases least, s.
+        """Return for each channel the delay on a coarse grid that leaves its phases smallest, s.
 
-        Phases wrap: a fit that began far off would stop in another minimum.
+        Phases wrap: a fit that starts far off would stop in another minimum.
         """
         trial = np.zeros(len(self.channels))
         for k in range(len(trial)):

@@ -13,7 +13,7 @@ from rsea_ros.checks.gain_findings import RIGHT_RIG
 from rsea_ros.checks.linearised_rig import LinearisedFit
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.estimates import parameters_of
-from rsea_ros.identification.misfit import reweighted
+from rsea_ros.identification.misfit import reweight
 from rsea_ros.identification.off_rig import FAR, off_rig
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import ParameterEstimate
@@ -30,7 +30,7 @@ def value_findings(linear: LinearisedFit, rig: Rig) -> list[Finding]:
     unknowns = unknowns_of_rig(rig)
     if not unknowns:
         return []
-    cases = tuple(reweighted(case, linear.misfit) for case in linear.problem.cases)
+    cases = tuple(reweight(case, linear.misfit) for case in linear.problem.cases)
     problem = replace(linear.problem, cases=cases, unknowns=unknowns)
     solution = solve(problem, linear.theta, iterations=_STEPS)
     if not math.isfinite(solution.cost):

@@ -54,15 +54,15 @@ def _finding(name: str, number: int, centred: bool, period: float) -> Finding:
 
 def _average_of(name: str, related: Mapping[str, Quotient], period: float) -> tuple[int, bool]:
     """Return over how many samples a channel was averaged beside any other, and whether without a lag."""
-    own = related[name]
+    smoothed = related[name]
     for other in (related[n] for n in SENSED if n in related and n != name):
-        if not np.array_equal(own.frequency, other.frequency):
+        if not np.array_equal(smoothed.frequency, other.frequency):
             continue
-        keep = usable(own) & usable(other)
+        keep = usable(smoothed) & usable(other)
         if np.count_nonzero(keep) < _FEWEST:
             continue
-        response, sd = own.value / other.value, np.hypot(own.sd, other.sd)
-        number, centred = _average(own.frequency[keep], response[keep], sd[keep], period)
+        response, sd = smoothed.value / other.value, np.hypot(smoothed.sd, other.sd)
+        number, centred = _average(smoothed.frequency[keep], response[keep], sd[keep], period)
         if number > 1:
             return number, centred
     return 1, False

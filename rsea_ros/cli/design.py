@@ -75,8 +75,8 @@ def _add_demand(parser: argparse.ArgumentParser, default: Requirement, name: str
 
 def run(args: argparse.Namespace) -> int:
     """Test the stiffness, find the stiffnesses that meet all demands, write the results."""
-    from rsea_ros.design.judge import judge, least_stiffness
     from rsea_ros.design.motor_gear_units import unit_named
+    from rsea_ros.design.spring_design import least_stiffness, spring_design
     from rsea_ros.design.tolerance import robust_stiffness
     from rsea_ros.report.design.json import design_json
     from rsea_ros.report.design.page import design_report
@@ -86,10 +86,10 @@ def run(args: argparse.Namespace) -> int:
     check_magnitude("stiffness", args.stiffness, "N m/rad")
     requirement, unit = _requirement(args), unit_named(args.unit, args.catalogue)
     unit = unit.with_train(args.train) if args.train else unit
-    asked = judge(requirement, unit, args.stiffness)
-    least = judge(requirement, unit, least_stiffness(requirement, unit))
+    asked = spring_design(requirement, unit, args.stiffness)
+    least = spring_design(requirement, unit, least_stiffness(requirement, unit))
     enough = robust_stiffness(requirement, unit)
-    robust = judge(requirement, unit, enough) if math.isfinite(enough) else None
+    robust = spring_design(requirement, unit, enough) if math.isfinite(enough) else None
     with NewFiles(place) as new:
         path = new.write(DESIGN_JSON, json_text(design_json(asked, least, robust)))
         report = new.write(REPORT, design_report(asked, least, robust))

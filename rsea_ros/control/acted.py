@@ -29,7 +29,7 @@ class Acted:
         self.start(0.0)
 
     def start(self, measured: float) -> None:
-        """Begin at a measured torque, N m, with what was learned."""
+        """Begin at a measured torque, N m, and keep what was learned."""
         self._last = measured
 
     def over_sample(self, measured: float, before: float, newest: float, *, sure: bool = True) -> float:

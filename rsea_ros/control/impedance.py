@@ -4,7 +4,7 @@
     T / w_d = H_T - P (a H_T + b H_w) / D
 
 w_d is the speed of the distal side, w that of the gear, a and b the law's actions, N and D as in loop.py. H
-is the bench without motor torque. A motor that stands still leaves the spring: Z_s = K_s / s + b_s.
+is the bench without motor torque. A motor at rest leaves the spring: Z_s = K_s / s + b_s.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from rsea_ros.signals import ComplexArray, FloatArray
 
 @dataclass(frozen=True)
 class OutputImpedance:
-    """N m s/rad at hz, shape (n,): under control, with the motor off, with the motor standing still."""
+    """N m s/rad at hz, shape (n,): under control, with the motor off, with the motor at rest."""
 
     hz: FloatArray
     controlled: ComplexArray

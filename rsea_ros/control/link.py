@@ -50,7 +50,7 @@ class LinkShare:
 
 
 class LinkMotion:
-    """Follows the link's speed beyond what the load does for the desired torque, one sample at a time."""
+    """Follows the link's speed that the desired torque does not explain, one sample at a time."""
 
     def __init__(self, law: FeedbackLaw, share: LinkShare, most: float = math.inf) -> None:
         """most: N m, the largest torque; an encoder that jumps must not make more."""

@@ -26,7 +26,7 @@ def actions(law: FeedbackLaw, hz: FloatArray) -> tuple[ComplexArray, ComplexArra
 
 
 def linked(law: FeedbackLaw, inertia: float, damping: float, corner: float, hz: FloatArray) -> ComplexArray:
-    """Return what the law makes of the link's angle (N m/rad), its one sample of delay included: link.py."""
+    """Return the law's response to the link's angle (N m/rad), with its delay of one sample (link.py)."""
     back, pole = 1.0 / z_of(law.period, hz), np.exp(-2.0 * np.pi * corner * law.period)
     rate = (1.0 - back) / law.period
     wanted = inertia * law.inertia * rate + 0.5 * damping * law.damping * (1.0 + back)

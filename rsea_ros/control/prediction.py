@@ -73,7 +73,7 @@ class Prediction:
         return along
 
     def _smoothed(self, desired: float, samples: int) -> FloatArray:
-        """Return the low pass of the desired torque at this sample, and where it goes from there."""
+        """Return the low pass of the desired torque at this sample, and its course from there on."""
         first, second = self._smooth
         path = np.empty(samples)
         for k in range(samples):

@@ -1,4 +1,4 @@
-"""What a torque controller is allowed and what it uses, beside its gains."""
+"""Limits and options of a torque controller, without its gains."""
 
 from __future__ import annotations
 

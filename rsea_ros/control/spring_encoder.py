@@ -91,7 +91,7 @@ class SpringEncoder:
         return rate
 
     def _trouble(self, r: SpringReading, off: float, step: float) -> str:
-        """Return in words what is wrong with a deflection; empty for nothing."""
+        """Return in words why a deflection is wrong; empty for a sound one."""
         if not math.isfinite(self._off):
             self._off = self._mean_off = off
         share = self._period / SLOW

@@ -1,7 +1,7 @@
 """What the controller makes of the simulated actuator: a table of trials, the worst case beside the nominal.
 
 All run one sample at a time on the simulated bench with the noise of its sensors, one sample of delay in it.
-The controller is told the rig with both ends clamped, whatever the bench has on them.
+The controller assumes a rig with both ends clamped, whatever load the bench has.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def corners(loads: Sequence[str], u: Uncertainty) -> list[BenchVariant]:
 
 
 def dense(loads: Sequence[str], u: Uncertainty, steps: int = 5) -> list[BenchVariant]:
-    """Return the set on a grid, for what is stated of a design."""
+    """Return the set on a grid, for the figures that a design states."""
     stiff, damp = (1.0 + part * np.linspace(-1.0, 1.0, steps) for part in (u.stiffness, u.damping))
     wire = product((0, u.samples), (0.0, 0.5 * u.delay, u.delay))
     grid = product(loads, stiff, damp, wire, (0.0, 0.5 * u.mode[2], u.mode[2]))
@@ -123,7 +123,7 @@ def family(
 
 
 def lags_of(case: BenchVariant, rate: float, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return what a case adds to the path from a command to the torque, and to the measured current."""
+    """Return the factors of a case on the path from command to torque, and on the measured current."""
     back = 1.0 / z_of(1.0 / rate, hz)
     path: ComplexArray = back**case.samples * np.exp(-2j * np.pi * hz * case.delay)
     current: ComplexArray = back ** (case.samples + int(case.delay * rate + 1e-9))
@@ -131,7 +131,7 @@ def lags_of(case: BenchVariant, rate: float, hz: FloatArray) -> tuple[ComplexArr
 
 
 def mode_of(mode: tuple[float, float, float], participation: float, hz: FloatArray) -> ComplexArray:
-    """Return what a mode of the F/T sensor's mount makes of the torque. mode: as Uncertainty has it."""
+    """Return the response of a mode of the F/T sensor's mount to the torque. mode: as Uncertainty has it."""
     s, w = 2j * np.pi * hz, 2.0 * np.pi * mode[0]
     factor: ComplexArray = 1.0 - participation * s * s / (s * s + 2.0 * mode[1] * w * s + w * w)
     return factor

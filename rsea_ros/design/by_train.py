@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.design.judge import judge, least_for_band, least_stiffness
 from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.design.requirement import Requirement
+from rsea_ros.design.spring_design import least_for_band, least_stiffness, spring_design
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.model.train import Train
 
@@ -43,7 +43,7 @@ def by_train(requirement: Requirement, unit: MotorGear, stiffness: float) -> tup
 
 
 def _with_train(r: Requirement, unit: MotorGear, stiffness: float) -> WithTrain:
-    design = judge(r, unit, stiffness)
+    design = spring_design(r, unit, stiffness)
     return WithTrain(
         train=unit.train,
         turns=unit.turns,

@@ -9,9 +9,9 @@ from types import MappingProxyType
 import numpy as np
 
 from rsea_ros.design import mechanism
-from rsea_ros.design.judge import SpringDesign, judge, least_stiffness
 from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.design.requirement import Requirement
+from rsea_ros.design.spring_design import SpringDesign, least_stiffness, spring_design
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.signals import FloatArray
 
@@ -77,11 +77,11 @@ def robust_stiffness(requirement: Requirement, unit: MotorGear, share: float = 0
     """
     low = least_stiffness(requirement, unit)
     high = 100.0 * low
-    if margins(judge(requirement, unit, high))[-1].share < share:
+    if margins(spring_design(requirement, unit, high))[-1].share < share:
         return float("inf")
     for _ in range(12):
         middle = float(np.sqrt(low * high))
-        met = margins(judge(requirement, unit, middle))[-1].share >= share
+        met = margins(spring_design(requirement, unit, middle))[-1].share >= share
         low, high = (low, middle) if met else (middle, high)
     return high
 

@@ -59,7 +59,7 @@ class ReducedModels:
     def with_rivals(
         self, model: Candidate, trials: Sequence[Trial] = ()
     ) -> list[tuple[str, str, Candidate]]:
-        """Return cause, another effect that it is said to be confused with, and the model with that.
+        """Return a cause, one of its listed look-alikes, and the model with the look-alike.
 
         The other is simpler, or as simple where the choice between them was made without the other causes
         and the model is near the floor: far from it priors say nothing.
@@ -101,7 +101,7 @@ class ReducedModels:
         rest, old = rests[name], effect_named(name).main
         solution = rest.solution
         same = {rival.main.name: model.solution.values[f"{name}.{old.name}"]}
-        guesses = [reached_by(t, rival) for t in trials if is_trial_of(t, rival.name, rest)][-1:]
+        guesses = [fitted_parameters(t, rival) for t in trials if is_trial_of(t, rival.name, rest)][-1:]
         if not guesses:
             rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
             guesses = initial_guesses(rival, RecordView(model.cases[0], rig, rest.outputs[0]))
@@ -130,7 +130,7 @@ def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
 
 
 def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
-    """Put in a cause's place one that it is said to be confused with, if that is simpler or likelier."""
+    """Replace a cause by one of its listed look-alikes, if that is simpler or likelier."""
     last = selection.last
     for name, rival, other in models.with_rivals(last, selection.trials):
         if models.is_needed(last, other):
@@ -142,7 +142,7 @@ def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
         if costs_priors_less(other, last, models.settings):
             trial = trial_of(last, name, without, "no_better_than_likelier", rival)
             swapped = _replaced(selection, other, trial)
-            equal = _ordered(last, [c for c in last.causes if c != name], name)
+            equal = _order_causes(last, [c for c in last.causes if c != name], name)
             rivals = {**selection.rivals, rival: (equal,)}
             return with_replacements(replace(swapped, rivals=rivals), models)
     return selection
@@ -165,7 +165,7 @@ def is_trial_of(trial: Trial, name: str, model: Candidate) -> bool:
     return trial.name == name and set(trial.beside.causes) == set(model.causes)
 
 
-def reached_by(trial: Trial, effect: Effect) -> Guess:
+def fitted_parameters(trial: Trial, effect: Effect) -> Guess:
     """Return the parameters of an effect that its trial reached; of a mode, the rig's values with them.
 
     Not those with a prior, which lies around where a fit begins.
@@ -183,12 +183,12 @@ def _in_order(models: list[Candidate]) -> list[Candidate]:
     known: tuple[str, ...] = ()
     for m in models:
         (newest,) = (name for name in m.causes if name not in known)
-        ordered.append(_ordered(m, known, newest))
+        ordered.append(_order_causes(m, known, newest))
         known = (*known, newest)
     return ordered
 
 
-def _ordered(model: Candidate, earlier: Sequence[str], newest: str) -> Candidate:
+def _order_causes(model: Candidate, earlier: Sequence[str], newest: str) -> Candidate:
     """Return a model with its causes in an order, after the effects that the rig states."""
     problem, order = model.problem, (*earlier, newest)
     stated = [name for name in problem.acting if name in problem.stated]

@@ -107,7 +107,7 @@ def fit_candidate(
     near: a solution on the same blocks, with other noise, whose derivatives the fit begins with.
     """
     masked = setup.masked(problem)
-    solution = setup.solve(masked, theta, None if near is None else _reweighted(near, masked))
+    solution = setup.solve(masked, theta, None if near is None else _reweight(near, masked))
     moved = with_common_clock_in_delay(solution)
     if moved is not None:
         solution = min(solution, setup.solve(masked, moved), key=lambda s: s.cost)
@@ -126,10 +126,10 @@ def with_noise_reestimated(model: Candidate) -> Candidate:
     """Return a candidate with the noise that its own residual shows, scored against that."""
     ratio = model.problem.rig["gear.ratio"]
     runs = zip(model.cases, model.outputs, strict=True)
-    return scored_against(model, tuple(reestimate_noise(c, out, ratio) for c, out in runs))
+    return rescore(model, tuple(reestimate_noise(c, out, ratio) for c, out in runs))
 
 
-def scored_against(model: Candidate, cases: tuple[Case, ...]) -> Candidate:
+def rescore(model: Candidate, cases: tuple[Case, ...]) -> Candidate:
     """Return a candidate with its score against the noise of other cases of the same records."""
     validation = score_on(model.problem, cases, VALIDATION, model.outputs, model.settings.blocks)
     return replace(model, cases=cases, validation=validation)
@@ -165,7 +165,7 @@ def is_at_bound(solution: Solution, name: str, near: float) -> bool:
 
 
 def is_within_clocks(solution: Solution, name: str) -> bool:
-    """Return whether an effect is a time that a clock's error may make, which no record tells from zero."""
+    """Return whether an effect is a time that an error of a clock can imitate: no record excludes zero."""
     unknown, at = _main(solution, name)
     error = Z95 * min(solution.problem.rig.clock_doubt(n) for n in solution.problem.channels)
     return unknown.unit == "s" and abs(unknown.outer(at) - effect_named(name).main.null) < error
@@ -184,7 +184,7 @@ def _distance(weights: Score | None, farthest: float) -> float:
     return min(max([1.0, *ratios]), farthest)
 
 
-def _reweighted(solution: Solution, problem: Problem) -> FloatArray:
+def _reweight(solution: Solution, problem: Problem) -> FloatArray:
     """Return the derivatives of a solution in units of the noise of another problem on the same samples."""
     new, old = (p.by_row(lambda case, n: case.noise[n]) for p in (problem, solution.problem))
     result: FloatArray = solution.jacobian * (old / new)[:, None]

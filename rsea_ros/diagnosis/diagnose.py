@@ -28,7 +28,7 @@ from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.remark import Remark
-from rsea_ros.identification.steady import steadied
+from rsea_ros.identification.steady import with_even_clocks
 from rsea_ros.identification.workers import Pools, worker_pools
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.position_loop import commanded
@@ -114,6 +114,6 @@ def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]
 
 def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:
     """Return records on the even clocks that their values agree with, and remarks on the changes."""
-    steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
+    steady = with_even_clocks([c.record for c in checked], [c.masked for c in checked], rig)
     records = zip(checked, steady.records, strict=True)
     return [replace(c, record=record) for c, record in records], steady.remarks

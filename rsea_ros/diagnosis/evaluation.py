@@ -14,7 +14,7 @@ from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stretches import spread_over
 from rsea_ros.identification.confidence import Confidence, confidence_of
-from rsea_ros.identification.problem import Case, Problem, case_from, simulated
+from rsea_ros.identification.problem import Case, Problem, case_from, simulate_cases
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.identification.workers import Pools
@@ -91,7 +91,7 @@ class HeldOut:
             return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta), rule)
         rig, offsets = apply(problem.rig, problem.unknowns, theta)
         phased = in_phase(rig, self.record.record)
-        return score(problem, (case,), simulated((case,), phased, offsets, ride=problem.ride), rule)
+        return score(problem, (case,), simulate_cases((case,), phased, offsets, ride=problem.ride), rule)
 
     def score_of(self, model: Candidate) -> Score:
         """Return the score of a model that is fitted and simulated on the cases."""

@@ -95,7 +95,7 @@ class ForwardStep:
     def _finalists(
         self, screened: Sequence[ScreenedEffect], close: Sequence[ScreenedEffect]
     ) -> list[ScreenedEffect]:
-        """Return the best on the pieces, and the effects that are said to be confused with the very best."""
+        """Return the best on the pieces, and the listed look-alikes of the very best."""
         rule, present = self.settings.forward, self.fits.on_pieces.cost
         if not close:
             return []
@@ -151,7 +151,7 @@ class ForwardStep:
 
 
 def _look_alikes(effect: Effect, effects: Sequence[Effect]) -> set[str]:
-    """Return the effects that one is said to be confused with, and no larger ones that say so of it."""
+    """Return the listed look-alikes of an effect, and those that list it and are no larger."""
     confusable, size = effect.claims.confusable_with, effect_size(effect.name)
     alike = look_alikes(effect.name, effects)
     return {e.name for e in alike if e.name in confusable or effect_size(e.name) <= size}

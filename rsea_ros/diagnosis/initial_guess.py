@@ -14,9 +14,9 @@ from scipy import signal
 
 from rsea_ros.diagnosis.residual_peaks import (
     angle_errors,
+    interpolate_peak,
     on_even_clock,
     peaks,
-    refined,
     residual_of,
     ripples,
     sine_at,
@@ -156,7 +156,7 @@ class RecordView:
             bins, level = signal.welch(residual, rate, nperseg=min(_SEGMENT, len(residual)))
             apart = _APART
         level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
-        return [refined(bins, level, k) for k in peaks(level, apart)]
+        return [interpolate_peak(bins, level, k) for k in peaks(level, apart)]
 
     def sine(self, channel: str, frequency: float) -> Guess:
         """Return amplitude and phase (rad) of the sine of a frequency (Hz) in a residual."""

@@ -111,10 +111,10 @@ def _model(solution: Solution) -> Rig:
 
 def _separation(rival: Solution, case: Case) -> float:
     """Return the residual of a rival fitted to the accepted model's motion, over the noise."""
-    return _left_over(replace(rival.problem, cases=(case,)), rival.theta)
+    return _remainder(replace(rival.problem, cases=(case,)), rival.theta)
 
 
-def _left_over(problem: Problem, theta: FloatArray) -> float:
+def _remainder(problem: Problem, theta: FloatArray) -> float:
     """Return the RMS of the worst channel's weighted residual after one linearised step of all unknowns."""
     outputs = problem.outputs(theta)
     residual = problem.residual_of(outputs)

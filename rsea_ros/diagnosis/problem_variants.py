@@ -72,7 +72,7 @@ def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Pr
 
 
 def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
-    """Return theta with the clock error shared by all sensors turned into delay of the command.
+    """Return theta with the clock error that all sensors share converted into a delay of the command.
 
     Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the
     rest in the clocks. None for a model without a delay.

@@ -29,7 +29,7 @@ def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) 
     keep = case.mask[channel]
     for respect in _respects(case, channel, rig):
         seen = respect._replace(values=respect.values[keep])
-        worst += _worst(_binned(seen, residual[keep], case.noise[channel], channel))
+        worst += _worst(_level_in_bins(seen, residual[keep], case.noise[channel], channel))
     return tuple(worst)
 
 
@@ -87,7 +87,7 @@ def _respects(case: Case, channel: str, rig: Rig) -> list[_Respect]:
     return [*respects, _Respect("time", "s", t - case.start, is_even=True)]
 
 
-def _binned(respect: _Respect, residual: FloatArray, noise: float, channel: str) -> list[Misfit]:
+def _level_in_bins(respect: _Respect, residual: FloatArray, noise: float, channel: str) -> list[Misfit]:
     """Return the residual's level in bins of equal width, or of equally many samples."""
     values = respect.values
     if len(values) < 4 * _BINS:

@@ -63,7 +63,7 @@ def _repeating(angle: FloatArray, values: FloatArray) -> list[dict[str, float]]:
     cycles, power = _periodogram(angle, values)
     seen = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
     power = np.where(seen & (cycles < _MOST), power, 0.0)
-    repeating = [refined(cycles, power, k) for k in peaks(power, apart=_APART)]
+    repeating = [interpolate_peak(cycles, power, k) for k in peaks(power, apart=_APART)]
     return [{"cycles_per_revolution": c, **sine_at(angle, values, c)} for c in repeating]
 
 
@@ -98,7 +98,7 @@ def missing_torque(
 def _along(
     motion: Motion, case: Case, outputs: Mapping[str, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the angles of a measured motion (rad), and the torque that its motor did not need there, N m."""
+    """Return the angles of a measured motion (rad), and the torque that its motor did not need, N m."""
     keep = case.mask["motor_torque"]
     return motion.q[keep], (outputs["motor_torque"] - case.measured["motor_torque"])[keep]
 
@@ -145,7 +145,7 @@ def peaks(level: FloatArray, apart: int) -> list[int]:
     return largest
 
 
-def refined(bins: FloatArray, level: FloatArray, k: int) -> float:
+def interpolate_peak(bins: FloatArray, level: FloatArray, k: int) -> float:
     """Return where between the bins a peak is, by a parabola through the logarithms."""
     if not 0 < k < len(level) - 1 or min(level[k - 1 : k + 2]) <= 0.0:
         return float(bins[k])

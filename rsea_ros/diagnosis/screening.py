@@ -1,7 +1,7 @@
 """Screening: every effect of the catalogue tried on the residual, cheaply and generously.
 
 From each initial guess one simulation and one derivative for each of the effect's parameters; the nominal
-values move along with the derivatives that they already have. Two such steps show what a full fit would gain.
+values change too, by the derivatives that are already known. Two such steps show what a full fit would gain.
 A mode is too sharp for that, and so is a guess that moves the nominal values: these need new derivatives, and
 more steps.
 """
@@ -17,7 +17,7 @@ import numpy as np
 from rsea_ros.diagnosis.settings import ForwardSettings
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.alternatives import extended
+from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns, power, solve
 from rsea_ros.identification.unknowns import start_vector
@@ -101,7 +101,7 @@ def _best_of(
     return None if best is None else replace(best, unsure=least)
 
 
-def fitted_on(screened: ScreenedEffect, rule: ForwardSettings) -> ScreenedEffect:
+def continue_fit(screened: ScreenedEffect, rule: ForwardSettings) -> ScreenedEffect:
     """Return the best of an effect's guesses after more steps of those that were unsure."""
     longer = [solve(s.problem, s.theta, iterations=rule.bent_steps) for s in screened.unsure]
     ends = [ScreenedEffect(screened.effect, s.problem, s.theta, s.cost) for s in longer]
@@ -120,7 +120,7 @@ def with_values(present: Solution, values: Mapping[str, float]) -> Solution:
 def _with_new_derivatives(
     present: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
 ) -> ScreenedEffect:
-    problem, theta = extended(present.problem, present.theta, effect, guess)
+    problem, theta = add_effect(present.problem, present.theta, effect, guess)
     solution = solve(problem, theta, iterations=rule.screening_steps)
     return ScreenedEffect(effect, solution.problem, solution.theta, solution.cost)
 
@@ -129,7 +129,7 @@ def _with_present_derivatives(
     present: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
 ) -> ScreenedEffect | None:
     """Return where two steps lead; None for an effect that shows in no channel, or that runs away."""
-    problem, theta = extended(present.problem, present.theta, effect, guess)
+    problem, theta = add_effect(present.problem, present.theta, effect, guess)
     residual = problem.residual(theta)
     if power(residual) == np.inf:
         return None

@@ -25,13 +25,13 @@ from rsea_ros.diagnosis.problem_variants import (
     without_clocks,
 )
 from rsea_ros.diagnosis.score import Score, score_on
-from rsea_ros.diagnosis.screening import ScreenedEffect, fitted_on, screen
+from rsea_ros.diagnosis.screening import ScreenedEffect, continue_fit, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
-from rsea_ros.identification.alternatives import extended
+from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, power, solve
 from rsea_ros.identification.unknowns import apply, idle, start_vector, unknowns_of_effect
@@ -94,13 +94,13 @@ class StepFits:
         screened = [s for s in self.pools.fits.map(tried, range(len(effects))) if s is not None]
         rule = self.settings.forward
         if all(s.cost > rule.clear * solution.cost for s in screened):
-            screened = list(self.pools.fits.map(lambda s: fitted_on(s, rule), screened))
+            screened = list(self.pools.fits.map(lambda s: continue_fit(s, rule), screened))
         return sorted(screened, key=lambda s: s.cost)
 
     def with_typical(self, effect: Effect) -> Solution:
         """Return the present model on the pieces with an effect of typical size, not fitted."""
         base = self.on_pieces
-        return solve(*extended(base.problem, base.theta, effect, dict(effect.typical)), iterations=0)
+        return solve(*add_effect(base.problem, base.theta, effect, dict(effect.typical)), iterations=0)
 
     def fit_pieces(self, screened: Iterable[ScreenedEffect]) -> list[ScreenedEffect]:
         """Fit screened effects to the short pieces."""
@@ -119,7 +119,7 @@ class StepFits:
         return [s for s, is_sure in zip(left_out, helps, strict=True) if is_sure]
 
     def nearly_as_good(self, left_out: Sequence[ScreenedEffect], chosen: Candidate) -> list[ScreenedEffect]:
-        """Return those of the effects left out that bring nearly what the chosen one brings.
+        """Return those of the effects left out that remove nearly as much as the chosen one.
 
         On the validation blocks, as fitted so far. In a part of the band many laws are one; which of them was
         fitted on is then chance.
@@ -150,7 +150,7 @@ class StepFits:
         theta = screened.theta
         if self.is_far:
             problem, theta = with_clocks(problem, theta, self.present.problem)
-        return _refined(problem, theta, screened.effect)
+        return _free_all_parameters(problem, theta, screened.effect)
 
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
         self.say(f"fitting {screened.name}", 0.5)
@@ -159,7 +159,7 @@ class StepFits:
         return replace(screened, theta=solution.theta, cost=solution.cost)
 
     def _fit_all(self, screened: ScreenedEffect) -> Candidate:
-        self.say(f"fitting {screened.name} on everything", 0.8)
+        self.say(f"fitting {screened.name} to all training blocks", 0.8)
         present, fits = self.present, self.settings.fits
         setup = FitSetup(
             present.cases, self.settings, self.pools.run, present.validation, iterations=fits.full_iterations,
@@ -215,12 +215,12 @@ class StepFits:
 
 
 def _rough(effect: Effect) -> Effect:
-    """Return an effect whose parameters with a prior stay there: from afar they lead a fit astray."""
+    """Return an effect whose parameters with a prior stay at it: from afar they lead a fit astray."""
     held = tuple(p.name for p in effect.parameters if math.isfinite(p.spread))
     return replace(effect, idle=lambda rig: held) if held else effect
 
 
-def _refined(problem: Problem, theta: FloatArray, effect: Effect) -> tuple[Problem, FloatArray]:
+def _free_all_parameters(problem: Problem, theta: FloatArray, effect: Effect) -> tuple[Problem, FloatArray]:
     """Return a problem with all parameters of a rough effect free that its rig has, and its theta."""
     known = {u.name for u in problem.unknowns} | idle(effect_named(effect.name), problem.rig)
     more = unknowns_of_effect(effect, effect.typical, known)

@@ -6,7 +6,7 @@ Models are fitted to the training blocks and chosen on the validation blocks; th
 Where no effect helps any more, a cause's place is offered to the more detailed effects that it may be
 confused with. The first causes were chosen while the others still hid in the residual: a hardening
 spring stands in for a stop, Coulomb friction for Stribeck's. Beside the causes that came later the right one
-does better.
+fits better.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rsea_ros.diagnosis.candidate import (
     fit_candidate,
     leaves_only_noise,
     refit,
-    scored_against,
+    rescore,
     with_noise_reestimated,
 )
 from rsea_ros.diagnosis.criteria import is_acceptable, is_far_from_floor
@@ -51,7 +51,7 @@ def select_stepwise(
     start: a rig whose values the first fit begins with.
     """
     setup = FitSetup(nominal.cases, settings, pools.run)
-    models = [_fitted_nominal(nominal, setup, start)]
+    models = [_fit_nominal(nominal, setup, start)]
     trials: list[Trial] = []
     rivals: dict[str, tuple[Candidate, ...]] = {}
     for number in range(settings.max_causes + settings.forward.replacements):
@@ -69,7 +69,7 @@ def select_stepwise(
         trials.append(trial_of(step.accepted, step.accepted.newest, present, "replaced"))
         models.append(refit(with_noise_reestimated(step.accepted), setup))
     cases = models[-1].cases
-    return Selection((*(scored_against(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)
+    return Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)
 
 
 def replacement_step(step: ForwardStep) -> StepResult:
@@ -90,7 +90,7 @@ def replacement_step(step: ForwardStep) -> StepResult:
     return NO_STEP
 
 
-def _fitted_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:
+def _fit_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:
     """Fit the nominal model, and again with the noise that its residual shows."""
     theta = vector_of(nominal.unknowns, start) if start else None
     first = fit_candidate(replace(setup, iterations=setup.settings.fits.first_iterations), nominal, theta)

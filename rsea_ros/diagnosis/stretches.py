@@ -38,7 +38,7 @@ def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Pro
     """Return a nominal problem on the stretches of its long records; itself where none is long."""
     if _is_whole(problem.cases, settings):
         return problem
-    settings = suited_to(problem.rig, settings)
+    settings = settings_for(problem.rig, settings)
     thinner = replace(problem, cases=tuple(as_often_as_commands(c) for c in problem.cases))
     if _is_whole(thinner.cases, settings):
         return thinner
@@ -52,7 +52,7 @@ def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Pro
     return replace(problem, cases=tuple(chosen))
 
 
-def suited_to(rig: Rig, settings: DiagnosisSettings) -> DiagnosisSettings:
+def settings_for(rig: Rig, settings: DiagnosisSettings) -> DiagnosisSettings:
     """Return settings with a run-up in which a rig forgets its start, and slots that are no shorter."""
     rule = settings.stretches
     run_up = max(rule.run_up, rule.decays * slowest_decay(rig))
@@ -71,7 +71,7 @@ def spread_over(case: Case, rig: Rig, settings: DiagnosisSettings) -> Case:
     """Return a case of a rig on slots that are spread evenly over it; itself where it is not long."""
     if _is_whole([case], settings):
         return case
-    settings = suited_to(rig, settings)
+    settings = settings_for(rig, settings)
     thinner = as_often_as_commands(case)
     (room,) = rooms([thinner], settings)
     return on_slots(thinner, spread_slots(slots_of(thinner, settings), room), settings)
@@ -81,7 +81,7 @@ def stretches_of(used: Problem, nominal: Problem, settings: DiagnosisSettings) -
     """Return the remark on how much of its records a problem uses; none where that is all."""
     if not any(isinstance(c.drive, Drive) and c.drive.spans for c in used.cases):
         return ()
-    suited = suited_to(nominal.rig, settings)
+    suited = settings_for(nominal.rig, settings)
     seconds = sum(simulated_time(c, suited) for c in used.cases)
     return (Remark("stretches", values=(seconds, sum(c.duration for c in nominal.cases)), unit="s"),)
 

@@ -41,7 +41,7 @@ def catalogue() -> Mapping[str, Effect]:
 
 @contextmanager
 def lent(*effects: Effect) -> Iterator[None]:
-    """Have effects that lie in no file of the catalogue known within the block, such as one just written."""
+    """Add effects without a file in the catalogue for the duration of a block, such as a law just learned."""
     before = dict(_LENT)
     _LENT.update({e.name: e for e in effects})
     try:
@@ -64,7 +64,7 @@ def effect_named(name: str) -> Effect:
 
 
 def look_alikes(name: str, effects: Iterable[Effect]) -> list[Effect]:
-    """Return those of some effects that are said to be confused with one, from either side."""
+    """Return the effects among some that list another as a look-alike, or that it lists."""
     confused = effect_named(name).claims.confusable_with
     return [e for e in effects if e.name in confused or name in e.claims.confusable_with]
 

@@ -1,7 +1,7 @@
 """The effect: a small change to one named signal of the nominal actuator.
 
 An effect is one file of this folder with one constant `EFFECT`. Its function is compiled on its own and
-called through its address, so the step is compiled once for all and a run pays only for what is on.
+called through its address, so the step is compiled only once and a run pays only for its active effects.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The equation of an effect stands once: in its file's docstring, as the first lines that are indented."""
+"""The equation of an effect is written once: the first indented lines of its file's docstring."""
 
 from __future__ import annotations
 

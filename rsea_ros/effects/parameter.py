@@ -21,7 +21,7 @@ class Parameter:
     reason: why these bounds, with the source where one is known.
     is_fixed: the same on every machine, although its unit scales with a machine's size.
     optional: may be left out; then it is `null`.
-    spread: one sigma of what is known of it beforehand, around its start: of its logarithm where that is
+    spread: one sigma of its prior around its start: of its logarithm where that is
     fitted, else absolute; inf for nothing. `reason` names the source.
     shapes: counts in the size of the law although it may be left out: it makes another law of it.
     per_record: differs from record to record, such as the phase of the mains at its start.

@@ -22,7 +22,7 @@ LAST, STARTED = range(2)
 
 @njit(inline="always")
 def mean_ripple(p, middle, way):  # type: ignore[no-untyped-def]
-    """Return the mean torque over a way of the rotor around an angle: the ripple there times a sinc, N m."""
+    """Return the mean torque over a travel of the rotor around an angle: the ripple times a sinc, N m."""
     half = 0.5 * p[1] * way
     share = math.sin(half) / half if half != 0.0 else 1.0
     return p[0] * share * math.sin(p[1] * middle + p[2])

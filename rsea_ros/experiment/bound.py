@@ -17,7 +17,7 @@ import numpy as np
 
 from rsea_ros.experiment.hypothesis import Hypothesis, motion, run_case
 from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used
-from rsea_ros.identification.excitation import ramped
+from rsea_ros.identification.excitation import ramp_ends
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, serial, solve
 from rsea_ros.signals import FloatArray
@@ -85,7 +85,7 @@ def _sine(
     length = max(_LENGTH, 1.0 / frequency)
     t = np.arange(round(length * rate)) / rate
     amplitude, bias = level
-    command = limits.torque * ramped(
+    command = limits.torque * ramp_ends(
         bias + amplitude * np.sin(2.0 * np.pi * frequency * t), round(0.2 * rate)
     )
     rig = true.rig_at(true.if_there())

@@ -19,7 +19,7 @@ from rsea_ros.signals import FloatArray
 def refined(
     start: Shape, value: Callable[[Shape], float], asked: DesignRequest, say: Progress
 ) -> tuple[Shape, int]:
-    """Return the shape near `start` of the largest value, and how many were judged."""
+    """Return the shape near `start` of the largest value, and how many were rated."""
     names = {
         "multisine": ("bias", "amplitude", "low", "high", "tilt"),
         "chirp": ("bias", "amplitude", "low", "high"),

@@ -75,66 +75,66 @@ def propose(
     """
     say = tell or (lambda step, share: None)
     check_commanded_by_torque(hypotheses[0].problem.rig)
-    judge = ShapeRater(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
+    rater = ShapeRater(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
     if len(hypotheses) == 1:
-        return _sharpest(judge, say)
+        return _sharpest(rater, say)
     shapes = [s for s in TRIED if s.kind in asked.kinds]
     tables = []
     for k, shape in enumerate(shapes):
         say(f"trying {shape.kind}", 0.6 * k / len(shapes))
-        tables.append(separations(hypotheses, judge.responses(judge.within(shape, asked.probe))))
+        tables.append(separations(hypotheses, rater.responses(rater.within(shape, asked.probe))))
     say("fitting rivals", 0.6)
-    apart = _hopeless(judge, shapes, tables)
-    values = [max(_per_second(judge, t, apart, asked))[0] for t in tables]
-    length = max(_per_second(judge, tables[int(np.argmax(values))], apart, asked))[1]
+    apart = _hopeless(rater, shapes, tables)
+    values = [max(_per_second(rater, t, apart, asked))[0] for t in tables]
+    length = max(_per_second(rater, tables[int(np.argmax(values))], apart, asked))[1]
 
     def value(shape: Shape) -> float:
-        table = separations(hypotheses, judge.responses(judge.within(shape, length)))
-        return decided(table, judge.probability, apart)
+        table = separations(hypotheses, rater.responses(rater.within(shape, length)))
+        return decided(table, rater.probability, apart)
 
     again = [value(shape) for shape in shapes]
     while max(again) < _KEPT * max(values) * (_PER_RUN + length) and 2.0 * length <= asked.longest:
         length *= 2.0
         again = [value(shape) for shape in shapes]
     shape, count = refined(shapes[int(np.argmax(again))], value, asked, say)
-    return _final(judge, shape, length, apart, 2 * len(shapes) + count)
+    return _final(rater, shape, length, apart, 2 * len(shapes) + count)
 
 
-def _hopeless(judge: ShapeRater, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
-    """Return which pairs no shape tried separates either way, in the longest run, shape (k, k)."""
-    stack, asked = np.array(tables), judge.asked
-    apart = np.eye(len(judge.hypotheses), dtype=bool)
+def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
+    """Return which pairs no tried shape separates in the longest run, in either direction, shape (k, k)."""
+    stack, asked = np.array(tables), rater.asked
+    apart = np.eye(len(rater.hypotheses), dtype=bool)
     for a, b in combinations(range(len(apart)), 2):
         i, j = (a, b) if stack[:, a, b].max() > stack[:, b, a].max() else (b, a)
         best = int(np.argmax(stack[:, i, j]))
         if stack[best, i, j] < _FAR:
-            case = judge.case(judge.within(shapes[best], asked.probe), is_quick=True)
-            data = refitted(judge.hypotheses[i], judge.hypotheses[j], case, judge.run).data
+            case = rater.case(rater.within(shapes[best], asked.probe), is_quick=True)
+            data = refitted(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).data
             apart[i, j] = apart[j, i] = data * asked.longest / asked.probe < _HOPE
     return apart
 
 
 def _per_second(
-    judge: ShapeRater, table: FloatArray, apart: BoolArray, asked: DesignRequest
+    rater: ShapeRater, table: FloatArray, apart: BoolArray, asked: DesignRequest
 ) -> list[tuple[float, float]]:
-    """Return the share that a shape decides per second, and the length, for several lengths of the run."""
+    """Return the share of cases that a shape decides per second, and the length, for several run lengths."""
     lengths = np.geomspace(asked.shortest, asked.longest, 7)
-    scaled = [(decided(table * s / asked.probe, judge.probability, apart), float(s)) for s in lengths]
+    scaled = [(decided(table * s / asked.probe, rater.probability, apart), float(s)) for s in lengths]
     return [(share / (_PER_RUN + s), s) for share, s in scaled]
 
 
-def _final(judge: ShapeRater, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
+def _final(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
     """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
-    asked, hypotheses = judge.asked, judge.hypotheses
-    command, reached = held(judge.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
-    responses = judge.responses(command, is_quick=False)
-    table = _with_refits(judge, command, separations(hypotheses, responses))
+    asked, hypotheses = rater.asked, rater.hypotheses
+    command, reached = held(rater.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
+    responses = rater.responses(command, is_quick=False)
+    table = _with_refits(rater, command, separations(hypotheses, responses))
     names = tuple(h.name for h in hypotheses)
     k = len(names)
     pairs = tuple((names[i], names[j]) for i in range(k) for j in range(i + 1, k) if apart[i, j])
     narrow = sharpened(hypotheses[0], responses[0])
     energy = float(np.sum(command**2) / asked.rate)
-    share = decided(table, judge.probability, apart) if k > 1 else 1.0
+    share = decided(table, rater.probability, apart) if k > 1 else 1.0
     return Proposal(
         shape, length, asked.rate, command, names, table, pairs, share, narrow, reached, tried,
         energy,
@@ -167,25 +167,25 @@ def held(command: FloatArray, asked: DesignRequest, groups: Sequence[Group]) -> 
     return best
 
 
-def _with_refits(judge: ShapeRater, command: FloatArray, table: FloatArray) -> FloatArray:
+def _with_refits(rater: ShapeRater, command: FloatArray, table: FloatArray) -> FloatArray:
     """Return S with a full fit of each nearest rival, where one linear step does not settle it."""
-    case, table = judge.case(command, is_quick=False), table.copy()
+    case, table = rater.case(command, is_quick=False), table.copy()
     for i, row in enumerate(table):
         j = int(np.argmin(row))
         if row[j] < _FAR:
-            table[i, j] = refitted(judge.hypotheses[i], judge.hypotheses[j], case, judge.run).total
+            table[i, j] = refitted(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).total
     return table
 
 
-def _sharpest(judge: ShapeRater, say: Progress) -> Proposal:
+def _sharpest(rater: ShapeRater, say: Progress) -> Proposal:
     """Return the run that narrows the parameters of a single cause most (D-optimality)."""
-    asked = judge.asked
+    asked = rater.asked
     shapes = [s for s in TRIED if s.kind in asked.kinds]
 
     def value(shape: Shape) -> float:
-        command = judge.within(shape, asked.probe)
-        return sharpened(judge.hypotheses[0], judge.responses(command)[0])
+        command = rater.within(shape, asked.probe)
+        return sharpened(rater.hypotheses[0], rater.responses(command)[0])
 
     values = [value(shape) for shape in shapes]
     shape, count = refined(shapes[int(np.argmax(values))], value, asked, say)
-    return _final(judge, shape, asked.longest, np.eye(1, dtype=bool), len(shapes) + count)
+    return _final(rater, shape, asked.longest, np.eye(1, dtype=bool), len(shapes) + count)

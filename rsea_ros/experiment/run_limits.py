@@ -101,6 +101,6 @@ def of_response(command: FloatArray, outputs: Mapping[str, FloatArray]) -> dict[
 
 
 def used(peaks: Mapping[str, float], limits: RunLimits) -> float:
-    """Return the largest share of a limit that is used; above 1 one is broken."""
+    """Return the largest share of a limit that is used; above 1 a limit is exceeded."""
     shares = [peaks[n] / limit for n, limit in limits.stated().items() if n in peaks]
     return max((s if math.isfinite(s) else math.inf for s in shares), default=0.0)

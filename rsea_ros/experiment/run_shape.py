@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from rsea_ros.identification.excitation import NYQUIST_SHARE, ExcitationSettings, chirp, ramped
+from rsea_ros.identification.excitation import NYQUIST_SHARE, ExcitationSettings, chirp, ramp_ends
 from rsea_ros.signals import FloatArray
 
 Kind = Literal["multisine", "chirp", "steps", "holds"]
@@ -56,7 +56,7 @@ def command_of(shape: Shape, duration: float, rate: float, slew: float = np.inf)
     n = round(duration * rate)
     moving = n - round(shape.rest * n)
     part = KINDS[shape.kind](shape, moving, rate)
-    run = ramped(shape.bias + shape.amplitude * part, min(round(RAMP * rate), moving // 4))
+    run = ramp_ends(shape.bias + shape.amplitude * part, min(round(RAMP * rate), moving // 4))
     if np.isfinite(slew):
         run = slowed(run, slew / rate, is_stepped=shape.kind in ("steps", "holds"))
     return at_rest_around(np.concatenate([run, np.zeros(n - moving)]), rate)
@@ -77,7 +77,7 @@ def slowed(command: FloatArray, most: float, *, is_stepped: bool) -> FloatArray:
         return command * (most / change)
     width = int(np.ceil(change / most))
     smooth: FloatArray = np.convolve(command, np.full(width, 1.0 / width))[: len(command)]
-    return ramped(smooth, width)
+    return ramp_ends(smooth, width)
 
 
 def _multisine(shape: Shape, n: int, rate: float) -> FloatArray:

@@ -22,7 +22,7 @@ INSIDE = 0.9
 
 @dataclass(frozen=True)
 class ShapeRater:
-    """Judges shapes for hypotheses. noise: by channel."""
+    """Rates shapes for hypotheses. noise: by channel."""
 
     hypotheses: Sequence[Hypothesis]
     asked: DesignRequest

@@ -35,7 +35,7 @@ from rsea_ros.signals import UNITS, Fault, Record
 from rsea_ros.units import with_unit
 
 _MAIN = ("ft", "deflection", "position", "velocity")
-"""Channels that judge a fit, the first one there speaks for the row."""
+"""Channels that show how well a fit is; the first that a recording has stands in the row."""
 
 
 def analyse(row: Row, path: Path, url: str, joint: MappedJoint) -> dict[str, str]:

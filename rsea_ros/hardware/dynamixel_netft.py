@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping
 
 from rsea_ros.hardware.device import State, Wrench
-from rsea_ros.hardware.dynamixel.encoder import EncoderConnection, SpringEncoder
+from rsea_ros.hardware.dynamixel.encoder import BusEncoder, EncoderConnection
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
 from rsea_ros.hardware.limits import Limits, check_limits
@@ -35,7 +35,7 @@ class DynamixelNetft:
         encoder: EncoderConnection | None = None,
     ) -> None:
         self._motor = motor
-        self._encoder = SpringEncoder(encoder, motor.port) if encoder is not None else None
+        self._encoder = BusEncoder(encoder, motor.port) if encoder is not None else None
         self._sensor = ForceTorqueSensor(sensor) if sensor is not None else None
         self._limits, self._stiffness, self._absolute = limits, stiffness, absolute
         self._epoch = 0

@@ -49,7 +49,7 @@ class Bank:
         rigs = (rig, *(h.changed(rig, h.step) for h in hypotheses))
         self._observers = [BatchObserver(each, noise, hold=hold) for each in rigs]
 
-    def judge(self, look: Look) -> LookEvidence:
+    def evidence(self, look: Look) -> LookEvidence:
         """Return the evidence of a look."""
         by_channel = [whitened(observer, look) for observer in self._observers]
         p, n = len(self._steps), len(CHANNELS)
@@ -68,5 +68,5 @@ class Bank:
 def whitened(observer: BatchObserver, look: Look) -> tuple[FloatArray, ...]:
     """Return the innovations of a look by channel over their standard deviations; nan where missing."""
     w = observer.innovations(look.t, look.kind, look.values)
-    state, ft = look.judged & (look.kind == STATE), look.judged & (look.kind == FT)
+    state, ft = look.counts & (look.kind == STATE), look.counts & (look.kind == FT)
     return w[state, 0], w[ft, 0], w[state, 1]

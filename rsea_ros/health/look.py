@@ -13,18 +13,18 @@ from rsea_ros.signals import FloatArray, IntArray, Record
 FILTER_SETTLING, LENGTH = 0.25, 1.0
 """s. Ten time constants of the disturbance's filter; long beside them, short beside a movement."""
 FEWEST = 20
-"""Measurements of a look that can be judged."""
+"""Measurements of a look that can be counts."""
 
 
 class Look(NamedTuple):
     """Events by stamp: t (s, shape (n,)), kind (of observer/log.py), values (n, 2): position and motor
-    torque, or ft, or command. judged: where the innovations count, shape (n,).
+    torque, or ft, or command. counts: where the innovations count, shape (n,).
     """
 
     t: FloatArray
     kind: IntArray
     values: FloatArray
-    judged: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    counts: np.ndarray[tuple[int], np.dtype[np.bool_]]
 
     @property
     def end(self) -> float:
@@ -78,8 +78,8 @@ class Cutter:
         before = np.flatnonzero(self._kind[:first] == COMMAND)[-1:]
         part = np.concatenate([before, np.arange(first, last)])
         t, kind = self._t[part], self._kind[part]
-        judged = (t > begin + FILTER_SETTLING) & (kind != COMMAND)
-        return Look(t, kind, self._values[part], judged) if judged.sum() >= FEWEST else None
+        counts = (t > begin + FILTER_SETTLING) & (kind != COMMAND)
+        return Look(t, kind, self._values[part], counts) if counts.sum() >= FEWEST else None
 
     def _drop(self) -> None:
         """Drop events before the beginning of the next look, except the command in force."""

@@ -73,7 +73,7 @@ class Monitor:
         self.sensors.take(t, kind, values)
         closer = self.changes is None or self.changes.suspects
         for look in self._cutter.take(t, kind, values, closer=closer):
-            self._judge(look)
+            self._weigh(look)
 
     @property
     def learning(self) -> bool:
@@ -99,14 +99,14 @@ class Monitor:
         """Return all parameters; none while it learns."""
         return [] if self.changes is None else self.changes.estimates.estimates()
 
-    def _judge(self, look: Look) -> None:
+    def _weigh(self, look: Look) -> None:
         self.looks += 1
         if self.sensors.frozen or look.travel() < self._least:
             self.still += 1
             if self.changes is not None:
                 self.changes.estimates.hold()
         elif self.changes is not None:
-            self.changes.take(look, self.changes.bank.judge(look))
+            self.changes.take(look, self.changes.bank.evidence(look))
         else:
             self._learn(look)
 
@@ -130,7 +130,7 @@ class Monitor:
     def _start(self, rig: Rig, hypotheses: tuple[ChangeHypothesis, ...], models: dict[str, float]) -> None:
         """Watch for changes from a rig, and from the first looks on."""
         bank = Bank(rig, self._noise, hypotheses, self._settings.hold)
-        first, self._first = [(look, bank.judge(look)) for look in self._first], []
+        first, self._first = [(look, bank.evidence(look)) for look in self._first], []
         scatter = scatter_of([evidence for _, evidence in first])
         self.changes = Changes(rig, self._noise, hypotheses, models, scatter, self._settings)
         for each in first:

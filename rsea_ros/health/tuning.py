@@ -36,7 +36,7 @@ def tuned(
     total, now, first = np.zeros(len(hypotheses)), tuple(hypotheses), rig
     for _ in range(ROUNDS):
         bank = Bank(rig, noise, now, hold)
-        total, sigma = _change([bank.judge(look) for look in looks], hypotheses, total)
+        total, sigma = _change([bank.evidence(look) for look in looks], hypotheses, total)
         changes = list(zip(hypotheses, total.tolist(), strict=True))
         now = tuple(
             replace(h, value=min(max(h.value + by, h.low), h.high), common=s)

@@ -74,8 +74,8 @@ def allowed_run(
     bounds = _bounds(rig, like, limits)
     for _ in range(_TRIES):
         try:
-            scaled, command = _scaled(kind, settings, peak)
-            case, outputs = _simulated(rig, like, command, settings.rate)
+            scaled, command = _scale(kind, settings, peak)
+            case, outputs = _simulate(rig, like, command, settings.rate)
         except RseaError:
             return None
         share = _share(command, outputs, bounds, settings.rate)
@@ -104,17 +104,16 @@ def _bounds(rig: Rig, like: Case, limits: DriverLimits) -> Mapping[str, float]:
     return {**bounds, "ft": min(limits.ft, limits.deflection * rig["spring.stiffness"])}
 
 
-def _scaled(kind: str, settings: ExcitationSettings, peak: float) -> tuple[ExcitationSettings, FloatArray]:
+def _scale(kind: str, settings: ExcitationSettings, peak: float) -> tuple[ExcitationSettings, FloatArray]:
     """Return settings and command whose largest value is the peak: both grow with amplitude and noise."""
     largest = float(np.max(np.abs(excitation(kind, settings))))
     factor = peak / largest
-    scaled = replace(
-        settings, amplitude=_rounded(factor * settings.amplitude), noise=_rounded(factor * settings.noise)
-    )
+    amplitude, noise = (_round_down(factor * value) for value in (settings.amplitude, settings.noise))
+    scaled = replace(settings, amplitude=amplitude, noise=noise)
     return scaled, excitation(kind, scaled)
 
 
-def _rounded(value: float) -> float:
+def _round_down(value: float) -> float:
     """Return a value with four digits, rounded towards zero, for a person to type."""
     if value == 0.0:
         return 0.0
@@ -122,7 +121,7 @@ def _rounded(value: float) -> float:
     return float(f"{math.floor(value / unit + 1e-9) * unit:.4g}")
 
 
-def _simulated(
+def _simulate(
     rig: Rig, like: Case, command: FloatArray, rate: float
 ) -> tuple[Case, Mapping[str, FloatArray]]:
     """Return a case with the rig's noise-free measurements, and all limited quantities."""

@@ -19,7 +19,7 @@ from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval
 from rsea_ros.identification.machine_scale import scale_of
-from rsea_ros.identification.misfit import misfit_ratios, reweighted
+from rsea_ros.identification.misfit import misfit_ratios, reweight
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, solve
 from rsea_ros.identification.unknowns import idle, start_vector, unknowns_of_effect, with_effect
@@ -51,7 +51,7 @@ class ExtendedFit:
         return interval(unknowns[i], float(self.solution.theta[i]), sd)
 
 
-def extended(
+def add_effect(
     present: Problem, theta: FloatArray, effect: Effect, start: dict[str, float]
 ) -> tuple[Problem, FloatArray]:
     """Return the present problem with one more effect whose parameters may move, and its start."""
@@ -70,18 +70,18 @@ def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[E
     if is_inverse(problem.rig):
         return ()
     acting, scale = {e.name for e in problem.rig.effects}, scale_of(problem.cases, problem.rig)
-    tried = [(n, _fitted(solution, effect_named(n).at(scale), run)) for n in LAWS if n not in acting]
+    tried = [(n, _fit_with(solution, effect_named(n).at(scale), run)) for n in LAWS if n not in acting]
     fitted = [(n, s) for n, s in tried if s is not None and s.cost < (1.0 - FALL) * solution.cost]
     best = min((s.cost for _, s in fitted), default=0.0)
     credible = sorted(((n, s) for n, s in fitted if s.cost <= NEAR * best), key=lambda item: item[1].cost)
-    settled = ((n, _settled(s, cases, run)) for n, s in credible)
+    settled = ((n, _refit(s, cases, run)) for n, s in credible)
     return tuple(ExtendedFit(n, s, confidence_of(s)) for n, s in settled)
 
 
-def _fitted(solution: Solution, effect: Effect, run: Map) -> Solution | None:
+def _fit_with(solution: Solution, effect: Effect, run: Map) -> Solution | None:
     """Return the fit with one more effect; None where the rig cannot have it."""
     try:
-        problem_and_start = extended(solution.problem, _clocks_at_zero(solution), effect, effect.typical)
+        problem_and_start = add_effect(solution.problem, _clocks_at_zero(solution), effect, effect.typical)
         return solve(*problem_and_start, iterations=_ITERATIONS, run=run)
     except RseaError:
         return None
@@ -93,15 +93,15 @@ def _clocks_at_zero(solution: Solution) -> FloatArray:
     return np.where(clocks, 0.0, solution.theta)
 
 
-def _settled(solution: Solution, cases: Sequence[Case], run: Map) -> Solution:
+def _refit(solution: Solution, cases: Sequence[Case], run: Map) -> Solution:
     """Return an alternative fitted again, every channel in units of its residual or its noise."""
     known = replace(solution.problem, cases=tuple(cases))
     ratios = misfit_ratios(replace(solution, problem=known))
-    weighted = tuple(reweighted(case, ratios) for case in cases)
+    weighted = tuple(reweight(case, ratios) for case in cases)
     return solve(replace(known, cases=weighted), solution.theta, iterations=_ITERATIONS, run=run)
 
 
-def spanned(ci95: tuple[float, float], name: str, others: Sequence[ExtendedFit]) -> tuple[float, float]:
+def span_all(ci95: tuple[float, float], name: str, others: Sequence[ExtendedFit]) -> tuple[float, float]:
     """Return an interval of a parameter widened to hold its intervals under the alternatives, SI."""
     every = [ci95, *(other.interval(name) for other in others)]
     return min(low for low, _ in every), max(high for _, high in every)

@@ -26,7 +26,7 @@ def with_even_clocks(
 
     stamped: the same records with the stamps that they came with.
     """
-    moved = list(_moved(solution, stamped, even))
+    moved = list(_clock_sensitivities(solution, stamped, even))
     if not moved:
         return confidence
     prior = np.diag([u.reach**-2 for u in solution.problem.unknowns])
@@ -34,7 +34,9 @@ def with_even_clocks(
     return replace(confidence, covariance=confidence.covariance + steps @ steps.T)
 
 
-def _moved(solution: Solution, stamped: Sequence[Record], even: Sequence[Record]) -> Iterator[FloatArray]:
+def _clock_sensitivities(
+    solution: Solution, stamped: Sequence[Record], even: Sequence[Record]
+) -> Iterator[FloatArray]:
     """Yield the change of the residual by one sigma of each even clock, shape (m,)."""
     problem = solution.problem
     doubts = [_doubts(before, after) for before, after in zip(stamped, even, strict=True)]

@@ -51,7 +51,7 @@ class RequiredClocks:
         return (Remark("clocks_taken_as_right", (name,), (times,)),) if times >= WORTH else ()
 
 
-def asked_of(solution: Solution, run: Map = serial) -> RequiredClocks:
+def required_clocks(solution: Solution, run: Map = serial) -> RequiredClocks:
     """Return the clocks that a fit without any must move, offsets and rates."""
     problem = solution.problem
     if is_inverse(problem.rig):
@@ -67,7 +67,7 @@ def asked_of(solution: Solution, run: Map = serial) -> RequiredClocks:
         if max(z) < ASKED:
             break
         taken.append(rest[int(np.argmax(z))])
-    if _left_over(solution, columns[:, taken], [left[i] for i in taken]) > MISFIT:
+    if _remainder(solution, columns[:, taken], [left[i] for i in taken]) > MISFIT:
         taken = [i for i in taken if not left[i].is_rate]
     others = [i for i, c in enumerate(left) if not c.is_rate and i not in taken]
     return RequiredClocks(
@@ -110,7 +110,7 @@ def _rms(solution: Solution) -> float:
     return float(np.sqrt(np.mean(solution.residual**2)))
 
 
-def freed(solution: Solution, asked: RequiredClocks) -> tuple[Problem, FloatArray]:
+def free_clocks(solution: Solution, asked: RequiredClocks) -> tuple[Problem, FloatArray]:
     """Return the problem of a fit with the required clocks among its unknowns, and its start."""
     problem = replace(solution.problem, unknowns=(*solution.problem.unknowns, *asked.clocks))
     return problem, np.concatenate([solution.theta, np.zeros(len(asked.clocks))])
@@ -147,7 +147,7 @@ def _score(
     return abs(total) / math.sqrt(max(float(scores @ scores), information))
 
 
-def _left_over(solution: Solution, columns: FloatArray, taken: Sequence[Unknown]) -> float:
+def _remainder(solution: Solution, columns: FloatArray, taken: Sequence[Unknown]) -> float:
     """Return the RMS over the noise of the residual with some clocks free, by the derivatives."""
     base = np.column_stack([solution.jacobian, columns])
     known = (*solution.problem.unknowns, *taken)

@@ -57,7 +57,7 @@ def is_noise(case: Case, outputs: Mapping[str, FloatArray], channel: str, ratio:
         return False
     seen = segment_spectra(left, _SHORT, 16)
     others = (segment_spectra(w, _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
-    return all(_shared(seen, other, rate) < SHARED for other in others)
+    return all(_coherent_share(seen, other, rate) < SHARED for other in others)
 
 
 def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
@@ -101,7 +101,7 @@ def _kurtosis(shape: SpectralShape, values: FloatArray) -> float:
     return float(np.mean(white**4) / np.mean(white**2) ** 2) - 3.0
 
 
-def _shared(a: ComplexArray, b: ComplexArray, rate: float) -> float:
+def _coherent_share(a: ComplexArray, b: ComplexArray, rate: float) -> float:
     """Return the share of the power of a that is coherent with b, without its bias, in the worst band."""
     chance = OVERLAP / len(a)
     powers = np.sum(np.abs(a) ** 2, axis=0) * np.sum(np.abs(b) ** 2, axis=0)

@@ -91,7 +91,7 @@ def inverse_of(matrix: FloatArray) -> FloatArray:
 
 
 def _alike(case: Case) -> float:
-    """Return how many samples of a case equal one independent sample: a filter correlates them."""
+    """Return how many samples of a case count as one independent sample: a filter correlates them."""
     drive = case.drive
     return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
 
@@ -123,7 +123,7 @@ def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, flo
     return unknown.outer(coordinate - Z95 * sd), unknown.outer(coordinate + Z95 * sd)
 
 
-def undetermined(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[Remark, ...]:
+def undetermined_remarks(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[Remark, ...]:
     """Return remarks on values that the data cannot determine.
 
     The eigenvectors of the data's information, in units of the prior, whose information is less than the

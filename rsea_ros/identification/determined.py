@@ -1,4 +1,4 @@
-"""Whether data determine a value, or what was known before does: one answer for a check and for a fit."""
+"""Whether the data or the prior determine a value: one answer for a check and for a fit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NULL = 1e-9
 
 
 def shares_from_data(information: FloatArray, doubt: FloatArray) -> FloatArray:
-    """Return by unknown the share of what is known of it that the data alone brought, 0 … 1, shape (n,).
+    """Return for each unknown the share of its information that comes from the data, 0 … 1, shape (n,).
 
     d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other unknowns
     free: 0 where only a ratio with others is determined. information: J'J, shape (n, n).
@@ -39,7 +39,7 @@ def _variances(information: FloatArray) -> FloatArray:
 
 
 def how_determined(name: str, value: float, ci95: tuple[float, float], share: float) -> Determined:
-    """Return how well data determine a value, relative to what was known before and to its size.
+    """Return how well data determine a value, relative to its prior and to its size.
 
     "no" where the interval reaches as far as the value is large, or where the fit ended at a bound.
     """

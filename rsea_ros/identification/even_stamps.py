@@ -36,7 +36,7 @@ _TINY = 1e-30
 
 @dataclass(frozen=True)
 class Evened:
-    """Records on the even clock where it is right, and the RMS scatter of stamps there, s by channel."""
+    """Records on the even clock where that is right, and the RMS scatter of its stamps, s by channel."""
 
     records: tuple[Record, ...]
     scatter: Mapping[str, float]
@@ -48,7 +48,7 @@ class Evened:
         return (Remark("even_clocks", names, tuple(self.scatter[n] for n in names)),) if names else ()
 
 
-def evened(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
+def even_out(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
     """Return the records with an even clock for each channel whose residual under a solution prefers it."""
     if is_inverse(rig):
         return Evened(tuple(records), {})
@@ -56,7 +56,7 @@ def evened(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
     result = []
     for record in records:
         steady, sizes = _on_even_clocks(record)
-        chosen = _preferred(record, steady, sizes.keys(), rig, solution) if sizes else set()
+        chosen = _prefer_even(record, steady, sizes.keys(), rig, solution) if sizes else set()
         scatter |= {n: max(sizes[n], scatter.get(n, 0.0)) for n in chosen}
         result.append(_taking(record, steady, chosen))
     return Evened(tuple(result), scatter)
@@ -128,7 +128,7 @@ def _taking(record: Record, steady: Record, names: Collection[str]) -> Record:
     return record.with_channels(**{n: steady[n] for n in names})
 
 
-def _preferred(
+def _prefer_even(
     record: Record, steady: Record, changed: Collection[str], rig: Rig, solution: Solution
 ) -> set[str]:
     """Return the channels with a smaller residual on the even clock: each sensor, the command by all."""
@@ -146,15 +146,15 @@ def _sensors_preferred(
     record: Record, steady: Record, sensors: set[str], rig: Rig, solution: Solution
 ) -> tuple[set[str], dict[str, float]]:
     """Return the sensors with a smaller residual on the even clock, and the residual of every sensor then."""
-    stamped = _left(record, rig, solution)
+    stamped = _residual_rms(record, rig, solution)
     if not sensors:
         return set(), stamped
-    even = _left(_taking(record, steady, sensors), rig, solution)
+    even = _residual_rms(_taking(record, steady, sensors), rig, solution)
     chosen = {n for n in sensors & stamped.keys() & even.keys() if even[n] < _FALL * stamped[n]}
     return chosen, {**stamped, **{n: even[n] for n in chosen}}
 
 
-def _left(record: Record, rig: Rig, solution: Solution) -> dict[str, float]:
+def _residual_rms(record: Record, rig: Rig, solution: Solution) -> dict[str, float]:
     """Return by channel the RMS that a solution leaves of a record, means aside."""
     case = case_from(record, rig)
     (outputs,) = replace(solution.problem, cases=(case,)).outputs(solution.theta)

@@ -187,10 +187,10 @@ def excitation(kind: str, settings: ExcitationSettings, ramp: float = 0.0) -> Fl
         raise ParameterError(f"excitation: ramp = {ramp:g} s, expected 0 to {longest:g} s")
     if kind in PERIODIC:
         command = np.concatenate([command[len(command) - n :], command, command[:n]])
-    return ramped(command, n)
+    return ramp_ends(command, n)
 
 
-def ramped(command: FloatArray, n: int) -> FloatArray:
+def ramp_ends(command: FloatArray, n: int) -> FloatArray:
     """Return the command with its first and last n samples under a raised cosine, (1 - cos(pi k / n)) / 2."""
     window = np.ones(len(command))
     rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / max(n, 1)))

@@ -8,9 +8,15 @@ from dataclasses import replace
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.scale import Scale
-from rsea_ros.identification.clocks import RequiredClocks, asked_of, freed, with_drifts, without_needless
+from rsea_ros.identification.clocks import (
+    RequiredClocks,
+    free_clocks,
+    required_clocks,
+    with_drifts,
+    without_needless,
+)
 from rsea_ros.identification.machine_scale import scale_of
-from rsea_ros.identification.misfit import ratios_of, reweighted
+from rsea_ros.identification.misfit import ratios_of, reweight
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
@@ -49,7 +55,7 @@ def fit(
     solution = solve(problem, _better_start(problem, start, run), run=run)
     outputs = problem.outputs(solution.theta)
     known = _with_noise_of(problem, outputs)
-    if _changed(problem.cases, known):
+    if _has_changed(problem.cases, known):
         solution = solve(replace(problem, cases=known), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
         known = _with_noise_of(solution.problem, outputs)
@@ -58,9 +64,9 @@ def fit(
         solution, problem = drifting, drifting.problem
         outputs = problem.outputs(solution.theta)
         known = _with_noise_of(problem, outputs)
-    asked = asked_of(solution, run)
+    asked = required_clocks(solution, run)
     if asked.clocks:
-        solution = solve(*freed(solution, asked), run=run)
+        solution = solve(*free_clocks(solution, asked), run=run)
         solution = solve(*without_needless(solution), run=run)
         problem = solution.problem
         outputs = problem.outputs(solution.theta)
@@ -69,7 +75,7 @@ def fit(
         ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < _MISFIT:
             break
-        cases = tuple(reweighted(c, ratios) for c in solution.problem.cases)
+        cases = tuple(reweight(c, ratios) for c in solution.problem.cases)
         solution = solve(replace(problem, cases=cases), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
     return solution, known, asked
@@ -81,7 +87,7 @@ def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -
     return tuple(reestimate_noise(c, out, ratio) for c, out in zip(problem.cases, outputs, strict=True))
 
 
-def _changed(before: Sequence[Case], after: Sequence[Case]) -> bool:
+def _has_changed(before: Sequence[Case], after: Sequence[Case]) -> bool:
     """Return whether the noise of any channel has changed by more than a fit would notice."""
     ratios = [b.noise[n] / a.noise[n] for a, b in zip(before, after, strict=True) for n in a.noise]
     return any(not 1.0 / _OTHER_NOISE < r < _OTHER_NOISE for r in ratios)

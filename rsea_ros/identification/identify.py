@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.identification.alternatives import ExtendedFit, alternatives, spanned
+from rsea_ros.identification.alternatives import ExtendedFit, alternatives, span_all
 from rsea_ros.identification.clock_doubt import with_even_clocks
 from rsea_ros.identification.confidence import (
     Confidence,
     confidence_of,
     torque_scale,
-    undetermined,
+    undetermined_remarks,
 )
 from rsea_ros.identification.estimates import (
     errors_by_channel,
@@ -22,7 +22,7 @@ from rsea_ros.identification.estimates import (
     overlays_of,
     parameters_of,
 )
-from rsea_ros.identification.even_stamps import Evened, evened
+from rsea_ros.identification.even_stamps import Evened, even_out
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.misfit import ratios_of
@@ -68,7 +68,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     with one_blas_thread(), ThreadPoolExecutor(cores()) as pool:
         solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=_start(records[0], rig, responses))
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
-        while misfits and (more := evened(steady.records, rig, solution)).scatter:
+        while misfits and (more := even_out(steady.records, rig, solution)).scatter:
             steady = Evened(more.records, {**steady.scatter, **more.scatter})
             cases = tuple(case_from(record, rig) for record in steady.records)
             solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
@@ -112,7 +112,7 @@ def _result(
     problem = solution.problem
     errors = errors_by_channel(problem, outputs)
     parameters = tuple(
-        replace(p, ci95=spanned(p.ci95, p.name, others)) for p in parameters_of(solution, confidence)
+        replace(p, ci95=span_all(p.ci95, p.name, others)) for p in parameters_of(solution, confidence)
     )
     rig = identified_rig(solution, parameters)
     return Identification(
@@ -134,7 +134,7 @@ def _result(
         remarks=(
             *off_rig(parameters),
             *torque_scale(problem),
-            *undetermined(problem.unknowns, confidence),
+            *undetermined_remarks(problem.unknowns, confidence),
         ),
         notes=tuple(note for r in records for note in r.notes),
         faults=tuple(fault for r in records for fault in r.faults),

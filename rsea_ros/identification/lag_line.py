@@ -69,7 +69,7 @@ def _lags(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return middle (s since start), lag (s) and weight of the blocks that show a lag."""
     slope = np.gradient(p, t)
-    since, found, weight = [], [], []
+    since, lags, weight = [], [], []
     lag, last = 0.0, 0
     edges = np.searchsorted(t, np.arange(t[0], t[-1] + BLOCK, BLOCK))
     for k, (a, b) in enumerate(pairwise(edges.tolist())):
@@ -79,9 +79,9 @@ def _lags(
         if share > _ALIKE:
             lag, last = at, k + 1
             since.append(float(np.mean(t[a:b])) - start)
-            found.append(lag)
+            lags.append(lag)
             weight.append(float(np.sum(slope[a:b] ** 2)))
-    return np.array(since), np.array(found), np.array(weight)
+    return np.array(since), np.array(lags), np.array(weight)
 
 
 def _lag_of(

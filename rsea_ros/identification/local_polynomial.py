@@ -15,7 +15,7 @@ import numpy as np
 from numpy.fft import rfft
 
 from rsea_ros.identification.resample import Aligned, AtRestError
-from rsea_ros.identification.response_lines import Lines, detrended, widened
+from rsea_ros.identification.response_lines import Lines, detrend, widen
 from rsea_ros.signals import ComplexArray, FloatArray
 
 _UNKNOWNS = 6
@@ -34,7 +34,7 @@ def local_polynomial(aligned: Aligned) -> Lines:
     """
     stretch = _longest(aligned)
     n = stretch.stop - stretch.start
-    u, y = (rfft(detrended(x[stretch])) / np.sqrt(n) for x in (aligned.command, aligned.output))
+    u, y = (rfft(detrend(x[stretch])) / np.sqrt(n) for x in (aligned.command, aligned.output))
     bands = _bands(len(u))
     response, variance, noise, power = _estimates(u, y, bands)
     freedom = np.array([2 * half + 1 - _UNKNOWNS for _, half in bands])
@@ -43,7 +43,7 @@ def local_polynomial(aligned: Aligned) -> Lines:
         method="local polynomial",
         frequency=np.array([centre for centre, _ in bands]) / (n * aligned.period),
         response=response,
-        sd=widened(np.sqrt(variance), freedom),
+        sd=widen(np.sqrt(variance), freedom),
         coherence=signal / (signal + noise + 1e-300),
         noise=np.sqrt(2.0 * noise / n),
     )

@@ -40,10 +40,10 @@ def torque_size(case: Case, rig: Rig) -> float:
         return max([*asked, *shown], default=0.0)
     if "motor_torque" in case.measured:
         return _largest(case, "motor_torque")
-    return _asked_by_errors(case, rig)
+    return _torque_of_errors(case, rig)
 
 
-def _asked_by_errors(case: Case, rig: Rig) -> float:
+def _torque_of_errors(case: Case, rig: Rig) -> float:
     """Return the largest torque of a position loop by its errors, N m; 0 without a position."""
     if "position" not in case.measured or not isinstance(case.drive, Drive):
         return 0.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.identification.problem import Case, Problem, weighted
+from rsea_ros.identification.problem import Case, Problem, weighted_residual
 from rsea_ros.identification.solver import Solution
 from rsea_ros.signals import FloatArray
 
@@ -25,10 +25,10 @@ def ratios_of(
     parts: dict[str, list[FloatArray]] = {}
     for case, out in zip(cases, outputs, strict=True):
         for n in problem.present(case):
-            parts.setdefault(n, []).append(weighted(case, out, [n]))
+            parts.setdefault(n, []).append(weighted_residual(case, out, [n]))
     return {n: float(np.sqrt(np.mean(np.concatenate(p) ** 2))) for n, p in parts.items()}
 
 
-def reweighted(case: Case, ratios: Mapping[str, float]) -> Case:
+def reweight(case: Case, ratios: Mapping[str, float]) -> Case:
     """Return a case in which the residual of a channel counts as its noise, where it is larger."""
     return replace(case, noise={n: s * max(1.0, ratios.get(n, 1.0)) for n, s in case.noise.items()})

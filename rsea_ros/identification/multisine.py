@@ -14,7 +14,7 @@ from numpy.fft import rfft
 
 from rsea_ros.identification.periodicity import Periods
 from rsea_ros.identification.resample import Aligned
-from rsea_ros.identification.response_lines import Lines, widened
+from rsea_ros.identification.response_lines import Lines, widen
 from rsea_ros.signals import ComplexArray, FloatArray, IntArray
 
 _EXCITED = 1e-2
@@ -58,7 +58,7 @@ def multisine(aligned: Aligned, periods: Periods) -> Lines:
         method="multisine",
         frequency=excited / (periods.length * aligned.period),
         response=mean_y[excited] / mean_u[excited],
-        sd=widened(spread, np.minimum(freedom, count - 1 + _SMOOTHED)),
+        sd=widen(spread, np.minimum(freedom, count - 1 + _SMOOTHED)),
         coherence=power / (power + variance[excited] + 1e-300),
         noise=levels.noise * np.sqrt(count),
         distortion=levels.total,

@@ -18,7 +18,7 @@ def is_off(spreads: float, told_by_data: float) -> bool:
 
 
 def off_rig(parameters: Iterable[ParameterEstimate]) -> tuple[Remark, ...]:
-    """Return a remark for each value of the rig that the data put far from what the rig states."""
+    """Return a remark for each value that the data put far from the value of the rig."""
     return tuple(
         Remark("off_rig", (p.name,), (p.start, p.value, *p.ci95, p.spreads_off), p.unit)
         for p in parameters

@@ -144,14 +144,14 @@ def _inverse_case(record: Record, rig: Rig) -> Case:
     )
 
 
-def simulated(
+def simulate_cases(
     cases: Sequence[Case], rig: Rig, clocks: Clocks, *, ride: bool = False
 ) -> list[dict[str, FloatArray]]:
     """Return the simulated channels of cases, sensors read as their clocks have it.
 
     A channel whose zero is unknown comes with the measured mean.
     """
-    drives = [_shifted(c.drive, clocks) for c in cases if isinstance(c.drive, Drive)]
+    drives = [_shift(c.drive, clocks) for c in cases if isinstance(c.drive, Drive)]
     simulations = iter(simulate_drives(rig, drives, ride=ride))
     return [
         {"motor_torque": inverse_torque(rig, c.drive)}
@@ -168,14 +168,14 @@ def _on_measured_zero(case: Case, outputs: dict[str, FloatArray]) -> dict[str, F
     return outputs
 
 
-def _shifted(drive: Drive, clocks: Clocks) -> Drive:
+def _shift(drive: Drive, clocks: Clocks) -> Drive:
     if clocks.are_right:
         return drive
     late = {n: clocks.later(n, drive.origin + drive.step * at) for n, at in drive.at.items()}
     return replace(drive, at={n: at + late[n] / drive.step for n, at in drive.at.items()})
 
 
-def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
+def weighted_residual(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
     """Return (simulated - measured) / noise of the samples that count, channel after channel.
 
     A simulation that runs away gives infinities, which a fit turns back from.
@@ -214,11 +214,11 @@ class Problem:
     def outputs(self, theta: FloatArray) -> list[dict[str, FloatArray]]:
         """Return the simulated channels of every case at theta."""
         rig, clocks = apply(self.rig, self.unknowns, theta)
-        return simulated(self.cases, rig, clocks, ride=self.ride)
+        return simulate_cases(self.cases, rig, clocks, ride=self.ride)
 
     def residual_of(self, outputs: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
         """Return the weighted residuals of all cases, shape (m,)."""
-        parts = [weighted(c, o, self.present(c)) for c, o in zip(self.cases, outputs, strict=True)]
+        parts = [weighted_residual(c, o, self.present(c)) for c, o in zip(self.cases, outputs, strict=True)]
         return np.concatenate(parts)
 
     def residual(self, theta: FloatArray) -> FloatArray:

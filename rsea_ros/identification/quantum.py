@@ -13,7 +13,7 @@ _ON_GRID = 1e-3
 
 
 def step_of(values: FloatArray) -> float:
-    """Return the step that all finite values are whole numbers of, in their unit; 0 where they have none."""
+    """Return the step of which all finite values are multiples, in their unit; 0 for none."""
     different = np.unique(values[np.isfinite(values)])
     if not 3 <= len(different) < FEW * len(values):
         return 0.0

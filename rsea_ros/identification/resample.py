@@ -22,7 +22,7 @@ _DRAWN = 15
 
 
 class AtRestError(IdentificationError):
-    """A record in which nothing is commanded while a channel is measured has no response to show."""
+    """The record has no response: nothing is commanded while a channel is measured."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class Lines:
         )
 
 
-def widened(sd: FloatArray, freedom: FloatArray | float) -> FloatArray:
+def widen(sd: FloatArray, freedom: FloatArray | float) -> FloatArray:
     """Return sd scaled so that the circle of radius 1.73 sd holds the truth in 95 % of cases.
 
     With the variance itself estimated from m = `freedom` complex values, |error|^2 / variance follows
@@ -52,7 +52,7 @@ def widened(sd: FloatArray, freedom: FloatArray | float) -> FloatArray:
     return result
 
 
-def detrended(values: FloatArray) -> FloatArray:
+def detrend(values: FloatArray) -> FloatArray:
     """Return values without their mean and slope."""
     place = np.linspace(-1.0, 1.0, len(values))
     slope = float(place @ values / (place @ place))

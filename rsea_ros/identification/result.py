@@ -119,7 +119,7 @@ class Identification:
 
     @property
     def times_noise(self) -> dict[str, float]:
-        """Return by channel the RMS of the residual over the noise, of the channels that judge."""
+        """Return by channel the RMS of the residual over the noise, of the channels that a verdict uses."""
         noise = self.noise_rms
         ratios = {n: v / noise[n] for n, v in self.residual_rms.items() if noise.get(n, 0.0) > 0.0}
         return {n: r for n, r in ratios.items() if n in SENSED} or ratios

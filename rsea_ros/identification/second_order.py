@@ -80,12 +80,12 @@ def fit_second_order(measured: FrequencyResponse, low: float = 0.0, high: float 
     s /= scale
     x = _linear_start(s, g, sd)
     for _ in range(_ITERATIONS):
-        error, slope = _linearised(x, s, g, sd)
+        error, slope = _linearise(x, s, g, sd)
         step = np.linalg.lstsq(slope, error, rcond=None)[0]
         x = x + step
         if np.max(np.abs(step)) < _CONVERGED * np.max(np.abs(x)):
             break
-    _, slope = _linearised(x, s, g, sd)
+    _, slope = _linearise(x, s, g, sd)
     units = np.array([scale**2, scale, scale**2])
     covariance = np.linalg.inv(slope.T @ slope) * np.outer(units, units)
     c, a1, a0 = (float(v) for v in x * units)
@@ -117,7 +117,7 @@ def _linear_start(s: ComplexArray, g: ComplexArray, sd: FloatArray) -> FloatArra
     return x
 
 
-def _linearised(
+def _linearise(
     x: FloatArray, s: ComplexArray, g: ComplexArray, sd: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return weighted error and slope of the response; real and imaginary part share a circular sd."""

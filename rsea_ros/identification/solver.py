@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.identification.problem import Problem, simulated
+from rsea_ros.identification.problem import Problem, simulate_cases
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector
 from rsea_ros.signals import FloatArray
 
@@ -118,7 +118,7 @@ def _read_later(problem: Problem, theta: FloatArray, delay: float) -> FloatArray
     """Return the weighted residuals with every sensor read `delay` s later than it was."""
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
     shifted = clocks.moved(delay, problem.channels)
-    return problem.residual_of(simulated(problem.cases, rig, shifted, ride=problem.ride))
+    return problem.residual_of(simulate_cases(problem.cases, rig, shifted, ride=problem.ride))
 
 
 def central_jacobian(problem: Problem, theta: FloatArray) -> FloatArray:
@@ -177,7 +177,7 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
         enough = cost - trial_cost < max(gain * cost, _SMALLEST_FALL)
         kept = cost - trial_cost > _AS_PROMISED * promised
         if kept:
-            matrix = corrected(matrix, step, trial_residual - residual)
+            matrix = broyden_update(matrix, step, trial_residual - residual)
         theta, residual, cost = trial, trial_residual, trial_cost
         damping = max(damping / 10.0, 1e-10)
         if enough:  # and too small a step to change the derivatives
@@ -188,8 +188,11 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
     return Solution(problem, theta, residual, matrix, cost)
 
 
-def corrected(matrix: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
-    """Return the derivatives nearest to `matrix`, each in its own scale, that give the change of a step."""
+def broyden_update(matrix: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
+    """Return the derivatives nearest to `matrix`, each in its own scale, that give the change of a step.
+
+    Source: Broyden, Mathematics of Computation 19, 1965, with scaled unknowns.
+    """
     size = np.sum(matrix**2, axis=0)
     along = size * step / max(float(size @ step**2), 1e-300)
     result: FloatArray = matrix + np.outer(change - matrix @ step, along)

@@ -43,7 +43,7 @@ def unfold(
     at_steps = measured * np.exp(-2j * np.pi * frequency * aligned.delay)
     if aligned.held:
         return at_steps, sd
-    response: ComplexArray = (at_steps - _folded(x, at_steps, sd, aligned.offsets)) / _hold(x)
+    response: ComplexArray = (at_steps - _fold(x, at_steps, sd, aligned.offsets)) / _hold(x)
     return response, sd / np.abs(_hold(x))
 
 
@@ -67,7 +67,7 @@ def _shifted_power(sums: ComplexArray, p: int, d: float) -> ComplexArray:
     return total
 
 
-def _folded(x: FloatArray, measured: ComplexArray, sd: FloatArray, offsets: FloatArray) -> ComplexArray:
+def _fold(x: FloatArray, measured: ComplexArray, sd: FloatArray, offsets: FloatArray) -> ComplexArray:
     """Return the sum of all images but the wanted one."""
     lines = np.flatnonzero((x > _FITTED_BAND[0]) & (x < _FITTED_BAND[1]) & (sd > 0.0))
     if len(lines) < 2 * len(_ORDERS):

@@ -94,7 +94,7 @@ class Unknown:
 
     @property
     def reach(self) -> float:
-        """Return how far from its start it may lie when the data say nothing: doubt, else the bounds."""
+        """Return how far from its start it can lie without data: its doubt, else the bounds."""
         if math.isfinite(self.doubt):
             return self.doubt
         wide = (
@@ -137,7 +137,7 @@ def unknowns_of_rig(rig: Rig) -> tuple[Unknown, ...]:
 def _rig_unknown(rig: Rig, name: str) -> Unknown:
     """Return a value of the rig as an unknown: on its logarithm where its prior keeps it away from 0.
 
-    A value that may well be near zero (a damping) moves on its own scale: its logarithm would never get back.
+    A value that may well be near zero (a damping) moves on its own scale: its logarithm would never return.
     """
     value, spread, unit = rig[name], rig.spread(name), rig.unit(name)
     if value > 0.0 and spread <= WELL_KNOWN:

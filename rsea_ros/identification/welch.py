@@ -13,7 +13,7 @@ from numpy.fft import rfft
 
 from rsea_ros.fast_length import next_fast_length
 from rsea_ros.identification.resample import Aligned
-from rsea_ros.identification.response_lines import Lines, detrended, widened
+from rsea_ros.identification.response_lines import Lines, detrend, widen
 from rsea_ros.signals import ComplexArray, FloatArray, IntArray
 
 LONGEST_SEGMENT = 16.0
@@ -51,7 +51,7 @@ def welch(aligned: Aligned) -> Lines:
     effective = len(starts) / (1.0 + 2.0 * _OVERLAP_CORRELATION**2)
     residual = np.sum(np.abs(y - response * u) ** 2, axis=0) / len(starts) * effective / (effective - 1.0)
     next_to = (starts[1:] - starts[:-1] == length // 2)[:, None]
-    overlap = np.sum(next_to * _turned(u[1:] * u[:-1].conj(), length).real, axis=0)
+    overlap = np.sum(next_to * _align_phases(u[1:] * u[:-1].conj(), length).real, axis=0)
     spread = np.sqrt(residual * np.maximum(s_uu + 2.0 * _OVERLAP_CORRELATION * overlap, 0.5 * s_uu)) / s_uu
     s_yy = np.sum(np.abs(y) ** 2, axis=0) + _TINY
     keep = slice(_FIRST_LINE, None)
@@ -59,7 +59,7 @@ def welch(aligned: Aligned) -> Lines:
         method="Welch",
         frequency=(np.arange(u.shape[1]) / (length * aligned.period))[keep],
         response=response[keep],
-        sd=widened(spread, effective - 1.0)[keep],
+        sd=widen(spread, effective - 1.0)[keep],
         coherence=np.minimum(np.abs(response) ** 2 * s_uu / s_yy, 1.0)[keep],
         noise=(np.sqrt(2.0 * residual / np.sum(_window(length) ** 2) / length))[keep],
     )
@@ -81,7 +81,7 @@ def _starts(aligned: Aligned, length: int) -> IntArray:
 
 def _segments(values: FloatArray, starts: IntArray, length: int) -> ComplexArray:
     """Return the windowed spectra, shape (segments, lines)."""
-    windows = np.lib.stride_tricks.sliding_window_view(detrended(values), length)[starts]
+    windows = np.lib.stride_tricks.sliding_window_view(detrend(values), length)[starts]
     spectra: ComplexArray = rfft(windows * _window(length), axis=1)
     return spectra
 
@@ -91,7 +91,7 @@ def _window(length: int) -> FloatArray:
     return window
 
 
-def _turned(cross: ComplexArray, length: int) -> ComplexArray:
+def _align_phases(cross: ComplexArray, length: int) -> ComplexArray:
     """Refer the product of neighbouring spectra to one time: half a segment is a turn of pi a line."""
     turned: ComplexArray = cross * (-1.0) ** np.arange(cross.shape[1])
     return turned

@@ -17,7 +17,7 @@ from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
-from rsea_ros.identification.steady import steadied
+from rsea_ros.identification.steady import with_even_clocks
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
@@ -49,7 +49,7 @@ def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
     rig = rig.with_effects(*(e for e in rig.effects if not e.guess))
     records = [bounded(commanded(r, rig)) for r in records]
     checked = [check(r, rig) for r in records]
-    steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
+    steady = with_even_clocks([c.record for c in checked], [c.masked for c in checked], rig)
     checked = [replace(c, record=r) for c, r in zip(checked, steady.records, strict=True)]
     problem = nominal_problem(checked, rig)
     parts = [part(c, FITTED, DEFAULT.blocks) for c in problem.cases]

@@ -56,7 +56,7 @@ class Choice:
 
 
 def chosen_models(search: Search, depends: Sequence[Dependence]) -> Choice:
-    """Return the models of the law, if any surely helps; a second place where that surely adds."""
+    """Return the models of the law, if one surely helps, with a second place if that surely adds to it."""
     gram = search.gram
     models = paths(gram, search.candidates)
     none = gram.held_out(np.array([], np.int64))
@@ -109,7 +109,7 @@ def surely_helps(
 
 
 def _is_sure(gain: FloatArray, errors: float, worse: float) -> bool:
-    """Return whether the gains of groups are more than chance: beyond their error, or with hardly a loss.
+    """Return whether the gains of groups exceed chance: by their error, or with hardly a loss.
 
     A feature that appears once, such as a mode passed by a chirp, gains in a single group.
     """

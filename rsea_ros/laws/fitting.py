@@ -19,7 +19,7 @@ _NEEDED = 0.03
 
 
 def refined_laws(base: Base, drafts: Sequence[Draft]) -> Refined:
-    """Fit the laws in the simulation, in units of their residual, and drop terms that it does not need."""
+    """Fit the laws in the simulation, in units of their residual, and drop needless terms."""
     refined = refine(base.solution, base.cases, base.score(FITTED), _starts(drafts, None))
     weights = _score(base, refined, FITTED)
     refined = _again(base, drafts, refined, weights, frozenset())

@@ -49,7 +49,7 @@ class Law:
 
     @property
     def is_learnt(self) -> bool:
-        """Whether it is a curve, which names nothing."""
+        """Whether it is a curve, which has no name in the field."""
         return self.curve is not None
 
     @property

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.signal import periodogram, welch
 
-from rsea_ros.diagnosis.residual_peaks import peaks, refined
+from rsea_ros.diagnosis.residual_peaks import interpolate_peak, peaks
 from rsea_ros.signals import FloatArray
 
 _MOST = 400.0
@@ -40,7 +40,7 @@ def periods(angle: FloatArray, torque: FloatArray) -> list[float]:
     level = np.where((cycles > _TURNS) & (cycles < _MOST), level, 0.0)
     if not level.any():
         return []
-    return [refined(cycles, level, k) * 2.0 * math.pi / travel for k in peaks(level, apart=16)]
+    return [interpolate_peak(cycles, level, k) * 2.0 * math.pi / travel for k in peaks(level, apart=16)]
 
 
 def lines(t: FloatArray, residual: FloatArray) -> list[float]:
@@ -48,7 +48,7 @@ def lines(t: FloatArray, residual: FloatArray) -> list[float]:
     rate = 1.0 / float(np.median(np.diff(t)))
     bins, level = periodogram(residual, rate, window="hann")
     level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
-    return [refined(bins, level, k) for k in peaks(level, apart=8)[:1]]
+    return [interpolate_peak(bins, level, k) for k in peaks(level, apart=8)[:1]]
 
 
 def modes(t: FloatArray, residual: FloatArray) -> list[float]:
@@ -56,4 +56,4 @@ def modes(t: FloatArray, residual: FloatArray) -> list[float]:
     rate = 1.0 / float(np.median(np.diff(t)))
     bins, level = welch(residual, rate, nperseg=min(1024, len(residual)))
     level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
-    return [refined(bins, level, k) for k in peaks(level, apart=12)]
+    return [interpolate_peak(bins, level, k) for k in peaks(level, apart=12)]

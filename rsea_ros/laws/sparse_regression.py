@@ -111,7 +111,7 @@ def _same_form(a: TermCandidate, b: TermCandidate) -> bool:
 
 
 def _acts_right(gram: Gram, candidates: Sequence[TermCandidate], columns: Sequence[int]) -> bool:
-    """Return whether all terms that only can take energy do."""
+    """Return whether all terms that can only dissipate energy do so."""
     first = len(gram.prior)
     beta = gram.fit(np.array(columns, np.int64), SELECTION)[first:]
     terms = [candidates[k - first].term for k in columns]

@@ -32,6 +32,11 @@ class Checks:
 
         return "\n".join(line.plain for line in check_lines(self.result))
 
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<pre>{escape(self.summary())}</pre>"
+
     def __repr__(self) -> str:
         """Return the rig, the worst light and the findings that are not green in one line."""
         marked = [f"{f.kind} {f.channel}".strip() for f in self.findings if f.light != "green"]

@@ -108,18 +108,20 @@ def diagnose(
 
     data: one record, or several of the same bench. rig: a Rig, a file, or the name of a rig in config/rigs.
     holdout: a record for testing only; without it, a quarter of their blocks. progress: called with
-    the name of a step and the share done, 0 to 1. Raises IdentificationError for records that cannot be
-    diagnosed, RigError for the rig. Method: docs/diagnosis.md.
+    the name of a step and the share done, 0 to 1; without it a notebook shows a bar. Raises
+    IdentificationError for records that cannot be diagnosed, RigError for the rig. Method: docs/diagnosis.md.
     Not to be confused with identify, which trusts the structure of the rig and fits only its values.
     """
     from rsea_ros.checks.carried import held_against
     from rsea_ros.checks.usable import check_diagnosable
     from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
     from rsea_ros.library.inputs import records_of
+    from rsea_ros.library.notebook_progress import shown_in_notebook
 
     rig, records = load_rig(rig), records_of(data)
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
     carrying = [held_against(record, rig, masks=True) for record in records]
-    result = diagnose_records(carrying, rig, holdout, progress, settings=settings)
+    with shown_in_notebook(progress) as say:
+        result = diagnose_records(carrying, rig, holdout, say, settings=settings)
     return Diagnosed(result, records[0])

@@ -95,14 +95,17 @@ def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progr
     """Fit the free values of a rig to one record, or to several of the same bench.
 
     rig: a Rig, a file, or the name of a rig in config/rigs; its values with a spread are free. progress:
-    called with the name of a step and the share done, 0 to 1. Raises IdentificationError for records from
-    which the rig cannot be identified, RigError for the rig. Method: output error, docs/architecture.md.
+    called with the name of a step and the share done, 0 to 1; without it a notebook shows a bar. Raises
+    IdentificationError for records from which the rig cannot be identified, RigError for the rig. Method:
+    output error, docs/architecture.md.
     Not to be confused with diagnose, which also searches for effects that the rig lacks.
     """
     from rsea_ros.checks.carried import held_against
     from rsea_ros.identification.identify import identify as identify_records
     from rsea_ros.library.inputs import records_of, without_missing
+    from rsea_ros.library.notebook_progress import shown_in_notebook
 
     rig = load_rig(rig)
     records = [without_missing(held_against(r, rig, masks=False)) for r in records_of(data)]
-    return Fit(identify_records(records, rig, progress))
+    with shown_in_notebook(progress) as say:
+        return Fit(identify_records(records, rig, say))

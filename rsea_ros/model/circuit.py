@@ -98,7 +98,7 @@ def _distal_side(rig: Rig) -> Iterator[Element]:
 
 
 def _load(rig: Rig, end: str, index: str) -> list[Part]:
-    """Return inertia, damping and stiffness (a pendulum's small-angle one included) of what is on an end."""
+    """Return inertia, damping and stiffness (a pendulum's small-angle one included) of the load on an end."""
     stiffness = rig[f"{end}.stiffness"] + rig[f"{end}.gravity"]
     parts: list[Part] = [
         (f"J_{index}", "inertia", rig[f"{end}.inertia"]),

@@ -55,7 +55,7 @@ def mean_of_curve(finer: int, knots: FloatArray, y: FloatArray, count: int) -> F
 
 
 def beside_mean(knots: FloatArray, y: FloatArray, means: FloatArray, at: FloatArray) -> FloatArray:
-    """Return the integral of the held signal less that of its means, at instants; all in steps."""
+    """Return the integral of the held signal minus the integral of its means, at instants; all in steps."""
     off_grid = at != np.rint(at)
     if not off_grid.any() or (knots == np.rint(knots)).all():
         return np.zeros(len(at))

@@ -42,7 +42,7 @@ def initial_state(record: Record) -> tuple[float, float]:
 
 
 def state_at(record: Record, first: float, at: float) -> tuple[float, float]:
-    """Return position and velocity at a time (s), from the first samples at or behind `first` (s).
+    """Return position and velocity at a time (s), from the first samples at or after `first` (s).
 
     Zero where there is none; a velocity that is not measured is the slope of the position.
     """

@@ -35,6 +35,11 @@ class Comparison:
     predicted: FloatArray
     counts: npt.NDArray[np.bool_]
 
+    def __repr__(self) -> str:
+        """Return the number of compared samples and the errors in one line."""
+        errors = f"RMS error {self.rms_error:.4g}, fit {self.fit_percent:.2f} %"
+        return f"Comparison({self.counts.sum()} of {len(self.t)} samples: {errors})"
+
     @property
     def rms_error(self) -> float:
         """RMS of predicted - measured, in the unit of the channel; NaN if no sample is compared."""

@@ -33,7 +33,7 @@ from rsea_ros.model.pure_torque_filter import (
     SINCE,
     VERDICT,
     empty_pair,
-    judge,
+    update_flag,
 )
 from rsea_ros.model.pure_torque_noise import split
 from rsea_ros.model.rig import Rig
@@ -138,7 +138,7 @@ class PureTorque:
             self._memory[:] = 0.0
             self._memory[[HEARD, SINCE, LAST, FELL]] = -math.inf
             self._pair = empty_pair()
-        judge(self._pair, self._limits, self._memory, t, estimate.distal, estimate.sigma_distal)
+        update_flag(self._pair, self._limits, self._memory, t, estimate.distal, estimate.sigma_distal)
         return self.verdict
 
     def reading(self) -> PureTorqueVerdict:

@@ -87,7 +87,7 @@ DECIDED = 3.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def judge(pair, limits, memory, t, torque, sigma):  # type: ignore[no-untyped-def]
+def update_flag(pair, limits, memory, t, torque, sigma):  # type: ignore[no-untyped-def]
     """Process a torque (N m) and its sigma at a later t (s), and update the verdict in memory."""
     if t <= memory[LAST]:
         return

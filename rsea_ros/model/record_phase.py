@@ -1,4 +1,4 @@
-"""Phases that differ from record to record, such as that of the mains at its start."""
+"""Phases that differ from record to record, for example that of the mains."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from rsea_ros.model.rig_fields import FIELDS, check_value, unit_of
 from rsea_ros.model.rig_structure import check_structure
 from rsea_ros.model.train import Train
 from rsea_ros.signals import FloatArray
-from rsea_ros.units import plain
+from rsea_ros.units import plain, with_unit
 
 CLOCK_DOUBT = 1e-4
 """s, one sigma of the time offset of a sensor if the rig states none."""
@@ -121,6 +121,12 @@ class Rig:
             check_value(name, quantity.value, where=self.name)
         check_structure(self)
 
+    def __repr__(self) -> str:
+        """Return the name, the values and the effects in one line."""
+        values = ", ".join(f"{n} {with_unit(f'{v:.5g}', unit_of(n))}" for n, v in self.values().items())
+        effects = ", ".join(effect.name for effect in self.effects) or "none"
+        return f"Rig({self.name!r}: {values}; effects: {effects})"
+
     def __getitem__(self, name: str) -> float:
         """Return a value in SI, or the default of a field that the rig leaves out."""
         if name in self.quantities:
@@ -172,7 +178,7 @@ class Rig:
         return not (self.rigid_spring and channel in ("ft", "deflection"))
 
     def zero_unknown(self, channel: str) -> bool:
-        """Return whether a channel's sensor has another zero in every record."""
+        """Return whether the zero of a channel's sensor differs from record to record."""
         return channel in self.sensors and self.sensors[channel].zero_unknown
 
     def clock(self, channel: str, since: FloatArray | float = 0.0) -> FloatArray | float:

@@ -1,4 +1,4 @@
-"""How a run came by its rig and its data: what the user gave, or the default."""
+"""Where a run took its rig and its data from: the user's options, or the defaults."""
 
 from __future__ import annotations
 

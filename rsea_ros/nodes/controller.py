@@ -18,9 +18,9 @@ from rsea_ros.control.controller import Measurement
 from rsea_ros.control.grid import Grid
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._control import TABLE, controller_of, design_of, summary
+from rsea_ros.nodes._controller_limits import ControllerLimits
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
-from rsea_ros.nodes._judge import Judge
 from rsea_ros.nodes._link import link_of, link_values, link_words
 from rsea_ros.nodes._measurements import Measurements
 from rsea_ros.nodes._qos import COMMAND, await_arrival
@@ -51,7 +51,7 @@ class ControllerNode:
         )
         self._desired = self._inputs.desired
         self._anchor, self._grid = Anchor(), Grid(self._period)
-        self._judge = Judge(values)
+        self._limits = ControllerLimits(values)
         self._last, self._heard, self._watched, self._until, self._torque = 0, 0, 0, 0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
         self._steps = self._missed = self._limited = self._late = self._late_reported = self._restarts = 0
@@ -103,10 +103,10 @@ class ControllerNode:
     def _command(self, stamp: int, reading: Measurement, missed: int, together: int) -> None:
         self._inputs.hear_desired(self._anchor)
         off = self._take_desired()
-        if not self._last or self._judge.idle(self._torque, reading.motor_torque):
+        if not self._last or self._limits.idle(self._torque, reading.motor_torque):
             self._controller.start(reading, self._desired.torque)
         late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
-        trust = self._judge.lateness.take(max(late, missed), max(together, int(missed > 0)))
+        trust = self._limits.lateness.take(max(late, missed), max(together, int(missed > 0)))
         torque = self._controller.step(
             reading,
             self._desired.torque,
@@ -115,14 +115,14 @@ class ControllerNode:
             offset=self._grid.offset,
             desired_offset=off,
         )
-        if fault := self._judge.fault(reading.ft, self._desired.torque):
+        if fault := self._limits.fault(reading.ft, self._desired.torque):
             return self._latch(fault)
         self._torque = torque
         self._publish(self._grid.next)
         self._last = stamp
         self._steps, self._missed = self._steps + 1, self._missed + missed
         self._limited += self._controller.share.limited
-        self._late += late > self._judge.lateness.tolerance.late
+        self._late += late > self._limits.lateness.tolerance.late
         self._squares.append((reading.ft - self._desired.torque) ** 2)
 
     def _take_desired(self) -> float:
@@ -161,7 +161,7 @@ class ControllerNode:
         with self._lock:
             self._fault, self._last, self._torque = "", 0, 0.0
             self._grid.forget()
-            self._judge.clear()
+            self._limits.clear()
             self._desired.clear(self._anchor.now())
         response.success, response.message = True, "clear_fault: done"
         return response
@@ -201,7 +201,7 @@ class ControllerNode:
             "unusable_measurements": self._inputs.unusable,
             "limited_commands": self._limited,
             "late_commands": self._late,
-            "feedback_share": f"{self._judge.lateness.trust:.2f}",
+            "feedback_share": f"{self._limits.lateness.trust:.2f}",
             "restarts": self._restarts,
             **link_values(self._link),
             **self._anchor.values(),

@@ -83,7 +83,7 @@ class HealthNode:
         if len(events[0]):
             self._heard = time.monotonic()
         try:
-            self._judge(events)
+            self._weigh(events)
         except (ArithmeticError, ValueError) as error:
             self._node.get_logger().error(f"begins anew: {type(error).__name__}: {error}")
             self._monitor.begin()
@@ -91,7 +91,7 @@ class HealthNode:
             self._node.get_logger().warning(f"kept {path}: {self._command(path)}")
             self._health.publish()
 
-    def _judge(self, events: Events) -> None:
+    def _weigh(self, events: Events) -> None:
         """Pass new events to the monitor, and its fits to the thread."""
         self._monitor.take(*events)
         if self._fit is None and self._monitor.job is not None:
@@ -123,7 +123,7 @@ class HealthNode:
         troubles = [f"{f.code}: {sentence(f)}" for f in findings]
         if time.monotonic() - self._heard > SILENT:
             missing = [name for name, count in inputs.counts.items() if not count]
-            troubles.append(f"nothing to judge, expected {' and '.join(missing) or 'joint_states and ft'}")
+            troubles.append(f"nothing to compare, expected {' and '.join(missing) or 'joint_states and ft'}")
         if self._keeper.trouble:
             troubles.append(self._keeper.trouble)
         usual = "learning how the signals scatter" if monitor.learning else "as the model says"

@@ -1,4 +1,4 @@
-"""Rival models of the same bench: each fitted to one record, all judged on records that took no part."""
+"""Rival models of the same bench: each fitted to one record, all tested on records that took no part."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rsea_ros.signals import Record
 
 
 @dataclass(frozen=True)
-class Judged:
+class HeldOutFit:
     """A rival on one held-out record.
 
     sensor: which end its F/T sensor is on. explained: share of the variance of its torque,
@@ -35,7 +35,7 @@ class Rival:
 
     name: str
     rig: Rig
-    judged: tuple[Judged, ...]
+    held_out: tuple[HeldOutFit, ...]
 
 
 def compare(
@@ -50,15 +50,15 @@ def compare(
 
 def _rival(name: str, rig: Rig, train: Record, holdout: Sequence[tuple[str, Record]]) -> Rival:
     fitted = identify([train], rig).rig
-    return Rival(name, fitted, tuple(judge(fitted, end, record) for end, record in holdout))
+    return Rival(name, fitted, tuple(test_on(fitted, end, record) for end, record in holdout))
 
 
-def judge(rig: Rig, end: str, record: Record) -> Judged:
+def test_on(rig: Rig, end: str, record: Record) -> HeldOutFit:
     """Return how well a rig predicts the torque that a sensor on an end recorded."""
     comparison: Comparison = predict(replace(rig, ft_end=end), record)["ft"]
     measured = comparison.measured[comparison.counts]
     error = (comparison.predicted - comparison.measured)[comparison.counts]
-    return Judged(
+    return HeldOutFit(
         sensor=end,
         explained=float(1.0 - np.var(error) / np.var(measured)),
         fit_percent=comparison.fit_percent,

@@ -12,10 +12,14 @@ from rsea_ros.wording import listed
 
 
 def fault(*alike: Fault) -> str:
-    """Return `outliers in F/T torque, 0.04 % of the samples`. alike: the same fault of several channels."""
-    f, names = alike[0], listed([words.channel(f.channel) for f in alike])
+    """Return `outliers in F/T torque, 0.04 % of the samples`.
+
+    alike: the same fault of several channels or records.
+    """
+    f, channels = alike[0], list(dict.fromkeys(f.channel for f in alike))
+    names = listed([words.channel(channel) for channel in channels])
     if f.kind == "missing_topic":
-        return f"{names} {'are' if len(alike) > 1 else 'is'} missing"
+        return f"{names} {'are' if len(channels) > 1 else 'is'} missing"
     detail = f" ({f.detail})" if f.detail else ""
     place = f" in {names}" if f.channel else ""
     return f"{_kind(f)}{place}{_size(f)}{detail}"

@@ -19,7 +19,7 @@ _TORQUE_BY_LOOP_GAINS = (
     "and friction by g."
 )
 _ON_MEASURED_ANGLE = (
-    "The torque ripple was fitted and judged on the measured rotor angle: a simulation that moves freely "
+    "The torque ripple was fitted and tested on the measured rotor angle: a simulation that moves freely "
     "settles in other detents, so `rsea predict` will show a larger residual than the gain here."
 )
 _FIXES = "A measured spring stiffness, the encoder (position), or a known inertia would fix it."

@@ -38,8 +38,8 @@ def test_paper_writes_page_json_and_bags(played):
 
 @pytest.mark.parametrize("rig", MOVING)
 def test_unlumped_explains_the_held_out_torque_at_every_sensor(played, rig):
-    judged = played[1]["moving_output"][rig]["unlumped"]
-    assert judged and all(j["explained"] > 0.95 for j in judged)
+    held_out = played[1]["moving_output"][rig]["unlumped"]
+    assert held_out and all(j["explained"] > 0.95 for j in held_out)
 
 
 @pytest.mark.parametrize("rig", MOVING)

@@ -14,7 +14,7 @@ from rsea_ros.checks import usable
 from rsea_ros.checks.finding import Findings
 from rsea_ros.cli import _checks, experiment, paper
 from rsea_ros.control import study
-from rsea_ros.design import judge, tolerance
+from rsea_ros.design import spring_design, tolerance
 from rsea_ros.diagnosis import diagnose
 from rsea_ros.experiment import advice, run_file
 from rsea_ros.fleet import store_columns
@@ -97,7 +97,8 @@ def prepare(record: Record, folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
     result = Result()
     for module, names, value in (
         (identify, "identify", result), (diagnose, "diagnose", result), (study, "study", result),
-        (judge, "judge", result), (judge, "least_stiffness", 1.0), (tolerance, "robust_stiffness", np.inf),
+        (spring_design, "spring_design", result), (spring_design, "least_stiffness", 1.0),
+        (tolerance, "robust_stiffness", np.inf),
         (usable, "check_diagnosable", None), (_checks, "check_record", Findings("run.mcap", RIG, (), ())),
         (results, "identification_json", JSON), (results, "identification_report", "page"),
         (diagnosis_files, "diagnosis_json", JSON), (diagnosis_files, "diagnosis_report", "page"),

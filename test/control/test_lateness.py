@@ -11,7 +11,7 @@ from rsea_ros.control.lateness import Lateness, Tolerance
 from rsea_ros.control.law import Gains
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
-from rsea_ros.nodes import _judge
+from rsea_ros.nodes import _controller_limits
 
 RATES = {
     280.0: Gains(0.2575, 0.003029, 1.195, 6.99, 42.9),
@@ -129,20 +129,20 @@ def test_n_late_commands_of_m_are_a_fault_and_fewer_are_not():
 
 
 def test_an_error_that_stays_is_a_fault_and_a_step_is_not():
-    judge = _judge.Judge(VALUES)
-    assert not any(judge.fault(0.0, 40.0) for _ in range(60))
-    assert not any(judge.fault(40.0, 40.0) for _ in range(100))
-    faults = [judge.fault(0.0, 40.0) for _ in range(150)]
+    limits = _controller_limits.ControllerLimits(VALUES)
+    assert not any(limits.fault(0.0, 40.0) for _ in range(60))
+    assert not any(limits.fault(40.0, 40.0) for _ in range(100))
+    faults = [limits.fault(0.0, 40.0) for _ in range(150)]
     assert faults[139] == "" and "40 N·m off the desired torque" in faults[-1]
 
 
 def test_a_torque_beyond_the_sensor_is_a_fault_at_once():
-    assert "ft of -111 N·m" in _judge.Judge(VALUES).fault(-111.0, -111.0)
+    assert "ft of -111 N·m" in _controller_limits.ControllerLimits(VALUES).fault(-111.0, -111.0)
 
 
 def test_a_motor_without_torque_is_noticed_and_a_late_one_is_not():
     """When a fault of the driver was cleared, a torque commanded meanwhile acted: 25 N m in place of 10."""
-    judge = _judge.Judge(VALUES)
-    assert [judge.idle(25.0, 0.0) for _ in range(15)].index(True) == 13
-    assert not any(judge.idle(25.0, 20.0) or judge.idle(1.0, 0.0) for _ in range(100))
-    assert not any(judge.idle(25.0, math.nan) for _ in range(100))
+    limits = _controller_limits.ControllerLimits(VALUES)
+    assert [limits.idle(25.0, 0.0) for _ in range(15)].index(True) == 13
+    assert not any(limits.idle(25.0, 20.0) or limits.idle(1.0, 0.0) for _ in range(100))
+    assert not any(limits.idle(25.0, math.nan) for _ in range(100))

@@ -10,9 +10,9 @@ import pytest
 
 from rsea_ros.design import mechanism
 from rsea_ros.design.by_train import band_range, by_train
-from rsea_ros.design.judge import judge, least_stiffness, rig_of, stiffness_bounds
 from rsea_ros.design.motor_gear_units import catalogue, unit_named
 from rsea_ros.design.requirement import Requirement, gyration
+from rsea_ros.design.spring_design import least_stiffness, rig_of, spring_design, stiffness_bounds
 from rsea_ros.design.tolerance import margins, robust_stiffness, spreads_of
 from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs
@@ -24,7 +24,7 @@ from rsea_ros.paper.formulas import eq_8_spring_torque, eq_9_spring_stiffness
 
 PAPER = Requirement()
 UNIT = unit_named("rd85x13-hd_cpl-25a-160")
-ASKED = judge(PAPER, UNIT, 260.0)
+ASKED = spring_design(PAPER, UNIT, 260.0)
 
 
 TRAIN = "train: {value: star, source: x}"
@@ -56,11 +56,12 @@ def test_the_example_also_yields_what_the_paper_leaves_out():
 
 def test_the_least_stiffness_meets_all_and_a_little_less_does_not():
     k_s = least_stiffness(PAPER, UNIT)
-    assert judge(PAPER, UNIT, k_s).feasible
-    assert not judge(PAPER, UNIT, 0.999 * k_s).feasible
+    assert spring_design(PAPER, UNIT, k_s).feasible
+    assert not spring_design(PAPER, UNIT, 0.999 * k_s).feasible
     soft = replace(PAPER, bandwidth=5.0)
-    assert judge(soft, UNIT, least_stiffness(soft, UNIT)).feasible
-    assert math.degrees(judge(soft, UNIT, least_stiffness(soft, UNIT)).deflection) == pytest.approx(5.0)
+    least = spring_design(soft, UNIT, least_stiffness(soft, UNIT))
+    assert least.feasible
+    assert math.degrees(least.deflection) == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("degrees", [0.5, 5.0, 30.0, 45.0])
@@ -97,7 +98,7 @@ def test_without_spread_a_margin_is_all_or_nothing():
 def test_robust_is_stiffer_and_impossible_where_the_motor_is_too_weak():
     k_s = robust_stiffness(PAPER, UNIT)
     assert k_s > least_stiffness(PAPER, UNIT)
-    assert margins(judge(PAPER, UNIT, k_s))[-1].share == pytest.approx(0.95, abs=3e-3)
+    assert margins(spring_design(PAPER, UNIT, k_s))[-1].share == pytest.approx(0.95, abs=3e-3)
     assert robust_stiffness(PAPER, unit_named("h54-200-s500-r")) == math.inf
 
 
@@ -133,7 +134,7 @@ def test_both_arrangements_of_the_prototypes_drive_are_designed():
 )
 def test_a_heavier_chassis_helps_where_the_rotor_turns_backward(train, sign):
     unit, heavier = UNIT.with_train(train), replace(PAPER, inertia=2.0 * PAPER.inertia)
-    change = judge(heavier, unit, 260.0).band_exact - judge(PAPER, unit, 260.0).band_exact
+    change = spring_design(heavier, unit, 260.0).band_exact - spring_design(PAPER, unit, 260.0).band_exact
     assert sign * change < -0.4
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from scripted import script, unknown
 
-from rsea_ros.diagnosis.backward_elimination import reached_by
+from rsea_ros.diagnosis.backward_elimination import fitted_parameters
 from rsea_ros.diagnosis.selection import trial_of
 from rsea_ros.effects.catalogue import effect_named
 
@@ -68,4 +68,4 @@ def test_only_a_mode_brings_the_rigs_values_along(effect, parameter, begins_with
     trial = SimpleNamespace(
         problem=SimpleNamespace(unknowns=tuple(map(unknown, names))), theta=(4.0, 0.01, 9.0)
     )
-    assert reached_by(trial, effect_named(effect)) == begins_with
+    assert fitted_parameters(trial, effect_named(effect)) == begins_with

@@ -58,8 +58,8 @@ class World:
             "fit_candidate": fits.fit,
             "ForwardStep": Step,
             "refit": self.refit,
-            "with_noise_reestimated": self.requieted,
-            "scored_against": self.scored,
+            "with_noise_reestimated": self.reestimate_noise,
+            "rescore": self.scored,
             "leaves_only_noise": lambda model, limit: model.validation.ratio("ft") < limit,
             "vector_of": lambda unknowns, start: (unknowns, start),
         }.items():
@@ -70,7 +70,7 @@ class World:
         self.events.append(("refit", model.causes))
         return model
 
-    def requieted(self, model):
+    def reestimate_noise(self, model):
         self.events.append(("noise", model.causes))
         return model
 

@@ -13,10 +13,10 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings, StretchSettings
 from rsea_ros.diagnosis.stretches import (
     in_stretches,
     on_slots,
+    settings_for,
     simulated_time,
     slowest_decay,
     spread_slots,
-    suited_to,
     with_worst,
 )
 from rsea_ros.effects.catalogue import catalogue
@@ -142,8 +142,8 @@ def test_a_swinging_load_has_run_ups_in_which_it_forgets_its_start():
     """Between two swinging ends 4 s left 30 times the noise of the encoder in every stretch."""
     rig = load_rig("two_moving_outputs")
     assert slowest_decay(rig) == pytest.approx(7.28, rel=1e-2)
-    assert suited_to(RIG, DiagnosisSettings()).stretches.run_up == 4.0
-    suited = suited_to(rig, replace(SHORT, stretches=replace(SHORT.stretches, enough=160.0)))
+    assert settings_for(RIG, DiagnosisSettings()).stretches.run_up == 4.0
+    suited = settings_for(rig, replace(SHORT, stretches=replace(SHORT.stretches, enough=160.0)))
     assert suited.stretches.run_up == pytest.approx(4.0 * 7.28, rel=1e-2)
     case = case_from(record_of(command(256.0), rig), rig)
     (cut,) = in_stretches(problem_of(case, rig), suited, serial).cases

@@ -7,7 +7,7 @@ import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply
-from rsea_ros.hardware.dynamixel.encoder import LINK, EncoderConnection, SpringEncoder
+from rsea_ros.hardware.dynamixel.encoder import LINK, BusEncoder, EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line
 from rsea_ros.hardware.dynamixel.line_motor import LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
@@ -45,7 +45,7 @@ class Answers:
 
 
 def encoder(*counts, **settings):
-    made = SpringEncoder(EncoderConnection(100, **settings), SimpleNamespace(latency=0.0, return_delay=0.0))
+    made = BusEncoder(EncoderConnection(100, **settings), SimpleNamespace(latency=0.0, return_delay=0.0))
     made._bus = Answers(*counts)
     return made
 
@@ -136,7 +136,7 @@ def run(joint, cycles=200):
 
 def test_the_torque_is_stiffness_times_deflection(joint):
     state = run(joint)[-1]
-    assert joint.fault is None and joint.ft_source.startswith("stiffness of 1530 N m/rad times")
+    assert joint.fault is None and joint.ft_source.startswith("stiffness of 1530 N·m/rad times")
     assert state.inferred and state.wrench[5] == pytest.approx(STIFFNESS * state.deflection)
     assert state.wrench[5] == pytest.approx(10.0, abs=3.0)  # it still swings
     assert state.deflection == pytest.approx(state.position, abs=2e-4)  # the other end is clamped

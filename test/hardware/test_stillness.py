@@ -46,12 +46,12 @@ def test_values_that_stop_are_a_fault_until_they_change():
     told = sensor.take(records([9] * 10, start=1052 * MS))
     assert told == "all six values unchanged for 60 ms: the sensor has stopped" and sensor.stopped
     assert sensor.take([]) == "" and sensor.stopped
-    assert sensor.judge(records([9] * 100)) == "all six values unchanged for 99 ms: the sensor has stopped"
-    assert sensor.judge(records([9] * 50 + [8] * 50)) == ""
+    assert sensor.reason(records([9] * 100)) == "all six values unchanged for 99 ms: the sensor has stopped"
+    assert sensor.reason(records([9] * 50 + [8] * 50)) == ""
     sensor.restart()
     assert not sensor.stopped and sensor.take(records([9] * 40, start=2000 * MS)) == ""
 
 
 def test_a_sensor_without_noise_may_stand_still():
     sensor = calibrated([7] * 100)
-    assert sensor.take(records([7] * 5000)) == "" and sensor.judge(records([7] * 100)) == ""
+    assert sensor.take(records([7] * 5000)) == "" and sensor.reason(records([7] * 100)) == ""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification import clocks
-from rsea_ros.identification.clocks import RequiredClocks, asked_of, freed, without_needless
+from rsea_ros.identification.clocks import RequiredClocks, free_clocks, required_clocks, without_needless
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown
 
@@ -103,7 +103,7 @@ def test_the_cost_that_a_fit_with_clocks_would_leave_is_predicted(doubt, taken, 
     fit = solution((3, 4, 0, 5), (1, 0, 0, 0), doubt=doubt)
     columns = np.array(taken, float).reshape(len(taken), 4).T
     free = [unknown("clock.ft", doubt)] * len(taken)
-    assert clocks._left_over(fit, columns, free) == pytest.approx(left)
+    assert clocks._remainder(fit, columns, free) == pytest.approx(left)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ class World:
             "clock_rates": lambda channels: [unknown(f"clock_rate.{n}") for n in channels],
             "is_inverse": lambda rig: self.inverse,
             "_score": self.score,
-            "_left_over": self.left_over,
+            "_remainder": self.left_over,
             "_cost": lambda fit, columns, free: {u.name: c for u, c in zip(free, columns[0], strict=True)},
         }.items():
             monkeypatch.setattr(clocks, name, stand_in)
@@ -158,7 +158,7 @@ class World:
         return self.left
 
     def asked(self):
-        return asked_of(solution((0, 0)))
+        return required_clocks(solution((0, 0)))
 
 
 @pytest.fixture
@@ -222,7 +222,7 @@ def test_a_rig_that_is_judged_by_torque_has_no_clocks_to_ask_for(world):
 
 def test_requested_clocks_start_at_zero_offset():
     fit = solution((0, 0), (1, 0), theta=[0.5])
-    problem, theta = freed(fit, RequiredClocks((FT, FT_RATE)))
+    problem, theta = free_clocks(fit, RequiredClocks((FT, FT_RATE)))
     assert [u.name for u in problem.unknowns] == ["value.0", "clock.ft", "clock_rate.ft"]
     assert theta.tolist() == [0.5, 0.0, 0.0]
 

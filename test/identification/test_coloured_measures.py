@@ -162,7 +162,7 @@ def test_the_worst_band_decides_whether_noise_is_steady():
 
 
 def share(a, b):
-    return coloured._shared(segment_spectra(a, 512, 16), segment_spectra(b, 512, 16), RATE)
+    return coloured._coherent_share(segment_spectra(a, 512, 16), segment_spectra(b, 512, 16), RATE)
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_lines_that_are_shared_count_in_their_band(first, last, expected):
     a, b = np.ones((4, 257), complex), np.ones((4, 257), complex)
     b[2:] = -1.0
     b[2:, first : last + 1] = 1.0
-    assert coloured._shared(a, b, RATE) == pytest.approx(expected)
+    assert coloured._coherent_share(a, b, RATE) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def measured(monkeypatch):
             monkeypatch.setattr(coloured, name, lambda *rest, value=numbers[name]: value)
         monkeypatch.setattr(coloured, "shape_of", lambda spectra: SimpleNamespace(off=numbers["off"]))
         shares = iter(np.atleast_1d(numbers["_shared"]))
-        monkeypatch.setattr(coloured, "_shared", lambda *rest: next(shares))
+        monkeypatch.setattr(coloured, "_coherent_share", lambda *rest: next(shares))
         count = len(np.atleast_1d(numbers["_shared"]))
         monkeypatch.setattr(coloured, "witnesses", lambda *rest: [white(2000)] * count)
 

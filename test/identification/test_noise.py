@@ -13,7 +13,7 @@ from rsea_ros.identification.coloured import is_noise
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.noise import noise_floor, top_of_band
 from rsea_ros.identification.noise_level import reestimate_noise
-from rsea_ros.identification.problem import case_from, simulated
+from rsea_ros.identification.problem import case_from, simulate_cases
 from rsea_ros.identification.quantum import step_of
 from rsea_ros.identification.unknowns import Clocks
 from rsea_ros.model.rig import EffectSetting, Sensor
@@ -51,7 +51,7 @@ def test_white_noise_of_a_short_record_is_not_called_coloured(duration):
     rig = load_rig("paper_high_impedance")
     for seed in range(15):
         case = case_from(recorded(rig, seed, duration), rig)
-        known = reestimate_noise(case, simulated((case,), rig, Clocks({}, {}))[0])
+        known = reestimate_noise(case, simulate_cases((case,), rig, Clocks({}, {}))[0])
         assert known.coloured == frozenset(), seed
 
 

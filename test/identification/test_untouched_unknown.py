@@ -38,7 +38,7 @@ def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_reported(
     monkeypatch.setattr(confidence, "central_jacobian", lambda *_: matrix)
     doubt = confidence.confidence_of(replace(solution, jacobian=matrix))
     assert np.sqrt(doubt.covariance[i, i]) == pytest.approx(solution.problem.unknowns[i].reach, rel=1e-6)
-    remarks = confidence.undetermined(solution.problem.unknowns, doubt)
+    remarks = confidence.undetermined_remarks(solution.problem.unknowns, doubt)
     assert Remark("not_shown", ("nonlinear_spring.cubic",)) in remarks
 
 

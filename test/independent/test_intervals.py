@@ -8,7 +8,7 @@ from independent.hidden import hide
 from independent.severities import drawn_parameters
 
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.alternatives import extended
+from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
@@ -30,7 +30,7 @@ def z_scores(effect: str, rig, seed: int) -> dict[str, float]:
     case, p = case_from(record, rig), bench.plant
     nominal = Problem((case,), rig, unknowns_of(rig, (case,)), MEASURED)
     start = start_vector(nominal.unknowns)
-    solution = solve(*extended(nominal, start, effect_named(effect), parameters), iterations=40, gain=1e-8)
+    solution = solve(*add_effect(nominal, start, effect_named(effect), parameters), iterations=40, gain=1e-8)
     rotor = p.j_m + p.j_sc * (rig["chassis.inertia"] == 0.0)
     truth = {
         "rotor.reflected_inertia": rotor,

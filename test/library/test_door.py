@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -220,6 +221,50 @@ def test_the_catalogue_shows_equation_parameters_and_source():
     assert "gap" in page._repr_html_() and "gap" in repr(page)
     for name in rsea.effects:
         assert name in rsea.effects._repr_html_()
+
+
+def test_results_are_short_in_a_notebook(record):
+    rig = rsea.load_rig("paper_high_impedance").with_effect("backlash", gap=4e-3)
+    assert repr(rig).startswith("Rig('paper_high_impedance': ") and repr(rig).endswith("effects: backlash)")
+    assert "spring.stiffness 1530" in repr(rig) and len(repr(rig)) < 400
+    comparison = rsea.predict("paper_high_impedance", record)["ft"]
+    assert repr(comparison).startswith("Comparison(") and len(repr(comparison)) < 100
+    assert rsea.check(record, "paper_high_impedance")._repr_html_().startswith("<pre>green")
+
+
+class Cell:
+    """The display of a notebook's cell: keeps what it shows."""
+
+    def __init__(self):
+        self.shown = []
+
+    def display(self, value, display_id):
+        self.shown.append(value)
+        return SimpleNamespace(update=self.shown.append)
+
+
+@pytest.fixture
+def cell(monkeypatch):
+    """A notebook's kernel, which runs the test."""
+    made = Cell()
+    shell = SimpleNamespace(get_ipython=lambda: SimpleNamespace(kernel=object()))
+    monkeypatch.setitem(sys.modules, "ipykernel", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "IPython", shell)
+    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=made.display))
+    return made
+
+
+def test_a_notebook_shows_a_bar_that_vanishes_at_the_end(cell, record):
+    rsea.identify(record, "paper_high_impedance")
+    *_, last, _, cleared = cell.shown
+    assert "fitting: 40 %" in map(repr, cell.shown) and "<progress value='0." in last._repr_html_()
+    assert cleared._repr_html_() == "" == repr(cleared)
+
+
+def test_the_callers_progress_replaces_the_bar(cell, record):
+    steps = []
+    rsea.identify(record, "paper_high_impedance", progress=lambda step, share: steps.append(step))
+    assert "fitting" in steps and not cell.shown
 
 
 def test_a_check_says_what_is_wrong_and_a_fit_carries_it(record):

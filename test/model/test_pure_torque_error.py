@@ -72,7 +72,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_verdict_is_that_of_the_true_error(name):
-    """Issue 13: right in 95 % of the time outside 20 % of the tolerance, at most one change a second."""
+    """Asked: right in 95 % of the time outside 20 % of the tolerance, at most one change a second."""
     distal, proximal = ends(PLATFORM, CASES[name])
     verdicts, shares = said(ErrorFlag(PLATFORM), distal, proximal)
     true = true_share(distal, proximal, SETTINGS.window)

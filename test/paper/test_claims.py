@@ -77,7 +77,7 @@ def test_contradictions_are_those_that_hold():
 
 
 def test_both_readings_of_the_lumped_model_miss_the_resonance():
-    """Issue 13: 6.1 Hz against 19.8 Hz; the grounded motor is 62.0 dB off at the pendulum's frequency."""
+    """Asked: 6.1 Hz against 19.8 Hz; the grounded motor is 62.0 dB off at the pendulum's frequency."""
     unlumped, moving, grounded = readings(load_rig("paper_moving_output")).values()
     assert resonance_hz(unlumped) == pytest.approx(19.8, abs=0.05)
     assert resonance_hz(moving) == pytest.approx(6.1, abs=0.05)

@@ -28,10 +28,20 @@ def test_faults_of_other_size_stay_apart():
     assert fault_lines(missing) == ["velocity and position are missing"]
 
 
+def test_a_channel_that_two_records_lack_is_named_once():
+    missing = [Fault("missing_topic", name, 1.0) for name in ("velocity", "position")]
+    assert fault_lines([*missing, *missing]) == ["velocity and position are missing"]
+    assert fault_lines([missing[0], missing[0]]) == ["velocity is missing"]
+    assert fault_lines([NAN, NAN]) == ["NaN in F/T torque, 1.0 % of the samples"]
+
+
 def test_only_what_is_masked_is_called_masked():
     assert faults([NAN]) == "Faults in the data, masked: NaN in F/T torque."
     assert "masked" not in faults(DISORDER)
     sentence = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, DISORDER)
     assert sentence.endswith(" The data have faults: out of order in position, velocity and motor_torque.")
+    missing = [Fault("missing_topic", name, 1.0) for name in ("velocity", "position", "velocity")]
+    lacking = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, missing)
+    assert lacking.endswith(" The data have faults: velocity and position missing.")
     both = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, [*DISORDER, NAN])
     assert both.endswith(" Samples were masked: nan in ft.")

@@ -32,7 +32,7 @@ def cause_of(
     where its residual falls.
     """
     (without, with_it), effect = step, effect_named(step[1].added)
-    channel = _helped(without.test, with_it.test, channel, rule)
+    channel = _helped_channel(without.test, with_it.test, channel, rule)
     held_out, interval = gain(with_it.test, without.test, channel)
     train, _ = gain(with_it.train, without.train, channel)
     return Cause(
@@ -49,7 +49,7 @@ def cause_of(
     )
 
 
-def _helped(without: Score, with_it: Score, channel: str, rule: SizeSettings) -> str:
+def _helped_channel(without: Score, with_it: Score, channel: str, rule: SizeSettings) -> str:
     """Return a channel if its residual falls, else the one whose residual falls most."""
     if without.ratio(channel) > rule.fall * with_it.ratio(channel):
         return channel
@@ -88,7 +88,7 @@ def size_of(effect: str, last: Evaluated, rule: SizeSettings) -> CauseParameter:
 
 
 def is_known(size: CauseParameter, rule: SizeSettings) -> bool:
-    """Return whether a size is known: its interval has one sign, and its ends are not far from each other."""
+    """Return whether a size is known: its interval has one sign, and its ends are not far apart."""
     low, high = sorted(map(abs, size.ci95))
     return size.ci95[0] * size.ci95[1] > 0.0 and high < rule.widest * low
 

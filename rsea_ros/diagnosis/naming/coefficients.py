@@ -1,6 +1,6 @@
 """Coefficients of the probability of a cause (probability.py), by feature.
 
-Written by `python bench/calibration.py fit`, from records of the project's own plants; `score` judges them.
+Written by `python bench/calibration.py fit`, from records of the project's own plants; `score` tests them.
 """
 
 from types import MappingProxyType

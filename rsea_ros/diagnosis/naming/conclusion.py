@@ -19,7 +19,7 @@ from rsea_ros.diagnosis.result import Alternative, Diagnosis, Experiment, Reject
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.identification.confidence import undetermined
+from rsea_ros.identification.confidence import undetermined_remarks
 from rsea_ros.identification.estimates import identified_rig, overlays_of, parameters_of
 from rsea_ros.identification.off_rig import off_rig
 from rsea_ros.identification.problem import Case
@@ -48,7 +48,7 @@ def _diagnosis(
     """Return the diagnosis of an outcome, with rivals, rejected effects, and the curves of a report."""
     first, last, main = outcome.stages[0], outcome.stages[-1], outcome.channel
     case, records, rig = selection.cases[0], examined.records, examined.rig
-    rejected = _rejected(selection, outcome, pools)
+    rejected = _rejections(selection, outcome, pools)
     baseline, final = (parameters_of(s.solution, s.confidence) for s in (first, last))
     return Diagnosis(
         verdict=outcome.verdict,
@@ -96,7 +96,7 @@ def _alternatives(outcome: Outcome, pools: Pools, settings: DiagnosisSettings) -
     return tuple(pools.fits.map(alternative, rivals))
 
 
-def _rejected(selection: Selection, outcome: Outcome, pools: Pools) -> tuple[Rejected, ...]:
+def _rejections(selection: Selection, outcome: Outcome, pools: Pools) -> tuple[Rejected, ...]:
     """Return the accepted effects that may not be named, then all others that were tried."""
     decided = {c.name for c in outcome.causes} | {r.name for r in outcome.dropped}
     others = [t for t in latest(selection.trials) if t.name not in decided]
@@ -113,7 +113,7 @@ def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
     lost, channel = lost_above(case, outcome.channel), outcome.channel
     return [
         *([Remark("also_in_model", unnamed)] if unnamed else []),
-        *undetermined(first.unknowns, outcome.stages[0].confidence),
+        *undetermined_remarks(first.unknowns, outcome.stages[0].confidence),
         *([Remark("coherence_lost", (channel,), (lost,), "Hz")] if lost is not None else []),
         *([Remark("on_measured_angle")] if last.ride else []),
         *([Remark("coloured_noise", tuple(sorted(case.coloured)))] if case.coloured else []),

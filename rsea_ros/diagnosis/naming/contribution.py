@@ -38,7 +38,7 @@ class ContributionRows:
     runs: tuple[slice, ...]
 
 
-def weighted_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Problem:
+def weight_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Problem:
     """Return a problem on all samples of the cases, each channel in units of its residual in `weights`."""
     return replace(problem, cases=tuple(with_misfit_as_noise(c, weights.ratios) for c in cases))
 
@@ -89,7 +89,7 @@ def _blocks_of_rows(
     return np.concatenate(blocks), np.concatenate(tests), tuple(runs)
 
 
-def projected(rows: ContributionRows, values: FloatArray) -> FloatArray:
+def project_out(rows: ContributionRows, values: FloatArray) -> FloatArray:
     """Return rows of values less their best fit by the other unknowns."""
     a = rows.others
     normal = a.T @ a + np.diag(rows.prior**2)

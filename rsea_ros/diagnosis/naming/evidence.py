@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.diagnosis.criteria import preference
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
-from rsea_ros.diagnosis.naming.contribution import rows_of, weighted_by
+from rsea_ros.diagnosis.naming.contribution import rows_of, weight_by
 from rsea_ros.diagnosis.naming.flexible import Flexible, flexible
 from rsea_ros.diagnosis.naming.signature import Signature, signature
 from rsea_ros.diagnosis.score import Score, gain, score_on
@@ -64,7 +64,7 @@ def evidence_for(
     everything = replace(claim.problem, cases=cases)
     sets, outputs = (*TRAIN, *VALIDATION, *TEST), everything.outputs(claim.theta)
     weights = score_on(everything, cases, sets, outputs, settings.blocks)
-    problem = weighted_by(claim.problem, cases, weights)
+    problem = weight_by(claim.problem, cases, weights)
     rows = rows_of(problem, claim.theta, claim.name, settings.blocks, run)
     if rows is None:
         return None

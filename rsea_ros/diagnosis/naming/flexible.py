@@ -143,7 +143,7 @@ def _spline(
 
 
 def _since(signal: FloatArray, samples: int) -> FloatArray:
-    """Return what a signal was some samples ago, less what it is."""
+    """Return a signal some samples ago minus the signal now."""
     return np.concatenate([np.full(samples, signal[0]), signal[:-samples]]) - signal
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from rsea_ros.diagnosis.criteria import is_at_floor, takes_most, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined
 from rsea_ros.diagnosis.naming.cause_facts import cause_of, dropped_of, is_known, size_of
-from rsea_ros.diagnosis.naming.status import Named, named
+from rsea_ros.diagnosis.naming.status import Named, name_causes
 from rsea_ros.diagnosis.naming.weighing import Weighing
 from rsea_ros.diagnosis.result import Cause, Rejected, Verdict
 from rsea_ros.diagnosis.score import Score
@@ -68,7 +68,7 @@ def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Name
     """Return the naming of each cause."""
     first, last = weighing.stages[0].test, weighing.stages[-1].test
     at_floor, most = is_at_floor(last, settings.floor), takes_most(first, last, settings)
-    return {n.cause.evidence.name: n for n in named(weighing.places, at_floor, most, settings)}
+    return {n.cause.evidence.name: n for n in name_causes(weighing.places, at_floor, most, settings)}
 
 
 def with_sizes_known(

@@ -58,17 +58,17 @@ def contests(
         claim = Claim(name, last.problem, last.theta, with_it.test, without.test, 1.0)
         rounds = [t for t in selection.trials if t.name == name and t.reason == "replaced"]
         tried = beside(selection, rounds[-1].beside) if rounds else []
-        result.append(weighed(selection, claim, tried, held_out, pools, far))
+        result.append(weigh(selection, claim, tried, held_out, pools, far))
     return result
 
 
 def beside(selection: Selection, model: Candidate) -> list[Trial]:
-    """Return the trials beside a model that were fitted to everything, each effect's last."""
+    """Return the trials beside a model that were fitted to all training blocks, the last of each effect."""
     full = {t.name: t for t in selection.trials if t.is_full and t.beside.causes == model.causes}
     return list(full.values())
 
 
-def weighed(
+def weigh(
     selection: Selection, claim: Claim, tried: Sequence[Trial], held_out: HeldOut, pools: Pools, far: float
 ) -> Contest:
     """Return a contest of a claim with the effects tried beside the same model, or as good in its place.
@@ -90,7 +90,7 @@ def weighed(
     swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(accepted)]
     models = [selection.last, *swapped]
     tested = [held_out.score_of(m) for m in models]
-    among_swapped = _stacked(tested, [m.prior_cost for m in models], [m.size for m in models], far)
+    among_swapped = _stack(tested, [m.prior_cost for m in models], [m.size for m in models], far)
     among_tried = weight_of.get(claim.name, 1.0)
     for model, with_it, weight in zip(swapped, tested[1:], among_swapped[1:], strict=True):
         theta = model.solution.theta
@@ -107,7 +107,7 @@ def _race(
     """Return the scores of trials and their weights."""
     scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), tried))
     priors = [prior_cost(t.problem, t.theta) for t in tried]
-    return scores, _stacked(scores, priors, [effect_size(t.name) for t in tried], far)
+    return scores, _stack(scores, priors, [effect_size(t.name) for t in tried], far)
 
 
 def _with_close_ones_fitted(
@@ -116,14 +116,14 @@ def _with_close_ones_fitted(
     """Return trials, those of some weight fitted to the end."""
     least = selection.last.settings.evidence.close_weight
     fitted = [t for t, w in zip(tried, weights, strict=True) if w >= least]
-    ends = {t.name: t for t in pools.fits.map(lambda t: _fitted_to_the_end(t, selection, pools), fitted)}
+    ends = {t.name: t for t in pools.fits.map(lambda t: _fit_to_the_end(t, selection, pools), fitted)}
     return [ends.get(t.name, t) for t in tried]
 
 
-def _fitted_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Trial:
+def _fit_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Trial:
     """Return a trial fitted as the models that are tested: the steps of the search stop far earlier.
 
-    Where laws are nearly the same a fit is long: the values of one make up for what the other does.
+    Nearly equal laws need long fits: the values of one compensate for the other.
     """
     settings = selection.last.settings
     blocks, gain = (*TRAIN, *VALIDATION), settings.fits.final_gain
@@ -133,7 +133,7 @@ def _fitted_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Tria
     return replace(trial, problem=model.problem, theta=model.solution.theta)
 
 
-def _stacked(
+def _stack(
     scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[int], far: float
 ) -> list[float]:
     """Return weights; each parameter of an effect costs the logarithm of the number of blocks.
@@ -146,10 +146,10 @@ def _stacked(
     best = min(scores, key=lambda s: float(s.loss(s).sum()))
     losses = [tempered_loss(s, best, far) for s in scores]
     prices = [p + math.log(len(losses[0])) * size for p, size in zip(priors, sizes, strict=True)]
-    return [float(w) for w in stacked(losses, prices)]
+    return [float(w) for w in stacking_weights(losses, prices)]
 
 
-def stacked(losses: Sequence[FloatArray], prices: Sequence[float]) -> FloatArray:
+def stacking_weights(losses: Sequence[FloatArray], prices: Sequence[float]) -> FloatArray:
     """Return a weight for each model, shape (k,), summing to 1.
 
     losses: twice the negative log likelihood of every block, shape (b,) each. prices: of the priors, alike.

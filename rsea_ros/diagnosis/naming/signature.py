@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.diagnosis.naming.contribution import ContributionRows, projected
+from rsea_ros.diagnosis.naming.contribution import ContributionRows, project_out
 from rsea_ros.diagnosis.settings import DEFAULT, EvidenceSettings
 from rsea_ros.signals import FloatArray, IntArray
 
@@ -52,26 +52,26 @@ class Signature:
 
 def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence) -> Signature:
     """Return the signature of a cause."""
-    c, r = (projected(rows, v) for v in (rows.contribution, rows.residual))
+    c, r = (project_out(rows, v) for v in (rows.contribution, rows.residual))
     cc, cr = c * c, c * r
-    held_out = _summed(rows.block, cc * rows.tests, cr * rows.tests)
-    every = _summed(rows.block, cc, cr)
+    held_out = _sums(rows.block, cc * rows.tests, cr * rows.tests)
+    every = _sums(rows.block, cc, cr)
     total = max(float(cc.sum()), 1e-300)
     return Signature(
         scale=1.0 + float(held_out[1].sum() / max(held_out[0].sum(), 1e-300)),
         spread=_spread(*held_out),
         overall=_spread(*every),
         chance=_by_chance(rows, c, r),
-        amplitude=_spread(*_summed(_parts_by(np.abs(c), cc, rule.parts), cc, cr)),
-        time=_spread(*_summed(_parts_by(rows.block.astype(float), cc, rule.parts), cc, cr)),
+        amplitude=_spread(*_sums(_parts_by(np.abs(c), cc, rule.parts), cc, cr)),
+        time=_spread(*_sums(_parts_by(rows.block.astype(float), cc, rule.parts), cc, cr)),
         frequency=_over_frequency(rows, c, r, rule.bands),
         share=total / max(float(r @ r), 1e-300),
         kept=total / max(float(rows.contribution @ rows.contribution), 1e-300),
-        carried=_carried(*every),
+        carried=_serial_correlation(*every),
     )
 
 
-def _summed(part: IntArray, cc: FloatArray, cr: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _sums(part: IntArray, cc: FloatArray, cr: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(np.bincount(part, cc), np.float64), np.asarray(np.bincount(part, cr), np.float64)
 
 
@@ -85,7 +85,7 @@ def _spread(cc: FloatArray, cr: FloatArray) -> float:
     return float(np.sqrt(np.sum(cc * (cr / cc - mean) ** 2) / cc.sum()))
 
 
-def _carried(cc: FloatArray, cr: FloatArray) -> float:
+def _serial_correlation(cc: FloatArray, cr: FloatArray) -> float:
     """Return the correlation of (cr - mean cc) / sqrt(cc) of neighbouring blocks over its standard error."""
     used = cc > 1e-12 * max(float(cc.sum()), 1e-300)
     cc, cr = cc[used], cr[used]
@@ -108,7 +108,7 @@ def _by_chance(rows: ContributionRows, c: FloatArray, r: FloatArray) -> float:
     spreads = []
     for k in range(1, _SHIFTS + 1):
         shifted = np.concatenate([np.roll(c[s], k * (s.stop - s.start) // (_SHIFTS + 1)) for s in rows.runs])
-        spreads.append(_spread(*_summed(rows.block, shifted**2, shifted * r)))
+        spreads.append(_spread(*_sums(rows.block, shifted**2, shifted * r)))
     return float(np.sqrt(np.mean(np.square(spreads))))
 
 

@@ -29,7 +29,7 @@ class Named:
     rivals: tuple[tuple[Weighed, float], ...]
 
 
-def named(
+def name_causes(
     places: Sequence[CauseAndRivals],
     at_floor: bool,
     takes_most: bool,
@@ -39,10 +39,10 @@ def named(
 
     at_floor, takes_most: all causes together leave only noise, or take most of the residual (criteria.py).
     """
-    return [_named(p, at_floor, takes_most and not p.is_late, settings) for p in places]
+    return [_name_one(p, at_floor, takes_most and not p.is_late, settings) for p in places]
 
 
-def _named(place: CauseAndRivals, at_floor: bool, takes_most: bool, settings: DiagnosisSettings) -> Named:
+def _name_one(place: CauseAndRivals, at_floor: bool, takes_most: bool, settings: DiagnosisSettings) -> Named:
     every = [place.cause, *place.rivals]
     likely, status = probabilities_and_status([w.evidence for w in every], at_floor, takes_most, settings)
     others = zip(every[1:], likely[1:], strict=True)

@@ -1,8 +1,8 @@
 """Weighing: the evidence for every accepted cause and its rivals, and for one more that surely helps.
 
-A step of the search requires a tenth of some channel's residual, far from the floor more. Where several
-small effects overlap none gains that much. An effect that nevertheless surely helps on unused blocks is
-promoted to a cause to be weighed.
+A step of the search requires that the residual of some channel falls by `acceptance.fall`, and by more far
+from the floor. Where several small effects overlap, none may gain that much. An effect that nevertheless
+surely helps on unused blocks is promoted to a cause to be weighed.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Weighed:
 
 @dataclass(frozen=True)
 class CauseAndRivals:
-    """A cause and its rivals, each with its evidence. is_late: the steps of the search had left it out."""
+    """A cause and its rivals, each with its evidence. is_late: the search had left it out."""
 
     cause: Weighed
     rivals: tuple[Weighed, ...]
@@ -58,7 +58,7 @@ def weigh(
     """Weigh every accepted cause and its rivals, and one more that surely helps where the floor is far."""
     accepted = len(stages)
     if not is_at_floor(stages[-1].test, settings.floor):
-        selection, stages = promoted(selection, stages, held_out, pools, settings)
+        selection, stages = promote_best(selection, stages, held_out, pools, settings)
     contested = contests(selection, stages, held_out, pools, settings.floor.far)
     claims = [c for contest in contested for c in (contest.cause, *contest.rivals)]
     weigh_claim = partial(evidence_for, cases=selection.cases, settings=settings, run=pools.run)
@@ -75,7 +75,7 @@ def weigh(
     return Weighing(selection, list(stages), places)
 
 
-def promoted(
+def promote_best(
     selection: Selection,
     stages: Sequence[Evaluated],
     held_out: HeldOut,

@@ -39,7 +39,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class DiagnosisSettings:
-    """Effects and numbers of a diagnosis: what is tried, and everything that steers its verdict.
+    """The effects that a diagnosis tries, and every number that steers its verdict.
 
     max_causes: the most causes, 1 or more; the search ends earlier where only noise is left. Four causes
     leave too little of the benchmark's records unexplained for a fifth.

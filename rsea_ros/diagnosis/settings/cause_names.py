@@ -16,9 +16,9 @@ class EvidenceSettings:
     least_spread: float = number(
         3e-3, "1", "spread of lambda that two right simulations of one law have", CALIBRATED
     )
-    most_spread: float = number(3.0, "1", "spread of lambda from which more says no more", CALIBRATED)
+    most_spread: float = number(3.0, "1", "spread of lambda above which it says no more", CALIBRATED)
     surest: float = number(
-        4.0, "1", "log odds among rivals from which more says no more: all of them may be wrong", CALIBRATED
+        4.0, "1", "log odds among rivals above which they say no more: all may be wrong", CALIBRATED
     )
     least_weight: float = number(
         0.02, "1", "weight among all that was tried in a cause's place, from which an effect is a rival",
@@ -26,7 +26,7 @@ class EvidenceSettings:
     )  # fmt: skip
     close_weight: float = number(
         1e-6, "1", "the same, from which an effect is fitted to the end before it is weighed",
-        "27 of twice the log likelihood: what the end of a long fit was seen to bring",
+        "27 in twice the log likelihood, which the last steps of a long fit were seen to bring",
     )  # fmt: skip
     most_rivals: int = number(3, "1", "rivals of a cause that are weighed", CALIBRATED)
 
@@ -56,7 +56,8 @@ class NamingSettings:
     carried: float = number(
         2.6, "1", "standard deviations by which a cause's misfit lasts from block to block, above which it "
         "is not confirmed although only noise is left (naming/signature.py)",
-        "one right cause in 200; 0 of 88 played exceeded it, 6 of 8 drifts told of a wandering sensor did",
+        "chance exceeds it for one right cause in 200; in simulated records 0 of 88 right causes did, "
+        "and 6 of 8 drifts that were named for a wandering sensor",
     )  # fmt: skip
     clear: float = number(
         0.8, "1", "share of the probability of a cause and its rivals, below which it is `one_of` them",
@@ -78,5 +79,5 @@ class SizeSettings:
     )  # fmt: skip
     widest: float = number(
         10.0, "1", "ratio of the ends of a size's interval from which a cause is not confirmed",
-        "what may be ten times larger or smaller is no known law; it bends to whatever is left",
+        "a law whose size is open by a factor of ten fits whatever is left",
     )  # fmt: skip

@@ -13,7 +13,7 @@ class BlockSettings:
     """The blocks of a record, and the coherence over them that shows a missed response (coherence.py)."""
 
     longest: float = number(
-        1.0, "s", "length of a block", "longer than a bench remembers: blocks are independent of each other"
+        1.0, "s", "length of a block", "longer than a bench's memory: blocks are independent"
     )
     shortest: float = number(
         0.25, "s", "length of a block below which short records have fewer blocks",
@@ -70,7 +70,7 @@ class StretchSettings:
     )
     decays: float = number(
         4.0, "1", "time constants of the rig's slowest motion that a run-up lasts at least",
-        "after 3 a sound rig with two swinging ends is at its floor; slots are as long, and so are fewer",
+        "after 3 a sound rig with two swinging ends is at its floor; slots are as long, so there are fewer",
     )  # fmt: skip
 
 
@@ -95,5 +95,5 @@ class FloorSettings:
     share_left: float = number(0.5, "1", "of a misfit: what may be left where causes are named")
     far: float = number(
         5.0, "1", "from it on, in the worst channel, a model is far from the floor",
-        "what is left is no noise there: priors say nothing and more parameters always gain a little",
+        "the residual is not noise there: priors mean little, and more parameters always gain a little",
     )  # fmt: skip

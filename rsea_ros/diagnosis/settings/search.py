@@ -32,7 +32,7 @@ class AcceptanceSettings:
     )  # fmt: skip
     fall_in_doubt: float = number(
         0.3, "1", "fall of the worst channel for a pair, a replacement, or a third cause that leaves much",
-        f"{flat('0.1', '0.5')}; such bend to whatever is left: they must bring three times as much",
+        f"{flat('0.1', '0.5')}; these fit whatever is left, so they must bring six times as much",
     )  # fmt: skip
     causes_in_doubt: int = number(2, "1", "causes from which one more counts as doubtful while far")
     room: float = number(
@@ -88,7 +88,7 @@ class ForwardSettings:
         0.5, "1", "of the present cost on pieces: where an effect leaves less, none is fitted on"
     )
     causes_beside_a_pair: int = number(
-        1, "1", "causes beside which pairs are tried", "beside more, pairs bend to whatever is left"
+        1, "1", "causes beside which pairs are tried", "beside more of them, a pair fits whatever is left"
     )
     replacements: int = number(2, "1", "steps that may replace a cause, beside those that add one")
 
@@ -105,7 +105,7 @@ class FitSettings:
     gain: float = number(2e-4, "1", "relative fall of the cost, at the noise, below which a fit is done")
     farthest: float = number(
         20.0, "1", "times the noise up to which that fall grows with the residual",
-        "of a residual far above the noise small falls mean nothing",
+        "small falls of a residual far above the noise mean nothing",
     )  # fmt: skip
     final_gain: float = number(
         1e-6, "1", "the same for the models that are tested", "far below the doubt of a parameter"

@@ -31,7 +31,7 @@ class EncoderConnection:
     latency: float = 1e-3
 
 
-class SpringEncoder:
+class BusEncoder:
     """Reads the spring's deflection, one transaction a cycle. It counts from `open`, the spring at rest."""
 
     def __init__(self, settings: EncoderConnection, port: SerialPort) -> None:

@@ -96,7 +96,7 @@ class ForceTorqueSensor:
         """Return when the stream is sound, at once where it continues. Raises DeviceError otherwise."""
         stopped = ""
         if self._age() > self._settings.timeout * 1e9 or self._complains() or self._stillness.stopped:
-            stopped = self._stillness.judge(self._collect())
+            stopped = self._stillness.reason(self._collect())
         if complaint := self._complains() or stopped:
             raise DeviceError(f"F/T sensor: {complaint} is still there, expected it to be over")
         self._restart_watch()

@@ -44,7 +44,7 @@ class Stillness:
         self.stopped = self.stopped or unchanged > self.limit
         return _words(unchanged) if unchanged > self.limit else ""
 
-    def judge(self, arrivals: Sequence[Arrival]) -> str:
+    def reason(self, arrivals: Sequence[Arrival]) -> str:
         """Return the fault in records of a while without any change, '' for none."""
         lasted = arrivals[-1].instant - arrivals[0].instant
         return "" if len(_changes(arrivals)) > 1 or lasted <= self.limit / TIMES else _words(lasted)

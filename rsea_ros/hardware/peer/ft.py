@@ -121,7 +121,7 @@ def _counts(plant: Mechanism) -> list[int]:
 def _serve_page(host: str, page: str) -> int:
     """Serve the calibration from a thread; return its port."""
 
-    class Page(BaseHTTPRequestHandler):
+    class CalibrationHandler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             is_page = self.path == "/netftapi2.xml"
             body = page.encode() if is_page else b""
@@ -133,6 +133,6 @@ def _serve_page(host: str, page: str) -> int:
         def log_message(self, format: str, *args: object) -> None:
             """Say nothing."""
 
-    server = ThreadingHTTPServer((host, 0), Page)
+    server = ThreadingHTTPServer((host, 0), CalibrationHandler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     return int(server.server_address[1])

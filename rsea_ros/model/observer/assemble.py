@@ -59,7 +59,7 @@ def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[F
 
 
 def _balanced(a: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a matrix with rows and columns of like size, and the scale that makes it so."""
+    """Return a matrix balanced in its rows and columns, and the scale that balances it."""
     balanced, (scale, _) = matrix_balance(a, permute=False, separate=True)
     return np.ascontiguousarray(balanced), np.ascontiguousarray(scale)
 

@@ -1,4 +1,4 @@
-"""The same filter over a block of events at once: its whitened innovations, to judge the model by.
+"""The same filter over a block of events at once: its whitened innovations, as a test of the model.
 
 The events are in order, so there is no log of checkpoints as `Observer` keeps one (log.py), and nothing is
 said of the torques' doubt.

@@ -73,14 +73,14 @@ def _keys(study: Study) -> list[tuple[str, str]]:
 
 
 def _held(study: Study) -> Figure:
-    """Return T_d over desired torque of the clamped actuator, with what the set makes of it."""
+    """Return T_d over desired torque of the clamped actuator, with its band over the set."""
     seen = [(at, at.locked, at.locked_spread) for at in study.rates]
     reached = " and ".join(f"{at.locked.bandwidth:.0f} Hz at {at.design.rate:g} Hz" for at in study.rates)
     return _following(study, study.rig, f"Held at both ends, torque follows to {reached}", seen)
 
 
 def _free(study: Study) -> Figure:
-    """Return the same with the free load, which the controller has not been told of."""
+    """Return the same with the free load, which the controller does not know."""
     seen = [(at, at.free, at.free_spread) for at in study.rates]
     return _following(study, study.free, _free_title(study), seen, LEARNING)
 
@@ -124,7 +124,7 @@ def _following(
 
 
 def _band(curve: Following, apart: Spread) -> Band:
-    """Return what the set makes of a curve, from its first sine to its last."""
+    """Return the band of a curve over the set, from its first sine to its last."""
     inside = (apart.hz >= curve.hz[0]) & (apart.hz <= curve.hz[-1])
     hz = apart.hz[inside]
     turned = np.interp(np.log(hz), np.log(curve.hz), curve.phase)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rsea_ros.design.by_train import WithTrain, by_train
-from rsea_ros.design.judge import SpringDesign, stiffness_bounds
+from rsea_ros.design.spring_design import SpringDesign, stiffness_bounds
 from rsea_ros.design.tolerance import margins
 from rsea_ros.report.json_values import finite
 

@@ -10,7 +10,7 @@ from html import escape
 import numpy as np
 
 from rsea_ros.design.by_train import by_train
-from rsea_ros.design.judge import SpringDesign, least_for_band, rig_of, stiffness_bounds
+from rsea_ros.design.spring_design import SpringDesign, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, undamped_stiffness
 from rsea_ros.model.response import frequency_response

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rsea_ros.design.by_train import NINETY_PERCENT, WithTrain, sense_unknown
-from rsea_ros.design.judge import Check, SpringDesign, judge
+from rsea_ros.design.spring_design import Check, SpringDesign, spring_design
 from rsea_ros.design.tolerance import Margin, margins, spreads_of
 from rsea_ros.report import words
 from rsea_ros.report.page.html import section
@@ -87,7 +87,7 @@ def springs_table(designs: Sequence[SpringDesign]) -> str:
         if separation > r.diameter:
             continue
         varied = replace(r, separation=separation)
-        rates = [judge(varied, d.unit, d.stiffness).rate for d in designs]
+        rates = [spring_design(varied, d.unit, d.stiffness).rate for d in designs]
         travel = 0.5 * separation * math.sin(r.deflection)
         rows.append(
             [words.number(1e3 * separation), *(f"{v / 1e3:.0f}" for v in rates), words.number(1e3 * travel)]

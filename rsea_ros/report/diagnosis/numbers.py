@@ -17,6 +17,16 @@ def times_noise(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
     return diagnosis.residual_rms[channel] / noise, diagnosis.extended_residual_rms[channel] / noise
 
 
+def left_channel(diagnosis: Diagnosis) -> str:
+    """Return the worst channel above the noise where the main one has reached it; empty for none."""
+    after = {n: times_noise(diagnosis, n)[1] for n in diagnosis.extended_residual_rms}
+    reached = diagnosis.settings.floor.reached
+    if diagnosis.at_noise_floor or not after[diagnosis.channel] <= reached:
+        return ""
+    worst = max(after, key=lambda n: after[n] if after[n] > reached else 0.0)
+    return worst if after[worst] > reached else ""
+
+
 def gain(diagnosis: Diagnosis, channel: str) -> float:
     """Return the gain of all causes together: 1 - RMS(residual after) / RMS(residual before), held out."""
     before = diagnosis.residual_rms[channel]

@@ -27,15 +27,16 @@ def verdict_sentence(
     faults: Sequence[Fault],
     at_floor: bool = False,
     off: str = "",
+    rest: str = "the rest stays unexplained",
 ) -> str:
     """Return the verdict as one sentence.
 
     before, after: held-out residual of the channel over its noise. at_floor: of all channels with all causes.
-    off: how many values are not the rig's, empty for none.
+    off: how many values are not the rig's, empty for none. rest: of the misfit, where a part is explained.
     """
     name, data = words.channel(channel), (f" {off}." if off else "") + _data(faults)
     named = words.sentence(listed([words.effect(c.name) for c in causes]))
-    pronoun = "them" if len(causes) > 1 else "it"
+    pronoun, explains = ("them", "explain") if len(causes) > 1 else ("it", "explains")
     fall = f"with {pronoun} the {name} residual falls from {before:.1f} to"
     silent = [words.channel(n) for n in silent_channels(faults)]
     if verdict == "unexplained" and silent and at_floor:
@@ -56,17 +57,28 @@ def verdict_sentence(
         return f"The {name} residual is {size} times the noise; no known effect explains it.{data}"
     if verdict == "partly_explained" and at_floor:
         doubt = "but another law may do the same"
-        return f"{named}, probably: {fall} {after:.2f} times the noise, {doubt}.{data}"
+        return f"{named} probably {explains} the misfit: {fall} {after:.2f} times the noise, {doubt}.{data}"
     if verdict == "explained":
-        return f"{named}: {fall} {after:.2f} times the noise, which is the floor.{data}"
-    return f"{named}, a part of it: {fall} {after:.1f} times the noise; the rest is open.{data}"
+        return f"{named} {explains} the misfit: {fall} {after:.2f} times the noise, which is the floor.{data}"
+    return f"{named} {explains} part of the misfit: {fall} {_times(after)} times the noise; {rest}.{data}"
+
+
+def _times(ratio: float) -> str:
+    """Return a ratio near the floor with two digits behind the point."""
+    return f"{ratio:.2f}" if ratio < 2.0 else f"{ratio:.1f}"
 
 
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:
     """Return the verdict of a diagnosis as one sentence."""
     d, (before, after) = diagnosis, num.times_noise(diagnosis, diagnosis.channel)
     off = words.sentence(values_off(d.remarks))
-    return verdict_sentence(d.verdict, d.causes, d.channel, before, after, d.faults, d.at_noise_floor, off)
+    rest = "the rest stays unexplained"
+    if left := num.left_channel(d):
+        size = _times(num.times_noise(d, left)[1])
+        rest = f"the {words.channel(left)} residual stays at {size} times the noise"
+    return verdict_sentence(
+        d.verdict, d.causes, d.channel, before, after, d.faults, d.at_noise_floor, off, rest
+    )
 
 
 def evidence(cause: Cause) -> str:
@@ -80,7 +92,7 @@ def evidence(cause: Cause) -> str:
 
 
 def next_run(experiment: Experiment) -> str:
-    """Return what a run would decide, or why none is recommended, as one sentence without its full stop."""
+    """Return the question that a run would decide, or why none is recommended, without a full stop."""
     rivals = f"{experiment.cause} and {listed(experiment.rivals)}"
     alike = f"{rivals} do as well on these data"
     if experiment.reason == "other_amplitude":
@@ -106,9 +118,15 @@ def _data(faults: Sequence[Fault]) -> str:
     channels: dict[str, list[str]] = {}
     for f in faults:
         channels.setdefault(f.kind, []).append(f.channel)
-    texts = {kind: f"{kind.replace('_', ' ')} in {listed(names)}" for kind, names in channels.items()}
+    texts = {kind: _fault(kind, list(dict.fromkeys(names))) for kind, names in channels.items()}
     left = "; ".join(text for kind, text in texts.items() if kind not in MASKED)
     masked = "; ".join(text for kind, text in texts.items() if kind in MASKED)
     return (f" The data have faults: {left}." if left else "") + (
         f" Samples were masked: {masked}." if masked else ""
     )
+
+
+def _fault(kind: str, channels: Sequence[str]) -> str:
+    """Return `frozen samples in ft`, or `velocity missing`."""
+    names = listed(channels)
+    return f"{names} missing" if kind == "missing_topic" else f"{kind.replace('_', ' ')} in {names}"

@@ -77,7 +77,7 @@ def _link(x: int, y: int, step: tuple[int, int]) -> str:
 
 
 def _beside(part: str, x: int, y: int, step: tuple[int, int]) -> str:
-    """Return where the name of a cause stands: under its part in a row, right of it in a column."""
+    """Return where the name of a cause is drawn: under its part in a row, right of it in a column."""
     if step == _COLUMN:
         return f'x="{x + _BOX + 10}" y="{y + _HEIGHT // 2 + 5}" style="text-anchor:start"'
     anchor, at = _ANCHORS.get(part, ("middle", _BOX / 2))

@@ -45,6 +45,8 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
     main = d.channel
     ratios, rms = num.residual_change(d, main), num.rms_change(d, main)
     yield "residual", f"{words.channel(main)} {ratios} times the noise ({rms})"
+    if left := num.left_channel(d):
+        yield "", f"{words.channel(left)} {num.residual_change(d, left)} times the noise"
     for cause in d.causes:
         yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in cause.parameters.items())}"
         gain, interval = num.percent(cause.gain_holdout), num.percent_range(cause.gain_holdout_ci95)

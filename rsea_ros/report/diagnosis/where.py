@@ -22,7 +22,10 @@ _ABOVE = 0.05
 
 
 def where_figure(profiles: Sequence[Profile], changed: bool, colour: str = BEFORE) -> Figure:
-    """Return one panel a respect, side by side. changed: there is an after. colour: of before."""
+    """Return one panel for each respect, side by side.
+
+    changed: whether to draw the residual with the causes too. colour: of the residual without them.
+    """
     data: list[Json] = []
     axes: Json = {"yaxis": _level_axis(profiles)}
     for i, profile in enumerate(profiles):
@@ -43,7 +46,7 @@ def where_figure(profiles: Sequence[Profile], changed: bool, colour: str = BEFOR
 def finding(profiles: Sequence[Profile]) -> str:
     """Return a sentence on the signal that the residual depends on most, and where it is largest.
 
-    Time comes last: in a sweep it stands for the frequency.
+    Time comes last: in a sweep it is a proxy for the frequency.
     """
     physical = [p for p in profiles if p.what != "time"]
     most = max(physical or profiles, key=lambda p: p.contrast)

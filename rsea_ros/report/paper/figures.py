@@ -89,11 +89,11 @@ def figure_18(test: MovingOutput) -> Figure:
     curves = [_measured(measured, "data of the<br>simulated bench")]
     for rival, colour in zip(test.rivals, (AFTER, BEFORE), strict=True):
         values = frequency_response(rival.rig, outputs.end_torque(rival.rig, "spring_end"), _HZ)
-        share = 100 * rival.judged[0].explained
+        share = 100 * rival.held_out[0].explained
         curves.append(
             ResponseCurve(f"<b>{rival.name}</b>, fitted:<br>{share:.2f} % explained", colour, _HZ, values)
         )
-    shares = [100 * rival.judged[0].explained for rival in test.rivals]
+    shares = [100 * rival.held_out[0].explained for rival in test.rivals]
     title = (
         f"Fig. 18: the unlumped model explains {shares[0]:.2f} % of the held-out torque, "
         f"the lumped {shares[1]:.0f} %"

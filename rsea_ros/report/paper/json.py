@@ -43,4 +43,4 @@ def _bands(b: Bands) -> dict[str, Any]:
 
 
 def _moving(test: MovingOutput) -> dict[str, Any]:
-    return {rival.name: [asdict(j) for j in rival.judged] for rival in test.rivals}
+    return {rival.name: [asdict(j) for j in rival.held_out] for rival in test.rivals}

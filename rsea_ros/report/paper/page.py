@@ -79,7 +79,7 @@ _FOOTER = [
 
 
 def _title(test: MovingOutput) -> str:
-    unlumped, lumped = (100.0 * rival.judged[0].explained for rival in test.rivals)
+    unlumped, lumped = (100.0 * rival.held_out[0].explained for rival in test.rivals)
     return (
         f"A moving output separates the models: unlumped {unlumped:.2f} % of a simulated bench's torque, "
         "lumped "

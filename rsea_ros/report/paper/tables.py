@@ -10,7 +10,7 @@ from rsea_ros.paper.bands import TOLERANCES, Bands
 from rsea_ros.paper.claims import TABLE_2, PaperClaim
 from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.paper.paper_finding import PaperFinding
-from rsea_ros.paper.rival_models import Judged
+from rsea_ros.paper.rival_models import HeldOutFit
 from rsea_ros.report import words
 from rsea_ros.report.page.html import equation, section
 from rsea_ros.report.page.html_table import table
@@ -175,23 +175,23 @@ def _values(limit: Limit) -> str:
 def moving_table(tests: Mapping[str, MovingOutput]) -> str:
     """Return how much of the held-out torque each model explains, for every test and sensor."""
     rows = [
-        _moving_row(name, rival.name, judged)
+        _moving_row(name, rival.name, held_out)
         for name, test in tests.items()
         for rival in test.rivals
-        for judged in rival.judged
+        for held_out in rival.held_out
     ]
     head = ["Bench", "Model", "Sensor", "Variance explained, held out", "RMS error, N·m", "RMS torque, N·m"]
     return section(
         "With both ends moving a sensor at the distal end alone cannot tell the models apart; one at the "
         "other end can",
         table(head, rows, numbers=(3, 4, 5)),
-        caption="Fitted to the first half of the spring end's record, judged on the second half, and on "
+        caption="Fitted to the first half of the spring end's record, tested on the second half, and on "
         "the other sensor, which no fit has seen. The lumped model is fitted with loose priors. The "
         "benches are unlumped by construction.",
     )
 
 
-def _moving_row(bench: str, model: str, j: Judged) -> list[str]:
+def _moving_row(bench: str, model: str, j: HeldOutFit) -> list[str]:
     end = "spring end" if j.sensor == "spring_end" else "housing end (never fitted)"
     share = (
         f"{100 * j.explained:.2f} %" if j.explained > 0.0 else f"none: off by {j.rms_error / j.rms:.0f} times"

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rsea_ros.diagnosis.naming.contribution import rows_of
-from rsea_ros.diagnosis.screening import extended
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.unknowns import start_vector
@@ -30,6 +30,7 @@ def problem() -> Problem:
 def test_a_stop_beyond_the_travel_has_no_evidence(problem, angle, acts):
     """It was named with a probability of 0.92: where nothing is contributed, no shape is wrong."""
     stop = effect_named("hard_stop")
-    larger, theta = extended(problem, start_vector(problem.unknowns), stop, {**stop.typical, "angle": angle})
+    start = {**stop.typical, "angle": angle}
+    larger, theta = add_effect(problem, start_vector(problem.unknowns), stop, start)
     rows = rows_of(larger, theta, "hard_stop", DEFAULT.blocks)
     assert (rows is not None) == acts

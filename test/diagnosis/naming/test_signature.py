@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.naming.contribution import ContributionRows, projected
+from rsea_ros.diagnosis.naming.contribution import ContributionRows, project_out
 from rsea_ros.diagnosis.naming.signature import signature
 
 BLOCKS, LENGTH = 48, 100
@@ -58,7 +58,7 @@ def test_a_law_of_another_shape_shows_where_it_is_wrong(law, respect):
 
 def test_what_the_other_unknowns_can_imitate_does_not_count():
     imitated = replace(rows(np.zeros(len(TIME))), contribution=7.0 * (TIME - TIME.mean()))
-    assert np.abs(projected(imitated, imitated.contribution)).max() < 1e-6
+    assert np.abs(project_out(imitated, imitated.contribution)).max() < 1e-6
     assert signature(imitated).kept < 1e-10
 
 

@@ -62,7 +62,7 @@ def test_only_what_is_likely_is_confirmed(p, rivals, at_floor):
 def test_a_cause_that_the_data_speak_against_is_not_named(evidence):
     """Away from the floor, an effect that takes less than most must be probable and surely useful."""
     (p,), status = probabilities_and_status([evidence], at_floor=False, takes_most=False)
-    brings = evidence.gain_low >= 0.1 and not evidence.at_edge
+    brings = evidence.gain_low >= DEFAULT.acceptance.fall and not evidence.at_edge
     assert (status is None) == (not evidence.is_sure or p < (0.2 if brings else 0.5))
 
 

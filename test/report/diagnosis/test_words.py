@@ -81,6 +81,20 @@ def test_a_gain_that_is_too_small_is_not_called_none():
     assert say.rejection(Rejected("backlash", 0.28, "too_small")).startswith("lowers the residual")
 
 
+def test_a_channel_that_stays_above_the_noise_is_named(diagnosed):
+    """The main channel fell to the noise and "the rest is open": no word said that it was the position's."""
+    d = replace(
+        diagnosed.diagnosis, verdict="partly_explained", channel="ft", at_noise_floor=False,
+        noise_rms={"ft": 1.0, "position": 1.0}, residual_rms={"ft": 45.0, "position": 150.0},
+        extended_residual_rms={"ft": 1.01, "position": 1.14},
+    )  # fmt: skip
+    assert "; the position residual stays at 1.14 times the noise." in diagnosis_sentence(d)
+    assert terminal(d)[3].split() == ["position", "150", "→", "1.14", "times", "the", "noise"]
+    open_too = replace(d, extended_residual_rms={"ft": 1.2, "position": 1.14})
+    assert "to 1.20 times the noise; the rest stays unexplained." in diagnosis_sentence(open_too)
+    assert not terminal(open_too)[3].startswith(" " * 12 + "position")
+
+
 def test_json_sentence_and_page_name_the_same_channel(diagnosed):
     """The sentence spoke of the F/T torque where the headline spoke of the first cause's channel."""
     d = diagnosed.diagnosis

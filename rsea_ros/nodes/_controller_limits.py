@@ -11,7 +11,7 @@ OBEYED, SEEN = 0.05, 3.0
 """s after which a motor makes the torque that is commanded, N m, of which so much is surely seen."""
 
 
-class Judge:
+class ControllerLimits:
     """Follows commands and torques sample by sample. lateness: of the commands."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""Judge a spring stiffness against a requirement, and find the least one that meets it."""
+"""A spring stiffness rated by a requirement, and the least stiffness that meets it."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class SpringDesign:
         return all(check.met for check in self.checks)
 
 
-def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> SpringDesign:
+def spring_design(requirement: Requirement, unit: MotorGear, stiffness: float) -> SpringDesign:
     """Return the design of a stiffness (N m/rad). Raises ParameterError unless it is above 0."""
     if not (math.isfinite(stiffness) and stiffness > 0.0):
         raise ParameterError(f"stiffness = {stiffness:g} N·m/rad, expected a finite value > 0 N·m/rad")
