@@ -23,7 +23,6 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.extent import check_extent
-from rsea_ros.model.held_command import mean_of_held
 from rsea_ros.model.pace import SKIPPED_START, check_slow
 from rsea_ros.model.restarts import gaps
 from rsea_ros.model.rig import Rig
@@ -145,32 +144,23 @@ def acted(record: Record) -> Channel:
 
 
 def _torque_at(record: Record, t: FloatArray) -> FloatArray:
-    """Return the mean motor torque that acted in the step around each instant of a uniform grid.
+    """Return the motor torque that acted at instants.
 
     A command is held from its stamp on. A measured torque that shows the command before its stamp was taken
     at the end of a hold, and counts for the whole hold; any other counts at its stamp.
     """
     command = record["command"]
-    if "motor_torque" not in record:
-        return _mean_of_held(command, t)
-    torque = record["motor_torque"]
     edge = _AT_EDGE / command.rate
+    hold = np.searchsorted(command.t, t + edge) - 1
+    if "motor_torque" not in record:
+        return command.y[np.maximum(hold, 0)]
+    torque = record["motor_torque"]
     ended, begun = (np.searchsorted(command.t, torque.t + side * edge) - 1 for side in (-1.0, 1.0))
     off = [float(np.std(torque.y - command.y[np.maximum(k, 0)])) for k in (ended, begun)]
     if off[1] <= off[0]:
         return np.interp(t, torque.t, torque.y)
-    shown = np.searchsorted(ended, np.arange(len(command)), side="left")
-    return _mean_of_held(Channel(command.t, torque.y[np.minimum(shown, len(torque) - 1)]), t)
-
-
-def _mean_of_held(held: Channel, t: FloatArray) -> FloatArray:
-    """Return the mean of a held channel from half a step before each instant of a grid to half a step after.
-
-    The value at the instant would be half a step early: a delay d takes b d of the inertia, b the damping.
-    """
-    step = float(t[1] - t[0])
-    means: FloatArray = mean_of_held((held.t - t[0]) / step + 0.5, held.y, len(t))
-    return means
+    shown = np.searchsorted(ended, hold, side="left")
+    return torque.y[np.minimum(shown, len(torque) - 1)]
 
 
 def smoothed(values: FloatArray, period: float) -> FloatArray:
