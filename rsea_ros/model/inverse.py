@@ -147,20 +147,21 @@ def _torque_at(record: Record, t: FloatArray) -> FloatArray:
     """Return the motor torque that acted at instants.
 
     A command is held from its stamp on. A measured torque that shows the command before its stamp was taken
-    at the end of a hold, and counts for the whole hold; any other counts at its stamp.
+    at the end of a hold, and counts for the whole hold; any other counts at its stamp. At the edge between
+    two holds their mean counts: with either of them the torque is half a sample early or late.
     """
     command = record["command"]
     edge = _AT_EDGE / command.rate
-    hold = np.searchsorted(command.t, t + edge) - 1
+    holds = np.array([np.searchsorted(command.t, t + side * edge) - 1 for side in (-1.0, 1.0)])
     if "motor_torque" not in record:
-        return command.y[np.maximum(hold, 0)]
+        return np.asarray(command.y[np.maximum(holds, 0)].mean(axis=0), np.float64)
     torque = record["motor_torque"]
     ended, begun = (np.searchsorted(command.t, torque.t + side * edge) - 1 for side in (-1.0, 1.0))
     off = [float(np.std(torque.y - command.y[np.maximum(k, 0)])) for k in (ended, begun)]
     if off[1] <= off[0]:
         return np.interp(t, torque.t, torque.y)
-    shown = np.searchsorted(ended, hold, side="left")
-    return torque.y[np.minimum(shown, len(torque) - 1)]
+    shown = np.searchsorted(ended, holds, side="left")
+    return np.asarray(torque.y[np.minimum(shown, len(torque) - 1)].mean(axis=0), np.float64)
 
 
 def smoothed(values: FloatArray, period: float) -> FloatArray:

@@ -9,7 +9,8 @@ import pytest
 
 import rsea_ros as rsea
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
-from rsea_ros.signals import Channel
+from rsea_ros.model import inverse
+from rsea_ros.signals import Channel, Record
 
 
 @functools.cache
@@ -71,3 +72,19 @@ def test_a_record_of_short_pieces_alone_is_compared_as_a_whole():
         **{n: Channel(c.t[~holes[: len(c)]], c.y[~holes[: len(c)]]) for n, c in whole().channels.items()}
     )
     assert np.isfinite(rsea.predict("pendulum", pieces)["motor_torque"].rms_error)
+
+
+@pytest.mark.parametrize("names", [("command",), ("command", "motor_torque")])
+@pytest.mark.parametrize("off", [0.0, 4e-10, -4e-10])
+def test_a_held_torque_is_neither_early_nor_late(names, off):
+    """Every edge took the value behind it: torques 0.2 ms early, and 1 of 24 intervals of J_m with the truth.
+
+    The torque is a step at 1 s: its integral from 0.5 to 1.5 s is 0.5 N m s, more where it is early.
+    """
+    t = np.arange(0.0, 2.0, 0.25)
+    step = (t >= 1.0).astype(float)
+    channels = {"command": Channel(t + off, step), "motor_torque": Channel(t + 0.25, step)}
+    record = Record({n: channels[n] for n in names})
+    fine = np.arange(0.5, 1.51, 0.05)
+    torque = inverse._torque_at(record, fine)
+    assert np.trapezoid(torque, fine) == pytest.approx(0.5, abs=1e-6)
