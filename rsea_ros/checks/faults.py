@@ -14,6 +14,7 @@ from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side, sides
 from rsea_ros.checks.frozen import SMALLEST_SHARE, frozen, held_together, longest, while_others_moved
 from rsea_ros.checks.moved_spans import is_commanded
+from rsea_ros.checks.rounded_stamps import rounded_stamps
 from rsea_ros.held_samples import repeats_of
 from rsea_ros.identification.quantum import FEW, step_of
 from rsea_ros.model.rig import Rig
@@ -49,6 +50,7 @@ def check(record: Record, rig: Rig) -> Checked:
     record = _without(record, {n for n, c in record.channels.items() if not len(c)})
     faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
     repaired, clock_faults = repair_stamps(record)
+    faults += [f for n, c in repaired.channels.items() for f in rounded_stamps(c, n)]
     masked, marked = {}, {}
     for name in repaired.channels:
         masked[name], marked[name] = _masked(repaired, name)
