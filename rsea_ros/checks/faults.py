@@ -46,8 +46,9 @@ class Checked:
 
 
 def check(record: Record, rig: Rig) -> Checked:
-    """Find and mask the faults of a record; a channel without a good sample counts as missing."""
-    record = _without(record, {n for n, c in record.channels.items() if not len(c)})
+    """Find and mask the faults of a record; a channel of one sample, or without a good one, is missing."""
+    few = {n: 1 if n in ("command", "reference") else 2 for n in record.channels}
+    record = _without(record, {n for n, c in record.channels.items() if len(c) < few[n]})
     faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
     repaired, clock_faults = repair_stamps(record)
     faults += [f for n, c in repaired.channels.items() for f in rounded_stamps(c, n)]
