@@ -190,12 +190,12 @@ class Record:
     @property
     def start(self) -> float:
         """First stamp of any channel, s."""
-        return min(float(c.t[0]) for c in self.channels.values())
+        return min(float(c.t[0]) for c in self.channels.values() if len(c))
 
     @property
     def stop(self) -> float:
         """Last stamp of any channel, s."""
-        return max(float(c.t[-1]) for c in self.channels.values())
+        return max(float(c.t[-1]) for c in self.channels.values() if len(c))
 
     def between(self, start: float, stop: float) -> Record:
         """Return the record restricted to start <= t < stop (s); stamps keep their origin."""

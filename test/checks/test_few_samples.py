@@ -54,3 +54,13 @@ def test_gaps_of_all_channels_are_no_jump_of_the_clocks_of_some(record):
     assert "clock_jump" not in {f.kind for f in faults}
     for name, channel in cut.channels.items():
         np.testing.assert_array_equal(repaired[name].t, channel.t)
+
+
+def test_a_sensor_that_ends_early_in_a_long_record_still_takes_part_in_its_checks():
+    """The checks look at the 30 s of the largest commands: without a sample of it they ended in a bug."""
+    command = np.linspace(5.0, 15.0, 70 * 280) * np.random.default_rng(1).standard_normal(70 * 280)
+    long = rsea.simulate(RIG, command, 280.0)
+    findings = check_record(first(long, "ft", 35 * 280), load_rig(RIG), values=True)
+    assert {f.kind for f in findings.findings if f.light != "green"} == {"partly_recorded"}
+    assert ("clock_drift", "ft") in {(f.kind, f.channel) for f in findings.findings}
+    assert check_record(first(long, "ft", 10 * 280), load_rig(RIG), values=True).light == "amber"
