@@ -43,7 +43,11 @@ class Comparison:
         return float(np.sqrt(np.mean((self.predicted - self.measured)[self.counts] ** 2)))
 
     @property
-    def fit_percent(self) -> float:
+    _ROUNDING = 1e-12
+"""Of the largest value: a filtered constant changes by no more."""
+
+
+def fit_percent(self) -> float:
         """The fit of the compared samples, %; NaN if no sample is compared."""
         if not self.counts.any():
             return math.nan
@@ -52,7 +56,7 @@ class Comparison:
 
 def fit_percent(error: FloatArray, measured: FloatArray) -> float:
     """Return 100 (1 - ||e|| / ||y - mean y||), %; 0 for a measured constant."""
-    if np.ptp(measured) == 0.0:
+    if np.ptp(measured) <= _ROUNDING * float(np.max(np.abs(measured))):
         return 0.0
     return 100.0 * (1.0 - float(np.linalg.norm(error)) / float(np.linalg.norm(measured - measured.mean())))
 

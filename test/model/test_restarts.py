@@ -9,7 +9,7 @@ import rsea_ros as rsea
 from rsea_ros.checks.faults import check
 from rsea_ros.model.restarts import gaps
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel
+from rsea_ros.signals import Channel, Record
 
 RIG = load_rig("paper_high_impedance")
 SOUND = rsea.simulate(RIG, 15.0 * np.random.default_rng(1).standard_normal(4200), rate=280.0, seed=1)
@@ -33,8 +33,10 @@ def test_predict_and_identify_leave_only_noise_beside_a_gap(spans):
     assert fit.rig["spring.stiffness"] == pytest.approx(1530.456, abs=1.0)
 
 
-def test_commands_that_pause_alone_are_held():
-    assert gaps(without((5.0, 8.0), names=("command",))) == []
+def test_commands_that_pause_alone_are_held_where_no_motor_torque_shows_others():
+    paused = without((5.0, 8.0), names=("command",))
+    unknown = Record({n: c for n, c in paused.channels.items() if n != "motor_torque"})
+    assert gaps(unknown) == []
     (only,) = gaps(without((5.0, 8.0)))
     assert only == pytest.approx((5.0, 8.0), abs=0.01)
 
