@@ -43,15 +43,15 @@ class Comparison:
         return float(np.sqrt(np.mean((self.predicted - self.measured)[self.counts] ** 2)))
 
     @property
-    _ROUNDING = 1e-12
-"""Of the largest value: a filtered constant changes by no more."""
-
-
-def fit_percent(self) -> float:
+    def fit_percent(self) -> float:
         """The fit of the compared samples, %; NaN if no sample is compared."""
         if not self.counts.any():
             return math.nan
         return fit_percent((self.predicted - self.measured)[self.counts], self.measured[self.counts])
+
+
+_ROUNDING = 1e-12
+"""Of the largest value: a filtered constant changes by no more."""
 
 
 def fit_percent(error: FloatArray, measured: FloatArray) -> float:

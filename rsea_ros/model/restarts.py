@@ -34,7 +34,9 @@ def gaps(record: Record) -> list[tuple[float, float]]:
     t = np.sort(np.concatenate(stamps))
     fastest = max(c.rate for c in record.channels.values() if len(c) > 1)
     at = np.flatnonzero(np.diff(t) > max(SHORTEST, PERIODS / fastest if fastest > 0.0 else np.inf))
-    return sorted({*((float(t[k]), float(t[k + 1])) for k in at), *_lost_commands(record)})
+    whole = [(float(t[k]), float(t[k + 1])) for k in at]
+    lost = _lost_commands(record)
+    return sorted([*whole, *(p for p in lost if not any(a < p[1] and b > p[0] for a, b in whole))])
 
 
 def _lost_commands(record: Record) -> list[tuple[float, float]]:
