@@ -39,9 +39,9 @@ def read_record(
     Stamps are those of the message headers; a zero one is replaced by the log time, with a note.
     Samples out of order are sorted by their stamps. Damaged messages are left out. The record's faults list
     all damage, and the faults in the bag's /diagnostics.
-    strict: refuse records to which no model can be fitted (missing command or measurement, NaN), and correct
-    the stamps (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock, repeats and NaN are returned
-    unchanged.
+    strict: refuse records to which no model can be fitted (missing command or measurement, NaN in the
+    command), and correct the stamps (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock and repeats are
+    returned unchanged, as NaN of a measurement always is.
     Raises BagError with file, topic, field, value and expectation.
     """
     topics = topics or TopicMap()
@@ -69,8 +69,9 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
         if messages is not None and messages.raw:
             series.update(_series(source, role, messages, topics, report))
     if strict:
-        for one in series.values():
-            check_finite(one)
+        for name, one in series.items():
+            if name in ("command", "reference"):
+                check_finite(one)
             note_repeats(one, report.notes)
     series = on_the_clock_of_the_command(series, report)
     _require_values(source, series, strict, report)

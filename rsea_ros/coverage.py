@@ -28,7 +28,7 @@ def absent_spans(record: Record) -> list[Fault]:
     last = max(float(c.t[-1]) for c in record.channels.values() if len(c))
     faults = []
     for name, channel in record.channels.items():
-        if len(channel) < _FEWEST:
+        if len(channel) < 2:
             continue
         start, stop = (driving.t[0], driving.t[-1]) if channel is not driving else (_first(record), last)
         longest = max(_ABSENT, _ABSENT_PERIODS / channel.rate, _ABSENT_SHARE * float(stop - start))

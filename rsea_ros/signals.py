@@ -74,9 +74,17 @@ class Channel:
 
     @property
     def rate(self) -> float:
-        """Median sample rate, Hz; NaN for a single sample, infinite where most stamps repeat."""
-        period = float(np.median(np.diff(self.t))) if len(self) > 1 else math.nan
-        return 1.0 / period if period else math.inf
+        """Sample rate, Hz, gaps aside; NaN for a single sample, infinite where most stamps repeat.
+
+        It is that of the mean interval of about the median's length: rounded stamps have few lengths.
+        """
+        if len(self) < 2:
+            return math.nan
+        interval = np.diff(self.t)
+        median = float(np.median(interval))
+        usual = interval[np.abs(interval - median) <= 0.5 * abs(median)]
+        period = float(np.mean(usual)) if len(usual) else median
+        return 1.0 / period if median else math.inf
 
     @property
     def is_still(self) -> bool:
@@ -182,12 +190,12 @@ class Record:
     @property
     def start(self) -> float:
         """First stamp of any channel, s."""
-        return min(float(c.t[0]) for c in self.channels.values())
+        return min(float(c.t[0]) for c in self.channels.values() if len(c))
 
     @property
     def stop(self) -> float:
         """Last stamp of any channel, s."""
-        return max(float(c.t[-1]) for c in self.channels.values())
+        return max(float(c.t[-1]) for c in self.channels.values() if len(c))
 
     def between(self, start: float, stop: float) -> Record:
         """Return the record restricted to start <= t < stop (s); stamps keep their origin."""

@@ -45,7 +45,7 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     faults += [*shared, *mixed]
     channels = {}
     for name, channel in record.channels.items():
-        channel, jumps = _without_jumps(channel, name, _expected_span(record, name))
+        channel, jumps = _without_jumps(channel, name, _expected_span(record, name), _paused(record, name))
         channel, disorder = sort_by_stamp(channel, name)
         repeated = np.diff(channel.t, prepend=-np.inf) <= _repeat(channel.t)
         faults += [*jumps, *disorder]
@@ -120,8 +120,24 @@ def _expected_span(record: Record, name: str) -> float:
     return float(np.median([span for _, span in spans])) if spans else 0.0
 
 
-def _without_jumps(channel: Channel, name: str, expected: float) -> tuple[Channel, list[Fault]]:
-    """Take out steps of the clock: those back for good, and one that makes the channel longer than others."""
+def _paused(record: Record, name: str) -> FloatArray:
+    """Return begin and end (s) of the pauses of the channel that a span is expected from, shape (2, n)."""
+    others = [n for n in record.channels if n != name]
+    beside = next((n for n in others if n == "command"), next(iter(others), name))
+    t = record[beside].t
+    if len(t) < 3:
+        return np.empty((2, 0))
+    long = np.diff(t) > _SHORTEST_JUMP * median_period(t)
+    return np.array([t[:-1][long], t[1:][long]])
+
+
+def _without_jumps(
+    channel: Channel, name: str, expected: float, beside: FloatArray
+) -> tuple[Channel, list[Fault]]:
+    """Take out steps of the clock: those back for good, and one that makes the channel longer than others.
+
+    beside: pauses of another channel, s, (2, n): one at the same time is a gap of both.
+    """
     if len(channel) < 3:
         return channel, []
     at = jumps_back(channel.t)
@@ -133,9 +149,16 @@ def _without_jumps(channel: Channel, name: str, expected: float) -> tuple[Channe
         expected
         and step[largest] > _SHORTEST_JUMP * period
         and abs(step[largest] - period - surplus) < 2.0 * period
+        and not _is_shared(channel.t[largest : largest + 2], beside)
     ):
         at[largest] = True
     return _taken_out(channel, name, at) if at.any() else (channel, [])
+
+
+def _is_shared(step: FloatArray, beside: FloatArray) -> bool:
+    """Return whether another channel has no sample either in the middle half of a step (begin and end, s)."""
+    begin, end = np.interp((0.25, 0.75), (0.0, 1.0), step)
+    return bool(np.any((beside[0] <= begin) & (beside[1] >= end)))
 
 
 def _taken_out(channel: Channel, name: str, at: BoolArray) -> tuple[Channel, list[Fault]]:

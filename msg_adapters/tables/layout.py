@@ -67,11 +67,12 @@ def layout_of(
 
     header: whether that line names the columns; None: if no delimiter makes numbers of all of it. It is the
     first line, or below a preamble the first that names all requested columns. Without a delimiter it is the
-    first of several with which the line has the requested columns; otherwise the one that makes most cells.
+    first of several with which the line has the requested columns; otherwise the one that makes most cells. A
+    comma between cells of decimal commas, which are quoted then, comes last.
     """
     usual = "\t" if ".tsv" in path.suffixes else ","
-    known = [one for one in (usual, "\t", ";", ",", "|", BLANKS) if one != decimal]
-    tried = [delimiter] if delimiter else list(dict.fromkeys(known))
+    known = sorted(dict.fromkeys((usual, "\t", ";", ",", "|", BLANKS)), key=lambda one: one == decimal)
+    tried = [delimiter] if delimiter else known
     layouts = [_layout(lines[0], one, header) for one in tried]
     for layout in sorted(layouts, key=lambda layout: layout.headed):
         if all(_has(layout, column) for column in columns):

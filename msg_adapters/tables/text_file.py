@@ -112,7 +112,9 @@ class _Reader:
         if not self._rows:
             raise ValueError("no rows, expected numbers below the column names")
         if self._left_out > MOST_LEFT_OUT * self._rows:
-            raise ValueError(f"{self._first}, as in {self._left_out} of {self._rows} rows")
+            both = self._layout.delimiter == self._decimal
+            quotes = ": cells of numbers with decimal commas need quotes between commas" if both else ""
+            raise ValueError(f"{self._first}, as in {self._left_out} of {self._rows} rows{quotes}")
         columns = {}
         for column, parts in self._parts.items():
             columns[column] = np.concatenate(parts)

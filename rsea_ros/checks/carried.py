@@ -22,7 +22,7 @@ from rsea_ros.wording import listed
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
           "clipping", "nan", "coarse_steps", "early_torque", "held_samples",
-          "mixed_rows")  # fmt: skip
+          "mixed_rows", "rounded_stamps")  # fmt: skip
 """Faults that the diagnosis finds and masks itself."""
 
 
@@ -88,13 +88,13 @@ def _repaired(record: Record) -> Record:
 def _sound(record: Record, findings: Findings) -> Record:
     """Return the record without the samples that must not count; commands stay, and what a fit refuses."""
     sound = {}
-    for name, bad in findings.masked.items():
-        channel = record.channels.get(name)
-        if name in ("command", "reference") or channel is None or len(channel) != len(bad):
+    for name, channel in record.channels.items():
+        if name in ("command", "reference"):
             continue
-        left_out = bad & np.isfinite(channel.y)
-        if left_out.any():
-            sound[name] = Channel(channel.t[~left_out], channel.y[~left_out])
+        bad, masked = ~np.isfinite(channel.y), findings.masked.get(name)
+        bad = bad | masked if masked is not None and len(masked) == len(bad) else bad
+        if bad.any():
+            sound[name] = Channel(channel.t[~bad], channel.y[~bad])
     return record.with_channels(**sound)
 
 

@@ -14,6 +14,7 @@ from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side, sides
 from rsea_ros.checks.frozen import SMALLEST_SHARE, frozen, held_together, longest, while_others_moved
 from rsea_ros.checks.moved_spans import is_commanded
+from rsea_ros.checks.rounded_stamps import rounded_stamps
 from rsea_ros.held_samples import repeats_of
 from rsea_ros.identification.quantum import FEW, step_of
 from rsea_ros.model.rig import Rig
@@ -27,6 +28,8 @@ _CLIPPED = 8
 """As many samples at exactly the largest value, some of them in a row, are clipping."""
 _SLOWLY = 0.1
 """Of the usual step from sample to sample: a motion that ends, not one that a limit cuts off."""
+_FEWEST_COMMANDS = 10
+"""Commands, with which a record can still be simulated."""
 _COARSE = 5.0
 """Steps larger than this multiple of those of the rig's sensor are reported."""
 
@@ -45,10 +48,12 @@ class Checked:
 
 
 def check(record: Record, rig: Rig) -> Checked:
-    """Find and mask the faults of a record; a channel without a good sample counts as missing."""
-    record = _without(record, {n for n, c in record.channels.items() if not len(c)})
+    """Find and mask the faults of a record; a channel of one sample, or without a good one, is missing."""
+    few = {n: 1 if n in ("command", "reference") else 2 for n in record.channels}
+    record = _without(record, {n for n, c in record.channels.items() if len(c) < few[n]})
     faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
     repaired, clock_faults = repair_stamps(record)
+    faults += [f for n, c in repaired.channels.items() for f in rounded_stamps(c, n)]
     masked, marked = {}, {}
     for name in repaired.channels:
         masked[name], marked[name] = _masked(repaired, name)
@@ -63,9 +68,22 @@ def check(record: Record, rig: Rig) -> Checked:
     faults += [f for n in repaired.channels for f in marked[n]]
     masked = {n: bad for n, bad in masked.items() if n in repaired}
     faults += [f for n in rig.sensors if _has_steps(repaired, n) for f in coarse(repaired[n], n, rig)]
+    repaired, masked = _without_unknown_commands(repaired, masked)
     alive = _without(repaired, {n for n, bad in masked.items() if bad.all() and n != "command"})
     whole = not dead and not any(bad.any() for bad in masked.values())
     return Checked(_filled(alive, masked), masked, tuple(faults), compared if whole else None)
+
+
+def _without_unknown_commands(
+    record: Record, masked: Mapping[str, BoolArray]
+) -> tuple[Record, dict[str, BoolArray]]:
+    """Return record and masks without the commands that are no numbers: lost ones, which no line replaces."""
+    masked, command = dict(masked), record.channels.get("command")
+    known = np.isfinite(command.y) if command is not None else np.zeros(0, bool)
+    if command is None or known.all() or np.count_nonzero(known) < _FEWEST_COMMANDS:
+        return record, masked
+    masked["command"] = masked["command"][known]
+    return record.with_channels(command=Channel(command.t[known], command.y[known])), masked
 
 
 def _has_steps(record: Record, name: str) -> bool:

@@ -22,6 +22,8 @@ REACH = 2.0
 NEAR = 0.05
 """s. Smaller lags are found by their phases (response_shape.py, linearised_rig.py), and another rig's
 response looks so."""
+_FEWEST = 64
+"""Samples: fewer agree by chance somewhere."""
 _PEAK = 0.5
 """Correlation that the best lag must reach."""
 _BESIDE = 0.7
@@ -41,10 +43,12 @@ def far_off(lags: Mapping[str, float | None]) -> dict[str, float]:
 
 def lag_of(side: Side) -> float:
     """Return how much later than predicted a channel comes, s; 0 where no single lag stands out."""
+    if len(side.t) < _FEWEST:
+        return 0.0
     period = float(np.median(np.diff(side.t)))
     even = np.arange(side.t[0], side.t[-1], period)
     reach = min(REACH, period * len(even) / _SHORTEST)
-    if len(even) < 64 or reach < period:
+    if len(even) < _FEWEST or reach < period:
         return 0.0
     y, p = (np.interp(even, side.t, v) for v in (side.y, side.p))
     return clear_lag(*_correlation(y, p, period, reach)) or 0.0

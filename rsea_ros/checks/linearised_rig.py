@@ -18,7 +18,7 @@ from rsea_ros.identification.problem import Problem, case_from, channels_that_te
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.normal import Z95
-from rsea_ros.signals import SENSED, BoolArray, Channel, FloatArray, Record
+from rsea_ros.signals import SENSED, BoolArray, FloatArray, Record
 
 _ROUNDS = 6
 _PARTS = (1.0, 0.5, 0.25, 0.1)
@@ -86,8 +86,8 @@ def _setting(
 ) -> tuple[LinearSetting, LinearState]:
     """Return the constants of all rounds, and the state where the quick fit ended."""
     start = float(record["command"].t[0])
-    begin, end = _liveliest(record["command"])
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
+    begin, end = _liveliest(record, masked)
     record, masked = _cut(record, masked, begin, end)
     informative = channels_that_tell(record, rig)
     sensed = [n for n in SENSED if n in informative]  # a held motor torque shows no clock
@@ -133,12 +133,17 @@ def _clocks_stand(setting: LinearSetting, step: FloatArray, sd: FloatArray) -> b
     return bool(np.all(np.abs(step[clocks]) < _DONE * np.hypot(sd[clocks], finest)))
 
 
-def _liveliest(command: Channel) -> tuple[float, float]:
-    """Return begin and end (s) of the LONGEST of a record in which the command changes most."""
+def _liveliest(record: Record, masked: Mapping[str, BoolArray]) -> tuple[float, float]:
+    """Return begin and end (s) of the LONGEST with most sensors in which the command changes most."""
+    command = record["command"]
     begins = np.arange(command.t[0], max(command.t[-1] - LONGEST, command.t[0]) + 1e-9, LONGEST / 4.0)
     change = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(command.y)))])
     within = [np.diff(np.interp([b, b + LONGEST], command.t, change))[0] for b in begins]
-    begin = float(begins[int(np.argmax(within))])
+    stamps = [c.t[~masked[n]] if n in masked else c.t for n, c in record.channels.items() if n in SENSED]
+    inside = [np.diff(np.searchsorted(t, [begins, begins + LONGEST]), axis=0)[0] for t in stamps]
+    counts = np.array(inside).reshape(len(stamps), len(begins))
+    sensors = np.sum(counts > 0.5 * counts.max(axis=1, initial=1, keepdims=True), axis=0)
+    begin = float(begins[np.lexsort((within, sensors))[-1]])
     return begin, begin + LONGEST
 
 

@@ -19,8 +19,8 @@ _PER_CYCLE = 4.0
 """Samples to a cycle of the rig's natural frequency, at least."""
 _SLOW = 0.6
 """Of the command's rate: a slower sensor folds what is above its Nyquist frequency."""
-_OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "clock_jump", "partly_recorded", "early_torque",
-           "held_samples", "mixed_rows")  # fmt: skip
+_OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "rounded_stamps", "clock_jump",
+           "partly_recorded", "early_torque", "held_samples", "mixed_rows")  # fmt: skip
 """Faults of a whole channel, whose share of its samples means nothing."""
 _MENDED = ("early_torque",)
 """Faults that leave no doubt in a result once they are mended."""
@@ -30,6 +30,7 @@ _REMEDIES = {
     "held_samples": "log it as it arrives; the repeats are left out",
     "dropped_samples": "record with a deeper queue, on a quieter machine",
     "coarse_stamps": "log stamps as fine as the samples",
+    "rounded_stamps": "log stamps as fine as the clock gives them",
     "partly_recorded": "start the recorder first and stop it last, or cut the run with --from and --to",
     "unnamed_file": "remove it, or give its own name to read it",
     "duplicate_stamps": "stamp at acquisition, not on arrival",

@@ -9,6 +9,7 @@ import numpy as np
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.identification.frequency_response import estimate_response
+from rsea_ros.identification.problem import FEWEST
 from rsea_ros.identification.resample import AtRestError
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.equations import Mechanics
@@ -24,7 +25,7 @@ def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
     if record["command"].is_still:
         return ()
     responses = []
-    for name in (n for n in outputs if not record[n].is_still):
+    for name in (n for n in outputs if len(record[n]) >= FEWEST and not record[n].is_still):
         with suppress(AtRestError):
             responses.append(estimate_response(record, name))
     return tuple(responses)

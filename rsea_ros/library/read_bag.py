@@ -20,8 +20,8 @@ def read_bag(
     """Return the record of a rosbag2 directory, an .mcap or a .db3 file, or of several files of one run.
 
     namespace: of the topics. joint: its name, if the messages hold several. axis: axis of the actuator in the
-    wrench; a leading `-` reverses it. strict: refuse values that are not finite and missing commands; with
-    False all samples are kept, as rsea.diagnose accepts them.
+    wrench; a leading `-` reverses it. strict: refuse commands that are missing or not finite, and correct the
+    stamps; with False all samples are kept as they were recorded.
     Raises BagError with file, topic, field, value and expected value.
     Not to be confused with `rsea import`, which converts tables to bags.
     """

@@ -55,10 +55,15 @@ class Comparison:
         return fit_percent((self.predicted - self.measured)[self.counts], self.measured[self.counts])
 
 
+_ROUNDING = 1e-12
+"""Of the largest value: a filtered constant changes by no more."""
+
+
 def fit_percent(error: FloatArray, measured: FloatArray) -> float:
-    """Return 100 (1 - ||e|| / ||y - mean y||), %."""
-    scale = float(np.linalg.norm(measured - measured.mean()))
-    return 100.0 * (1.0 - float(np.linalg.norm(error)) / scale) if scale > 0.0 else 0.0
+    """Return 100 (1 - ||e|| / ||y - mean y||), %; 0 for a measured constant."""
+    if np.ptp(measured) <= _ROUNDING * float(np.max(np.abs(measured))):
+        return 0.0
+    return 100.0 * (1.0 - float(np.linalg.norm(error)) / float(np.linalg.norm(measured - measured.mean())))
 
 
 def predict(rig: Rig | str, record: Record) -> Mapping[str, Comparison]:

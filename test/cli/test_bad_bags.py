@@ -56,10 +56,21 @@ def test_a_truncated_mcap_without_a_chunk_is_refused(record, tmp_path, out):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_value_that_is_not_finite_is_refused(record, tmp_path, out, value):
-    write_record(changed(record, "ft", 7, y=value), tmp_path / "bag")
+def test_a_command_that_is_not_finite_is_refused(record, tmp_path, out, value):
+    write_record(changed(record, "command", 7, y=value), tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--out", out)
-    refused(done, tmp_path / "bag", f"/rsea/ft wrench[7] is {value}", "expected a finite number")
+    words = f"/rsea/torque_command effort[7] is {value}", "expected a finite number"
+    refused(done, tmp_path / "bag", *words)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e31])
+def test_identify_masks_and_reports_a_measurement_that_is_no_number(record, tmp_path, value):
+    """It refused what diagnose and predict mask."""
+    write_record(changed(record, "ft", 7, y=value), tmp_path / "bag")
+    done = rsea("identify", tmp_path / "bag", "--out", tmp_path / "results")
+    assert (done.returncode, done.stderr) == (0, "")
+    faults = json.loads((tmp_path / "results" / "identification.json").read_text())["data"]["faults"]
+    assert ("nan", "ft") in {(fault["kind"], fault["channel"]) for fault in faults}
 
 
 @pytest.mark.parametrize(

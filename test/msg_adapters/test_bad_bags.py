@@ -30,6 +30,7 @@ def _wrong_type():
 
 
 STATE = joint_state(EPOCH + 3_572_428, position=[0.1], velocity=[np.nan], effort=[0.3])
+COMMAND = joint_state(EPOCH + 3_571_428, effort=[np.nan])
 REFUSED = {
     "no command": (
         _without("/rsea/torque_command"),
@@ -42,8 +43,8 @@ REFUSED = {
     ),
     "empty bag": ([], "no message on /rsea/torque_command; the bag holds no topic at all"),
     "NaN": (
-        _changed(4, STATE),
-        r"/rsea/joint_states velocity\[1\] is nan at 1763000000.127029217 s, expected a finite",
+        _changed(3, COMMAND),
+        r"/rsea/torque_command effort\[1\] is nan at 1763000000.127028217 s, expected a finite",
     ),
     "two joints": (
         _changed(1, joint_state(EPOCH, ["hip", "knee"], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0])),
@@ -82,7 +83,13 @@ def test_faults_are_returned_where_a_diagnosis_asks_for_them(tmp_path, case):
         expected = sum(topic == count for topic, _, _ in rows)
         assert len(record[name]) == expected if expected else name not in record
     if case == "NaN":
-        assert np.isnan(record["velocity"].y[1])
+        assert np.isnan(record["command"].y[1])
+
+
+@pytest.mark.parametrize("strict", [True, False])
+def test_a_measurement_that_is_nan_stays_for_the_checks_to_mask(tmp_path, strict):
+    record = read_record(write_foreign(tmp_path / "bag", _changed(4, STATE)), strict=strict)
+    assert np.isnan(record["velocity"].y).tolist() == [False, True, False, False]
 
 
 def test_repeated_stamps_are_dropped_with_a_note_or_kept(tmp_path):

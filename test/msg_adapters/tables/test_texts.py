@@ -20,6 +20,10 @@ TEXTS = {
     "preamble": ("Bench 3\nDate: 12.3.2024, 14:05\n\nt,u\n0,1.5\n0.1,-2.5\n0.2,1500\n", ""),
     "preamble and units": ("a;b;c;d\n1;2\nt;u\ns;Nm\n0;1.5\n0.1;-2.5\n0.2;1500\n", ""),
     "decimal commas": ("t;u\n0,0;1,5\n0,1;-2,5\n0,2;1,5e3\n", 'decimal: ","\n'),
+    "decimal commas in quotes, no delimiter in the map": (
+        't,u\n"0,0","1,5"\n"0,1","-2,5"\n"0,2","1,5e3"\n',
+        'decimal: ","\n',
+    ),
     "decimal commas in quotes": (
         't,u\n"0,0","1,5"\n"0,1","-2,5"\n"0,2","1500"\n',
         'decimal: ","\ndelimiter: ","\n',
@@ -65,6 +69,12 @@ def test_what_is_left_out_is_noted(tmp_path):
 def test_a_first_row_with_a_number_that_is_none_is_refused_as_before(row, tmp_path):
     with pytest.raises(ImportMapError, match="line 2, column 't' is"):
         imported(tmp_path, f"t,u\n{row}\n0,1.5\n0.1,-2.5\n")
+
+
+def test_decimal_commas_between_commas_are_refused_with_what_is_missing(tmp_path):
+    """The message was "no column 't', expected one of t,u": the comma was never tried as a delimiter."""
+    with pytest.raises(ImportMapError, match=r"line 2 has 4 fields, expected 2, .* need quotes"):
+        imported(tmp_path, "t,u\n0,0,1,5\n0,1,2,5\n", 'decimal: ","\n')
 
 
 def test_another_decimal_sign_is_refused(tmp_path):
