@@ -15,7 +15,7 @@ _STEPS = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5)
 _NEAR = 0.01
 """Of a step: as near to a multiple stamps of 1.7e9 s are in a double, at steps of 10 µs and more."""
 _OFTEN = 0.02
-"""Share of the intervals: where fewer differ from the usual one, samples are missing or late."""
+"""Share of the intervals: where fewer are no multiple of the usual one, samples are late."""
 _FEWEST = 10
 """Intervals: of fewer any may be whole by chance."""
 
@@ -28,7 +28,8 @@ def rounded_stamps(channel: Channel, name: str) -> list[Fault]:
         return []
     period = float(np.median(interval))
     step = next((s for s in _STEPS if _is_whole(interval, s)), 0.0)
-    uneven = float(np.mean(np.abs(interval - period) > 0.5 * step))
+    off = interval - period * np.rint(interval / period)  # behind lost samples it is some periods
+    uneven = float(np.mean(np.abs(off) > 0.5 * step))
     if step / np.sqrt(12.0) < SCATTER * period or uneven < _OFTEN:
         return []
     detail = f"whole {_named(step)}, off by up to {1e3 * step / 2:g} ms at {channel.rate:.4g} Hz"

@@ -42,6 +42,7 @@ def test_rounding_is_reported_with_step_and_rate(rate, step, says, start):
     [
         channel(1000.0, 1e-3),
         channel(250.0, 1e-3, missing=(7, 900, 901)),
+        channel(100.0, 0.0, missing=np.random.default_rng(3).choice(2101, 210, replace=False)),
         channel(280.0, 1e-6),
         channel(280.0, 0.0, 1.7e9),
         channel(280.0, 1e-3, size=8),

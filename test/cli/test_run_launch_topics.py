@@ -121,7 +121,7 @@ def visitor():
 def test_a_node_that_hangs_is_listed_as_such(visitor, monkeypatch):
     monkeypatch.setattr(_caller, "DISCOVERY", 0.1)
     caller = _caller.Caller(visitor)
-    assert _caller._await(lambda: caller.callable_nodes(0.0) == ["/rsea/mute"])
+    assert _caller._await(lambda: "/rsea/mute" in caller.callable_nodes(0.0))
     assert offer_of(caller, "/rsea/mute") == ("no answer", "-")
 
 

@@ -31,7 +31,7 @@ def test_ft_and_deflection_come_from_the_encoder_and_are_marked_as_such(wire, li
     assert len(both) > 20, "a busy listener loses some of each"
     for at in both:
         assert torques[at] == pytest.approx(STIFFNESS * angles[at], rel=1e-9)
-    source = f"stiffness of {STIFFNESS:.4g} N m/rad times measured deflection"
+    source = f"stiffness of {STIFFNESS:.4g} N·m/rad times measured deflection"
     wire.push(lambda: newest_value(health, "felt", "ft_source") == source)
 
 
