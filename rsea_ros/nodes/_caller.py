@@ -17,6 +17,8 @@ from rsea_ros.wording import did_you_mean
 _TRIGGER, _CHANGE_STATE = "std_srvs/srv/Trigger", "lifecycle_msgs/srv/ChangeState"
 _PATIENCE = 60.0
 """s that an answer may take: a driver that configures talks to its devices."""
+_SEARCH = 8.0
+"""s that a running node may take to be seen: on a busy machine 3 s were not always enough."""
 _QUESTIONS = 3
 """Repetitions of a question whose answer was lost: a service may be seen before it sees who asks."""
 _MATCHING = 0.1
@@ -84,7 +86,7 @@ class Caller:
     def full_name(self, name: str) -> str:
         """Return the full name of a node. Raises ParameterError when it does not run or offers nothing."""
         name = absolute(name)
-        if not _await(lambda: name in self._nodes() and bool(self.actions(name))):
+        if not _await(lambda: name in self._nodes() and bool(self.actions(name)), _SEARCH):
             near = did_you_mean(name, self._nodes())
             raise ParameterError(f"node {name}: it does not run{near} (rsea call lists what does)")
         return name
@@ -133,9 +135,9 @@ class Caller:
             self._node.destroy_client(client)
 
 
-def _await(is_true: Callable[[], bool]) -> bool:
-    """Return whether something becomes true while the services of a graph are being discovered."""
-    deadline = time.monotonic() + DISCOVERY
+def _await(is_true: Callable[[], bool], patience: float = DISCOVERY) -> bool:
+    """Return whether something becomes true while the services of a graph are being discovered, s."""
+    deadline = time.monotonic() + patience
     while not (done := is_true()) and time.monotonic() < deadline:
         time.sleep(POLL)
     return done
