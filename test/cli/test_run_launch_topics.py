@@ -145,7 +145,8 @@ def test_a_driver_is_activated_stopped_and_cleared_by_calls(tmp_path):
         up = call("driver", "configure", "activate", "stop")
         assert up.stdout.splitlines()[:2] == ["/rsea/driver: inactive", "/rsea/driver: active"], up.stderr
         down = call("driver", "deactivate", "cleanup", "clear_faults")
-        assert down.stdout.splitlines() == ["/rsea/driver: inactive", "/rsea/driver: unconfigured"], down.stderr
+        ended = ["/rsea/driver: inactive", "/rsea/driver: unconfigured"]
+        assert down.stdout.splitlines() == ended, down.stderr
         assert "did you mean clear_fault?" in down.stderr
     finally:
         driver.send_signal(signal.SIGTERM)
