@@ -103,13 +103,7 @@ def as_often_as_commands(case: Case) -> Case:
         at={n: at[every[n]] for n, at in drive.at.items()},
         impulse={n: i[every[n]] for n, i in drive.impulse.items()},
     )
-    return replace(
-        case,
-        drive=thinner,
-        t={n: t[every[n]] for n, t in case.t.items()},
-        measured={n: y[every[n]] for n, y in case.measured.items()},
-        mask={n: m[every[n]] for n, m in case.mask.items()},
-    )
+    return case.keeping(every, thinner)
 
 
 def _samples_in(period: float, t: FloatArray) -> int:
@@ -155,13 +149,7 @@ def _piece(case: Case, drive: Drive, begin: float, end: float, run_up: float) ->
         restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last),
         spans=(),
     )
-    return replace(
-        case,
-        drive=cut,
-        t={n: t[inside[n]] for n, t in case.t.items()},
-        measured={n: y[inside[n]] for n, y in case.measured.items()},
-        mask={n: (m & (case.t[n] >= compared))[inside[n]] for n, m in case.mask.items()},
-    )
+    return case.within({n: t >= compared for n, t in case.t.items()}).keeping(inside, cut)
 
 
 def state_at(case: Case, t: float) -> tuple[float, float]:

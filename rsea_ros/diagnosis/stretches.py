@@ -34,6 +34,7 @@ _ROUNDING = 1e-6
 _LASTS = 1e-5
 """Share of a motion that a step takes away, from which it ends within a record: 45 s."""
 
+
 def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Problem:
     """Return a nominal problem on the stretches of its long records; itself where none is long."""
     if _is_whole(problem.cases, settings):
@@ -142,13 +143,7 @@ def on_slots(case: Case, slots: Sequence[int] | IntArray, settings: DiagnosisSet
         restarts=tuple(sorted([*drive.restarts, *anew])),
         spans=spans,
     )
-    return replace(
-        case,
-        drive=cut,
-        t={n: t[keep[n]] for n, t in case.t.items()},
-        measured={n: y[keep[n]] for n, y in case.measured.items()},
-        mask={n: m[keep[n]] for n, m in case.mask.items()},
-    )
+    return case.keeping(keep, cut)
 
 
 def simulated_time(case: Case, settings: DiagnosisSettings) -> float:

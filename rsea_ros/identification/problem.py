@@ -50,6 +50,16 @@ class Case:
         """Return the case with only samples that are also in `mask`."""
         return replace(self, mask={n: m & mask[n] for n, m in self.mask.items()})
 
+    def keeping(self, samples: Mapping[str, slice | BoolArray], drive: Drive) -> Case:
+        """Return the case on another drive, with some samples of each channel."""
+        return replace(
+            self,
+            drive=drive,
+            t={n: t[samples[n]] for n, t in self.t.items()},
+            measured={n: y[samples[n]] for n, y in self.measured.items()},
+            mask={n: m[samples[n]] for n, m in self.mask.items()},
+        )
+
     @property
     def start(self) -> float:
         """Record time at which the case begins, s."""
