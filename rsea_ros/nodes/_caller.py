@@ -136,7 +136,7 @@ class Caller:
 
 
 def _await(is_true: Callable[[], bool], patience: float = DISCOVERY) -> bool:
-    """Return whether something becomes true while the services of a graph are being discovered, s."""
+    """Return whether something becomes true while a graph is being discovered. patience: s."""
     deadline = time.monotonic() + patience
     while not (done := is_true()) and time.monotonic() < deadline:
         time.sleep(POLL)
