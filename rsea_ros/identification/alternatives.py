@@ -23,6 +23,7 @@ from rsea_ros.identification.misfit import misfit_ratios, reweight
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, solve
 from rsea_ros.identification.unknowns import idle, start_vector, unknowns_of_effect, with_effect
+from rsea_ros.identification.workers import Pools
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.signals import FloatArray
 
@@ -61,7 +62,7 @@ def add_effect(
     return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])
 
 
-def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[ExtendedFit, ...]:
+def alternatives(solution: Solution, cases: Sequence[Case], pools: Pools) -> tuple[ExtendedFit, ...]:
     """Return the laws that would explain a part of a solution's residual, the best first.
 
     cases: with the noise of their sensors, not with weights from the misfit.
@@ -70,12 +71,13 @@ def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[E
     if is_inverse(problem.rig):
         return ()
     acting, scale = {e.name for e in problem.rig.effects}, scale_of(problem.cases, problem.rig)
-    tried = [(n, _fit_with(solution, effect_named(n).at(scale), run)) for n in LAWS if n not in acting]
-    fitted = [(n, s) for n, s in tried if s is not None and s.cost < (1.0 - FALL) * solution.cost]
+    names = [n for n in LAWS if n not in acting]
+    tried = pools.fits.map(lambda n: _fit_with(solution, effect_named(n).at(scale), pools.run), names)
+    fitted = [(n, s) for n, s in zip(names, tried, strict=True) if s is not None]
+    fitted = [(n, s) for n, s in fitted if s.cost < (1.0 - FALL) * solution.cost]
     best = min((s.cost for _, s in fitted), default=0.0)
     credible = sorted(((n, s) for n, s in fitted if s.cost <= NEAR * best), key=lambda item: item[1].cost)
-    settled = ((n, _refit(s, cases, run)) for n, s in credible)
-    return tuple(ExtendedFit(n, s, confidence_of(s)) for n, s in settled)
+    return tuple(pools.fits.map(lambda law: _settled(law[0], law[1], cases, pools.run), credible))
 
 
 def _fit_with(solution: Solution, effect: Effect, run: Map) -> Solution | None:
@@ -93,12 +95,13 @@ def _clocks_at_zero(solution: Solution) -> FloatArray:
     return np.where(clocks, 0.0, solution.theta)
 
 
-def _refit(solution: Solution, cases: Sequence[Case], run: Map) -> Solution:
+def _settled(name: str, solution: Solution, cases: Sequence[Case], run: Map) -> ExtendedFit:
     """Return an alternative fitted again, every channel in units of its residual or its noise."""
     known = replace(solution.problem, cases=tuple(cases))
     ratios = misfit_ratios(replace(solution, problem=known))
     weighted = tuple(reweight(case, ratios) for case in cases)
-    return solve(replace(known, cases=weighted), solution.theta, iterations=_ITERATIONS, run=run)
+    settled = solve(replace(known, cases=weighted), solution.theta, iterations=_ITERATIONS, run=run)
+    return ExtendedFit(name, settled, confidence_of(settled, run))
 
 
 def span_all(ci95: tuple[float, float], name: str, others: Sequence[ExtendedFit]) -> tuple[float, float]:

@@ -16,7 +16,7 @@ import numpy as np
 from rsea_ros.identification.determined import shares_from_data
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.remark import Remark
-from rsea_ros.identification.solver import Solution, central_jacobian
+from rsea_ros.identification.solver import Map, Solution, central_jacobian, serial
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF
@@ -58,13 +58,13 @@ class Confidence:
         return result
 
 
-def confidence_of(solution: Solution) -> Confidence:
+def confidence_of(solution: Solution, run: Map = serial) -> Confidence:
     """Return the doubt that is left after a fit."""
     doubt = np.array([u.reach for u in solution.problem.unknowns])
     prior = np.diag(1.0 / doubt**2)
     information = solution.jacobian.T @ solution.jacobian
     if np.linalg.eigvalsh(information * np.outer(doubt, doubt))[0] < _WEAK:
-        solution = replace(solution, jacobian=central_jacobian(solution.problem, solution.theta))
+        solution = replace(solution, jacobian=central_jacobian(solution.problem, solution.theta, run))
         information = solution.jacobian.T @ solution.jacobian
     inverse = inverse_of(information + prior)
     spread = inverse @ np.hstack([_block_scores(solution).T, np.sqrt(prior)])

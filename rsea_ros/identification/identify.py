@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -35,11 +34,10 @@ from rsea_ros.identification.result import (
     FrequencyResponse,
     Identification,
 )
-from rsea_ros.identification.solver import Solution, in_pool
+from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.start import start_from
 from rsea_ros.identification.statics import statics_of
-from rsea_ros.identification.threads import one_blas_thread
-from rsea_ros.identification.workers import cores
+from rsea_ros.identification.workers import worker_pools
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.position_loop import commanded
@@ -65,18 +63,19 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     report("frequency responses", 0.2)
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
-    with one_blas_thread(), ThreadPoolExecutor(cores()) as pool:
-        solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=_start(records[0], rig, responses))
+    with worker_pools() as pools:
+        solution, cases, asked = fit(cases, rig, run=pools.run, start=_start(records[0], rig, responses))
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
         while misfits and (more := even_out(steady.records, rig, solution)).scatter:
             steady = Evened(more.records, {**steady.scatter, **more.scatter})
             cases = tuple(case_from(record, rig) for record in steady.records)
-            solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
+            solution, cases, asked = fit(cases, rig, run=pools.run, start=identified_rig(solution, ()))
             misfits = _misfits(solution, cases)
         report("confidence", 0.8)
         outputs = solution.problem.outputs(solution.theta)
-        others = alternatives(solution, cases, in_pool(pool)) if misfits else ()
-    confidence = with_even_clocks(confidence_of(solution), solution, records, steady.records)
+        others = alternatives(solution, cases, pools) if misfits else ()
+        doubt = confidence_of(solution, pools.run)
+    confidence = with_even_clocks(doubt, solution, records, steady.records)
     result = _result(solution, outputs, records, cases, responses, others, confidence)
     report("done", 1.0)
     return replace(

@@ -12,6 +12,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.blas import dger
 
 from rsea_ros.identification.problem import Problem, simulate_cases
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector
@@ -121,15 +122,16 @@ def _read_later(problem: Problem, theta: FloatArray, delay: float) -> FloatArray
     return problem.residual_of(simulate_cases(problem.cases, rig, shifted, ride=problem.ride))
 
 
-def central_jacobian(problem: Problem, theta: FloatArray) -> FloatArray:
+def central_jacobian(problem: Problem, theta: FloatArray, run: Map = serial) -> FloatArray:
     """Return d residual / d theta by central differences, which leave no trace of curvature, shape (m, n)."""
-    columns = []
-    for i, unknown in enumerate(problem.unknowns):
-        step = np.zeros(len(theta))
+
+    def column(i: int) -> FloatArray:
+        unknown, step = problem.unknowns[i], np.zeros(len(theta))
         is_offset = unknown.is_clock and not unknown.is_rate
         step[i] = _CLOCK_DIFFERENCE if is_offset else _DIFFERENCE * unknown.scale
-        columns.append((problem.residual(theta + step) - problem.residual(theta - step)) / (2.0 * step[i]))
-    return np.column_stack(columns)
+        return np.asarray((problem.residual(theta + step) - problem.residual(theta - step)) / (2.0 * step[i]))
+
+    return np.column_stack(run(column, range(len(theta))))
 
 
 def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int = 25, run: Map = serial,
@@ -193,10 +195,10 @@ def broyden_update(matrix: FloatArray, step: FloatArray, change: FloatArray) -> 
 
     Source: Broyden, Mathematics of Computation 19, 1965, with scaled unknowns.
     """
-    size = np.sum(matrix**2, axis=0)
+    size = np.einsum("ij,ij->j", matrix, matrix)
     along = size * step / max(float(size @ step**2), 1e-300)
-    result: FloatArray = matrix + np.outer(change - matrix @ step, along)
-    return result
+    updated: FloatArray = dger(1.0, along, change - matrix @ step, a=matrix.T).T
+    return updated
 
 
 def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope: FloatArray) -> FloatArray:
