@@ -18,13 +18,12 @@ up until lateness latches a fault, and the time from that to zero torque is meas
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import random
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from statistics import median
@@ -138,7 +137,7 @@ def _trial(
         late = _lateness(rate)
         _drive(outside)
         begun = time.monotonic_ns()
-        errors = sine(outside, kind.amplitude, rate) or [math.nan]  # none where ft was lost for good
+        errors = sine(outside, kind.amplitude, rate)
         largest, faults = max(abs(torque) for _, torque, _ in outside.wrenches), _faults(outside)
         acting = sum(goal != 0 and on for _, goal, on in bench.log(begun)["torque"])
         nodes.close()
@@ -146,12 +145,19 @@ def _trial(
     outside.node.destroy_node()
     own = outside.health.get("controller", {})
     share, missed = own.get("feedback_share"), own.get("missed_measurements")
-    told = f"median of periods {100.0 * median(errors):.2f} %, worst {100.0 * max(errors):.1f} %"
+    told = _errors(errors)
     told += f", {acting} writes of torque, feedback at the end {share}, {own.get('late_commands')} late"
     told += f", {missed} measurements missed, faults {faults or 'none'}"
     told += f", bare loop late in {late:.1%} of its cycles"
     lost = any(fault.startswith("no_reply") for fault in faults)
     return Trial(told, largest, lost, wire_faults, alone)
+
+
+def _errors(errors: Sequence[float]) -> str:
+    """Return the errors of the periods of a sine, in words; none is left where the torque or ft was lost."""
+    if not errors:
+        return "no whole period was driven"
+    return f"median of periods {100.0 * median(errors):.2f} %, worst {100.0 * max(errors):.1f} %"
 
 
 def _lateness_fault(rate: float, priority: int, folder: Path) -> tuple[str, str, str]:

@@ -101,7 +101,7 @@ def damaged_parquet(rng: random.Random, data: bytes, other: bytes = b"") -> byte
     if rng.random() < 0.5:
         return damaged(rng, data, other)
     try:
-        table = pq.read_table(io.BytesIO(data))
+        table = pq.read_table(io.BytesIO(data), use_threads=False)
         columns = [(name, table.column(name)) for name in table.column_names]
     except Exception:
         return damaged(rng, data, other)
