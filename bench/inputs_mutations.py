@@ -92,6 +92,7 @@ def _read(form: Format, folder: Path, data: bytes, number: int) -> Outcome:
         outcome = Outcome("traceback", place(error), "".join(traceback.format_exception(error))[-3000:])
     finally:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        limit_seconds(WALL)  # the next file may take long to make
     if "_TooSlow" in outcome.where:
         outcome.kind = "time-out"
     limit_memory()

@@ -23,7 +23,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "zero_stamps": "header stamps that are zero; the log time replaces them",
         "missing_values": "cells of a table that are empty or not a number, left out",
         "rows_left_out": "rows of a table with another number of cells, left out",
-        "coarse_stamps": "stamps of a table that repeat; the samples are spread evenly between them",
+        "coarse_stamps": "stamps of a clock coarser than the samples, which are dated evenly between them",
         "rounded_stamps": "stamps rounded to a step of which the sample period is no multiple",
         "clock_jump": "the clock of the stamps jumped; the jump is removed",
         "clock_offset": "the clock of a channel differs from the command's",

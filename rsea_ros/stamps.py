@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rsea_ros.coarse_clock import even_behind_ticks
 from rsea_ros.coverage import absent_spans
 from rsea_ros.errors import ChannelError
 from rsea_ros.held_samples import without_held_samples
@@ -28,6 +29,8 @@ _SHORTEST_JUMP = 5.0
 """In sample periods: less than that a channel may well end later than the others, by chance."""
 _REPEAT = 1e-3
 """Of nearly all steps: what is closer is a repeat."""
+_NEW_VALUES = 0.5
+"""Share of samples with a stamp that repeats that differ from the one before, from which none is a copy."""
 _MOST_PLACES, _MOST_PER_SAMPLE = 1e7, 100.0
 """Periods that a channel may span, and times its number of samples: a long run at 2 kHz has 1e6."""
 _EXPLAIN_GAPS = ("duplicate_stamps", "dropped_samples")
@@ -50,8 +53,9 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         repeated = np.diff(channel.t, prepend=-np.inf) <= _repeat(channel.t)
         faults += [*jumps, *disorder]
         if repeated.any():
-            faults.append(Fault("duplicate_stamps", name, float(repeated.mean())))
-            channel = Channel(channel.t[~repeated], channel.y[~repeated])
+            channel, fault = _with_repeats_dated(channel, name, repeated)
+            faults.append(fault)
+            repeated = repeated if fault.kind == "duplicate_stamps" else np.zeros_like(repeated)
         _check_even(channel, f"{record.source}: {name}")
         faults += dropped_samples(channel, name, int(repeated.sum()))
         channels[name] = channel
@@ -61,6 +65,19 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     explained = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}
     new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in explained]
     return repaired, [*new, *(fault for fault in absent_spans(repaired) if fault not in record.faults)]
+
+
+def _with_repeats_dated(channel: Channel, name: str, repeated: BoolArray) -> tuple[Channel, Fault]:
+    """Return a channel without stamps that repeat, and the fault.
+
+    Repeats with other values that fit an even clock are samples between the ticks of a coarse one; all others
+    are left out but for the first of each.
+    """
+    even, share = even_behind_ticks(channel.t), float(repeated.mean())
+    if even is None or np.mean(np.diff(channel.y)[repeated[1:]] != 0.0) < _NEW_VALUES:
+        return Channel(channel.t[~repeated], channel.y[~repeated]), Fault("duplicate_stamps", name, share)
+    detail = f"{int(repeated.sum())} of {len(even)} stamps repeat: dated by the even clock that they fit"
+    return Channel(even, channel.y), Fault("coarse_stamps", name, share, detail)
 
 
 def _repeat(t: FloatArray) -> float:

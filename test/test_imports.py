@@ -10,7 +10,8 @@ from import_graph import MODULES, ROOT, imports, name_of
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-STAMPS = {"coverage", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order", "torque_edge"}
+STAMPS = {"coarse_clock", "coverage", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order",
+          "torque_edge"}  # fmt: skip
 FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -18,6 +19,7 @@ AROUND = {"laws", "experiment", "health", "trends", "exports"}
 OWN = {
     "errors": set(),
     "signals": {"errors", "arrays"},
+    "coarse_clock": {"signals"},
     "coverage": {"signals"},
     "held_samples": {"signals"},
     "mixed_rows": {"signals"},
@@ -113,6 +115,7 @@ FOREIGN = {
     "signals": {"numpy"},
     "arrays": {"numpy"},
     "library": {"numpy", "plotly", "rich"},
+    "coarse_clock": {"numpy"},
     "coverage": {"numpy"},
     "stamps": {"numpy"},
     "stamp_gaps": {"numpy"},

@@ -93,6 +93,24 @@ def test_stamps_that_nearly_repeat_are_repeats():
     assert [f.kind for f in faults] == ["duplicate_stamps"]
 
 
+@pytest.mark.parametrize("tick", [0.005, 0.01, 1 / 64])
+def test_samples_between_the_ticks_of_a_coarse_clock_get_their_own_times(tick):
+    true = np.arange(COUNT) * PERIOD
+    repaired, faults = repair_stamps(_record(np.floor(true / tick) * tick))
+    assert np.ptp(repaired["ft"].t - true) < 0.02 * PERIOD
+    (fault,) = faults
+    assert (fault.kind, fault.channel) == ("coarse_stamps", "ft")
+    assert fault.share == pytest.approx(1.0 - PERIOD / tick, abs=0.01)
+
+
+def test_messages_logged_twice_are_copies_not_samples_of_a_coarse_clock():
+    twice = np.repeat(np.arange(COUNT // 2) * 2.0 * PERIOD, 2)
+    record = _record(twice).with_channels(ft=Channel(twice, np.repeat(np.arange(COUNT // 2), 2) * 1.0))
+    repaired, faults = repair_stamps(record)
+    assert len(repaired["ft"]) == COUNT // 2
+    assert [f.kind for f in faults] == ["duplicate_stamps"]
+
+
 def test_stamps_of_no_clock_are_refused():
     t = np.concatenate([np.arange(COUNT - 50) * 1e-9, 1.0 + np.arange(50) * 60.0])
     with pytest.raises(ChannelError, match="ft: 2000 stamps, half of them 1e-09 s apart"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rsea_ros.coarse_clock import even_behind_ticks
 from rsea_ros.signals import FloatArray
 
 LONG = 1.5
@@ -13,13 +14,19 @@ LONG = 1.5
 def repaired(t: FloatArray) -> tuple[FloatArray, str]:
     """Spread samples with equal stamps evenly until the clock's next tick; return a note.
 
-    The first sample after a tick is dated by it to within one sample period, so the error of each stamp
-    stays below that, whatever the rate does meanwhile; a line through all samples would be off by as much
-    as the rate wanders. t: s, shape (n,), not decreasing. Returns t unchanged where no stamp repeats.
+    Where all stamps fit one even clock, that is used. Otherwise the first sample after a tick is dated by it
+    to within one sample period, so the error of each stamp stays below that, whatever the rate does
+    meanwhile; a line through all samples would be off by as much as the rate wanders.
+    t: s, shape (n,), not decreasing. Returns t unchanged where no stamp repeats.
     """
     first = np.flatnonzero(np.diff(t, prepend=-np.inf))
     if len(first) == len(t) or len(first) < 2:
         return t, ""
+    repeats = f"{len(t) - len(first)} of {len(t)} stamps repeat"
+    even = even_behind_ticks(t)
+    if even is not None:
+        rate = 1.0 / (even[1] - even[0])
+        return even, f"{repeats}: samples dated by the even clock that they fit, {rate:.4g} Hz"
     counts = np.diff(first, append=len(t))
     spans = np.diff(t[first])
     tick = float(np.median(spans))
@@ -32,6 +39,6 @@ def repaired(t: FloatArray) -> tuple[FloatArray, str]:
         spread[: counts[0]] = spread[first[1]] - (counts[0] - place[: counts[0]]) * min(steps[:2])
     slow, fast = 1.0 / np.quantile(steps, [0.95, 0.05])
     return spread, (
-        f"{len(t) - len(first)} of {len(t)} stamps repeat (clock of {tick * 1e3:.3g} ms):"
+        f"{repeats} (clock of {tick * 1e3:.3g} ms):"
         f" samples spread evenly between its ticks, {slow:.0f} to {fast:.0f} Hz"
     )

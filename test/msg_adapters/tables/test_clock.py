@@ -36,6 +36,15 @@ def test_stamps_come_within_a_sample_of_the_truth(tick, wander, stalls):
     assert "stamps repeat" in report
 
 
+@pytest.mark.parametrize("tick", [1 / 64, 0.01, 0.1])
+def test_even_samples_are_dated_far_better_than_their_ticks(tick):
+    truth = 3.0 + np.arange(20_000) / 280.0
+    stamps, report = repaired(np.round(truth / tick) * tick)
+    assert np.max(np.abs(np.diff(stamps) - 1.0 / 280.0)) < 1e-6
+    assert np.max(np.abs(stamps - truth)) < 0.02 * tick
+    assert "fit, 280 Hz" in report
+
+
 def test_a_line_through_all_samples_would_be_worse():
     """The reason for going tick by tick: a rate that wanders."""
     rng = np.random.default_rng(8)
