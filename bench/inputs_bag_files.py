@@ -160,6 +160,8 @@ _COLUMNS = {
 
 STEPS = 5_000_000
 """Steps of a statement that damages a database; one with more does not end."""
+LARGEST = 50_000_000
+"""Bytes of a damaged database: copies of copies would fill the memory of the process that makes them."""
 
 
 def damaged_sqlite(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
@@ -171,6 +173,8 @@ def damaged_sqlite(rng: random.Random, data: bytes, other: bytes = b"") -> bytes
         path.write_bytes(data)
         database = sqlite3.connect(path)
         database.text_factory = bytes
+        with suppress(sqlite3.Error):
+            database.execute(f"PRAGMA max_page_count = {LARGEST // 4096}")
         database.set_progress_handler(lambda: True, STEPS)  # ends what reads a view without end
         for _ in range(rng.choice((1, 1, 2, 4))):
             try:
