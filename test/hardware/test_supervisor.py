@@ -1,0 +1,34 @@
+"""The supervisor of a motor: a process of its own that the machine's other work must not hold up."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from rsea_ros.hardware import supervisor
+
+
+def may_hurry():
+    """Return whether a process of this user may run at real-time priority."""
+    code = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(99))"
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("listens", [False, True])
+def test_it_runs_before_all_other_processes_where_it_may(listens, tmp_path):
+    reader, writer = os.pipe()
+    words = ["--listen", str(tmp_path / "socket")] if listens else [str(writer), "0.1", "ff"]
+    process = subprocess.Popen(
+        [sys.executable, "-I", "-S", supervisor.__file__, *words], stdin=subprocess.PIPE, pass_fds=(writer,)
+    )
+    wanted, until = (os.SCHED_FIFO if may_hurry() else os.SCHED_OTHER), time.monotonic() + 30.0
+    while os.sched_getscheduler(process.pid) != wanted and time.monotonic() < until:
+        time.sleep(0.01)
+    assert os.sched_getscheduler(process.pid) == wanted
+    assert process.poll() is None
+    process.kill()
+    process.communicate()
+    os.close(reader)
+    os.close(writer)
