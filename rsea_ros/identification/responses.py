@@ -20,7 +20,10 @@ from rsea_ros.signals import ComplexArray, FloatArray, Record
 
 
 def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
-    """Return the measured responses of a record's sensors to the command, of those that move."""
+    """Return the measured responses of a record's sensors to the command, of those that move.
+
+    A sensor that is too slow for every line of the command shows none.
+    """
     outputs = [n for n in ("ft", "position", "deflection") if n in record and rig.measures(n)]
     if record["command"].is_still:
         return ()
@@ -28,7 +31,7 @@ def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
     for name in (n for n in outputs if len(record[n]) >= FEWEST and not record[n].is_still):
         with suppress(AtRestError):
             responses.append(estimate_response(record, name))
-    return tuple(responses)
+    return tuple(r for r in responses if len(r.frequency) > 0)
 
 
 def model_response(rig: Rig, output: str, frequency: FloatArray) -> ComplexArray:

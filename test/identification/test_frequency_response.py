@@ -158,3 +158,13 @@ def test_a_stretch_at_rest_shows_no_response() -> None:
     with pytest.raises(AtRestError, match="position: the command never changes where all is measured"):
         estimate_response(record, "position")
     assert responses_of(record, load_rig("paper_high_impedance")) == ()
+
+
+@pytest.mark.parametrize("frequency", [10.0, 20.0])
+def test_a_sensor_too_slow_for_the_only_line_of_a_command_shows_no_response(frequency):
+    t = np.arange(1400) / RATE
+    rig = load_rig("bare_drive")
+    fast = synthesize(rig, Channel(t, 5.0 * np.sin(2.0 * np.pi * frequency * t)))
+    slow = np.arange(0.0, 5.0, 1.0 / 14.0)
+    record = fast.with_channels(position=Channel(slow, np.interp(slow, t, fast["position"].y)))
+    assert responses_of(record, rig) == ()
