@@ -38,6 +38,11 @@ class Examined:
         every = [*self.checked, *([self.holdout] if self.holdout is not None else [])]
         return tuple(fault for checked in every for fault in checked.faults)
 
+    @property
+    def rate(self) -> float:
+        """The rate of the commands, Hz, stamps that repeat aside."""
+        return self.checked[0].record["command"].rate
+
 
 @dataclass(frozen=True)
 class Evaluated:

@@ -26,7 +26,6 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.workers import Pools
 from rsea_ros.model.prediction_errors import fit_percent
-from rsea_ros.signals import Record
 
 
 def conclude(
@@ -56,7 +55,7 @@ def _diagnosis(
         rig_name=rig.name,
         sources=tuple(r.source for r in records),
         duration=sum(r.stop - r.start for r in records),
-        rate=records[0]["command"].rate,
+        rate=examined.rate,
         faults=examined.faults,
         baseline_rig=identified_rig(first.solution, baseline),
         baseline=baseline,
@@ -71,7 +70,7 @@ def _diagnosis(
         causes=outcome.causes,
         alternatives=_alternatives(outcome, pools, settings),
         rejected=rejected,
-        next_experiment=_next_experiment(selection, outcome, records[0], settings),
+        next_experiment=_next_experiment(selection, outcome, examined.rate, settings),
         remaining=misfits(case, last.outputs[0], main, rig),
         masked={n: ~counted for n, counted in case.mask.items()},
         settings=settings,
@@ -121,10 +120,10 @@ def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
 
 
 def _next_experiment(
-    selection: Selection, outcome: Outcome, record: Record, settings: DiagnosisSettings
+    selection: Selection, outcome: Outcome, rate: float, settings: DiagnosisSettings
 ) -> Experiment | None:
-    """Return the run that would decide an open question; None without one."""
-    rate, last = record["command"].rate, outcome.stages[-1]
+    """Return the run that would decide an open question; None without one. rate: of its commands, Hz."""
+    last = outcome.stages[-1]
     for stage in outcome.stages[1:]:
         rivals = selection.rivals_of(stage.added)
         if rivals:
