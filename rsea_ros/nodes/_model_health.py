@@ -59,8 +59,9 @@ class ModelHealth:
             )
         tests = self._observer.consistency()
         self.contradictions = self._contradictions(tests)
-        stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in self._inputs.frozen]
-        if self._inputs.unmoved and not stopped:
+        sensors = self._inputs.stopped
+        stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in sensors.frozen]
+        if sensors.unmoved and not stopped:
             stopped = [UNMOVED]
         doubts = (_inconsistency(name, test) for name, test in tests.items() if test.broken)
         troubles = [*stopped, *self.contradictions, *self._silence(), *doubts]
