@@ -12,7 +12,7 @@ YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
 STAMPS = {"coverage", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order", "torque_edge"}
 FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
-BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
+BASE = FACTS | {"progress", "setting", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 AROUND = {"laws", "experiment", "health", "trends", "exports"}
 OWN = {
@@ -29,6 +29,7 @@ OWN = {
     "fast_length": set(),
     "normal": set(),
     "progress": set(),
+    "setting": set(),
     "wording": set(),
     "version": set(),
     "plugins": {"errors"},

@@ -124,9 +124,9 @@ def refit(model: Candidate, setup: FitSetup) -> Candidate:
 
 def with_noise_reestimated(model: Candidate) -> Candidate:
     """Return a candidate with the noise that its own residual shows, scored against that."""
-    ratio = model.problem.rig["gear.ratio"]
+    ratio, rule = model.problem.rig["gear.ratio"], model.settings.noise
     runs = zip(model.cases, model.outputs, strict=True)
-    return rescore(model, tuple(reestimate_noise(c, out, ratio) for c, out in runs))
+    return rescore(model, tuple(reestimate_noise(c, out, ratio, rule) for c, out in runs))
 
 
 def rescore(model: Candidate, cases: tuple[Case, ...]) -> Candidate:

@@ -17,7 +17,7 @@ from rsea_ros.diagnosis.evaluation import Evaluated, Examined, evaluate, held_ou
 from rsea_ros.diagnosis.naming.conclusion import conclude
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.selection import Selection
-from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
 from rsea_ros.effects.catalogue import catalogue
@@ -61,7 +61,7 @@ def diagnose(
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
     checked, remarks = _steady([check(r, rig) for r in records], rig)
-    nominal = nominal_problem(checked, rig)
+    nominal = nominal_problem(checked, rig, settings)
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
     examined = Examined(records, checked, tested, rig)
     with worker_pools() as pools:
@@ -74,9 +74,11 @@ def diagnose(
     return replace(result, remarks=(*remarks, *cut, *torque_scale(nominal), *result.remarks))
 
 
-def nominal_problem(checked: Sequence[Checked], rig: Rig) -> Problem:
+def nominal_problem(
+    checked: Sequence[Checked], rig: Rig, settings: DiagnosisSettings = DEFAULT
+) -> Problem:
     """Return the fit of a rig to checked records: the nominal model."""
-    cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
+    cases = tuple(case_from(c.record, rig, c.masked, settings.noise) for c in checked)
     stated = frozenset(e.name for e in rig.effects)
     return Problem(cases, rig, unknowns_of(rig, cases), MEASURED, stated=stated)
 

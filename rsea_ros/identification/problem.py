@@ -11,6 +11,7 @@ import numpy as np
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
+from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
@@ -72,13 +73,19 @@ class Case:
         return drive.duration if isinstance(drive, Drive) else float(drive.t[-1] - drive.t[0])
 
 
-def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None = None) -> Case:
-    """Make a record ready. masked: samples by channel that are faulty and must not count.
+def case_from(
+    record: Record,
+    rig: Rig,
+    masked: Mapping[str, BoolArray] | None = None,
+    rule: NoiseSettings = DEFAULT,
+) -> Case:
+    """Make a record ready.
 
+    masked: samples by channel that are faulty and must not count. rule: of the noise that the record shows.
     Raises IdentificationError when no channel of the record is one that the rig has.
     """
     if is_inverse(rig):
-        return _inverse_case(record, rig)
+        return _inverse_case(record, rig, rule)
     record = commanded(record, rig)
     channels = channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
@@ -92,13 +99,13 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
         drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
-        noise=MappingProxyType({n: noise_floor(record, n, sensors[n]) for n in channels}),
+        noise=MappingProxyType({n: noise_floor(record, n, sensors[n], rule) for n in channels}),
         mask=MappingProxyType(
             {n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
         ),
         source=record.source,
         floating=floating,
-        least=MappingProxyType({n: least_noise(record[n].y, sensors[n]) for n in channels}),
+        least=MappingProxyType({n: least_noise(record[n].y, sensors[n], rule) for n in channels}),
     )
 
 
@@ -128,7 +135,7 @@ def channels_that_tell(record: Record, rig: Rig) -> list[str]:
     )
 
 
-def _inverse_case(record: Record, rig: Rig) -> Case:
+def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
     """Make a record of a drive without a spring ready: its torque against the one that its motion takes.
 
     Noise: the part that passes the filter of the white noise at the top of the torque's band, or
@@ -141,7 +148,7 @@ def _inverse_case(record: Record, rig: Rig) -> Case:
                 f"{record.source}: {name} holds one value, expected motion: "
                 "a rig without a spring is judged by what moves it"
             )
-    level, is_flat = top_of_band(torque.y)
+    level, is_flat = top_of_band(torque.y, rule=rule)
     stated = 0.0 if is_flat else rig.sensors.get("motor_torque", Sensor()).noise
     noise = max(level, stated) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
     return Case(

@@ -39,9 +39,9 @@ class World:
     def __init__(self, monkeypatch):
         self.white, self.noises, self.asked = {}, set(), []
         monkeypatch.setattr(noise_level, "is_noise", self.is_noise)
-        monkeypatch.setattr(noise_level, "top_of_band", lambda left, seams: self.white[len(left)])
+        monkeypatch.setattr(noise_level, "top_of_band", lambda left, seams, rule: self.white[len(left)])
 
-    def is_noise(self, case, outputs, channel, ratio):
+    def is_noise(self, case, outputs, channel, ratio, rule):
         self.asked.append((channel, ratio))
         return channel in self.noises
 

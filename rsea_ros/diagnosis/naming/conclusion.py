@@ -90,7 +90,7 @@ def _alternatives(outcome: Outcome, pools: Pools, settings: DiagnosisSettings) -
     """Return the rivals of the named causes, each with its size."""
 
     def alternative(rival: tuple[str, Weighed, float]) -> Alternative:
-        return alternative_of(*rival, settings.sizes)
+        return alternative_of(*rival, settings)
 
     rivals = [(c.name, weighed, p) for c in outcome.causes for weighed, p in outcome.named[c.name].rivals]
     return tuple(pools.fits.map(alternative, rivals))

@@ -12,8 +12,7 @@ import pytest
 from rich.console import Console
 
 from rsea_ros.diagnosis.result import CauseParameter, Misfit, Reason, Rejected
-from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
-from rsea_ros.identification import coloured, noise_level
+from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings, NoiseSettings
 from rsea_ros.identification.result import Overlay
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
@@ -185,8 +184,10 @@ def test_the_settings_are_in_json_and_page_and_a_changed_one_stands_out(diagnose
     assert section.count("<b>") == 1
 
 
-def test_the_numbers_of_the_noise_are_shown_beside_the_settings(diagnosed):
-    written = diagnosis_json(diagnosed.diagnosis)["noise_numbers"]
-    assert (written["noise.above"], written["noise.fewest"]) == (noise_level.ABOVE, coloured.FEWEST)
-    section = settings_section(DiagnosisSettings())
-    assert all(f"<code>{name}</code>" in section for name in written)
+def test_the_numbers_of_the_noise_are_settings_in_json_and_page(diagnosed):
+    changed = DiagnosisSettings(noise=NoiseSettings(above=1.1))
+    written = diagnosis_json(replace(diagnosed.diagnosis, settings=changed))
+    assert written["noise_numbers"].items() <= written["settings"].items()
+    assert (written["settings"]["noise.above"], written["settings"]["noise.fewest"]) == (1.1, 1500)
+    assert "<b>1.1</b> (default 1.04)" in settings_section(changed)
+    assert "0, 0.1, 0.25" in settings_section(changed)
