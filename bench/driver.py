@@ -1,4 +1,4 @@
-"""Performance of the driver on the bench on a wire, beside a bare loop with absolute deadlines.
+"""Performance of the driver on a simulated bench, beside a bare loop with absolute deadlines.
 
 Run: python bench/driver.py [SECTION …] [--seconds 30] [--strings 1000000] [--rate 280 1000] [--priority 0 80]
 The sections: timing, loss, faults, random, controller, stream, fuzz; all of them without a name. `random

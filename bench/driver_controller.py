@@ -1,4 +1,4 @@
-"""Controller and driver together on the bench on a wire, quiet and beside processes that burn every core.
+"""Controller and driver together on a simulated bench, quiet and beside processes that burn every core.
 
 A sine of 5 Hz, 10 N m, 4.7 N m with a free end: its error, RMS, by period, and the largest |ft|, which a load
 may not raise. In each trial a bare loop shows how late this machine is, and once the driver has left the

@@ -1,7 +1,7 @@
 """Cycles, latency and CPU of the driver node, beside a bare loop with absolute deadlines meanwhile.
 
 Each rate as any process, then at SCHED_FIFO where that is permitted: driver and bare loop at the same
-priority, the bench on a wire one above, since hardware does not wait for our processor. After each, for half
+priority, the simulated bench one above, since hardware does not wait for our processor. After each, for half
 as long, a minute at most, and beside another bare loop: a loop of nothing but the two requests to the motor.
 Its lateness is that of pseudo-terminal and bench: the kernel passes the bytes on in a worker of usual
 priority. A driver is late less often only where it does not wait for a reply.

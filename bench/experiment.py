@@ -2,7 +2,7 @@
 
     causes LOG [FIRST COUNT]   hidden-cause benches, each line of LOG one of them; goes on where it stopped
     summary LOG                the figures of those lines
-    wire OUT                   the real driver on the wire bench, an overload in the middle of a run
+    wire OUT                   the real driver on a simulated bench, an overload in the middle of a run
     limits RUNS                limit violations in RUNS simulated runs, true values drawn from their intervals
 
 Truth is the second bench of test/independent. Every policy starts from the same poor log, 10 s of slow work
@@ -248,7 +248,7 @@ def limits(runs):
 
 
 def wire(out):
-    """Inject an overload into a run on the wire bench; print when the torque was zero and how it ended."""
+    """Inject an overload into a run on a simulated bench; print when the torque was zero and how it ended."""
     rig = load_rig("paper_high_impedance").with_effect("current_loop_lag", time_constant=3e-3)
     out.mkdir(parents=True)
     save_rig(rig, out / "bench.yaml")

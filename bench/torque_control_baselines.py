@@ -34,7 +34,7 @@ from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.trials import amplitude_of, disturbed
-from rsea_ros.control.uncertainty import BenchVariant, bench
+from rsea_ros.control.uncertainty import BenchVariant, variant_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Plant
 from rsea_ros.signals import FloatArray
@@ -169,7 +169,7 @@ def tuned(name: str, rig: Rig, loads: Mapping[str, Rig], rate: float) -> Values:
     within = [(case, disturbed(loads, case)) for case in WITHIN]
 
     def error(x: Values, case: BenchVariant, true: Rig) -> float:
-        amplitude = amplitude_of(bench(loads[case.load], case))
+        amplitude = amplitude_of(variant_rig(loads[case.load], case))
         return error_of(method(rig, 1.0 / rate, x), true, rate, amplitude, case.samples)
 
     def cost(x: FloatArray) -> float:
@@ -218,7 +218,7 @@ def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
         for name, begin in made.items():
             cells = []
             for case in cases().values():
-                amplitude = amplitude_of(bench(loads[case.load], case))
+                amplitude = amplitude_of(variant_rig(loads[case.load], case))
                 error = error_of(begin(), disturbed(loads, case), rate, amplitude, case.samples)
                 cells.append(f"{100.0 * error:.1f}" if error < UNSTABLE else "unstable")
             yield f"| {name} | " + " | ".join(cells) + " |"

@@ -79,13 +79,13 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.cli._demo_experiment import show
 
         return show(out, domain, args)
-    bench = bench_of(load_rig(RIG), args.seed)
-    save_rig(bench, out / "bench.yaml")
+    true_rig = drawn_rig(load_rig(RIG), args.seed)
+    save_rig(true_rig, out / "bench.yaml")
     print(f"{RIG}, with true values up to {100.0 * SPREAD:g} % off, known to the plant only")
     with Processes(out / "log", domain) as nodes:
         bag = recorded(nodes, out, duration, args)
         evaluate(nodes, bag, out, duration)
-        print(table(load_rig(RIG), bench, load_rig(out / "model.yaml")))
+        print(table(load_rig(RIG), true_rig, load_rig(out / "model.yaml")))
         print(losses(bag, nodes.log("identify")))
     print(f"report: {out / 'report.html'}")
     return 0
@@ -116,7 +116,7 @@ def recorded(nodes: Processes, out: Path, duration: float, args: argparse.Namesp
     return bag
 
 
-def bench_of(rig: Rig, seed: int) -> Rig:
+def drawn_rig(rig: Rig, seed: int) -> Rig:
     """Return a rig whose free values differ at random by up to SPREAD."""
     rng = np.random.default_rng(seed)
     return rig.with_values({n: rig[n] * (1.0 + SPREAD * rng.uniform(-1.0, 1.0)) for n in rig.free()})

@@ -17,7 +17,7 @@ from rsea_ros.control.law import FeedbackLaw, Gains, law_of
 from rsea_ros.control.loads import locked
 from rsea_ros.control.loop import actions, returns
 from rsea_ros.control.sampled import FT, responses, sampled, z_of
-from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench, lags_of, mode_of
+from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, lags_of, mode_of, variant_rig
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output
@@ -78,7 +78,7 @@ def moved(rig: Rig, rate: float, hz: FloatArray) -> Moved:
 def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: BenchVariant, u: Uncertainty) -> Moved:
     """Return what moving the distal side of a bench of the set does. hz: below half the rate."""
     path, current = lags_of(case, rate, hz)
-    still = moved(bench(rig, case), rate, hz)
+    still = moved(variant_rig(rig, case), rate, hz)
     return replace(still, sensor=mode_of(u.mode, case.participation, hz), path=path, current=current)
 
 

@@ -23,7 +23,7 @@ from rsea_ros.control.robustness import Robustness
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.spread import Spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
-from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench
+from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, variant_rig
 from rsea_ros.model.rig import EffectSetting, Rig
 
 HZ, AMPLITUDE = 5.0, 10.0
@@ -192,7 +192,7 @@ def disturbed(loads: Mapping[str, Rig], case: BenchVariant) -> Rig:
         hz, ratio, _ = u.mode
         shape = {"frequency": hz, "damping_ratio": ratio, "participation": case.participation}
         effects.append(EffectSetting("structural_resonance", shape))
-    return bench(loads[case.load], case).with_effects(*effects)
+    return variant_rig(loads[case.load], case).with_effects(*effects)
 
 
 def amplitude_of(load: Rig) -> float:
@@ -202,7 +202,7 @@ def amplitude_of(load: Rig) -> float:
 
 def tracked(rig: Rig, loads: Mapping[str, Rig], case: BenchVariant, design: ControllerDesign) -> float:
     """Return the error of the sine on a bench of the set, once it has been learned."""
-    true, amplitude = disturbed(loads, case), amplitude_of(bench(loads[case.load], case))
+    true, amplitude = disturbed(loads, case), amplitude_of(variant_rig(loads[case.load], case))
     return sine(true, locked(rig), design, amplitude, span=LEARNED, late=case.samples)
 
 

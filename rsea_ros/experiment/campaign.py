@@ -131,7 +131,7 @@ class Campaign:
     tell: Progress | None = None
     hear: Callable[[Round], None] = lambda _: None
     choose: Callable[..., Proposal] = propose
-    """How the next run is chosen; a bench puts other policies here."""
+    """How the next run is chosen; a benchmark puts other policies here."""
 
     def go(self, records: Sequence[Record], first: RunWeighing | None = None) -> CampaignOutcome:
         """Run the loop from some records to its end. first: their weighing, if known.

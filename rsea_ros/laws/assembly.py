@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.laws.candidates import SPLINES, TermCandidate, basis_of, spline_knots
-from rsea_ros.laws.columns import LawBench
+from rsea_ros.laws.columns import CaseModel
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import SELECTION, Gram
 from rsea_ros.laws.law import FittedTerm, Law, LearntCurve, joined
@@ -21,7 +21,7 @@ _RIDGE = 1e-4
 
 
 def law_of(
-    gram: Gram, candidates: Sequence[TermCandidate], benches: Sequence[LawBench], models: Sequence[SparseLaw]
+    gram: Gram, candidates: Sequence[TermCandidate], cases: Sequence[CaseModel], models: Sequence[SparseLaw]
 ) -> list[Law]:
     """Return the laws of some models fitted together, those of one place as one."""
     first = len(gram.prior)
@@ -42,12 +42,12 @@ def law_of(
         law = Law(
             f"law_of_{_slug(items[0].term.regressor)}", items[0].term.place, regressor, tuple(items), {}
         )
-        laws.append(replace(law, ranges=ranges_of(law, _all_letters(benches)), name=_placed(law.name, place)))
+        laws.append(replace(law, ranges=ranges_of(law, _all_letters(cases)), name=_placed(law.name, place)))
     return laws
 
 
 def curve_of(
-    gram: Gram, candidates: Sequence[TermCandidate], benches: Sequence[LawBench], dependence: Dependence
+    gram: Gram, candidates: Sequence[TermCandidate], cases: Sequence[CaseModel], dependence: Dependence
 ) -> Law:
     """Return the learnt law of a dependence: its spline, as points of a curve."""
     first, place = len(gram.prior), dependence.place
@@ -55,7 +55,7 @@ def curve_of(
                if c.part and (c.place, c.regressor) == (place, dependence.regressor)]  # fmt: skip
     beta = gram.fit(np.array(columns), SELECTION, _RIDGE)[first:] / gram.scale[columns]
     spline = next(s for s in SPLINES if (s.place, s.regressor) == (place, dependence.regressor))
-    knots = spline_knots(benches, spline)
+    knots = spline_knots(cases, spline)
     x = np.linspace(knots[0], knots[-1], _POINTS)
     used = [c.part[2] for k in columns if (c := candidates[k - first]).part]
     curve = LearntCurve(spline.over, spline.factor, x, beta @ basis_of(x, knots)[used])
@@ -67,12 +67,12 @@ def curve_of(
         {},
         curve,
     )
-    return replace(law, ranges=ranges_of(law, _all_letters(benches)))
+    return replace(law, ranges=ranges_of(law, _all_letters(cases)))
 
 
-def _all_letters(benches: Sequence[LawBench]) -> dict[str, np.ndarray]:
+def _all_letters(cases: Sequence[CaseModel]) -> dict[str, np.ndarray]:
     return {
-        n: np.concatenate([b.variables.letters[n] for b in benches]) for n in benches[0].variables.letters
+        n: np.concatenate([c.variables.letters[n] for c in cases]) for n in cases[0].variables.letters
     }
 
 

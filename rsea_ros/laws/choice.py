@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.laws.base import Base
 from rsea_ros.laws.candidates import TermCandidate, candidates_of, columns_of
-from rsea_ros.laws.columns import LawBench, bench_of, rows_of
+from rsea_ros.laws.columns import CaseModel, case_model, rows_of
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
 from rsea_ros.laws.result import Tried
@@ -31,7 +31,7 @@ class Search:
     """A base model with all columns of laws and their sums of products."""
 
     base: Base
-    benches: tuple[LawBench, ...]
+    cases: tuple[CaseModel, ...]
     candidates: tuple[TermCandidate, ...]
     gram: Gram
 
@@ -40,10 +40,10 @@ def searched(base: Base) -> Search:
     """Return a base with the columns of all candidates."""
     problem, theta = base.problem, base.solution.theta
     rows = rows_of(problem, theta)
-    benches = tuple(bench_of(problem, theta, c, o) for c, o in zip(base.cases, base.outputs, strict=True))
-    made = candidates_of(benches)
-    gram = gram_of(rows, columns_of(rows, benches, made))
-    return Search(base, benches, tuple(c for c, _ in made), gram)
+    cases = tuple(case_model(problem, theta, c, o) for c, o in zip(base.cases, base.outputs, strict=True))
+    made = candidates_of(cases)
+    gram = gram_of(rows, columns_of(rows, cases, made))
+    return Search(base, cases, tuple(c for c, _ in made), gram)
 
 
 @dataclass(frozen=True)

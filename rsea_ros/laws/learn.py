@@ -99,5 +99,5 @@ def _with_files(rig: Rig, base: Rig, written: Sequence[WrittenLaw]) -> Rig:
 
 def _laws(search: Search, choice: Choice) -> list[Law]:
     if choice.curve is not None:
-        return [curve_of(search.gram, search.candidates, search.benches, choice.curve)]
-    return law_of(search.gram, search.candidates, search.benches, choice.taken)
+        return [curve_of(search.gram, search.candidates, search.cases, choice.curve)]
+    return law_of(search.gram, search.candidates, search.cases, choice.taken)

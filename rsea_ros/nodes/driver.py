@@ -20,7 +20,7 @@ from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
 from rsea_ros.nodes._alarm import SignalListener
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._bench import NAMES, SPRING_FRAME
+from rsea_ros.nodes._bench_topics import NAMES, SPRING_FRAME
 from rsea_ros.nodes._buses import devices_of
 from rsea_ros.nodes._combined import Combined
 from rsea_ros.nodes._cycle import Cycle

@@ -36,9 +36,9 @@ Bag = Callable[[str, Record], Record]
 
 @dataclass(frozen=True)
 class MovingOutput:
-    """bench: the true rig. rivals: unlumped and lumped, fitted. responses: measured, F/T per command."""
+    """true_rig: of the bench. rivals: unlumped and lumped, fitted. responses: measured, F/T per command."""
 
-    bench: Rig
+    true_rig: Rig
     rivals: tuple[Rival, ...]
     responses: Mapping[str, FrequencyResponse]
 
@@ -50,18 +50,18 @@ def moving_output(
 
     channels: used by the fit beside the command; the paper had the F/T sensor alone.
     """
-    bench = drawn(rig, seed)
+    true_rig = drawn(rig, seed)
     values = excitation(
         "white_noise", ExcitationSettings(rate=RATE, duration=duration, amplitude=NOISE, seed=seed)
     )
     command = Channel(np.arange(len(values)) / RATE, values)
     ends = ["spring_end", *(["housing_end"] if "proximal_spring.stiffness" in rig.quantities else [])]
-    records = {end: bag(f"{rig.name}_{end}", _record(bench, end, command, seed)) for end in ends}
+    records = {end: bag(f"{rig.name}_{end}", _record(true_rig, end, command, seed)) for end in ends}
     middle = 0.5 * duration
     train = _only(records["spring_end"].between(0.0, middle), channels)
     holdout = [(end, record.between(middle, duration + 1.0)) for end, record in records.items()]
     rivals = compare({"unlumped": rig, "lumped": loosened(lumped(rig))}, train, holdout)
-    return MovingOutput(bench, rivals, {end: estimate_response(r, "ft") for end, r in records.items()})
+    return MovingOutput(true_rig, rivals, {end: estimate_response(r, "ft") for end, r in records.items()})
 
 
 def drawn(rig: Rig, seed: int) -> Rig:
@@ -77,8 +77,8 @@ def loosened(rig: Rig) -> Rig:
     return replace(rig, quantities={**rig.quantities, **wide})
 
 
-def _record(bench: Rig, end: str, command: Channel, seed: int) -> Record:
-    return synthesize(replace(bench, ft_end=end), command, seed=seed + len(end))
+def _record(true_rig: Rig, end: str, command: Channel, seed: int) -> Record:
+    return synthesize(replace(true_rig, ft_end=end), command, seed=seed + len(end))
 
 
 def _only(record: Record, channels: tuple[str, ...]) -> Record:

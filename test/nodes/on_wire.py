@@ -1,4 +1,4 @@
-"""A driver node on the bench on a wire, and a driver made of a script."""
+"""A driver node on a simulated bench, and a driver made of a script."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Controller and driver together on the bench on a wire, with the defaults of config/nodes."""
+"""Controller and driver together on a simulated bench, with the defaults of config/nodes."""
 
 import signal
 import time

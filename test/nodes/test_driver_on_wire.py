@@ -1,4 +1,4 @@
-"""The driver node on the bench on a wire: what it publishes, its services, zero torque on every way out."""
+"""The driver node on a simulated bench: what it publishes, its services, zero torque on every way out."""
 
 import signal
 import subprocess

@@ -11,7 +11,7 @@ from msg_adapters.ros import JointState, Trigger, WrenchStamped, stamp_of, torqu
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._bench import MOST, NAMES, Bench
+from rsea_ros.nodes._bench_topics import MOST, NAMES, Bench
 from rsea_ros.nodes._flags import Flags
 from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
 from test.nodes.test_driver import Spy

@@ -1,4 +1,4 @@
-"""Misbehaviour of the bench on request. Shares are probabilities for one packet."""
+"""Misbehaviour of the simulated bench on request. Shares are probabilities for one packet."""
 
 from __future__ import annotations
 

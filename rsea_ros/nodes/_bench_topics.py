@@ -43,7 +43,7 @@ MOST = 100
 """Commands taken in a cycle: 28 kHz of them at 280 Hz; each costs 10 us."""
 
 
-class Bench:
+class BenchTopics:
     """Publishes readings, and queues messages on `torque_command`.
 
     Messages are serialised templates with the numbers filled in: making them from Python objects takes 60 us
