@@ -38,7 +38,7 @@ from rsea_ros.experiment.hypothesis import motion  # noqa: E402
 from rsea_ros.experiment.joint_weighing import weigh  # noqa: E402
 from rsea_ros.experiment.proposal import DesignRequest  # noqa: E402
 from rsea_ros.experiment.run_design import propose  # noqa: E402
-from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used  # noqa: E402
+from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response  # noqa: E402
 from rsea_ros.experiment.run_shape import at_rest_around  # noqa: E402
 from rsea_ros.experiment.weighed_causes import USUAL  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
@@ -239,7 +239,7 @@ def limits(runs):
             shares = np.array([h.probability for h in possible])
             true = possible[rng.choice(len(possible), p=shares / shares.sum())].draws(1, rng)[0]
             found = of_response(proposal.command, motion(true, proposal.command, RATE))
-            share = used(found | of_command(proposal.command, RATE), tight)
+            share = largest_share(found | of_command(proposal.command, RATE), tight)
             made, broken, worst = made + 1, broken + (share > 1.0), max(worst, share)
             if made % 1000 == 0:
                 print(f"{made} runs, {broken} broke a limit, largest share used {worst:.3f}", flush=True)

@@ -155,7 +155,7 @@ def reading(count: int = 100_000) -> bool:
 
     with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:
         store = make_store(Path(folder) / "store", count)
-        known = timed(store.known)
+        known = timed(store.known_rows)
         line("keys of 100 000 rows", "–", f"{known:.1f} s, before a run begins")
         begin = time.perf_counter()
         columns, rows = history(store.path), recordings(store.path)

@@ -19,7 +19,7 @@ import fleet_stub as stub
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.cluster import on_scheduler, on_this_machine
 from rsea_ros.fleet.executor import serial
-from rsea_ros.fleet.store import Store, locked, open_store
+from rsea_ros.fleet.store import Store, hold_lock, open_store
 
 KILLS = 20
 MEMORY = 1_000_000_000
@@ -66,7 +66,7 @@ def workers_killed(count: int = 60) -> bool:
 def client(folder: str, path: str) -> None:
     """Run a whole run with its cluster, as a client that can be killed."""
     store = open_store(path, create=True)
-    with locked(store, lambda holder: None), on_this_machine(1, MEMORY, "127.0.0.1:0") as (workers, _):
+    with hold_lock(store, lambda holder: None), on_this_machine(1, MEMORY, "127.0.0.1:0") as (workers, _):
         store.finish()
         stub.played(store, Path(folder), workers)
 
@@ -147,14 +147,14 @@ def disk_full(count: int = 200) -> bool:
             return True
         try:
             store, said, os.environ[stub.TAKES] = open_store(path, create=True), "never full", "0"
-            with locked(store, None), serial() as here:
+            with hold_lock(store, None), serial() as here:
                 try:
                     stub.played(store, bags, here)
                 except OSError as error:
                     said = f"stopped with {error.strerror}"
             before = len(stub.outcomes(store)) and sum(stub.outcomes(store).values())
             subprocess.run(["mount", "-o", "remount,size=20m", str(path)], check=True)
-            with locked(store, None), serial() as here:
+            with hold_lock(store, None), serial() as here:
                 store.finish()
                 stub.played(store, bags, here)
             return verdict("disk full", path, count, f"{said} after {before} rows, which stayed")

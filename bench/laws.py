@@ -28,7 +28,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import Score, score
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.effects.catalogue import lent
+from rsea_ros.effects.catalogue import lend
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import simulate_cases
 from rsea_ros.laws.fitting import gain_of
@@ -112,7 +112,7 @@ def fresh_gains(
 ) -> tuple[float, float]:
     """Return the gains on the fresh record of the true effect, fitted, and of the law."""
     assert case.effect is not None
-    with lent(case.effect, *(w.effect for w in result.laws)):
+    with lend(case.effect, *(w.effect for w in result.laws)):
         true = rig.with_effects(EffectSetting(case.effect.name, dict(case.parameters)))
         base, best, law = (_fitted(r, record) for r in (rig, true, result.rig if result.laws else rig))
         scores = [_score(r, fresh, rig) for r in (base, best, law)]

@@ -22,7 +22,7 @@ from independent.bench import drawn_bench, record_run
 from independent.excitations import chirp_noise, odd_multisine
 
 from rsea_ros.effects import signal_table as st
-from rsea_ros.effects.catalogue import catalogue, lent
+from rsea_ros.effects.catalogue import catalogue, lend
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -61,7 +61,7 @@ class LawCase:
             rig.with_effects(EffectSetting(self.effect.name, dict(self.parameters))) if self.effect else rig
         )
         made = []
-        with lent(*([self.effect] if self.effect else [])):
+        with lend(*([self.effect] if self.effect else [])):
             for k, excitation in enumerate((chirp_noise, odd_multisine)):
                 command = excitation(duration, np.random.default_rng([self.seed, k]))
                 channel = Channel(np.arange(len(command)) / RATE, command)

@@ -30,16 +30,16 @@ from bench.torque_control_stiffest import stiffest as limited
 from rsea_ros.cli.control import motors
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.harness import Arrivals, irregular
-from rsea_ros.control.human import measured
-from rsea_ros.control.impedance import moved
+from rsea_ros.control.human import measure_impedance
+from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.large_signal import largest
 from rsea_ros.control.link import LinkShare, link_share, linked_set
-from rsea_ros.control.loads import LOCKED, load_range, locked
+from rsea_ros.control.loads import LOCKED, load_range, lock
 from rsea_ros.control.robustness import robustness
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
-from rsea_ros.control.trials import LEARNED, sine, tracked
+from rsea_ros.control.trials import LEARNED, sine, tracking_error
 from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, corners
 from rsea_ros.control.virtual import Virtual, passive_to, stiffest
 from rsea_ros.model.rig import Rig
@@ -98,7 +98,7 @@ _followed: dict[str, Any] = {}
 
 
 def _follow(case: BenchVariant) -> float:
-    return tracked(case=case, **_followed)
+    return tracking_error(case=case, **_followed)
 
 
 def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
@@ -109,7 +109,7 @@ def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
         for hz in (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0):
             most = min(10.0, 0.8 * largest(free, hz, TorqueLimits().torque, math.inf))
             errors = [
-                sine(free, locked(rig), found, part * most, hz, span=LEARNED, link=link)
+                sine(free, lock(rig), found, part * most, hz, span=LEARNED, link=link)
                 for link in (None, share)
                 for part in (1.0, 0.3)
             ]
@@ -123,10 +123,10 @@ def linked(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     for found in designs(rig, loads, rates):
         share = link_share(rig, loads, found)
         yield f"{found.rate:g} Hz: {share}"
-        spring = np.abs(moved(rig, found.rate, SWEEP).spring)
+        spring = np.abs(distal_responses(rig, found.rate, SWEEP).spring)
         benches = linked_set(rig, loads, found)
         for name, link in (("without", LinkShare()), ("with", share)):
-            over = np.abs(measured(rig, found, Virtual(0.0, 0.0), SWEEP, link)) / spring
+            over = np.abs(measure_impedance(rig, found, Virtual(0.0, 0.0), SWEEP, link)) / spring
             cells = [f"{f:g} Hz {r:.2f}" for f, r in zip(SWEEP, over, strict=True)]
             most = benches.sensitivity(link).max()
             yield f"{name}: |Z| over the spring's {', '.join(cells)}; largest |S| of the set {most:.2f}"
@@ -143,8 +143,8 @@ def outer(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
                 f"0.9 of that to {to:.0f} Hz"
             )
         for virtual in (Virtual(0.0, 0.0), Virtual(200.0, 2.0)):
-            z = measured(rig, found, virtual, SWEEP)
-            over = np.abs(z) / np.abs(moved(rig, found.rate, SWEEP).spring)
+            z = measure_impedance(rig, found, virtual, SWEEP)
+            over = np.abs(z) / np.abs(distal_responses(rig, found.rate, SWEEP).spring)
             cells = [f"{f:g} Hz {r:.2f}" for f, r in zip(SWEEP, over, strict=True)]
             yield f"{virtual}: |Z| over the spring's {', '.join(cells)}; least Re Z {z.real.min():.1f}"
 

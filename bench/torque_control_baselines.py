@@ -33,7 +33,7 @@ from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import design
-from rsea_ros.control.trials import amplitude_of, disturbed
+from rsea_ros.control.trials import amplitude_of, disturbed_rig
 from rsea_ros.control.uncertainty import BenchVariant, variant_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Plant
@@ -165,8 +165,8 @@ def tuned(name: str, rig: Rig, loads: Mapping[str, Rig], rate: float) -> Values:
     one of them.
     """
     method, start = METHODS[name]
-    followed = [(case, disturbed(loads, case)) for case in (IN_TIME, LATE)]
-    within = [(case, disturbed(loads, case)) for case in WITHIN]
+    followed = [(case, disturbed_rig(loads, case)) for case in (IN_TIME, LATE)]
+    within = [(case, disturbed_rig(loads, case)) for case in WITHIN]
 
     def error(x: Values, case: BenchVariant, true: Rig) -> float:
         amplitude = amplitude_of(variant_rig(loads[case.load], case))
@@ -219,7 +219,7 @@ def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
             cells = []
             for case in cases().values():
                 amplitude = amplitude_of(variant_rig(loads[case.load], case))
-                error = error_of(begin(), disturbed(loads, case), rate, amplitude, case.samples)
+                error = error_of(begin(), disturbed_rig(loads, case), rate, amplitude, case.samples)
                 cells.append(f"{100.0 * error:.1f}" if error < UNSTABLE else "unstable")
             yield f"| {name} | " + " | ".join(cells) + " |"
 

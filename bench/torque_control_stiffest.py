@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from rsea_ros.control import synthesis
-from rsea_ros.control.impedance import Moved, moved, moved_bench
+from rsea_ros.control.impedance import Moved, distal_responses, moved_bench
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.synthesis import DesignLimits, check, design, grid
@@ -57,7 +57,7 @@ def _limited(
     def cost(x: np.ndarray) -> float:
         gains = synthesis._gains(x, rate)
         score, worst = synthesis._score(problem, gains), _worst(rig, rate, set_of, gains)
-        beyond = 20.0 * synthesis._lacking(problem, score, DesignLimits())
+        beyond = 20.0 * synthesis._shortfall(problem, score, DesignLimits())
         if limit is None:
             return float(np.log(worst)) + beyond
         soft = np.interp(synthesis.SOFT, problem.moved.hz, score.softness)
@@ -72,7 +72,7 @@ def _limited(
 
 def _row(rig: Rig, loads: Mapping[str, Rig], rate: float, set_of: Sequence[Moved], gains: Gains) -> str:
     found = check(rig, loads, rate, gains)
-    soft = moved(rig, rate, np.array(synthesis.SOFT)).ratio(law_of(rig, rate, gains))
+    soft = distal_responses(rig, rate, np.array(synthesis.SOFT)).ratio(law_of(rig, rate, gains))
     at = ", ".join(f"{hz:g} Hz {ratio:.3f}" for hz, ratio in zip(synthesis.SOFT, soft, strict=True))
     worst = _worst(rig, rate, set_of, gains)
     return (

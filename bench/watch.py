@@ -98,10 +98,10 @@ async def watched(
 def missed(seconds: float) -> float:
     """Return the plant's missed cycles a second, as its diagnostics say; NaN without any."""
     from rsea_ros.nodes._listener import Listener
-    from rsea_ros.nodes._visitor import visiting
+    from rsea_ros.nodes._visitor import visit
 
     values = []
-    with visiting("bench_watch") as node:
+    with visit("bench_watch") as node:
         deadline = time.monotonic() + seconds
         for text in Listener(node).messages("/diagnostics", sys.maxsize, 5.0):
             if "/rsea/plant" in text and (count := re.search(r"missed_cycles\n\s+value: '?(\d+)", text)):

@@ -18,7 +18,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, RigError
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.problem import case_from
-from rsea_ros.model.extent import bounded, check_extent
+from rsea_ros.model.extent import bound_values, check_extent
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import drive_of, synthesize
@@ -181,7 +181,7 @@ def test_a_channel_without_a_valid_sample_is_left_out():
 
 def test_numbers_beyond_any_measurement_count_as_missing():
     y = np.array([1.0, 1e31, -1e300, 1e-31, -5e-324, 0.0, np.inf])
-    channel = bounded(Record({"ft": Channel(np.arange(7.0), y)}))["ft"]
+    channel = bound_values(Record({"ft": Channel(np.arange(7.0), y)}))["ft"]
     assert np.array_equal(channel.y, [1.0, np.nan, np.nan, 0.0, 0.0, 0.0, np.nan], equal_nan=True)
 
 

@@ -34,7 +34,7 @@ class LinearState(NamedTuple):
     offset: FloatArray
     drift: FloatArray
 
-    def moved(self, step: FloatArray) -> LinearState:
+    def move(self, step: FloatArray) -> LinearState:
         """Return the state after a step; a clock that reads later than stamped is stamped early."""
         n, m = len(self.theta), len(self.offset)
         return LinearState(

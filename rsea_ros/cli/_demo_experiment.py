@@ -45,7 +45,7 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
     for line in lines:
         if "[INFO]" in line:
             say(line.partition("]: ")[2], indent=2)
-    print(f"hidden cause: {hidden(true_rig)}")
+    print(f"hidden cause: {hidden_cause_text(true_rig)}")
     return 0
 
 
@@ -68,7 +68,7 @@ def _session(nodes: Processes, out: Path, bag: Path) -> None:
         nodes.wait("experiment", SESSION, tell)
 
 
-def hidden(true_rig: Rig) -> str:
+def hidden_cause_text(true_rig: Rig) -> str:
     """Return the hidden cause in words."""
     cause = true_rig.effects[-1]
     main = effect_named(cause.name).main

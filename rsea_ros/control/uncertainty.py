@@ -18,8 +18,8 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from rsea_ros.control.lags import lagging
-from rsea_ros.control.sampled import FT, sampled, z_of
+from rsea_ros.control.lags import lag_responses
+from rsea_ros.control.sampled import FT, sample_rig, z_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
 
@@ -111,7 +111,7 @@ def family(
         key = case.load, case.stiffness, case.damping
         if key not in made:
             rig = variant_rig(loads[case.load], case)
-            made[key] = lagging(rig, sampled(rig, rate), hz)
+            made[key] = lag_responses(rig, sample_rig(rig, rate), hz)
         response, path = made[key]
         seen = response.copy()
         seen[FT] *= mode_of(u.mode, case.participation, hz)

@@ -30,8 +30,8 @@ from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.steady import with_even_clocks
 from rsea_ros.identification.workers import Pools, worker_pools
-from rsea_ros.model.extent import bounded
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.extent import bound_values
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import MEASURED, Record
@@ -56,8 +56,8 @@ def diagnose(
     tell = progress or (lambda step, share: None)
     tell("checking the data", 0.0)
     rig = rig.with_effects(*(e for e in rig.effects if not e.guess))
-    records = [bounded(commanded(r, rig)) for r in records]
-    holdout = bounded(commanded(holdout, rig)) if holdout is not None else None
+    records = [bound_values(with_command(r, rig)) for r in records]
+    holdout = bound_values(with_command(holdout, rig)) if holdout is not None else None
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
     checked, remarks = _steady([check(r, rig) for r in records], rig)

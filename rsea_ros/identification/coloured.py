@@ -42,7 +42,7 @@ def is_noise(
     if len(left) < rule.fewest or not np.any(left):
         return False
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
-    if _lasting(left) > rule.lasting or _slow(left, rate) > rule.slow:
+    if _lasting_share(left) > rule.lasting or _slow(left, rate) > rule.slow:
         return False
     spectra = segment_spectra(left, _LONG, 8)
     shape = shape_of(spectra)
@@ -60,7 +60,7 @@ def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> 
     return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
 
 
-def _lasting(values: FloatArray) -> float:
+def _lasting_share(values: FloatArray) -> float:
     """Return the share of the power in a constant and a trend."""
     late = np.linspace(-1.0, 1.0, len(values))
     line = np.polyval(np.polyfit(late, values, 1), late)
@@ -91,7 +91,7 @@ def _unsteady(spectra: ComplexArray, shape: SpectralShape, rate: float) -> float
 
 def _kurtosis(shape: SpectralShape, values: FloatArray) -> float:
     """Return the excess kurtosis of whitened values."""
-    white = shape.whitened(values)
+    white = shape.whiten(values)
     white = white - white.mean()
     return float(np.mean(white**4) / np.mean(white**2) ** 2) - 3.0
 

@@ -14,10 +14,10 @@ from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
 from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive
-from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
+from rsea_ros.model.inverse import CUT_OFF, Motion, acting_torque, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.measured_motion import zero_unknown
 from rsea_ros.model.pace import SKIPPED_START
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
@@ -51,7 +51,7 @@ class Case:
         """Return the case with only samples that are also in `mask`."""
         return replace(self, mask={n: m & mask[n] for n, m in self.mask.items()})
 
-    def keeping(self, samples: Mapping[str, slice | BoolArray], drive: Drive) -> Case:
+    def keep(self, samples: Mapping[str, slice | BoolArray], drive: Drive) -> Case:
         """Return the case on another drive, with some samples of each channel."""
         return replace(
             self,
@@ -86,7 +86,7 @@ def case_from(
     """
     if is_inverse(rig):
         return _inverse_case(record, rig, rule)
-    record = commanded(record, rig)
+    record = with_command(record, rig)
     channels = channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
     record = replace(record, channels={n: record[n] for n in (*beside, *channels)})
@@ -141,7 +141,7 @@ def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
     Noise: the part that passes the filter of the white noise at the top of the torque's band, or
     where that is not flat of the stated noise, if that is more.
     """
-    motion, torque = motion_from(record), acted(record)
+    motion, torque = motion_from(record), acting_torque(record)
     for name, channel in (("position", record["position"]), ("the torque that acted", torque)):
         if channel.is_still:
             raise IdentificationError(

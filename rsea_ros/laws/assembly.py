@@ -11,7 +11,7 @@ from rsea_ros.laws.candidates import SPLINES, TermCandidate, basis_of, spline_kn
 from rsea_ros.laws.columns import CaseModel
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import SELECTION, Gram
-from rsea_ros.laws.law import FittedTerm, Law, LearntCurve, joined
+from rsea_ros.laws.law import FittedTerm, Law, LearntCurve, join_names
 from rsea_ros.laws.sparse_regression import SparseLaw
 from rsea_ros.laws.variable_places import ranges_of
 
@@ -38,11 +38,13 @@ def law_of(
         )
     laws = []
     for place, items in parts.items():
-        regressor = joined(list(dict.fromkeys(p.term.regressor for p in items)))
+        regressor = join_names(list(dict.fromkeys(p.term.regressor for p in items)))
         law = Law(
             f"law_of_{_slug(items[0].term.regressor)}", items[0].term.place, regressor, tuple(items), {}
         )
-        laws.append(replace(law, ranges=ranges_of(law, _all_letters(cases)), name=_placed(law.name, place)))
+        laws.append(
+            replace(law, ranges=ranges_of(law, _all_letters(cases)), name=_name_with_place(law.name, place))
+        )
     return laws
 
 
@@ -60,7 +62,7 @@ def curve_of(
     used = [c.part[2] for k in columns if (c := candidates[k - first]).part]
     curve = LearntCurve(spline.over, spline.factor, x, beta @ basis_of(x, knots)[used])
     law = Law(
-        _placed(f"learnt_law_of_{_slug(dependence.regressor)}", place),
+        _name_with_place(f"learnt_law_of_{_slug(dependence.regressor)}", place),
         place,
         dependence.regressor,
         (),
@@ -81,5 +83,5 @@ def _slug(text: str) -> str:
     return "_".join(w for w in words if w != "a").replace("sensor_sensor", "sensor")
 
 
-def _placed(name: str, place: str) -> str:
+def _name_with_place(name: str, place: str) -> str:
     return name if place == "gear" or name.endswith(place) else f"{name}_at_{place}"

@@ -36,7 +36,7 @@ class Search:
     gram: Gram
 
 
-def searched(base: Base) -> Search:
+def make_search(base: Base) -> Search:
     """Return a base with the columns of all candidates."""
     problem, theta = base.problem, base.solution.theta
     rows = rows_of(problem, theta)
@@ -102,7 +102,7 @@ def surely_helps(
     gain = (before - after)[SELECTION] @ weight
     if not _is_sure(gain, _SURE, _WORSE):
         return False
-    held = [gram.tested(np.array(c, np.int64)) @ weight for c in ([*given], [*given, *columns])]
+    held = [gram.squares_left(np.array(c, np.int64)) @ weight for c in ([*given], [*given, *columns])]
     fall = (held[0] - held[1])[HELD_BACK]
     rms = 1.0 - float(np.sqrt(held[1][HELD_BACK].sum() / max(held[0][HELD_BACK].sum(), 1e-300)))
     return rms > MATTERS and _is_sure(fall, _SURE_ON_TEST, _WORSE_ON_TEST)

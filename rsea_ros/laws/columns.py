@@ -17,7 +17,7 @@ from rsea_ros.laws.injection import Injector
 from rsea_ros.laws.missing import MissingTorque, missing_torque
 from rsea_ros.laws.terms import PORTS, Place
 from rsea_ros.laws.variables import Variables, variables_along, variables_of
-from rsea_ros.model.inverse import Motion, smoothed
+from rsea_ros.model.inverse import Motion, smooth
 from rsea_ros.signals import FloatArray, IntArray
 
 GROUPS = 8
@@ -58,7 +58,7 @@ class CaseModel:
         """Return the response of each measured channel to values along the steps, acting at a place."""
         case = self.case
         if self.injector is None:
-            return {"motor_torque": -smoothed(values, self.variables.step)}
+            return {"motor_torque": -smooth(values, self.variables.step)}
         if place not in ("ft", "encoder"):
             return self.injector.answers(values, place)
         made = {n: np.zeros(len(t)) for n, t in case.t.items()}

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.effects.catalogue import lent
+from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Claims, Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.unknowns import apply
@@ -41,7 +41,7 @@ class Draft:
         return source_of(law, Claims("velocity", "neither", None), _NO_PROVENANCE)
 
 
-def finished(
+def finish_laws(
     drafts: Sequence[Draft], refined: Refined, cases: Sequence[Case], provenance: LawProvenance | None,
     gain: float, ci95: tuple[float, float],
 ) -> list[WrittenLaw]:  # fmt: skip
@@ -64,7 +64,7 @@ def finished(
         shown = shown_of(problem, refined, law, values)
         whole = len(law.parts) == len(draft.law.parts)
         effect = draft.effect if whole else effect_from(Draft.source(law), law.name)
-        with lent(effect):
+        with lend(effect):
             claims = claims_of(law, effect, rig, cases[0])
         written.append(
             WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=held_out_gain)), claims, shown)

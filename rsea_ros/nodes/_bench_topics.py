@@ -97,7 +97,7 @@ class BenchTopics:
         """Put all commands that have arrived into the queue; of a flood no more than a cycle has time for."""
         now = anchor.now()
         for stamp, (torque,), received in self._wanted.take(*((MOST,) if self._strict else ())):
-            arrival = anchor.arrived(received, self._polled)
+            arrival = anchor.arrival(received, self._polled)
             if self._strict and now - arrival > HORIZON:
                 self.commands.refuse()
             else:

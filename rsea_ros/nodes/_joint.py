@@ -87,19 +87,19 @@ class DrivenJoint:
         before, self._reported = self._reported, now
         if fault is not None and fault != before[0]:
             text = f"fault {fault}; torque zero until clear_fault or reboot"
-            self._node.get_logger().error(self.named(text))
+            self._node.get_logger().error(self.with_name(text))
             self._health.publish()
         if limited > before[1]:
             limits = self.guarded.guard.limits
             text = f"{limited} commands limited to {limits.torque:g} N·m and {limits.slew:g} N·m/s so far"
-            self._node.get_logger().warning(self.named(text), throttle_duration_sec=1.0)
+            self._node.get_logger().warning(self.with_name(text), throttle_duration_sec=1.0)
 
     def fail(self, error: Exception) -> None:
         """Log and keep the error that ended it."""
         self._ended = " ".join(str(error).split())
-        self._node.get_logger().error(self.named(self._ended))
+        self._node.get_logger().error(self.with_name(self._ended))
 
-    def named(self, text: str) -> str:
+    def with_name(self, text: str) -> str:
         """Return a line of the log with the name of the joint if there are several."""
         return f"{self.part}: {text}" if self.part else text
 

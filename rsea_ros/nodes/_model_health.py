@@ -67,7 +67,7 @@ class ModelHealth:
         troubles = [*stopped, *self.contradictions, *self._silence(), *doubts]
         summary = "; ".join(troubles) or self._error.verdict
         return NodeHealth(
-            WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)}
+            WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_test_values(tests)}
         )
 
     def _contradictions(self, tests: Mapping[str, Consistency]) -> list[str]:
@@ -145,7 +145,7 @@ def _inconsistency(name: str, test: Consistency) -> str:
     )
 
 
-def _tested(tests: Mapping[str, Consistency]) -> dict[str, object]:
+def _test_values(tests: Mapping[str, Consistency]) -> dict[str, object]:
     values: dict[str, object] = {}
     for name, test in tests.items():
         values |= {f"{name}.innovation": f"{test.ratio:.3f}", f"{name}.innovation_limit": f"{test.limit:.3f}"}

@@ -73,7 +73,7 @@ class ModelInputs:
         samples += [(t, self._sign * y, math.nan, _FT) for t, (y,), _ in self.ft.take()]
         samples.sort(key=itemgetter(0, 3))
         for stamp, a, b, kind in samples:
-            estimate = self._measured(stamp, a, b, kind)
+            estimate = self._measure(stamp, a, b, kind)
             if estimate is not None and (kind == _FT or self.ft_silent or self.stopped.ft_frozen):
                 self._note_period(stamp)
                 yield stamp, estimate
@@ -99,7 +99,7 @@ class ModelInputs:
         """Median time between estimates, s; nan before there are enough."""
         return median(self._periods) if len(self._periods) == PERIODS else math.nan
 
-    def _measured(self, stamp: int, a: float, b: float, kind: int) -> TorqueEstimate | None:
+    def _measure(self, stamp: int, a: float, b: float, kind: int) -> TorqueEstimate | None:
         """Give a sample to the observer, unless its sensor has stopped."""
         if kind == _FT:
             self._ft_stamp = stamp

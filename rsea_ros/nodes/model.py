@@ -111,9 +111,9 @@ class ModelNode:
         with self._lock:
             return self._assess.report()
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Run until stopped."""
-        return not self._waiter.running()
+        return not self._waiter.is_running()
 
     def conclude(self) -> None:
         """Leave nothing to do."""

@@ -72,9 +72,9 @@ class PlantNode:
             time.sleep(PAUSE)
         self._behind = behind
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Run until stopped."""
-        return not self._cycle.running()
+        return not self._cycle.is_running()
 
     def conclude(self) -> None:
         """Leave nothing to do."""

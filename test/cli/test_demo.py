@@ -154,7 +154,7 @@ def test_a_run_that_was_disturbed_is_repeated_once(tmp_path, capsys, monkeypatch
     monkeypatch.setattr(demo, "source", lambda nodes, out, args: nullcontext("plant"))
     monkeypatch.setattr(demo, "measure", lambda nodes, path, *rest: played.append(path))
     monkeypatch.setattr(demo, "read_record", read)
-    assert demo.recorded(None, tmp_path, 20.0, SimpleNamespace(seed=1)) == tmp_path / bag == played[-1]
+    assert demo.record_bench(None, tmp_path, 20.0, SimpleNamespace(seed=1)) == tmp_path / bag == played[-1]
     told = " ".join(capsys.readouterr().out.split())
     assert told.count("this machine was too busy (") == lines
     assert told.count("once more") == min(lines, 1)

@@ -9,7 +9,7 @@ import pytest
 
 import rsea_ros as rsea
 from msg_adapters import write_record
-from rsea_ros.cli._shown import shown
+from rsea_ros.cli._shown import show_controls
 from rsea_ros.cli.main import FAULT, main
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import rig_path
@@ -75,7 +75,7 @@ def test_a_seed_below_zero_is_refused(tmp_path, capsys):
 
 def test_a_closed_stdout_is_no_error(monkeypatch):
     monkeypatch.setattr("sys.stdout", None)
-    with shown():
+    with show_controls():
         print("nobody hears this")  # noqa: T201
 
 

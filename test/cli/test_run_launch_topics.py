@@ -112,7 +112,7 @@ def call(*words: str) -> subprocess.CompletedProcess[str]:
 @pytest.fixture
 def visitor():
     """A node beside /rsea/mute, whose lifecycle never answers, as that of a node that hangs."""
-    with _visitor.visiting("visitor") as node:
+    with _visitor.visit("visitor") as node:
         mute = LifecycleNode("mute", namespace="rsea")
         yield node
         mute.destroy_node()

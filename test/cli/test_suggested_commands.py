@@ -15,7 +15,7 @@ from msg_adapters import TopicMap, write_record
 from rsea_ros.cli import diagnose, identify
 from rsea_ros.cli._runs import rig_choice
 from rsea_ros.cli._topics import topic_map
-from rsea_ros.cli.main import attached, main
+from rsea_ros.cli.main import attach_axis, main
 from rsea_ros.report.rig.words import command
 
 OPTIONS = [
@@ -30,7 +30,7 @@ OPTIONS = [
 def parsed(verb, words):
     parser = argparse.ArgumentParser()
     verb.add_arguments(parser)
-    return parser.parse_args(attached(words))
+    return parser.parse_args(attach_axis(words))
 
 
 @pytest.mark.parametrize("options", OPTIONS)

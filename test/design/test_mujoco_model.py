@@ -17,7 +17,7 @@ from rsea_ros.design import mujoco_model as mjcf_module
 from rsea_ros.design.mujoco_model import GRAVITY, mjcf
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import mechanics
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS
 
@@ -125,7 +125,7 @@ def test_a_rig_that_mujoco_cannot_represent_is_refused():
     with pytest.raises(RigError, match="a rigid spring cannot be exported"):
         mjcf(load_rig("bare_drive"))
     with pytest.raises(RigError, match="lumped train cannot be exported"):
-        mjcf(lumped(load_rig("paper_moving_output")))
+        mjcf(lumped_rig(load_rig("paper_moving_output")))
     light = replace(load_rig("paper_moving_output")).with_values({"chassis.inertia": 0.0})
     with pytest.raises(RigError, match="chassis has inertia 0 kg·m²"):
         mjcf(light)

@@ -14,7 +14,7 @@ from similar_machine import record_with
 import rsea_ros.effects as effects
 from rsea_ros.cli.main import main
 from rsea_ros.control.compensation import compensation
-from rsea_ros.control.lags import lagging
+from rsea_ros.control.lags import lag_responses
 from rsea_ros.control.sampled import responses, sampled
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming.cause_facts import undetermined_play
@@ -179,7 +179,7 @@ def test_a_delay_of_another_name_is_treated_as_a_delay():
     rig = RIG.with_effects(EffectSetting("late_bus", {"delay": 4e-3}))
     assert without_delay(rig) == (RIG.with_effects(), 4e-3)
     hz, plant = np.array([10.0]), sampled(RIG, 280.0)
-    response, path = lagging(rig, plant, hz)
+    response, path = lag_responses(rig, plant, hz)
     assert path[0] == pytest.approx(np.exp(-2j * math.pi * 10.0 * 4e-3))
     np.testing.assert_array_equal(response, responses(plant, hz))
     case = case_from(record_with(RIG, effect_named("late_bus"), 1.0, duration=5.0), rig)

@@ -14,7 +14,7 @@ from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.sdf import export_sdf
 from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.model.equations import mechanics
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig_file import load_rig
 
 S = 2j * np.pi * np.array([0.3, 2.0, 11.0, 70.0])
@@ -123,4 +123,4 @@ def test_a_linear_rig_is_refused(export):
 
 def test_a_lumped_rig_is_no_mechanism():
     with pytest.raises(RigError, match="the lumped train cannot be exported"):
-        export_urdf(lumped(load_rig("paper_moving_output")))
+        export_urdf(lumped_rig(load_rig("paper_moving_output")))

@@ -20,7 +20,7 @@ from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.plan import is_anything_new
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
-from rsea_ros.fleet.store import TaskOutcome, locked, open_store
+from rsea_ros.fleet.store import TaskOutcome, hold_lock, open_store
 from rsea_ros.fleet.task import Changed, Task
 
 
@@ -188,14 +188,14 @@ def test_two_runs_take_turns(store):
     """Another process holds the lock: a run that does not wait names it, one that waits begins after it."""
     code = f"""
 import time
-from rsea_ros.fleet.store import TaskOutcome, locked, open_store
-with locked(open_store({str(store.path)!r}), None):
+from rsea_ros.fleet.store import TaskOutcome, hold_lock, open_store
+with hold_lock(open_store({str(store.path)!r}), None):
     print("held", flush=True)
     time.sleep(30)
 """
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout is not None and other.stdout.readline() == "held\n"
-        with pytest.raises(FleetError, match=f"process {other.pid} on "), locked(store, None):
+        with pytest.raises(FleetError, match=f"process {other.pid} on "), hold_lock(store, None):
             pass
         begin, heard = time.monotonic(), []
 
@@ -203,7 +203,7 @@ with locked(open_store({str(store.path)!r}), None):
             heard.append(holder)
             os.kill(other.pid, 9)
 
-        with locked(store, waiting):
+        with hold_lock(store, waiting):
             assert heard and time.monotonic() - begin < 10.0
 
 

@@ -10,7 +10,7 @@ import pytest
 from fleet_stubs import HIP, KNEE
 
 from rsea_ros.fleet.fleet_error import FleetError
-from rsea_ros.fleet.sources import bags_of, fingerprint, local_copy, relisted
+from rsea_ros.fleet.sources import bags_of, fingerprint, local_copy, relist
 
 
 def urls(sources, joints=(KNEE,)):
@@ -61,7 +61,7 @@ def test_an_object_store_is_read_like_a_folder(remote):
         assert sorted(os.listdir(path)) == ["metadata.yaml", "monday.mcap"]
         assert (path / "monday.mcap").read_bytes() == b"content"
     assert not path.exists()
-    assert relisted(tuesday) == tuesday
+    assert relist(tuesday) == tuesday
 
 
 def test_a_fingerprint_is_that_of_the_content(folder, remote):
@@ -76,7 +76,7 @@ def test_a_file_that_has_changed_is_listed_as_another(folder):
     (bag, _), *_ = bags_of([str(folder)], [KNEE])
     with open(bag.url, "ab") as file:
         file.write(b"more")
-    assert relisted(bag) != bag
+    assert relist(bag) != bag
 
 
 @pytest.mark.parametrize("source", ["nowhere", "nowhere/*.mcap", "@nowhere", "no-such-protocol://x"])

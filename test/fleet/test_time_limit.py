@@ -18,7 +18,7 @@ from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
 from rsea_ros.fleet.store import TaskOutcome
 from rsea_ros.fleet.task import Task, work
-from rsea_ros.fleet.time_limit import TIME_LIMIT, OutOfTime, limited
+from rsea_ros.fleet.time_limit import TIME_LIMIT, OutOfTime, limit_time
 
 MAP = "joints:\n  knee: {rig: paper_high_impedance}\n"
 
@@ -34,7 +34,7 @@ def endless(*_: object) -> dict[str, str]:
 
 def ended() -> bool:
     try:
-        with limited(0.05):
+        with limit_time(0.05):
             endless()
     except OutOfTime:
         return True
@@ -48,7 +48,7 @@ def test_a_block_that_never_ends_is_ended_in_any_thread():
 
 
 def test_a_block_in_time_hears_nothing_of_its_limit():
-    with limited(0.02):
+    with limit_time(0.02):
         pass
     until = time.monotonic() + 0.05
     while time.monotonic() < until:
@@ -61,7 +61,7 @@ def test_a_worker_whose_call_never_returns_ends_itself(monkeypatch):
     monkeypatch.setattr(os, "_exit", ends.append)
 
     def stuck() -> None:
-        with pytest.raises(OutOfTime), limited(0.02):
+        with pytest.raises(OutOfTime), limit_time(0.02):
             time.sleep(0.3)  # one call: the exception waits for its end
 
     with ThreadPoolExecutor(1) as pool:

@@ -21,7 +21,7 @@ def guard(period=PERIOD, **limits):
 
 def torques(it, *commands):
     """The torques of commands (wanted, age)."""
-    return [it.allowed(*c) for c in commands]
+    return [it.allowed_torque(*c) for c in commands]
 
 
 def test_a_new_guard_commands_zero_and_has_no_fault():
@@ -31,7 +31,7 @@ def test_a_new_guard_commands_zero_and_has_no_fault():
 
 def test_a_step_of_torque_is_limited_by_default():
     """10 000 N m/s, as the driver: 10 N m a ms."""
-    assert Guard(Limits(68.0), 1e-3).allowed(68.0, 0.0) == pytest.approx(10.0)
+    assert Guard(Limits(68.0), 1e-3).allowed_torque(68.0, 0.0) == pytest.approx(10.0)
 
 
 def test_the_slew_limit_holds_both_ways_and_from_the_previous_torque():
@@ -55,21 +55,21 @@ def test_without_a_command_there_is_no_torque_and_no_fault():
 @pytest.mark.parametrize(("age", "tripped"), [(0.05, False), (0.0501, True)])
 def test_a_command_counts_for_50_ms_by_default(age, tripped):
     it = guard()
-    it.allowed(9.0, 0.0)
-    it.allowed(9.0, age)
+    it.allowed_torque(9.0, 0.0)
+    it.allowed_torque(9.0, age)
     assert (it.fault is not None) == tripped
 
 
 def test_the_fault_of_late_commands_says_how_late_in_ms():
     it = guard(command_timeout=0.125)
-    it.allowed(9.0, 0.0)
-    it.allowed(9.0, 0.25)
+    it.allowed_torque(9.0, 0.0)
+    it.allowed_torque(9.0, 0.25)
     assert it.fault == DeviceFault("command_timeout", 250.0, 125.0, "ms")
 
 
 def test_at_the_end_of_the_program_the_torque_is_zero_without_a_fault():
     it = guard()
-    it.allowed(9.0, 0.0)
+    it.allowed_torque(9.0, 0.0)
     it.halted = True
     assert torques(it, (9.0, 0.0), (9.0, None)) == [0.0, 0.0]
     assert it.fault is None
@@ -77,7 +77,7 @@ def test_at_the_end_of_the_program_the_torque_is_zero_without_a_fault():
 
 def test_any_other_fault_makes_the_torque_zero_at_once():
     it = guard()
-    it.allowed(9.0, 0.0)
+    it.allowed_torque(9.0, 0.0)
     it.trip(DeviceFault("ft"))
     assert torques(it, (9.0, 0.0), (9.0, 9.0), (9.0, None)) == [0.0, 0.0, 0.0]
     assert it.fault.cause == "ft"
@@ -88,9 +88,9 @@ def test_any_other_fault_makes_the_torque_zero_at_once():
 def test_the_first_fault_stays_and_any_other_ends_its_ramp(cause, late):
     """A ramp may last 10 s: the service stop and a deflection beyond its limit did not end it."""
     it = guard(ramp=4 * PERIOD)
-    it.allowed(8.0, 0.0)
+    it.allowed_torque(8.0, 0.0)
     it.trip(DeviceFault("command_timeout"))
-    it.allowed(8.0, 0.0)
+    it.allowed_torque(8.0, 0.0)
     it.trip(DeviceFault(cause))
     assert it.fault.cause == "command_timeout"
     assert torques(it, (8.0, late), (8.0, late)) == [0.0, 0.0]
@@ -98,9 +98,9 @@ def test_the_first_fault_stays_and_any_other_ends_its_ramp(cause, late):
 
 def test_a_second_silence_leaves_the_ramp_as_it_is():
     it = guard(ramp=4 * PERIOD)
-    it.allowed(8.0, 0.0)
+    it.allowed_torque(8.0, 0.0)
     it.trip(DeviceFault("command_timeout"))
-    it.allowed(8.0, 0.0)
+    it.allowed_torque(8.0, 0.0)
     it.trip(DeviceFault("command_timeout"))
     assert torques(it, (8.0, 0.0), (8.0, 0.0)) == [4.0, 2.0]
 
@@ -113,16 +113,16 @@ def test_a_second_silence_leaves_the_ramp_as_it_is():
 ])  # fmt: skip
 def test_the_ramp_takes_its_duration_and_one_cycle_at_least(age, ramp, expected):
     it = guard(ramp=ramp)
-    it.allowed(-8.0, 0.0)
+    it.allowed_torque(-8.0, 0.0)
     it.trip(DeviceFault("command_timeout"))
-    assert [abs(it.allowed(-8.0, age)) for _ in range(5)] == expected
+    assert [abs(it.allowed_torque(-8.0, age)) for _ in range(5)] == expected
 
 
 def test_the_ramp_takes_20_ms_by_default():
     it = guard(period=0.005)
-    it.allowed(8.0, 0.0)
+    it.allowed_torque(8.0, 0.0)
     it.trip(DeviceFault("command_timeout"))
-    assert [it.allowed(8.0, 0.0) for _ in range(5)] == pytest.approx([6, 4, 2, 0, 0], abs=1e-12)
+    assert [it.allowed_torque(8.0, 0.0) for _ in range(5)] == pytest.approx([6, 4, 2, 0, 0], abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -131,15 +131,15 @@ def test_the_ramp_takes_20_ms_by_default():
 def test_the_rest_of_the_ramp_follows_the_age_of_the_command(late, expected):
     """late: cycles since the command ceased to count, of a ramp of four."""
     it = guard(command_timeout=2 * PERIOD, ramp=4 * PERIOD)
-    it.allowed(8.0, 0.0)
+    it.allowed_torque(8.0, 0.0)
     it.trip(DeviceFault("command_timeout"))
-    assert it.allowed(8.0, (2.0 + late) * PERIOD) == expected
+    assert it.allowed_torque(8.0, (2.0 + late) * PERIOD) == expected
 
 
 def test_a_ramp_shorter_than_a_cycle_is_a_cycle_for_late_commands_too():
     it = guard(command_timeout=2 * PERIOD, ramp=0.0)
-    it.allowed(8.0, 0.0)
-    assert it.allowed(8.0, 2.5 * PERIOD) == 0.0
+    it.allowed_torque(8.0, 0.0)
+    assert it.allowed_torque(8.0, 2.5 * PERIOD) == 0.0
 
 
 SOFT = {"soft_start": 128.0}
@@ -166,11 +166,11 @@ def test_a_soft_start_ends_at_the_torque_limit():
 def test_a_soft_start_begins_anew_when_commands_have_ceased(pause, expected):
     it = guard(**SOFT)
     torques(it, (9.0, 0.0), (0.0, 0.0), pause)
-    assert it.allowed(9.0, 0.0) == expected
+    assert it.allowed_torque(9.0, 0.0) == expected
 
 
 def test_there_is_no_soft_start_by_default():
-    assert guard().allowed(64.0, 0.0) == 64.0
+    assert guard().allowed_torque(64.0, 0.0) == 64.0
 
 
 def test_a_guard_begins_anew_after_it_was_cleared():
@@ -189,7 +189,7 @@ def misses(it, *measured, wanted=10.0):
     """Whether there is a fault after each measured torque, under a constant command."""
     seen = []
     for torque in measured:
-        it.allowed(wanted, 0.0)
+        it.allowed_torque(wanted, 0.0)
         it.look(reading(torque))
         seen.append(it.fault is not None)
     return seen
@@ -226,7 +226,7 @@ def test_a_torque_must_be_measured_within_three_cycles():
 def test_a_torque_between_the_last_ones_written_is_not_missed(measured):
     it = guard(**EFFORT)
     for k in range(12):
-        it.allowed(10.0 * (-1) ** k, 0.0)
+        it.allowed_torque(10.0 * (-1) ** k, 0.0)
         if k > 1:
             it.look(reading(measured))
     assert it.fault is None
@@ -244,7 +244,7 @@ def test_a_missed_torque_is_forgotten_when_a_fault_is_cleared():
 
 def test_a_ramp_is_not_taken_for_a_missed_torque():
     it = guard(**EFFORT)
-    it.allowed(10.0, 0.0)
+    it.allowed_torque(10.0, 0.0)
     it.trip(DeviceFault("ft"))
     for _ in range(5):
         it.look(reading(10.0))

@@ -53,7 +53,7 @@ def test_a_reply_in_pieces_is_read_whole(wire):
 def test_without_a_reply_nothing_is_returned_after_the_time_out(wire):
     port, _ = wire
     port.setPacketTimeoutMillis(2.0)
-    assert port.receive() == b"" and port.isPacketTimeout() and port.left == 0.0
+    assert port.receive() == b"" and port.isPacketTimeout() and port.time_left == 0.0
 
 
 def test_bytes_that_came_before_are_discarded(wire):

@@ -28,7 +28,7 @@ ALTERNATING = np.resize([1.0, -1.0], 10_000)
     ],
 )
 def test_the_share_of_a_constant_and_a_trend_is_measured(values, share):
-    assert coloured._lasting(values) == pytest.approx(share, abs=2e-3)
+    assert coloured._lasting_share(values) == pytest.approx(share, abs=2e-3)
 
 
 def toned(size, *tones, rate=RATE):

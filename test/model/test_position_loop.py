@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from rsea_ros.errors import ChannelError, RigError
 from rsea_ros.identification.responses import model_response
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import PositionLoop, Quantity, Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig
@@ -178,7 +178,7 @@ def test_a_record_must_have_what_commands_its_rig():
     rig = load_rig("pd_joint")
     record = synthesize(rig, Channel(T, STEPPING))
     assert set(record.channels) == {"reference", *rig.sensors}
-    assert np.array_equal(commanded(record, rig)["command"].y, STEPPING)
+    assert np.array_equal(with_command(record, rig)["command"].y, STEPPING)
     with pytest.raises(ChannelError, match="expected a rig with controller"):
         simulate(load_rig("bare_drive"), record)
     torques = Record({"command": Channel(T, STEPPING), "position": record["position"]}, source="torques")

@@ -41,7 +41,7 @@ class Process:
         """Its number."""
         return self._process.pid
 
-    def running(self):
+    def is_running(self):
         """Whether it has not ended."""
         return self._process.poll() is None
 
@@ -51,7 +51,7 @@ class Process:
 
     def stop(self, number=signal.SIGINT):
         """Send a signal and return the exit status."""
-        if self.running():
+        if self.is_running():
             self._process.send_signal(number)
         return self.wait()
 

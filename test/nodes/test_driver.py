@@ -190,7 +190,7 @@ def test_after_an_exception_the_device_is_closed_at_zero_torque_and_can_be_confi
     spy.fault = ZeroDivisionError("a mistake in the program")
     listener.until(lambda: not spy.opened)
     assert spy.written[-1] == 0.0
-    program.finished()
+    program.is_finished()
     assert node._state_machine.current_state[1] == "unconfigured"
     assert program.joints[0].report()[1] == "a mistake in the program"
     spy.fault = None
@@ -221,7 +221,7 @@ def test_two_actuators_each_follow_only_their_own_commands(listener, monkeypatch
     def pushed():
         for name in spies:
             topic[name].publish(torque_command_message(0, 5.0, "left_knee"))
-        return spies["left"].written[-1:] == [5.0] and made[1][0].joints[0].bench.commands.refused > 3
+        return spies["left"].written[-1:] == [5.0] and made[1][0].joints[0].topics.commands.refused > 3
 
     listener.until(pushed)
     assert not any(spies["right"].written)

@@ -94,7 +94,7 @@ def test_replay_keeps_stamps_and_gives_identify_everything(bag, start, listener,
     replay = start("replay", bag=bag, rate=10.0, subscribers=2)
     epoch = read_record(bag).epoch_ns
     expected = epoch + np.rint(read_record(bag)["position"].t * 1e9).astype(np.int64)
-    listener.until(lambda: not replay.running() and len(states) >= len(expected))
+    listener.until(lambda: not replay.is_running() and len(states) >= len(expected))
     listener.forget()
     assert replay.wait() == 0, replay.output
     rows = [row for row in iterate(bag) if row[0] in TOPICS]

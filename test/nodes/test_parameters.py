@@ -43,13 +43,13 @@ FLAG = NodeParameter("flag", False, "whether")
 )
 def test_a_value_that_does_not_fit_is_refused(parameter, value, message):
     with pytest.raises(ParameterError, match=message):
-        parameter.checked(value)
+        parameter.check(value)
 
 
 def test_a_value_that_fits_comes_in_its_type():
-    assert RATE.checked(280) == 280.0 and isinstance(RATE.checked(280), float)
-    assert (RATE.checked(10.0), RATE.checked(1000.0), COUNT.checked(0)) == (10.0, 1000.0, 0)
-    assert KIND.checked("b") == "b" and FLAG.checked(True) is True
+    assert RATE.check(280) == 280.0 and isinstance(RATE.check(280), float)
+    assert (RATE.check(10.0), RATE.check(1000.0), COUNT.check(0)) == (10.0, 1000.0, 0)
+    assert KIND.check("b") == "b" and FLAG.check(True) is True
 
 
 @pytest.mark.parametrize("name", NODES)
@@ -58,7 +58,7 @@ def test_parameter_file_and_table_agree(name):
     table = importlib.import_module(f"rsea_ros.nodes.{name}").TABLE
     assert document["/**"]["ros__parameters"] == {p.name: p.default for p in table}
     for parameter in table:
-        assert parameter.checked(parameter.default) == parameter.default
+        assert parameter.check(parameter.default) == parameter.default
         assert parameter.description
 
 

@@ -35,7 +35,7 @@ PATIENT = {
 def values_of(**given):
     """The values of a driver node with parameters, as `declare` makes them."""
     table = [*driver.TABLE, *joint_table(driver.TABLE, given)]
-    return {p.name: p.checked(given.get(p.name, p.default)) for p in table}
+    return {p.name: p.check(given.get(p.name, p.default)) for p in table}
 
 
 def test_a_parameter_not_given_for_a_joint_is_that_of_the_node():
@@ -96,7 +96,7 @@ class Leg:
         clear_now_and_then = every(2.0, self.clear_stalls)
 
         def pushed():
-            assert self.process.running(), self.process.output[-5:]
+            assert self.process.is_running(), self.process.output[-5:]
             clear_now_and_then()
             for joint, torque in torques.items():
                 self.commands[joint].publish(torque_command_message(time.time_ns(), torque, joint))

@@ -8,7 +8,7 @@ from fleet_histories import DAY, START, cause, history, recordings
 
 from rsea_ros.trends import alarms, fleet_trends
 from rsea_ros.trends.ranking import by_joint
-from rsea_ros.trends.significance import adjusted, scan_p, scan_threshold
+from rsea_ros.trends.significance import adjust, scan_p, scan_threshold
 
 JOINTS = tuple("abcdefgh")
 QUIET = history(np.random.default_rng(0), joints=JOINTS, days=60, each=1)
@@ -115,7 +115,7 @@ def test_an_ongoing_change_comes_before_bad_data():
 
 def test_the_false_discovery_rate_is_that_of_benjamini_and_hochberg():
     p = np.array([0.01, 0.04, 0.03, 0.005, 0.8])
-    assert adjusted(p) == pytest.approx([0.025, 0.05, 0.05, 0.025, 0.8])
+    assert adjust(p) == pytest.approx([0.025, 0.05, 0.05, 0.025, 0.8])
 
 
 @pytest.mark.parametrize("rate", [0.05, 0.01, 1e-5])

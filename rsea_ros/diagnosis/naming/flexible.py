@@ -175,17 +175,17 @@ def _with_part(
     cases = tuple(replace(c, drive=d) for c, d in zip(problem.cases, pushed, strict=True))
     outputs = replace(problem, cases=cases).outputs(theta)
     if effect.port is not st.Port.COMMAND:
-        outputs = [{**o, **_kept(b, "motor_torque")} for o, b in zip(outputs, base, strict=True)]
+        outputs = [{**o, **_kept_channel(b, "motor_torque")} for o, b in zip(outputs, base, strict=True)]
     if effect.port is st.Port.SPRING:
-        outputs = [_seen(c, o, d) for c, o, d in zip(problem.cases, outputs, pushed, strict=True)]
+        outputs = [_with_ft_torque(c, o, d) for c, o, d in zip(problem.cases, outputs, pushed, strict=True)]
     return outputs
 
 
-def _kept(base: dict[str, FloatArray], name: str) -> dict[str, FloatArray]:
+def _kept_channel(base: dict[str, FloatArray], name: str) -> dict[str, FloatArray]:
     return {name: base[name]} if name in base else {}
 
 
-def _seen(case: Case, out: dict[str, FloatArray], pushed: Drive) -> dict[str, FloatArray]:
+def _with_ft_torque(case: Case, out: dict[str, FloatArray], pushed: Drive) -> dict[str, FloatArray]:
     """Return channels in which the F/T sensor also measures the torque taken from the spring's."""
     if "ft" not in out or not isinstance(case.drive, Drive):
         return out

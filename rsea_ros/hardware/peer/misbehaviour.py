@@ -41,7 +41,7 @@ class Misbehaviour:
             return True
         return False
 
-    def damaged(self, packet: bytes) -> bytes:
+    def damage(self, packet: bytes) -> bytes:
         """Return a reply as it goes onto the wire: empty when it is dropped."""
         if self.happens("silent") or self.happens("drop"):
             return b""

@@ -50,7 +50,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "misfit": [_misfit(m) for m in d.misfit],
         "causes": [_cause(c) for c in d.causes],
         "alternatives": [_alternative(a) for a in d.alternatives],
-        "rejected": [_rejected(r) for r in d.rejected],
+        "rejected": [_rejection(r) for r in d.rejected],
         "extended": {
             "residual_rms": numbers(d.extended_residual_rms),
             "fit_percent": numbers(d.extended_fit_percent),
@@ -130,7 +130,7 @@ def _pair(interval: tuple[float, float]) -> list[float | None]:
     return [finite(side) for side in interval]
 
 
-def _rejected(rejected: Rejected) -> dict[str, Any]:
+def _rejection(rejected: Rejected) -> dict[str, Any]:
     return {
         "name": rejected.name,
         "gain_holdout": finite(rejected.gain_holdout),

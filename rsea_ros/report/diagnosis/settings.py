@@ -6,7 +6,7 @@ from html import escape
 
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, Setting
 from rsea_ros.report import words
-from rsea_ros.report.page.html import folded, paragraph
+from rsea_ros.report.page.html import fold, paragraph
 from rsea_ros.report.page.html_table import table_of_rows
 
 _DEFAULTS = {s.name: s.value for s in DEFAULT.listed()}
@@ -19,7 +19,7 @@ def settings_section(settings: DiagnosisSettings) -> str:
     if settings.without:
         limits += f" Not tried: {', '.join(settings.without)}."
     shown = table_of_rows(("Setting", "#Value", "Meaning", "Why this value"), rows)
-    return folded("Settings: the numbers that steer the verdict", paragraph(limits), shown)
+    return fold("Settings: the numbers that steer the verdict", paragraph(limits), shown)
 
 
 def _row(s: Setting) -> str:

@@ -10,7 +10,7 @@ from scipy.signal import butter, filtfilt
 
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.identification.joint_start import joint_start
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
@@ -91,6 +91,6 @@ def test_so101_joints_hold_what_their_targets_ask(joint):
     """A fit of a joint that begins from a regression along its motion explains most of a slow run."""
     mapping = load_map(REPOSITORY / "config" / "imports" / "so101.yaml")
     rig = load_rig("so101_joint")
-    record = commanded(import_record(REAL / "so101" / "friction_gravity", mapping, joint), rig)
+    record = with_command(import_record(REAL / "so101" / "friction_gravity", mapping, joint), rig)
     begun = joint_start(record, rig).with_effect("coulomb_friction", torque=0.05)
     assert predict(begun, record.between(0.0, 30.0))["position"].fit_percent > 60.0

@@ -127,7 +127,7 @@ def test_an_experiment_is_described_with_its_units():
 def test_a_number_without_unit_is_named(diagnosed):
     cause = replace(diagnosed.diagnosis.causes[0], name="ft_gain_error",
                     parameters={"gain": CauseParameter(1.05, "1", (1.04, 1.06))})  # fmt: skip
-    assert say.named([cause]) == "F/T gain error (gain 1.05)"
+    assert say.cause_list([cause]) == "F/T gain error (gain 1.05)"
 
 
 def laid_out(diagnosed, residual):
