@@ -53,8 +53,8 @@ def rigs(args: argparse.Namespace) -> Iterator[str]:
         rig = load_rig(name)
         truth = true_run(rig, command(), RATE, seed=2)
         size = float(np.sqrt(np.mean(truth.proximal**2)))
-        own, other = errors(rig, truth), errors(lumped_rig(rig), truth)
-        line = f"{name:24}{size:11.3f}{own[0]:14.4f}{own[1]:9.4f}{other[0]:12.3f}{other[1]:9.3f}"
+        unlumped, other = errors(rig, truth), errors(lumped_rig(rig), truth)
+        line = f"{name:24}{size:11.3f}{unlumped[0]:14.4f}{unlumped[1]:9.4f}{other[0]:12.3f}{other[1]:9.3f}"
         if "ft" in rig.sensors:
             blind = replace(
                 lumped_rig(rig), sensors={n: s for n, s in rig.sensors.items() if n != "position"}

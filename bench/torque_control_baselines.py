@@ -158,7 +158,7 @@ def cases() -> dict[str, BenchVariant]:
     }
 
 
-def tuned(name: str, rig: Rig, loads: Mapping[str, Rig], rate: float) -> Values:
+def tune(name: str, rig: Rig, loads: Mapping[str, Rig], rate: float) -> Values:
     """Return the gains of a method with the least errors on the locked bench, in time and late.
 
     They keep the benches of WITHIN stable: without that, each of the four follows better and is unstable on
@@ -180,8 +180,8 @@ def tuned(name: str, rig: Rig, loads: Mapping[str, Rig], rate: float) -> Values:
 
     simplex = np.log(start) + np.vstack([np.zeros(len(start)), STRIDE * np.eye(len(start))])
     options = {"maxfev": TRIED, "xatol": 1e-2, "fatol": 1e-3, "adaptive": True, "initial_simplex": simplex}
-    found = minimize(cost, np.log(start), method="Nelder-Mead", options=options) if start else None
-    return [float(value) for value in np.exp(found.x)] if found else start
+    optimum = minimize(cost, np.log(start), method="Nelder-Mead", options=options) if start else None
+    return [float(value) for value in np.exp(optimum.x)] if optimum else start
 
 
 def error_of(step: Step, true: Rig, rate: float, amplitude: float, late: int) -> float:
@@ -231,8 +231,8 @@ _searched: dict[str, Any] = {}
 def _all_tuned(rig: Rig, loads: Mapping[str, Rig], rate: float) -> list[Values]:
     _searched.update(rig=rig, loads=loads, rate=rate)
     with ProcessPoolExecutor(2, get_context("fork")) as pool:
-        return list(pool.map(_tuned, METHODS))
+        return list(pool.map(_tune, METHODS))
 
 
-def _tuned(name: str) -> Values:
-    return tuned(name, **_searched)
+def _tune(name: str) -> Values:
+    return tune(name, **_searched)

@@ -144,8 +144,8 @@ def offences(path: Path, source: str) -> list[str]:
     """Return the forbidden imports of a source at that path."""
     layer = layer_of(name_of(path))
     where = path.relative_to(ROOT)
-    found = [(module, line) for module, line in imports(path, source) if not may_import(layer, module)]
-    return [f"{where}:{line}: layer {layer} may not import {module}" for module, line in found]
+    forbidden = [(module, line) for module, line in imports(path, source) if not may_import(layer, module)]
+    return [f"{where}:{line}: layer {layer} may not import {module}" for module, line in forbidden]
 
 
 def may_import(layer: str, module: str) -> bool:

@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
 from inputs import kept_promises
 from inputs_bags import bag_of, record_of
-from inputs_cover import covering, pairs
+from inputs_cover import cover_pairs, pairs
 from inputs_matrix import BAG_VERBS
 from inputs_outcome import Outcome, judge
 from inputs_server import MODULES
@@ -241,7 +241,7 @@ def test_an_interrupted_gate_resumes_without_the_cases_that_passed(tmp_path):
 
 def test_the_covering_design_holds_every_pair():
     factors = {"a": [1, 2, 3], "b": ["x", "y"], "c": [True, False], "d": [0.1, 0.2, 0.3, 0.4]}
-    cases, count = covering(factors, random.Random(0), must=[{"a": 1, "d": 0.4}])
+    cases, count = cover_pairs(factors, random.Random(0), must=[{"a": 1, "d": 0.4}])
     covered = set().union(*(pairs(case, list(factors)) for case in cases))
     assert len(covered) == count == 3 * 2 + 3 * 2 + 3 * 4 + 2 * 2 + 2 * 4 + 2 * 4
     assert len(cases) < 3 * 2 * 2 * 4

@@ -90,13 +90,13 @@ def test_backlash_makes_no_limit_cycle():
 
 def test_small_sines_come_out_as_predicted():
     """No frequency is amplified beyond 1.5 dB: an extrapolator alone reached 18.7 dB at half the rate."""
-    found = follow(RIG, RIG, DESIGN)
-    decibel = 20.0 * np.log10(np.abs(found.torque))
-    assert decibel.max() < 1.5 and np.abs(decibel[found.hz < 8.0]).max() < 0.1
-    assert found.bandwidth > 3.0 * 6.365
-    wanted = prediction_response(80.0, 1.0 / RATE, found.hz)
-    below = found.hz < 6.0
-    assert found.torque[below] == pytest.approx(wanted[below], rel=0.02)
+    response = follow(RIG, RIG, DESIGN)
+    decibel = 20.0 * np.log10(np.abs(response.torque))
+    assert decibel.max() < 1.5 and np.abs(decibel[response.hz < 8.0]).max() < 0.1
+    assert response.bandwidth > 3.0 * 6.365
+    wanted = prediction_response(80.0, 1.0 / RATE, response.hz)
+    below = response.hz < 6.0
+    assert response.torque[below] == pytest.approx(wanted[below], rel=0.02)
 
 
 def test_a_jump_is_not_extrapolated():

@@ -24,7 +24,7 @@ LOCKED_RIG, FREE_RIG = load_rig("paper_high_impedance"), load_rig("paper_moving_
 
 
 @pytest.fixture(scope="module")
-def found():
+def margins_by_load():
     """Margins of GAINS with every load."""
     return check(LOCKED_RIG, load_range(LOCKED_RIG, FREE_RIG), RATE, GAINS)
 
@@ -71,10 +71,10 @@ def test_margins_are_those_of_python_control():
 
 
 @pytest.mark.parametrize("rig", [LOCKED_RIG, FREE_RIG], ids=lambda rig: rig.name)
-def test_the_bench_is_stable_below_the_gain_margin_and_unstable_above(rig, found):
+def test_the_bench_is_stable_below_the_gain_margin_and_unstable_above(rig, margins_by_load):
     """With more torque per current the loop is stable below the margin and unstable above it."""
     name = LOCKED if rig is LOCKED_RIG else "free x 1"
-    gain = 10.0 ** (found.margins[name].gain / 20.0)
+    gain = 10.0 ** (margins_by_load.margins[name].gain / 20.0)
     rms = {}
     for share in (0.95, 1.05):
         true = rig.with_effects(EffectSetting("torque_constant_error", {"gain": share * gain}))
@@ -84,9 +84,9 @@ def test_the_bench_is_stable_below_the_gain_margin_and_unstable_above(rig, found
     assert rms[0.95] < 2.0 and rms[1.05] > 5.0
 
 
-def test_poles_and_encirclements_agree(found):
+def test_poles_and_encirclements_agree(margins_by_load):
     plant, law = sample_rig(LOCKED_RIG, RATE), law_of(LOCKED_RIG, RATE, GAINS)
-    edge = 10.0 ** (found.margins[LOCKED].gain / 20.0)
+    edge = 10.0 ** (margins_by_load.margins[LOCKED].gain / 20.0)
     for share, stable in ((0.98, True), (1.02, False)):
         stronger = type(plant)(plant.a, plant.b * share * edge, plant.c, plant.period)
         assert (largest_pole(law, stronger) < 1.0) is stable

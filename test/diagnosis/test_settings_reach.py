@@ -27,7 +27,7 @@ from rsea_ros.signals import Channel
 RIG = load_rig("paper_high_impedance")
 
 
-def steered(group, **values):
+def steer(group, **values):
     return replace(DEFAULT, **{group: replace(getattr(DEFAULT, group), **values)})
 
 
@@ -46,7 +46,7 @@ def with_friction(checked):
 
 def test_the_least_noise_that_is_believed(checked):
     stated = RIG.sensors["ft"].noise
-    case = nominal_problem([checked], RIG, steered("noise", filtered=3.0)).cases[0]
+    case = nominal_problem([checked], RIG, steer("noise", filtered=3.0)).cases[0]
     assert case.noise["ft"] == pytest.approx(3.0 * stated)
 
 
@@ -72,13 +72,13 @@ def test_the_correction_of_an_interval_for_few_blocks(checked):
 
 @pytest.mark.parametrize(("least", "acts"), [(1e-5, True), (1e6, False)])
 def test_the_contribution_below_which_a_cause_changes_nothing(with_friction, least, acts):
-    rows = rows_of(*with_friction, "coulomb_friction", steered("evidence", least_contribution=least))
+    rows = rows_of(*with_friction, "coulomb_friction", steer("evidence", least_contribution=least))
     assert (rows is not None) == acts
 
 
 def test_the_knots_of_the_flexible_law(with_friction):
     rows = rows_of(*with_friction, "coulomb_friction", DEFAULT)
-    coarse = steered("evidence", knots=(0.0, 1.0))
+    coarse = steer("evidence", knots=(0.0, 1.0))
     gains = [flexible(*with_friction, "coulomb_friction", rows, s).gain for s in (DEFAULT, coarse)]
     assert gains[0] != gains[1]
 
@@ -87,7 +87,7 @@ def test_the_lags_of_the_flexible_law(checked):
     problem, delay = nominal_problem([checked], RIG), effect_named("command_delay")
     late = add_effect(problem, start_vector(problem.unknowns), delay, delay.typical)
     rows = rows_of(*late, "command_delay", DEFAULT)
-    short = steered("evidence", lags=(1,))
+    short = steer("evidence", lags=(1,))
     gains = [flexible(*late, "command_delay", rows, s).gain for s in (DEFAULT, short)]
     assert gains[0] > gains[1]
 

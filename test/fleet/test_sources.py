@@ -34,8 +34,8 @@ def test_a_folder_with_metadata_is_one_bag_and_other_files_are_each(folder):
         (bag / name).write_bytes(b"x" * 10)
     (folder / "notes.txt").write_text("no bag")
     (folder / ".hidden.mcap").write_text("half written")
-    found = urls([folder])
-    assert found == [*(str(folder / f"run{n}.mcap") for n in range(5)), str(bag)]
+    listed_sources = urls([folder])
+    assert listed_sources == [*(str(folder / f"run{n}.mcap") for n in range(5)), str(bag)]
     assert dict(bags_of([str(folder)], [KNEE])).keys() and bags_of([str(bag)], [KNEE])[0][0].size == 30
 
 
@@ -48,8 +48,8 @@ def test_a_source_named_twice_counts_once(folder, tmp_path):
 
 def test_a_joint_is_in_the_bags_that_its_pattern_names(folder):
     first, rest = replace(KNEE, bags=("run0.mcap",)), replace(HIP, bags=("bags/run[1-9]*",))
-    found = bags_of([str(folder)], [first, rest])
-    held = {bag.url[-9:]: [joint.name for joint in joints] for bag, joints in found}
+    listed_sources = bags_of([str(folder)], [first, rest])
+    held = {bag.url[-9:]: [joint.name for joint in joints] for bag, joints in listed_sources}
     assert held["run0.mcap"] == ["knee"] and held["run3.mcap"] == ["hip"]
 
 

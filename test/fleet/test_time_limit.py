@@ -32,7 +32,7 @@ def endless(*_: object) -> dict[str, str]:
             continue
 
 
-def ended() -> bool:
+def has_ended() -> bool:
     try:
         with limit_time(0.05):
             endless()
@@ -42,9 +42,9 @@ def ended() -> bool:
 
 
 def test_a_block_that_never_ends_is_ended_in_any_thread():
-    assert ended()
+    assert has_ended()
     with ThreadPoolExecutor(1) as pool:
-        assert pool.submit(ended).result(10.0)
+        assert pool.submit(has_ended).result(10.0)
 
 
 def test_a_block_in_time_hears_nothing_of_its_limit():
@@ -60,12 +60,12 @@ def test_a_worker_whose_call_never_returns_ends_itself(monkeypatch):
     monkeypatch.setattr(time_limit, "GRACE", 0.02)
     monkeypatch.setattr(os, "_exit", ends.append)
 
-    def stuck() -> None:
+    def hang() -> None:
         with pytest.raises(OutOfTime), limit_time(0.02):
             time.sleep(0.3)  # one call: the exception waits for its end
 
     with ThreadPoolExecutor(1) as pool:
-        pool.submit(stuck).result(10.0)
+        pool.submit(hang).result(10.0)
     assert ends == [70]
 
 

@@ -10,7 +10,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import DeviceFault, Limits
-from test.hardware.logged_device import LOST, Device, guarded
+from test.hardware.logged_device import LOST, Device, guard
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def device():
 
 @pytest.fixture
 def joint(device):
-    return guarded(device)
+    return guard(device)
 
 
 def test_enabling_needs_no_fault_and_begins_softly(joint, device):

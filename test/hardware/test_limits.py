@@ -193,43 +193,43 @@ def test_limits_hold_for_every_rig(limits, reading, told):
 ])  # fmt: skip
 def test_an_ft_limit_needs_a_torque_that_is_measured(readings, fault):
     """A device whose wrench ceased went on without the limit, and nobody was told."""
-    it = Guard(Limits(68.0, ft=60.0), 0.01)
+    limiter = Guard(Limits(68.0, ft=60.0), 0.01)
     for reading in readings:
-        it.look(reading)
-    assert (it.fault and str(it.fault)) == fault
-    it.clear()
-    it.look(readings[-1])
-    assert (it.fault and str(it.fault)) == fault, "clear_fault changes nothing of it"
-    it.clear()
-    it.look(FELT)
-    assert it.fault is None
+        limiter.look(reading)
+    assert (limiter.fault and str(limiter.fault)) == fault
+    limiter.clear()
+    limiter.look(readings[-1])
+    assert (limiter.fault and str(limiter.fault)) == fault, "clear_fault changes nothing of it"
+    limiter.clear()
+    limiter.look(FELT)
+    assert limiter.fault is None
 
 
 @pytest.mark.parametrize("name", ["temperature", "current", "voltage"])
 def test_a_limited_quantity_must_go_on_being_measured(name):
     good = {"temperature": 30.0, "current": 1.0, "voltage": 24.0}
-    it = Guard(Limits(68.0, temperature=70.0, current=12.0, voltage=20.0), 0.01)
-    read = lambda **values: it.look(State(0, 0.0, 0.0, 0.0, **(good | values)))  # noqa: E731
+    limiter = Guard(Limits(68.0, temperature=70.0, current=12.0, voltage=20.0), 0.01)
+    read = lambda **values: limiter.look(State(0, 0.0, 0.0, 0.0, **(good | values)))  # noqa: E731
     for _ in range(3):
         read()
         for _ in range(100):
             read(**{name: math.nan})
-    assert it.fault is None
+    assert limiter.fault is None
     read(**{name: math.nan})
-    assert str(it.fault) == f"{name}: no {name} measured for 1 s, expected one for {name}_limit"
-    it.clear()
+    assert str(limiter.fault) == f"{name}: no {name} measured for 1 s, expected one for {name}_limit"
+    limiter.clear()
     read(**{name: math.nan})
-    assert it.fault.cause == name, "clear_fault changes nothing of it"
-    it.clear()
+    assert limiter.fault.cause == name, "clear_fault changes nothing of it"
+    limiter.clear()
     read()
-    assert it.fault is None
+    assert limiter.fault is None
 
 
 def test_without_an_ft_limit_no_torque_need_be_measured():
-    it = Guard(Limits(68.0), 0.01)
+    limiter = Guard(Limits(68.0), 0.01)
     for _ in range(150):
-        it.look(UNFELT)
-    assert it.fault is None
+        limiter.look(UNFELT)
+    assert limiter.fault is None
 
 
 def test_the_ramp_after_the_last_command_takes_its_time_not_cycles():

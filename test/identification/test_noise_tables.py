@@ -40,7 +40,7 @@ def white(size, rms=1.0, seed=0):
     return rms * np.random.default_rng(seed).normal(size=size)
 
 
-def alternating(size, amplitude=1.0):
+def alternate(size, amplitude=1.0):
     """Values of one size whose signs alternate: all of their power lies at the Nyquist frequency."""
     return amplitude * (-1.0) ** np.arange(size)
 
@@ -52,14 +52,14 @@ SECOND = 4.0 / math.sqrt(6.0)
 @pytest.mark.parametrize(
     ("y", "stated", "floor"),
     [
-        (alternating(2), sensor(), 1e-9),  # too few to say anything: rounding
-        (alternating(3), sensor(), 1e-9 * math.sqrt(8.0) / 3.0),
-        (alternating(3), sensor(0.25), 0.25),
-        (alternating(4), sensor(), SECOND),
-        (alternating(62), sensor(), SECOND),
-        (alternating(62), sensor(0.25), SECOND),
-        (alternating(62), sensor(2.0), 2.0),  # so few do not contradict the rig
-        (alternating(62), sensor(0.0, 12.0), 6.0),  # half a step of the rig's
+        (alternate(2), sensor(), 1e-9),  # too few to say anything: rounding
+        (alternate(3), sensor(), 1e-9 * math.sqrt(8.0) / 3.0),
+        (alternate(3), sensor(0.25), 0.25),
+        (alternate(4), sensor(), SECOND),
+        (alternate(62), sensor(), SECOND),
+        (alternate(62), sensor(0.25), SECOND),
+        (alternate(62), sensor(2.0), 2.0),  # so few do not contradict the rig
+        (alternate(62), sensor(0.0, 12.0), 6.0),  # half a step of the rig's
         (np.linspace(0.0, 9.0, 62), sensor(0.25), 0.25),  # a line has no noise
         (np.linspace(0.0, 9.0, 62) ** 2, sensor(0.25), 0.25),
     ],
@@ -70,7 +70,7 @@ def test_a_short_channel_has_the_noise_of_its_second_differences(y, stated, floo
 
 @pytest.mark.parametrize(("size", "short"), [(63, True), (64, False)])
 def test_from_64_samples_on_a_channel_has_a_spectrum(size, short):
-    floor = noise_floor(record(alternating(size)), "ft", sensor())
+    floor = noise_floor(record(alternate(size)), "ft", sensor())
     assert (abs(floor - SECOND) < 0.1) == short
 
 

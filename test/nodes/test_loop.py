@@ -106,10 +106,10 @@ def test_replay_keeps_stamps_and_gives_identify_everything(bag, start, listener,
     gathered = next(line for line in identify.output if "identifying from" in line)
     for topic in TOPICS:
         assert f"{sum(row[0] == topic for row in rows)} {topic.rpartition('/')[2]}" in gathered
-    found = load_rig(tmp_path / "model.yaml")
+    identified = load_rig(tmp_path / "model.yaml")
     for name in load_rig(RIG).free():
-        low, high = found.quantities[name].ci95
-        assert abs(found[name] - load_rig(RIG)[name]) < high - low
+        low, high = identified.quantities[name].ci95
+        assert abs(identified[name] - load_rig(RIG)[name]) < high - low
 
 
 def test_excite_interrupted_ends_with_zero_and_says_so(start, listener):

@@ -60,7 +60,7 @@ def test_frozen_joint_states_are_left_out_and_reported(heard, listener):
     assert estimates[-1][1].distal == pytest.approx(torque, abs=0.5)
 
 
-def fed(listener, inputs, publishers, samples):
+def feed(listener, inputs, publishers, samples):
     """Publish samples of command, (position, effort) and torque, and have them taken."""
     for start in range(0, len(samples), 20):
         some, count = samples[start : start + 20], 0
@@ -70,12 +70,12 @@ def fed(listener, inputs, publishers, samples):
             publishers["joint_states"].publish(joint_state_message(stamp, state[0], 0.0, state[1]))
             publishers["ft"].publish(wrench_message(stamp, torque))
 
-        def arrived():
+        def has_arrived():
             nonlocal count
             count += sum(1 for _ in inputs.take())
             return count >= len(some) or inputs.stopped.frozen  # noqa: B023  called at once
 
-        listener.until(arrived)
+        listener.until(has_arrived)
 
 
 @pytest.fixture
@@ -102,9 +102,9 @@ def test_states_that_stand_still_while_commands_move_are_noticed(listener, input
     inputs, publishers = inputs_of()
     torques = [0.0] * 60 + [8.0 * math.sin(0.1 * k) for k in range(60)]
     samples = [(u, (0.001, 0.1), 1.0 + 0.01 * (-1) ** k) for k, u in enumerate(torques)]
-    fed(listener, inputs, publishers, samples[:60])
+    feed(listener, inputs, publishers, samples[:60])
     assert not inputs.stopped.unmoved
-    fed(listener, inputs, publishers, samples)
+    feed(listener, inputs, publishers, samples)
     assert inputs.stopped.unmoved and inputs.stopped.frozen == []
 
 
@@ -112,8 +112,8 @@ def test_a_torque_from_an_encoder_may_stand_still_as_long_as_the_joint_does(list
     """Of a machine at rest it was said that its sensor had stopped."""
     inputs, publishers = inputs_of(ft_repeats=True, stiffness=RIG["spring.stiffness"])
     still = [(0.0, (0.001, 0.0), 1.53)] * 60
-    fed(listener, inputs, publishers, still)
+    feed(listener, inputs, publishers, still)
     assert inputs.stopped.frozen == []
     moving = [(0.0, (0.001 + 1e-4 * k, 0.0), 1.53) for k in range(60)]
-    fed(listener, inputs, publishers, [*still, *moving])
+    feed(listener, inputs, publishers, [*still, *moving])
     assert inputs.stopped.frozen == ["ft"]

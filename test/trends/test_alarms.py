@@ -39,9 +39,9 @@ def test_a_cause_that_all_joints_have_is_no_alarm():
 
 def test_a_cause_of_one_joint_from_its_first_recording_is_an_alarm():
     names = recordings(JOINTS, 60, causes=lambda j, d: [cause("backlash", 2e-3)] if j == "b" else [])
-    (found,) = fleet_trends(QUIET, names).appearances
-    assert found.from_first
-    assert found.joint == "b"
+    (causes,) = fleet_trends(QUIET, names).appearances
+    assert causes.from_first
+    assert causes.joint == "b"
 
 
 def test_a_name_given_in_error_now_and_then_is_no_alarm():
@@ -51,8 +51,8 @@ def test_a_name_given_in_error_now_and_then_is_no_alarm():
 
 
 def test_two_days_that_name_it_are_not_enough():
-    found = [cause("backlash", 2e-3)]
-    names = recordings(JOINTS, 9, causes=lambda j, d: found if j == "c" and d >= 7 else [])
+    causes = [cause("backlash", 2e-3)]
+    names = recordings(JOINTS, 9, causes=lambda j, d: causes if j == "c" and d >= 7 else [])
     assert alarms(QUIET, names) == ()
 
 

@@ -142,12 +142,12 @@ def laid_out(diagnosed, residual):
 
 def test_a_residual_at_high_speed_is_located_at_high_speed(diagnosed):
     limit = float(np.quantile(diagnosed.record["velocity"].y, 1.0 - 1.0 / BINS))
-    found = laid_out(diagnosed, lambda speed, t: np.where(speed > limit, 30.0, 2.0))
-    assert set(found) == {"amplitude", "velocity", "angle", "time"}
-    assert found["velocity"].before[-1] == pytest.approx(30.0, rel=0.05)
-    assert found["velocity"].before[:-2] == pytest.approx(2.0)
-    assert found["velocity"].after == pytest.approx(0.0)
-    assert finding(list(found.values())).startswith("The residual depends most on speed: ")
+    sentence = laid_out(diagnosed, lambda speed, t: np.where(speed > limit, 30.0, 2.0))
+    assert set(sentence) == {"amplitude", "velocity", "angle", "time"}
+    assert sentence["velocity"].before[-1] == pytest.approx(30.0, rel=0.05)
+    assert sentence["velocity"].before[:-2] == pytest.approx(2.0)
+    assert sentence["velocity"].after == pytest.approx(0.0)
+    assert finding(list(sentence.values())).startswith("The residual depends most on speed: ")
 
 
 def test_faulty_samples_count_for_nothing(diagnosed):
@@ -160,8 +160,8 @@ def test_faulty_samples_count_for_nothing(diagnosed):
 
 
 def test_a_uniform_residual_is_described_as_uniform(diagnosed):
-    found = laid_out(diagnosed, lambda speed, t: 5.0 + 0.0 * t)
-    assert finding(list(found.values())) == "The residual is the same at every load, speed or rotor angle"
+    sentence = laid_out(diagnosed, lambda speed, t: 5.0 + 0.0 * t)
+    assert finding(list(sentence.values())) == "The residual is the same at every load, speed or rotor angle"
 
 
 def test_a_residual_of_zero_in_a_bin_leaves_the_axis_finite():

@@ -51,9 +51,9 @@ def test_thinning_keeps_the_shape_of_the_response(identification: Identification
     shown, shown_model = thin(measured, model)
     assert shown_model is not None
     assert len(shown.frequency) < len(measured.frequency)
-    there = np.interp(shown.frequency, measured.frequency, np.abs(model))
+    interpolated = np.interp(shown.frequency, measured.frequency, np.abs(model))
     inside = (shown.frequency > 0.5) & (shown.frequency < 100.0)
-    assert np.abs(shown_model)[inside] == pytest.approx(there[inside], rel=0.02)
+    assert np.abs(shown_model)[inside] == pytest.approx(interpolated[inside], rel=0.02)
 
 
 def test_the_bode_title_says_where_a_wrong_model_deviates(identification: Identification) -> None:
