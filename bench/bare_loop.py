@@ -43,7 +43,7 @@ class BareLoop:
         return np.load(self._file)
 
 
-def permitted(priority: int) -> bool:
+def may_have(priority: int) -> bool:
     """Return whether this process may have a priority."""
     if priority == 0:
         return True

@@ -1,4 +1,4 @@
-"""The wire of the bench alone: lateness of its replies, and the faults that the driver's rule would latch."""
+"""The wire of a simulated bench alone: lateness of its replies, and faults that the driver would latch."""
 
 from __future__ import annotations
 

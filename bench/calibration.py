@@ -19,8 +19,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from calibration_records import Plan, left_out, made, plans
-from calibration_score import JUDGES, diagram, fitted, reliability, rows, said, table
+from calibration_records import Plan, left_out, plans, simulate_plan
+from calibration_score import JUDGES, diagram, fit_coefficients, probabilities_of, reliability, rows, table
 from json_log import append_to_log, read_log
 
 from rsea_ros.checks.faults import check
@@ -82,7 +82,7 @@ def _make(args: argparse.Namespace) -> None:
 def _fit(args: argparse.Namespace) -> None:
     """Fit the coefficients to the plants that do not judge, and write their table."""
     entries = [e for e in usable(args.cache) if e["family"] != JUDGES]
-    coefficients = fitted(*rows(entries))
+    coefficients = fit_coefficients(*rows(entries))
     items = "".join(f'        "{name}": {value},\n' for name, value in coefficients.items())
     head, _, _ = TABLE.read_text().partition("COEFFICIENTS = ")
     TABLE.write_text(f"{head}COEFFICIENTS = MappingProxyType(\n    {{\n{items}    }}\n)\n")
@@ -95,7 +95,7 @@ def _score(args: argparse.Namespace) -> None:
     text = []
     for title, chosen in (("The plant that judges", True), ("The plants that were fitted to", False)):
         entries = [e for e in usable(args.cache) if (e["family"] == JUDGES) == chosen]
-        causes = list(said(entries))
+        causes = list(probabilities_of(entries))
         text += [f"**{title}**: {len(entries)} records", "", *table(causes), ""]
         if chosen and args.svg:
             args.svg.write_text(diagram(reliability(causes)))
@@ -116,20 +116,20 @@ def _entry(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
     entry |= {"off": plan.off[0] if plan.off else None, "excitation": plan.excitation, "pool": pool}
     entry["sizes"] = plan.hidden
     try:
-        entry |= _weighed(plan, searches, pool)
+        entry |= _weigh(plan, searches, pool)
     except Exception:
         entry["error"] = traceback.format_exc(limit=-3)
     return entry | {"seconds": round(time.perf_counter() - start, 2)}
 
 
-def _weighed(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
+def _weigh(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
     kept = searches / f"{plan.name}.pickle" if searches else None
     settings = DiagnosisSettings(without=left_out(plan, pool))
     with worker_pools() as pools:
         if kept and kept.exists():
             selection, stages = pickle.loads(kept.read_bytes())
         else:
-            record, rig = made(plan)
+            record, rig = simulate_plan(plan)
             checked = check(record, rig)
             nominal = nominal_problem([checked], rig)
             selection, stages = search(
@@ -159,8 +159,10 @@ def _place(place: CauseAndRivals) -> list[dict[str, Any]]:
 
 
 def _values(problem: Any, theta: Any, name: str) -> dict[str, float]:
-    own = [(u, t) for u, t in zip(problem.unknowns, theta, strict=True) if u.name.startswith(name + ".")]
-    return {u.name.split(".")[1]: u.outer(float(t)) for u, t in own}
+    unknowns_of_cause = [
+        (u, t) for u, t in zip(problem.unknowns, theta, strict=True) if u.name.startswith(name + ".")
+    ]
+    return {u.name.split(".")[1]: u.outer(float(t)) for u, t in unknowns_of_cause}
 
 
 def _line(entry: dict[str, Any]) -> str:

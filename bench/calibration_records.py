@@ -83,7 +83,7 @@ def _plan(k: int, rng: np.random.Generator) -> Plan:
     family = FAMILIES[k % len(FAMILIES)]
     group = str(rng.choice(list(GROUPS), p=np.array(list(GROUPS.values())) / sum(GROUPS.values())))
     names = _drawn_effects(family, COUNT.get(group, 0), rng)
-    hidden = {n: _sized(n, family, rng) for n in names}
+    hidden = {n: _sizes(n, family, rng) for n in names}
     off = None
     if group.startswith("off"):
         laws = list(OFF_CATALOGUE) if family == "second" else [n for n, f in LAWS.items() if family in f.on]
@@ -109,7 +109,7 @@ def _unknown(family: str, off: tuple[str, float] | None) -> tuple[str, ...]:
     return (known,) if known in catalogue() else ()
 
 
-def _sized(name: str, family: str, rng: np.random.Generator) -> dict[str, float]:
+def _sizes(name: str, family: str, rng: np.random.Generator) -> dict[str, float]:
     """Return parameters of an effect; a drive without a spring works against larger torques."""
     drawn = drawn_parameters(name, str(rng.choice(SEVERITIES, p=(0.35, 0.4, 0.25))), rng)
     torques = {p.name for p in catalogue()[name].parameters if p.unit == "N m"}
@@ -150,10 +150,10 @@ def left_out(plan: Plan, pool: int) -> tuple[str, ...]:
     return (*plan.without, *(n for n in effects if pool and n not in stays and n not in plan.without))
 
 
-def made(plan: Plan) -> tuple[Record, Rig]:
+def simulate_plan(plan: Plan) -> tuple[Record, Rig]:
     """Simulate a plan; return the record and the rig that a user would diagnose it with."""
     rng = np.random.default_rng(plan.seed)
-    return _second(plan, rng) if plan.family == "second" else _simulated(plan, rng)
+    return _second(plan, rng) if plan.family == "second" else _simulate(plan, rng)
 
 
 def _command(plan: Plan, rng: np.random.Generator, size: float = 1.0) -> FloatArray:
@@ -191,7 +191,7 @@ def _second(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
     return _with_colour(record, plan, rng), load_rig("paper_high_impedance")
 
 
-def _simulated(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
+def _simulate(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
     """Return a record of one of the project's rigs with drawn values, and the rig as stated."""
     stated = rig_of(plan.family)
     true = stated.with_values(
@@ -207,7 +207,7 @@ def _simulated(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
     blank = {n: Channel(t + 1.0 / RATE, np.zeros(len(t))) for n in names}
     channels = {"command": Channel(t, acting), **blank}
     if plan.family in ("loop", "rigid"):
-        channels = _looped(channels, true, commanded, acting)
+        channels = _with_loop(channels, true, commanded, acting)
     outputs = simulate(true, Record(channels, plan.name))
     measured = {n: measure(true, n, outputs[n], rng) for n in names}
     if law and law.sensor and plan.off:
@@ -225,7 +225,7 @@ def _simulated(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
     return _with_colour(record, plan, rng), stated
 
 
-def _looped(channels, rig: Rig, commanded: FloatArray, acting: FloatArray):
+def _with_loop(channels, rig: Rig, commanded: FloatArray, acting: FloatArray):
     """Return channels with a reference (rad) that demands about the commanded torque."""
     softness = 2.0 / rig["spring.stiffness"] if not rig.rigid_spring else 0.02
     reference = Channel(channels["command"].t, softness * commanded)

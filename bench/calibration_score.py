@@ -73,14 +73,14 @@ def evidence_from(entry: Mapping[str, Any]) -> Evidence:
 def rows(entries: Sequence[Mapping[str, Any]]) -> tuple[list[dict[str, float]], np.ndarray]:
     """Return the features of all evidence of some records, and whether each name is right, shape (n,)."""
     every = [(e, k == 0, r["truth"]) for r in entries for p in r["places"] for k, e in enumerate(p)]
-    found = [features(evidence_from(e), preferred) for e, preferred, _ in every]
-    return found, np.array([e["name"] in truth for e, _, truth in every], float)
+    feature_rows = [features(evidence_from(e), preferred) for e, preferred, _ in every]
+    return feature_rows, np.array([e["name"] in truth for e, _, truth in every], float)
 
 
-def fitted(found: Sequence[Mapping[str, float]], right: np.ndarray) -> dict[str, float]:
+def fit_coefficients(feature_rows: Sequence[Mapping[str, float]], right: np.ndarray) -> dict[str, float]:
     """Return the coefficients of greatest posterior probability, by Newton's method."""
-    names = list(found[0])
-    x = np.array([list(f.values()) for f in found])
+    names = list(feature_rows[0])
+    x = np.array([list(f.values()) for f in feature_rows])
     ridge = np.diag([1e-9 if n == "intercept" else _RIDGE for n in names])
     before = np.array([EXPECTED[n] for n in names])
     a = before.copy()
@@ -91,7 +91,7 @@ def fitted(found: Sequence[Mapping[str, float]], right: np.ndarray) -> dict[str,
     return {n: round(float(v), 4) for n, v in zip(names, a, strict=True)}
 
 
-def said(
+def probabilities_of(
     entries: Sequence[Mapping[str, Any]], coefficients: Mapping[str, float] = COEFFICIENTS
 ) -> Iterator[Said]:
     """Yield the probability of every cause and rival of some records."""

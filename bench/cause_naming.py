@@ -73,7 +73,7 @@ def write(folder: Path, count: int, duration: float, seed: str, tell: Progress) 
         for number in range(1, count + 1):
             name = f"r{number:04d}"
             tell(name, (number - 1) / count)
-            record, truths[name] = made(seed, number, duration)
+            record, truths[name] = make_record(seed, number, duration)
             new.write(f"{name}.csv", table_text(record))
             new.write(f"{name}.yaml", rig)
         effects = {name: effect.about for name, effect in catalogue().items()}
@@ -82,7 +82,7 @@ def write(folder: Path, count: int, duration: float, seed: str, tell: Progress) 
     return write_text(truth_file, truth_text(truths))
 
 
-def made(seed: str, number: int, duration: float) -> tuple[Record, RecordTruth]:
+def make_record(seed: str, number: int, duration: float) -> tuple[Record, RecordTruth]:
     """Return a record (duration in s) and what it hides."""
     digest = hashlib.sha256(f"rsea cause naming {VERSION}:{number}:{seed}".encode())
     rng = np.random.default_rng(int.from_bytes(digest.digest()))
@@ -92,12 +92,12 @@ def made(seed: str, number: int, duration: float) -> tuple[Record, RecordTruth]:
     groups = list(GROUPS)
     group = groups[int(rng.choice(len(groups), p=list(GROUPS.values())))]
     for _ in range(TRIES):
-        hidden = _drawn(*group, rng)
+        hidden = _draw(*group, rng)
         bench = hidden.within(clean)
         command = excitation(bench, duration, rng)
-        record = _recorded(bench, command, noise_seed)
+        record = _record(bench, command, noise_seed)
         shown = {
-            name: times_noise(record, _recorded(hidden.without(name).within(clean), command, noise_seed))
+            name: times_noise(record, _record(hidden.without(name).within(clean), command, noise_seed))
             for name in hidden.effects
         }
         if all(times >= 1.0 for times in shown.values()):
@@ -106,7 +106,7 @@ def made(seed: str, number: int, duration: float) -> tuple[Record, RecordTruth]:
     raise AssertionError(f"record {number}: no draw of {TRIES} shows")
 
 
-def _recorded(bench: Bench, command: FloatArray, noise_seed: int) -> Record:
+def _record(bench: Bench, command: FloatArray, noise_seed: int) -> Record:
     return record_command(bench, command, np.random.default_rng(noise_seed))
 
 
@@ -118,7 +118,7 @@ def times_noise(record: Record, other: Record) -> float:
     return max(rms[n] / noises[n] for n in noises)
 
 
-def _drawn(count: int, has_outside: bool, rng: np.random.Generator) -> Hidden:
+def _draw(count: int, has_outside: bool, rng: np.random.Generator) -> Hidden:
     """Draw what a record hides: at most one effect at each place of the chain."""
     effects = catalogue()
     outside = None

@@ -45,7 +45,7 @@ def main() -> int:
     signal.signal(signal.SIGUSR1, hold.toggle)
     latch, take = controller.ControllerNode._latch, controller.Measurements.take
 
-    def noted(self: controller.ControllerNode, fault: str) -> None:
+    def note(self: controller.ControllerNode, fault: str) -> None:
         now = time.monotonic_ns()
         latch(self, fault)
         with Path(os.environ[MARK]).open("a") as file:
@@ -57,7 +57,7 @@ def main() -> int:
             hold.pause()
         return iter(arrived)
 
-    controller.ControllerNode._latch = noted  # type: ignore[method-assign]
+    controller.ControllerNode._latch = note  # type: ignore[method-assign]
     controller.Measurements.take = held  # type: ignore[method-assign]
     return controller.main()
 

@@ -117,7 +117,7 @@ class Plan:
             bench = hide_beside_the_contract(bench, *self.newer)
         if self.off:
             bench = hide_off_catalogue(bench, *self.off)
-        return bench.having(**self.values)
+        return bench.with_values(**self.values)
 
     def make(self) -> Case:
         """Simulate the case: its record with the faults put in, and a fresh record without."""
@@ -145,7 +145,7 @@ class Plan:
 
 def plan(seed: int = 2024) -> tuple[Plan, ...]:
     """Return all cases that a seed makes, each with a seed of its own."""
-    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings, _taken_out, _drawn, _newer)
+    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings, _taken_out, _draw, _newer)
     rng = np.random.default_rng(seed)
     return tuple(case for maker in makers for case in maker(rng))
 
@@ -206,7 +206,7 @@ def _faulty(rng: np.random.Generator) -> Iterator[Plan]:
             yield Plan(name, "faulty", _seed(rng), _excitation(k), hidden, faults=(fault,))
 
 
-def _drawn(rng: np.random.Generator) -> Iterator[Plan]:
+def _draw(rng: np.random.Generator) -> Iterator[Plan]:
     """Two or three effects drawn at random, of those that are not confused with each other."""
     effects, names = catalogue(), list(SIZES)
     for group, count, number in (("drawn_pair", 2, 50), ("drawn_triple", 3, 25)):

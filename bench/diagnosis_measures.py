@@ -36,7 +36,7 @@ class Measure:
 
 def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
     """Return the issue's measures, in the issue's order; one without a case is left out."""
-    found = [f for o in outcomes if o.group in HIDDEN for f in o.found if f.main]
+    sizes = [f for o in outcomes if o.group in HIDDEN for f in o.found if f.main]
     ended = [o for o in outcomes if o.group in (*HIDDEN, "clean") and not o.error]
     floor = DEFAULT.floor.reached
     groups = {name: [o for o in outcomes if o.group == name] for name in {o.group for o in outcomes}}
@@ -74,9 +74,9 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
         ),
         _at_least("unexplained, effect that is not searched, %", _right(groups.get("unsearched", ())), 90.0),
         _at_least("fault found and cause right, faulty data, %", _right(groups.get("faulty", ())), 90.0),
-        _at_most("main parameter, median error, %", [100.0 * f.error for f in found], 3.0),
-        _at_least("main parameter within 10 %, %", [f.error <= 0.1 for f in found], 100.0),
-        _at_least("main parameter in its 95 % interval, %", [f.covered for f in found], 90.0),
+        _at_most("main parameter, median error, %", [100.0 * f.error for f in sizes], 3.0),
+        _at_least("main parameter within 10 %, %", [f.error <= 0.1 for f in sizes], 100.0),
+        _at_least("main parameter in its 95 % interval, %", [f.covered for f in sizes], 90.0),
         _at_least("held-out residual at the noise floor, %", [o.times_noise <= floor for o in ended], 95.0),
         _at_least(
             "residual on a fresh record at the noise floor, %",
@@ -131,10 +131,10 @@ def table(outcomes: Sequence[Outcome]) -> list[str]:
     return lines
 
 
-def _parameters(found: Sequence[Found]) -> str:
+def _parameters(sizes: Sequence[Found]) -> str:
     parts = []
-    for name in dict.fromkeys(f.parameter for f in found):
-        of = [f for f in found if f.parameter == name]
+    for name in dict.fromkeys(f.parameter for f in sizes):
+        of = [f for f in sizes if f.parameter == name]
         error = [100.0 * f.error for f in of]
         covered = f"{sum(f.covered for f in of)}/{len(of)}"
         parts.append(f"{name} {np.median(error):.2g} {max(error):.2g} {covered}")

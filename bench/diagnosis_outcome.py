@@ -122,7 +122,7 @@ def _outcome(case: Case, diagnosis: Diagnosis, seconds: float) -> Outcome:
         verdict=diagnosis.verdict,
         statuses=tuple(cause.status for cause in causes),
         confusable=tuple(causes[0].confusable_with) if causes else (),
-        found=tuple(_found(case, diagnosis)),
+        found=tuple(_estimates(case, diagnosis)),
         faults=case.faults,
         faults_found=tuple(sorted({fault.kind for fault in diagnosis.faults})),
         mimics=case.mimics,
@@ -135,7 +135,7 @@ def _outcome(case: Case, diagnosis: Diagnosis, seconds: float) -> Outcome:
     )
 
 
-def _found(case: Case, diagnosis: Diagnosis):
+def _estimates(case: Case, diagnosis: Diagnosis):
     """Yield every true parameter of the causes that were named rightly."""
     for cause in diagnosis.causes:
         for name, truth in case.truth_parameters.get(cause.name, {}).items():

@@ -1,4 +1,4 @@
-"""Performance of the driver on the bench on a wire, beside a bare loop with absolute deadlines.
+"""Performance of the driver on a simulated bench, beside a bare loop with absolute deadlines.
 
 Run: python bench/driver.py [SECTION …] [--seconds 30] [--strings 1000000] [--rate 280 1000] [--priority 0 80]
 The sections: timing, loss, faults, random, controller, stream, fuzz; all of them without a name. `random
@@ -23,7 +23,7 @@ from bench.driver_loss import loss
 from bench.driver_random import random_faults
 from bench.driver_stream import stream
 from bench.driver_timing import timing
-from bench.sections import chosen, parser_of
+from bench.sections import choose, parser_of
 
 SECTIONS: dict[str, Callable[[argparse.Namespace, Path], list[tuple[str, str, str]]]] = {
     "timing": timing,
@@ -46,7 +46,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=1.0, help="of `random`")
     parser.add_argument("--seed", type=int, default=1, help="of `random`")
     parser.add_argument("--patient", action="store_true", help="`controller`: late replies are no fault")
-    args, sections = chosen(parser, SECTIONS)
+    args, sections = choose(parser, SECTIONS)
     print(f"{'what':58} {'asked':22} measured")
     for _, section in sections:
         with tempfile.TemporaryDirectory() as folder:

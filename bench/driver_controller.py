@@ -1,4 +1,4 @@
-"""Controller and driver together on the bench on a wire, quiet and beside processes that burn every core.
+"""Controller and driver together on a simulated bench, quiet and beside processes that burn every core.
 
 A sine of 5 Hz, 10 N m, 4.7 N m with a free end: its error, RMS, by period, and the largest |ft|, which a load
 may not raise. In each trial a bare loop shows how late this machine is, and once the driver has left the
@@ -33,10 +33,10 @@ import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
-from bench.bare_loop import permitted
+from bench.bare_loop import may_have
 from bench.bare_wire import ALONE, wire_alone
 from bench.driver_lateness import Torques, noted_controller, row, to_zero
-from bench.torque_control_nodes import Outside, running, sine
+from bench.torque_control_nodes import Outside, run_node_process, sine
 from msg_adapters.ros import Trigger
 from rsea_ros.hardware.peer.remote import RemoteBench
 
@@ -73,7 +73,7 @@ BURN = "while True: pass"
 
 
 @contextmanager
-def burning(count: int) -> Iterator[None]:
+def burn_cores(count: int) -> Iterator[None]:
     """Run this many processes that only compute."""
     processes = [subprocess.Popen([sys.executable, "-c", BURN]) for _ in range(count)]
     try:
@@ -91,16 +91,16 @@ def controller(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, s
     rclpy.init()
     rows = []
     for rate in args.rate:
-        for priority in filter(permitted, args.priority):
+        for priority in filter(may_have, args.priority):
             for bench, load in ((LOCKED, 0), (FREE, 0), (LOCKED, os.cpu_count() or 1)):
                 place = folder / f"{bench.name}{rate:g}-{load}-{priority}"
-                rows += _tried(bench, rate, load, priority, place, PATIENT if args.patient else {})
-        rows.append(_lateness_fault(rate, max(filter(permitted, args.priority)), folder))
+                rows += _try(bench, rate, load, priority, place, PATIENT if args.patient else {})
+        rows.append(_lateness_fault(rate, max(filter(may_have, args.priority)), folder))
     rclpy.shutdown()
     return rows
 
 
-def _tried(
+def _try(
     kind: Kind, rate: float, load: int, priority: int, path: Path, patient: Mapping[str, object]
 ) -> list[tuple[str, str, str]]:
     """Run one trial; again where the driver lost replies while nothing ran beside it that should, and the
@@ -128,12 +128,12 @@ def _trial(
     with ExitStack() as kept, ExitStack() as nodes:
         bench = kept.enter_context(RemoteBench(path, "--rig", kind.rig))
         bench.hurry(priority + 1 if priority else 50)
-        own = {**bench.parameters(), "baud": 4_000_000, "autostart": "true", "rig": kind.rig}
+        parameters = {**bench.parameters(), "baud": 4_000_000, "autostart": "true", "rig": kind.rig}
         both = {"rate": rate, "realtime_priority": priority}
-        nodes.enter_context(running("driver", 0, **own, **both, **patient))
-        nodes.enter_context(running("controller", 0, rig=kind.rig, **both))
+        nodes.enter_context(run_node_process("driver", 0, **parameters, **both, **patient))
+        nodes.enter_context(run_node_process("controller", 0, rig=kind.rig, **both))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
-        kept.enter_context(burning(load))
+        kept.enter_context(burn_cores(load))
         late = _lateness(rate)
         _drive(outside)
         begun = time.monotonic_ns()
@@ -143,10 +143,10 @@ def _trial(
         nodes.close()
         wire_faults, alone = wire_alone(rate, priority, path.parent, bench)
     outside.node.destroy_node()
-    own = outside.health.get("controller", {})
-    share, missed = own.get("feedback_share"), own.get("missed_measurements")
+    health = outside.health.get("controller", {})
+    share, missed = health.get("feedback_share"), health.get("missed_measurements")
     told = _errors(errors)
-    told += f", {acting} writes of torque, feedback at the end {share}, {own.get('late_commands')} late"
+    told += f", {acting} writes of torque, feedback at the end {share}, {health.get('late_commands')} late"
     told += f", {missed} measurements missed, faults {faults or 'none'}"
     told += f", bare loop late in {late:.1%} of its cycles"
     lost = any(fault.startswith("no_reply") for fault in faults)
@@ -166,8 +166,8 @@ def _lateness_fault(rate: float, priority: int, folder: Path) -> tuple[str, str,
     place.mkdir()
     torques = Torques(outside)
     with ExitStack() as kept:
-        own = {"rate": rate, "autostart": "true", "realtime_priority": priority}
-        kept.enter_context(running("driver", 0, **own))
+        parameters = {"rate": rate, "autostart": "true", "realtime_priority": priority}
+        kept.enter_context(run_node_process("driver", 0, **parameters))
         process, file = kept.enter_context(noted_controller(place, rate, realtime_priority=priority))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
         runs: list[tuple[str, str]] = []

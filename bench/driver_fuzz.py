@@ -32,7 +32,7 @@ def _frames(strings: int) -> tuple[int, int, int]:
     rng, accepted, wrong, blind = random.Random(1), 0, 0, 0
     for k in range(strings):
         packet = protocol2.status(1, 0, rng.randbytes(rng.choice((0, 3, 15, 16, 21))))
-        damaged, same_length = _mutated(rng, packet) if k % 4 else (rng.randbytes(rng.randrange(60)), False)
+        damaged, same_length = _mutate(rng, packet) if k % 4 else (rng.randbytes(rng.randrange(60)), False)
         blind += same_length
         for frame in StatusFrameParser().feed(damaged):
             accepted += frame == packet
@@ -40,7 +40,7 @@ def _frames(strings: int) -> tuple[int, int, int]:
     return accepted, wrong, blind
 
 
-def _mutated(rng: random.Random, packet: bytes) -> tuple[bytes, bool]:
+def _mutate(rng: random.Random, packet: bytes) -> tuple[bytes, bool]:
     """Return a damaged packet, and whether only its CRC can show it: several bytes changed."""
     kind = rng.randrange(5)
     at = rng.randrange(len(packet))
@@ -68,6 +68,6 @@ def _records(strings: int) -> tuple[int, int]:
         jump[0] ^= 1 << rng.randrange(8)
         noise, cut = rng.randbytes(rng.randrange(80)), whole[: rng.randrange(36)]
         damaged = rng.choice((noise, rng.randbytes(36), cut, bytes(jump)))
-        found = decode(damaged)
-        strange += found is not None and sequence.accept(found)
+        decoded = decode(damaged)
+        strange += decoded is not None and sequence.accept(decoded)
     return accepted, strange

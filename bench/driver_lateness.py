@@ -108,15 +108,15 @@ def to_zero(
 
 
 def _hold(outside: Outside, condition: object) -> None:
-    def held() -> bool:
+    def hold() -> bool:
         outside.desired.publish(torque_command_message(time.time_ns(), 10.0))
         time.sleep(2e-3)
         return bool(condition())  # type: ignore[operator]
 
-    outside.until(held)
+    outside.until(hold)
 
 
-def row(here: str, runs: list[tuple[str, str]]) -> tuple[str, str, str]:
+def row(label: str, runs: list[tuple[str, str]]) -> tuple[str, str, str]:
     """Return the row of some runs."""
     times = [float(each) for each, _ in runs if each.replace(".", "").isdigit()]
     others = sorted({each for each, _ in runs if not each.replace(".", "").isdigit()})
@@ -125,4 +125,4 @@ def row(here: str, runs: list[tuple[str, str]]) -> tuple[str, str, str]:
         told = f"median {median(times):.0f}, most {max(times):.0f} ms of {len(times)}"
     told += f"; else {', '.join(others)}" if others else ""
     last = next((fault for each, fault in reversed(runs) if each.isdigit()), runs[-1][1])
-    return f"{here}: late commands to zero torque", f"≤ {ASKED:g} ms", f"{told}; {last}"
+    return f"{label}: late commands to zero torque", f"≤ {ASKED:g} ms", f"{told}; {last}"

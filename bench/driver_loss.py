@@ -21,9 +21,9 @@ def loss(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
     """Run with a time-out that no stall reaches, for the counts; then with the driver's own, for the cost."""
     seconds = min(SECONDS, 2.0 * args.seconds)
     with RemoteBench(folder / "tty") as bench:
-        counted, broken, loop, log = _broken(bench, seconds, PATIENT)
+        counted, broken, loop, log = _lose_replies(bench, seconds, PATIENT)
         wrong = f"{_wrong(loop, log)} of {len(loop.states)}"
-        _, _, hasty, _ = _broken(bench, min(10.0, seconds), 0.0)
+        _, _, hasty, _ = _lose_replies(bench, min(10.0, seconds), 0.0)
     return [
         (f"{seconds:g} s with {SHARE:.0%} of the replies broken: wrong values", "0", wrong),
         ("  losses counted", "all", f"{counted} counted, {broken} made by the bench"),
@@ -31,7 +31,7 @@ def loss(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
     ]
 
 
-def _broken(bench: RemoteBench, seconds: float, latency: float) -> tuple[int, int, Loop, dict]:
+def _lose_replies(bench: RemoteBench, seconds: float, latency: float) -> tuple[int, int, Loop, dict]:
     """Run with broken replies; return how many were counted and made, the loop, and the bench's log."""
     begin = time.monotonic_ns()
     before = sum(bench.log(begin)["misbehaved"].values())

@@ -53,21 +53,21 @@ def main() -> int:
     """Run the node with a note of its times."""
     from rsea_ros.hardware.device import State
     from rsea_ros.nodes import driver
-    from rsea_ros.nodes._bench import Bench
+    from rsea_ros.nodes._bench_topics import BenchTopics
 
     times = array("q")  # not objects, which the garbage collector would look at
-    step, publish = driver.DriverNode._step, Bench.publish
+    step, publish = driver.DriverNode._step, BenchTopics.publish
 
     def noted_step(self: driver.DriverNode, stamp: int) -> None:
         times.extend((stamp, time.monotonic_ns(), 0, 0))
         step(self, stamp)
 
-    def noted_publish(self: Bench, state: State, shift: int = 0) -> None:
+    def noted_publish(self: BenchTopics, state: State, shift: int = 0) -> None:
         publish(self, state, shift)
         now = time.monotonic_ns()
         times[-2], times[-1] = state.stamp + shift - time.time_ns() + now, now
 
-    driver.DriverNode._step, Bench.publish = noted_step, noted_publish
+    driver.DriverNode._step, BenchTopics.publish = noted_step, noted_publish
     atexit.register(lambda: np.save(os.environ[MARK], np.array(times).reshape(-1, 4)))
     return driver.main()
 

@@ -51,5 +51,5 @@ def _ages(loop: Loop, rate: float, seconds: float) -> tuple[np.ndarray, np.ndarr
             ends.append(state.stamp)
             newest.append(stamps[-1])
     taken, arrived, begun = np.array(newest), np.array(stamps), newest.count(0)
-    there = np.searchsorted(arrived, ends) > np.searchsorted(arrived, newest) + 1
-    return (np.array(ends) - taken)[begun:], there[begun:]
+    has_arrived = np.searchsorted(arrived, ends) > np.searchsorted(arrived, newest) + 1
+    return (np.array(ends) - taken)[begun:], has_arrived[begun:]

@@ -1,7 +1,7 @@
 """Cycles, latency and CPU of the driver node, beside a bare loop with absolute deadlines meanwhile.
 
 Each rate as any process, then at SCHED_FIFO where that is permitted: driver and bare loop at the same
-priority, the bench on a wire one above, since hardware does not wait for our processor. After each, for half
+priority, the simulated bench one above, since hardware does not wait for our processor. After each, for half
 as long, a minute at most, and beside another bare loop: a loop of nothing but the two requests to the motor.
 Its lateness is that of pseudo-terminal and bench: the kernel passes the bytes on in a worker of usual
 priority. A driver is late less often only where it does not wait for a reply.
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.bare_loop import BareLoop, permitted
+from bench.bare_loop import BareLoop, may_have
 from bench.driver_node import Node
 from bench.reception import Reception
 from msg_adapters.ros import JointState
@@ -36,7 +36,7 @@ def timing(args: argparse.Namespace, folder: Path) -> list[Row]:
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     rows: list[Row] = []
     for rate in args.rate:
-        for priority in filter(permitted, args.priority):
+        for priority in filter(may_have, args.priority):
             place = folder / f"{rate:g}_{priority}"
             place.mkdir()
             rows += _at(rate, args.seconds, priority, place)
@@ -65,12 +65,12 @@ def _at(rate: float, seconds: float, priority: int, folder: Path) -> list[Row]:
         alone_for = min(0.5 * seconds, 60.0)
         floor = _wire_alone(rate, alone_for, priority, folder, bench)
     times = times[(times[:, 1] > alone[0, 1]) & (times[:, 1] < alone[-1, 1])]
-    here = f"{rate:g} Hz, {seconds:g} s" + (f", FIFO {priority}" if priority else "")
+    setup = f"{rate:g} Hz, {seconds:g} s" + (f", FIFO {priority}" if priority else "")
     return [
-        *_cycles(here, rate, times[:, :2], alone),
-        *_latencies(here, times[:, 2:], delays),
-        (f"{here}: late cycles of the two requests alone, {alone_for:g} s", "", floor),
-        (f"{here}: CPU of the driver", "< 20 % at 280 Hz", f"{100 * cpu / seconds:.1f} %"),
+        *_cycles(setup, rate, times[:, :2], alone),
+        *_latencies(setup, times[:, 2:], delays),
+        (f"{setup}: late cycles of the two requests alone, {alone_for:g} s", "", floor),
+        (f"{setup}: CPU of the driver", "< 20 % at 280 Hz", f"{100 * cpu / seconds:.1f} %"),
     ]
 
 
@@ -87,7 +87,7 @@ def _late(begun: np.ndarray, rate: float) -> int:
     return int((np.diff(begun) / 1e6 > 1e3 / rate + LATE).sum())
 
 
-def _cycles(here: str, rate: float, node: np.ndarray, bare: np.ndarray) -> list[Row]:
+def _cycles(setup: str, rate: float, node: np.ndarray, bare: np.ndarray) -> list[Row]:
     """Return how late cycles begin. node, bare: due and begun of each, ns."""
     period = 1e3 / rate
     between, alone = np.diff(node[:, 1]) / 1e6, np.diff(bare[:, 1]) / 1e6
@@ -96,13 +96,13 @@ def _cycles(here: str, rate: float, node: np.ndarray, bare: np.ndarray) -> list[
     on_grid = (node[-1, 1] - node[0, 1]) / 1e6 / numbers[-1]
     left_out, bare_out = int(numbers[-1]) + 1 - len(node), _left_out(bare, 1e9 / rate)
     return [
-        (f"{here}: cycles later than {period + LATE:.1f} ms", "≤ 1.5 × bare loop",
+        (f"{setup}: cycles later than {period + LATE:.1f} ms", "≤ 1.5 × bare loop",
          f"{late} of {len(between)}, bare {late_alone}, ratio {late / max(1, late_alone):.2f}"),
-        (f"{here}: mean period on the grid", "exact to 0.1 %",
+        (f"{setup}: mean period on the grid", "exact to 0.1 %",
          f"off by {100 * abs(on_grid / period - 1):.4f} %"),
-        (f"{here}: cycles left out, due before the one before began", "",
+        (f"{setup}: cycles left out, due before the one before began", "",
          f"{left_out}, {100 * left_out / numbers[-1]:.3f} %; a bare loop that leaves them out: {bare_out}"),
-        (f"{here}: period p99, max", "", f"{np.quantile(between, 0.99):.3f}, {between.max():.2f} ms;"
+        (f"{setup}: period p99, max", "", f"{np.quantile(between, 0.99):.3f}, {between.max():.2f} ms;"
          f" bare {np.quantile(alone, 0.99):.3f}, {alone.max():.2f} ms"),
     ]  # fmt: skip
 
@@ -116,14 +116,14 @@ def _left_out(cycles: np.ndarray, period: float) -> int:
     return count
 
 
-def _latencies(here: str, node: np.ndarray, delays: FloatArray) -> list[Row]:
+def _latencies(setup: str, node: np.ndarray, delays: FloatArray) -> list[Row]:
     """Return the latencies of publication and reception. node: sample, publication, ns or 0; delays: ms."""
     replied = node[:, 0] > 0
     published = (node[replied, 1] - node[replied, 0]) / 1e6
     (p50, p99), (r50, r99) = np.quantile(published, [0.5, 0.99]), np.quantile(delays, [0.5, 0.99])
     return [
-        (f"{here}: cycles without a reply in time", "", f"{(~replied).sum()} of {len(node)}"),
-        (f"{here}: bus read to published, p50, p99", "p99 < 0.5 ms", f"{p50:.3f}, {p99:.3f} ms"),
-        (f"{here}: stamp to reception elsewhere, p50, p99", "p99 < 1 ms",
+        (f"{setup}: cycles without a reply in time", "", f"{(~replied).sum()} of {len(node)}"),
+        (f"{setup}: bus read to published, p50, p99", "p99 < 0.5 ms", f"{p50:.3f}, {p99:.3f} ms"),
+        (f"{setup}: stamp to reception elsewhere, p50, p99", "p99 < 1 ms",
          f"{r50:.3f}, {r99:.3f} ms of {len(delays)}"),
     ]  # fmt: skip

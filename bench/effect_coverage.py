@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from effect_coverage_records import COMMANDS, RIG_VALUES, Made, made
+from effect_coverage_records import COMMANDS, RIG_VALUES, Made, make_record
 from independent.severities import SEVERITIES, SIZES
 from json_log import append_to_log, read_log
 
@@ -82,7 +82,7 @@ def _play(args: argparse.Namespace) -> None:
 def _outcome(effect: str, work: str, severity: str, args: argparse.Namespace) -> dict[str, Any]:
     start = time.perf_counter()
     try:
-        truth = made(effect, work, severity, args.seed, args.duration)
+        truth = make_record(effect, work, severity, args.seed, args.duration)
         result = diagnose([truth.record], load_rig("paper_high_impedance"))
     except Exception:
         return {"outcome": "error", "error": traceback.format_exc(limit=-3), "seconds": 0.0}
@@ -97,7 +97,7 @@ def _outcome(effect: str, work: str, severity: str, args: argparse.Namespace) ->
     ]
     left = max((result.residual_rms[k] / n for k, n in result.noise_rms.items() if n), default=0.0)
     return {
-        "outcome": _judged(effect, causes, left),
+        "outcome": _judge(effect, causes, left),
         "causes": causes,
         "left": left,
         "verdict": result.verdict,
@@ -124,7 +124,7 @@ def z_scores(result: Diagnosis, truth: Made) -> dict[str, float]:
     }
 
 
-def _judged(effect: str, causes: Sequence[dict[str, Any]], left: float) -> str:
+def _judge(effect: str, causes: Sequence[dict[str, Any]], left: float) -> str:
     """Return the outcome of a cell, a key of MARKS."""
     if any(c["name"] == effect for c in causes):
         return "named"
@@ -148,11 +148,11 @@ def _table(args: argparse.Namespace) -> None:
         )
         print(f"| {effect} | " + " | ".join(marks) + " |")
     showing = [e for e in entries if e["outcome"] != "hidden"]
-    found = [e for e in showing if e["outcome"] in ("named", "rival")]
+    decided = [e for e in showing if e["outcome"] in ("named", "rival")]
     wrong = [e for e in entries if _is_surely_wrong(e)]
     print(f"\nmild, medium, strong; {', '.join(f'{m} {o}' for o, m in MARKS.items())}")
-    print(f"found {len(found)} of {len(showing)} that show ({len(entries)} played): ", end="")
-    print(f"{len(found) / max(len(showing), 1):.1%}; wrong and confirmed: {len(wrong)}")
+    print(f"found {len(decided)} of {len(showing)} that show ({len(entries)} played): ", end="")
+    print(f"{len(decided) / max(len(showing), 1):.1%}; wrong and confirmed: {len(wrong)}")
     _print_z_scores(entries)
 
 

@@ -48,7 +48,7 @@ class Made(NamedTuple):
     rig: Mapping[str, float]
 
 
-def made(effect: str, excitation: str, severity: str, seed: int, duration: float) -> Made:
+def make_record(effect: str, excitation: str, severity: str, seed: int, duration: float) -> Made:
     """Return a record (duration in s) with its truth."""
     rng = np.random.default_rng([seed, *map(ord, effect + excitation + severity)])
     parameters = drawn_parameters(effect, severity, rng)
@@ -81,11 +81,11 @@ def _closed_loop(bench: Bench, duration: float, rng: np.random.Generator) -> Flo
     plant = bench.plant._replace(duration=duration)
     steps = 72 if plant.gap > 0.0 or plant.gear_k > 0.0 else 24
     late, limit = _pieces(plant.delay, 1.0 / RATE), bench.outside.saturation
-    return _followed(reference, noise, 1.0 / RATE, *late, steps, plant, limit)
+    return _follow(reference, noise, 1.0 / RATE, *late, steps, plant, limit)
 
 
 @njit(cache=True)
-def _followed(reference, noise, period, whole, part, steps, p, limit):
+def _follow(reference, noise, period, whole, part, steps, p, limit):
     """Return the commands (n,) of u = STIFF (r - q) - DAMPED q', computed and applied sample by sample."""
     x, commands = np.zeros(SIZE), np.zeros(reference.size)
     k1, k2, k3, k4 = np.zeros(SIZE), np.zeros(SIZE), np.zeros(SIZE), np.zeros(SIZE)

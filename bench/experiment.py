@@ -2,7 +2,7 @@
 
     causes LOG [FIRST COUNT]   hidden-cause benches, each line of LOG one of them; goes on where it stopped
     summary LOG                the figures of those lines
-    wire OUT                   the real driver on the wire bench, an overload in the middle of a run
+    wire OUT                   the real driver on a simulated bench, an overload in the middle of a run
     limits RUNS                limit violations in RUNS simulated runs, true values drawn from their intervals
 
 Truth is the second bench of test/independent. Every policy starts from the same poor log, 10 s of slow work
@@ -38,7 +38,7 @@ from rsea_ros.experiment.hypothesis import motion  # noqa: E402
 from rsea_ros.experiment.joint_weighing import weigh  # noqa: E402
 from rsea_ros.experiment.proposal import DesignRequest  # noqa: E402
 from rsea_ros.experiment.run_design import propose  # noqa: E402
-from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used  # noqa: E402
+from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response  # noqa: E402
 from rsea_ros.experiment.run_shape import at_rest_around  # noqa: E402
 from rsea_ros.experiment.weighed_causes import USUAL  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
@@ -58,7 +58,7 @@ SECONDS, SHORTEST = 20.0, 0.1
 """s of excitation that a policy has, and of its first run at least."""
 
 
-def hidden(k):
+def hidden_case(k):
     """Return bench number k, its cause, and the parameters."""
     rng = np.random.default_rng([17, k])
     name = USUAL[k % len(USUAL)]
@@ -123,7 +123,7 @@ def random_multisine(rms, seed):
     return np.clip(signal * rms / signal.std(), -LIMITS.torque, LIMITS.torque)
 
 
-def played(policy, first, weighing, bench, rig, rng, pools):
+def play_policy(policy, first, weighing, bench, rig, rng, pools):
     """Return the outcome of a policy on a bench."""
     asked = DesignRequest(LIMITS, RATE, SHORTEST, probe=1.0, refine=8)
 
@@ -138,24 +138,27 @@ def played(policy, first, weighing, bench, rig, rng, pools):
 
 def one(k, pools):
     """Return the line of bench k."""
-    plain, bench, name, severity, parameters = hidden(k)
+    plain, bench, name, severity, parameters = hidden_case(k)
     rig, begun = load_rig("paper_high_impedance"), time.process_time()
     rng = np.random.default_rng([18, k])
     first = record_command(bench, slow_work(), rng)
     weighing = weigh([first], rig, USUAL, run=pools.run)
-    designed = played(propose, first, weighing, bench, rig, rng, pools)
+    designed = play_policy(propose, first, weighing, bench, rig, rng, pools)
     runs = [r.proposal.command for r in designed.rounds if r.proposal is not None]
     rms = float(np.sqrt(np.mean(np.concatenate([np.trim_zeros(u) for u in runs]) ** 2))) if runs else 0.0
     line = {"bench": k, "cause": name, "severity": severity, "parameters": parameters}
-    line |= {"shown": is_shown(plain, bench), "designed": said(designed), "rms": rms}
+    line |= {"shown": is_shown(plain, bench), "designed": outcome_entry(designed), "rms": rms}
     if runs and designed.end == "confirmed":
-        line["chirp"] = said(played(Fixed(fixed_chirp(), SHORTEST), first, weighing, bench, rig, rng, pools))
+        line["chirp"] = outcome_entry(
+            play_policy(Fixed(fixed_chirp(), SHORTEST), first, weighing, bench, rig, rng, pools)
+        )
         noise = random_multisine(rms, k)
-        line["random"] = said(played(Fixed(noise, SHORTEST), first, weighing, bench, rig, rng, pools))
+        at_random = play_policy(Fixed(noise, SHORTEST), first, weighing, bench, rig, rng, pools)
+        line["random"] = outcome_entry(at_random)
     return line | {"cpu": time.process_time() - begun}
 
 
-def said(outcome):
+def outcome_entry(outcome):
     """Return the part of an outcome that counts."""
     kinds = [getattr(getattr(r.proposal, "shape", None), "kind", "") for r in outcome.rounds if r.proposal]
     return {
@@ -229,7 +232,7 @@ def limits(runs):
     with worker_pools() as pools:
         designs = []
         for k in range(DESIGNS):
-            _, bench, *_ = hidden(k * 7)
+            _, bench, *_ = hidden_case(k * 7)
             first = record_command(bench, slow_work(), np.random.default_rng([18, k]))
             possible = weigh([first], rig, USUAL, run=pools.run).hypotheses(0.005)[:7]
             asked = DesignRequest(tight, RATE, probe=1.0, refine=0)
@@ -238,8 +241,8 @@ def limits(runs):
             possible, proposal = designs[k % len(designs)]
             shares = np.array([h.probability for h in possible])
             true = possible[rng.choice(len(possible), p=shares / shares.sum())].draws(1, rng)[0]
-            found = of_response(proposal.command, motion(true, proposal.command, RATE))
-            share = used(found | of_command(proposal.command, RATE), tight)
+            peaks = of_response(proposal.command, motion(true, proposal.command, RATE))
+            share = largest_share(peaks | of_command(proposal.command, RATE), tight)
             made, broken, worst = made + 1, broken + (share > 1.0), max(worst, share)
             if made % 1000 == 0:
                 print(f"{made} runs, {broken} broke a limit, largest share used {worst:.3f}", flush=True)
@@ -248,7 +251,7 @@ def limits(runs):
 
 
 def wire(out):
-    """Inject an overload into a run on the wire bench; print when the torque was zero and how it ended."""
+    """Inject an overload into a run on a simulated bench; print when the torque was zero and how it ended."""
     rig = load_rig("paper_high_impedance").with_effect("current_loop_lag", time_constant=3e-3)
     out.mkdir(parents=True)
     save_rig(rig, out / "bench.yaml")

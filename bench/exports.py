@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name in args.rigs or rig_names():
         rig = load_rig(name)
         if not rig.rigid_spring or args.fmu:
-            worst = max(worst, played(rig, command(rig, args.seconds), args.fmu))
+            worst = max(worst, play_rig(rig, command(rig, args.seconds), args.fmu))
     return int(worst > NOMINAL)
 
 
@@ -63,12 +63,12 @@ def words() -> None:
         "mjcf": export_mjcf, "sdf": export_sdf, "urdf": export_urdf, "isaac": export_isaac, "bam": export_bam,
     }  # fmt: skip
     for target, export in targets.items():
-        left = [name for name in catalogue() if name in {one.name for one in _made(export, name).omitted}]
+        left = [name for name in catalogue() if name in {one.name for one in _make(export, name).omitted}]
         count = f"{len(catalogue()) - len(left)} of {len(catalogue())} effects"
         print(f"{target}: says {count}; leaves out {', '.join(left)}")
 
 
-def _made(export: Callable[[Rig], object], name: str) -> object:
+def _make(export: Callable[[Rig], object], name: str) -> object:
     base = "paper_moving_output" if name == "gravity_error" else "paper_high_impedance"
     return export(load_rig(base).with_effect(name))
 
@@ -79,7 +79,7 @@ def command(rig: Rig, seconds: float) -> FloatArray:
     return excitation("chirp", replace(base, rate=RATE, duration=seconds, low=0.5))
 
 
-def played(rig: Rig, given: FloatArray, is_fmu: bool) -> float:
+def play_rig(rig: Rig, given: FloatArray, is_fmu: bool) -> float:
     """Print a line for each effect; return the largest nominal difference of a rig without a loop."""
     export, play = (export_fmu, play_fmu) if is_fmu else (export_mjcf, play_mujoco)
     nominal = ours(rig, given, RATE)

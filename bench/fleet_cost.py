@@ -48,14 +48,14 @@ def real() -> bool:
         run_real(warm, make_fleet(root / "one", 1))
         stores, took = {}, {}
         stores[0], took[0] = open_store(root / "serial", create=True), 0.0
-        took[0] = timed(lambda: run_real(stores[0], bags))
+        took[0] = seconds_of(lambda: run_real(stores[0], bags))
         for count in (1, 2):
             stores[count] = open_store(root / f"dask{count}", create=True)
             with on_this_machine(count, MEMORY, "127.0.0.1:0") as (workers, _):
                 # some recordings for each worker first, so that none compiles while the clock runs
                 warm = open_store(root / f"warm{count}", create=True)
                 run_real(warm, make_fleet(root / f"warmers{count}", 4), workers)
-                took[count] = timed(partial(run_real, stores[count], bags, workers))
+                took[count] = seconds_of(partial(run_real, stores[count], bags, workers))
         equal = content(stores[0]) == content(stores[1]) == content(stores[2])
         good = line("rows serial, 1, 2 workers", "bit for bit", "equal" if equal else "DIFFERENT", equal)
         faster = took[1] / took[2]
@@ -72,7 +72,7 @@ def overhead(name: str, took: float, work: float) -> bool:
     return line(name, "≤ 5 %", f"{100.0 * share:.1f} % of {work:.1f} s of work", share <= 0.05)
 
 
-def timed(work: Callable[[], object]) -> float:
+def seconds_of(work: Callable[[], object]) -> float:
     """Return how long some work takes, s."""
     begin = time.perf_counter()
     work()
@@ -89,14 +89,14 @@ def scheduler(count: int = 10_000) -> bool:
         seen: list[tuple[int, float]] = []
         put = store.put
 
-        def watched(outcome: object) -> None:
+        def watch_run(outcome: object) -> None:
             put(outcome)
             seen.append((len(seen) + 1, resident()))
 
-        store.put = watched  # type: ignore[method-assign]
+        store.put = watch_run  # type: ignore[method-assign]
         with on_this_machine(1, MEMORY, "127.0.0.1:0") as (workers, _):
             begin = time.process_time()
-            took = timed(lambda: stub.played(store, bags, workers, stub.stub_row))
+            took = seconds_of(lambda: stub.run_engine(store, bags, workers, stub.stub_row))
             busy = time.process_time() - begin
         marks = [count // 10, count // 2, count - 1]
         figures = ", ".join(f"{seen[k][1] / MEGA:.0f} MB at {seen[k][0]}" for k in marks)
@@ -155,7 +155,7 @@ def reading(count: int = 100_000) -> bool:
 
     with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:
         store = make_store(Path(folder) / "store", count)
-        known = timed(store.known)
+        known = seconds_of(store.known_rows)
         line("keys of 100 000 rows", "–", f"{known:.1f} s, before a run begins")
         begin = time.perf_counter()
         columns, rows = history(store.path), recordings(store.path)
@@ -170,10 +170,10 @@ def memory() -> bool:
     """Identify recordings of several lengths, each in a new process: the memory of a worker for each byte."""
     from fleet_memory import peaks
 
-    found = peaks()
-    for size, peak in found:
+    seen_peaks = peaks()
+    for size, peak in seen_peaks:
         line("memory of a task", "–", f"{peak / MEGA:.0f} MB for a recording of {size / MEGA:.1f} MB")
-    slope, base = np.polyfit(*np.array(found, float).T, 1)
+    slope, base = np.polyfit(*np.array(seen_peaks, float).T, 1)
     return line("memory of a task", "BASE, FACTOR", f"{base / MEGA:.0f} MB + {slope:.1f} × bytes")
 
 

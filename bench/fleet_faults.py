@@ -19,7 +19,7 @@ import fleet_stub as stub
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.cluster import on_scheduler, on_this_machine
 from rsea_ros.fleet.executor import serial
-from rsea_ros.fleet.store import Store, locked, open_store
+from rsea_ros.fleet.store import Store, hold_lock, open_store
 
 KILLS = 20
 MEMORY = 1_000_000_000
@@ -57,7 +57,7 @@ def workers_killed(count: int = 60) -> bool:
         os.environ[stub.TAKES] = "0.5"
         killer = threading.Thread(target=kill)
         killer.start()
-        summary = stub.played(store, bags, workers)
+        summary = stub.run_engine(store, bags, workers)
         over.set()
         killer.join()
         return verdict("worker killed", path, count, f"{len(killed)} kills, {summary.sentence()}")
@@ -66,9 +66,9 @@ def workers_killed(count: int = 60) -> bool:
 def client(folder: str, path: str) -> None:
     """Run a whole run with its cluster, as a client that can be killed."""
     store = open_store(path, create=True)
-    with locked(store, lambda holder: None), on_this_machine(1, MEMORY, "127.0.0.1:0") as (workers, _):
+    with hold_lock(store, lambda holder: None), on_this_machine(1, MEMORY, "127.0.0.1:0") as (workers, _):
         store.finish()
-        stub.played(store, Path(folder), workers)
+        stub.run_engine(store, Path(folder), workers)
 
 
 def _client(bags: Path, store: Path, seconds: str = "0.2") -> subprocess.Popen[bytes]:
@@ -82,9 +82,9 @@ def client_killed(count: int = 40, kills: int = 4) -> bool:
         store = open_store(path, create=True)
         for kill in range(kills):
             running = _client(bags, path)
-            _kill_after(running, store, stub.written(store) + 3 + kill)
+            _kill_after(running, store, stub.count_row_files(store) + 3 + kill)
             running.wait()
-        done = stub.written(store)
+        done = stub.count_row_files(store)
         _client(bags, path).wait(timeout=120.0)
         return verdict("client and scheduler killed", path, count, f"{kills} kills, {done} rows at the last")
 
@@ -99,15 +99,15 @@ def scheduler_killed(count: int = 30) -> bool:
                 if kill:
                     threading.Thread(target=_kill_after, args=(scheduler, store, 5), daemon=True).start()
                 try:
-                    with on_scheduler(address) as there:
-                        stub.played(store, bags, there)
+                    with on_scheduler(address) as cluster_run:
+                        stub.run_engine(store, bags, cluster_run)
                 except RseaError as error:
                     said = str(error).split(":")[0]
         return verdict("scheduler killed", path, count, f"first run: {said}")
 
 
 def _kill_after(process: subprocess.Popen[bytes], store: Store, least: int) -> None:
-    stub.wait_for(lambda: stub.written(store) >= least or process.poll() is not None, 120.0)
+    stub.wait_for(lambda: stub.count_row_files(store) >= least or process.poll() is not None, 120.0)
     process.kill()
 
 
@@ -147,16 +147,16 @@ def disk_full(count: int = 200) -> bool:
             return True
         try:
             store, said, os.environ[stub.TAKES] = open_store(path, create=True), "never full", "0"
-            with locked(store, None), serial() as here:
+            with hold_lock(store, None), serial() as serial_run:
                 try:
-                    stub.played(store, bags, here)
+                    stub.run_engine(store, bags, serial_run)
                 except OSError as error:
                     said = f"stopped with {error.strerror}"
             before = len(stub.outcomes(store)) and sum(stub.outcomes(store).values())
             subprocess.run(["mount", "-o", "remount,size=20m", str(path)], check=True)
-            with locked(store, None), serial() as here:
+            with hold_lock(store, None), serial() as serial_run:
                 store.finish()
-                stub.played(store, bags, here)
+                stub.run_engine(store, bags, serial_run)
             return verdict("disk full", path, count, f"{said} after {before} rows, which stayed")
         finally:
             subprocess.run(["umount", str(path)], check=False)
@@ -165,7 +165,7 @@ def disk_full(count: int = 200) -> bool:
 def four_gigabytes(count: int = 8) -> bool:
     """Have one recording take 4 GB on workers that may have 1 GB."""
     with place(count) as (bags, path), on_this_machine(2, MEMORY, "127.0.0.1:0") as (workers, _):
-        summary = stub.played(open_store(path, create=True), bags, workers, stub.greedy)
+        summary = stub.run_engine(open_store(path, create=True), bags, workers, stub.greedy)
         good = summary.outcomes == {"done": count - 1, "quarantined": 1}
         why = summary.quarantined[0][2] if summary.quarantined else "no quarantine"
         return verdict("4 GB on 1 GB", path, count, f"{summary.sentence()}: {why}") and good
@@ -180,7 +180,7 @@ def two_at_once(count: int = 40) -> bool:
         return verdict("two runs at once", path, count, f"exit status {states}")
 
 
-def truncated() -> bool:
+def truncate_while_read() -> bool:
     """Truncate a real recording while it is read: no row; the next run reads the rest of it."""
     from fleet_real import make_fleet, run_real
 
@@ -194,7 +194,15 @@ def truncated() -> bool:
         return verdict("truncated while read", store.path, 3, said)
 
 
-ALL = (workers_killed, client_killed, scheduler_killed, disk_full, four_gigabytes, two_at_once, truncated)
+ALL = (
+    workers_killed,
+    client_killed,
+    scheduler_killed,
+    disk_full,
+    four_gigabytes,
+    two_at_once,
+    truncate_while_read,
+)
 
 
 def main(names: list[str]) -> int:

@@ -1,4 +1,4 @@
-"""A million recordings on a hundred workers: a simulation by events with the costs that the bench measures.
+"""A million recordings on a hundred workers: a simulation by events, with the costs of `fleet.py cost`.
 
 Clients and schedulers are one process that serves one thing at a time: fingerprints that end, tasks that end,
 rows that are written. The store is listed once, and compacted as it grows.

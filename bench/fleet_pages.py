@@ -36,7 +36,7 @@ PATIENCE = 60.0
 """s after which a page counts as not drawn."""
 
 
-def enlarged(history: Mapping[str, np.ndarray], rows: int) -> dict[str, np.ndarray]:
+def enlarge(history: Mapping[str, np.ndarray], rows: int) -> dict[str, np.ndarray]:
     """Return a history of so many rows: its parameters again under other names."""
     copies = -(-rows // len(history["joint"]))
     out = {n: np.concatenate([c] * copies)[:rows] for n, c in history.items()}
@@ -146,7 +146,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     made = fleet(1)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        history = enlarged(made.history, args.rows)
+        history = enlarge(made.history, args.rows)
         begun, before = time.perf_counter(), time.process_time()
         write_fleet_report(history, made.recordings, out / "large")
         seconds, spent = time.perf_counter() - begun, time.process_time() - before
@@ -158,13 +158,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         write_fleet_report(made.history, made.recordings, out / "fleet")
         if shutil.which(args.chromium):
-            _opened(args.chromium, out)
+            _open(args.chromium, out)
         else:
             print(f"pages not opened: no {args.chromium}")
     return 0
 
 
-def _opened(program: str, out: Path) -> None:
+def _open(program: str, out: Path) -> None:
     bags = 10_000
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         browser = Browser(program, profile)

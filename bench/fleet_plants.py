@@ -39,7 +39,7 @@ def joint(
     new = drawn_bench(np.random.default_rng(seed))
     warmer = temperature - 25.0
     drag = friction * (1.0 + FRICTION_PER_K * warmer)
-    return new.having(
+    return new.with_values(
         k_s=new.plant.k_s * stiffness * (1.0 + STIFFNESS_PER_K * warmer),
         b_m=new.plant.b_m * drag,
         coulomb=COULOMB * drag,
@@ -49,35 +49,35 @@ def joint(
     )
 
 
-def handling(n: int, rng: np.random.Generator) -> FloatArray:
+def handle_loads(n: int, rng: np.random.Generator) -> FloatArray:
     """Return pick and place, N m: levels held for 0.2 to 1.2 s with smooth moves between them."""
-    return _smoothed(_levels(n, rng, 30.0, (0.2, 1.2)), 0.15)
+    return _smooth(_levels(n, rng, 30.0, (0.2, 1.2)), 0.15)
 
 
-def stepping(n: int, rng: np.random.Generator) -> FloatArray:
+def step_loads(n: int, rng: np.random.Generator) -> FloatArray:
     """Return commands of a coarse supervisor, N m: levels without a move between them."""
     return _levels(n, rng, 25.0, (0.3, 1.0))
 
 
-def walking(n: int, rng: np.random.Generator) -> FloatArray:
+def gait(n: int, rng: np.random.Generator) -> FloatArray:
     """Return a gait, N m: a stride of about 0.9 s with its harmonics, each stride a little different."""
-    phase = np.cumsum(2.0 * np.pi * rng.uniform(1.0, 1.2) * (1.0 + 0.05 * _drifting(n, rng)) / RATE)
+    phase = np.cumsum(2.0 * np.pi * rng.uniform(1.0, 1.2) * (1.0 + 0.05 * _slow_noise(n, rng)) / RATE)
     harmonics = np.arange(1, 9)
     sizes = 22.0 * rng.uniform(0.5, 1.0, 8) / harmonics
     waves = np.sin(phase[:, None] * harmonics + rng.uniform(0.0, 2.0 * np.pi, 8))
-    return (waves @ sizes) * (1.0 + 0.1 * _drifting(n, rng))
+    return (waves @ sizes) * (1.0 + 0.1 * _slow_noise(n, rng))
 
 
-def holding(n: int, rng: np.random.Generator) -> FloatArray:
+def hold_loads(n: int, rng: np.random.Generator) -> FloatArray:
     """Return loads that are held and slowly changed, N m: hardly any excitation."""
-    return _smoothed(_levels(n, rng, 6.0, (2.0, 4.0)), 1.0)
+    return _smooth(_levels(n, rng, 6.0, (2.0, 4.0)), 1.0)
 
 
 WORK: dict[str, Callable[[int, np.random.Generator], FloatArray]] = {
-    "handling": handling,
-    "stepping": stepping,
-    "walking": walking,
-    "holding": holding,
+    "handling": handle_loads,
+    "stepping": step_loads,
+    "walking": gait,
+    "holding": hold_loads,
 }
 """Kinds of normal work; none is made for identification."""
 
@@ -95,13 +95,13 @@ def _levels(n: int, rng: np.random.Generator, most: float, held: tuple[float, fl
     return np.concatenate(levels)[:n]
 
 
-def _smoothed(values: FloatArray, seconds: float) -> FloatArray:
+def _smooth(values: FloatArray, seconds: float) -> FloatArray:
     window = np.hanning(round(seconds * RATE) + 2)[1:-1]
     smooth: FloatArray = np.convolve(values, window / window.sum(), mode="same")
     return smooth
 
 
-def _drifting(n: int, rng: np.random.Generator) -> FloatArray:
+def _slow_noise(n: int, rng: np.random.Generator) -> FloatArray:
     """Return noise below about 1 Hz, RMS 1, shape (n,)."""
-    slow = _smoothed(rng.normal(size=n), 1.0)
+    slow = _smooth(rng.normal(size=n), 1.0)
     return slow / slow.std()

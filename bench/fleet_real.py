@@ -53,10 +53,10 @@ def knee() -> MappedJoint:
 def run_real(store: Store, folder: Path, executor: Executor | None = None, cut: str = "") -> RunSummary:
     """Run the engine over real recordings. cut: truncate the one with this in its name while it is read."""
 
-    def cutting(task: Task) -> TaskOutcome:
+    def cut_short(task: Task) -> TaskOutcome:
         if cut and cut in task.bag.url:
             os.truncate(task.bag.url, task.bag.size // 2)
         return work(task)
 
     held = bags_of([str(folder)], [knee()])
-    return Engine(store, executor or Serial(), cutting if cut else work, lambda step, share: None).run(held)
+    return Engine(store, executor or Serial(), cut_short if cut else work, lambda step, share: None).run(held)

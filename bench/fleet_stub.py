@@ -62,7 +62,7 @@ def greedy(task: Task) -> TaskOutcome:
     return stub_row(task)
 
 
-def played(
+def run_engine(
     store: Store, folder: Path, executor: Executor, work=slow, limits: EngineLimits | None = None
 ) -> RunSummary:
     """Run the engine over a folder."""
@@ -92,7 +92,7 @@ def wait_for(condition, limit: float) -> None:
         time.sleep(0.05)
 
 
-def written(store: Store) -> int:
+def count_row_files(store: Store) -> int:
     """Return how many files of rows the store has."""
     with suppress(OSError):
         return len(list(store.rows.glob("joint=*/month=*/*.parquet")))

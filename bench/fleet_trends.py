@@ -61,7 +61,7 @@ def outcome(seed: int, values: str) -> dict[str, Any]:
     false = [a.key for d, a in first.values() if is_false(made.wear.get(a.joint), d, a)]
     beside = [a.key for d, a in first.values() if is_beside(made.wear.get(a.joint), d, a)]
     groups = by_joint(last)
-    worn = [judged(made, joint, wear, groups.get(joint, []), first) for joint, wear in made.wear.items()]
+    worn = [judge_joint(made, joint, wear, groups.get(joint, []), first) for joint, wear in made.wear.items()]
     return {
         "seed": seed, "worn": worn, "false": false, "beside": beside,
         "joint_days": 20 * 365, "looks": len(days),
@@ -83,7 +83,7 @@ def is_beside(wear: Wear | None, day: float, alarm: Alarm) -> bool:
     return alarm.about not in RIGHT[wear.kind]
 
 
-def judged(
+def judge_joint(
     made: Fleet, joint: str, wear: Wear, final: Sequence[Alarm], first: dict[str, tuple[float, Alarm]]
 ) -> dict[str, Any]:
     """Return whether the joint's first finding is right, its date's error, and the delay beside its limit."""

@@ -105,7 +105,7 @@ def plans() -> Iterator[Plan]:
         yield Plan(f"{k:02d} {kind} {what}", int(rng.integers(1, 2**31)), kind, temperature, wear, fault)
 
 
-def recorded(plan: Plan) -> tuple[Bench, Record]:
+def record_run(plan: Plan) -> tuple[Bench, Record]:
     """Return the joint of a plan and its record."""
     bench = joint(plan.seed, temperature=plan.temperature, **plan.wear)
     record = recording(bench, plan.kind, plan.seed + 1)
@@ -114,24 +114,24 @@ def recorded(plan: Plan) -> tuple[Bench, Record]:
     return bench, record
 
 
-def identified(plan: Plan) -> dict[str, Any]:
+def identify_run(plan: Plan) -> dict[str, Any]:
     """Return the result of identify, which trusts the rig's structure; nothing if it refuses."""
     start = time.perf_counter()
     parameters = {}
     with suppress(RseaError):
-        fit = identify(recorded(plan)[1], RIG)
+        fit = identify(record_run(plan)[1], RIG)
         parameters = {n: [p.value, *p.ci95, p.told_by_data] for n, p in fit.parameters.items() if n in TRUE}
     return {"name": plan.name, "identified": parameters, "seconds": round(time.perf_counter() - start, 1)}
 
 
-def played(plan: Plan) -> dict[str, Any]:
+def play(plan: Plan) -> dict[str, Any]:
     """Return the outcome of a plan beside the truth; a refusal is an outcome too."""
     start = time.perf_counter()
-    bench, record = recorded(plan)
+    bench, record = record_run(plan)
     entry: dict[str, Any] = {**asdict(plan), "outcome": "done", "true": truth(bench)}
     others = tuple(name for name in catalogue() if name not in TRIED)
     try:
-        entry |= said(diagnose(record, RIG, settings=DiagnosisSettings(without=others)).result)
+        entry |= summary_of(diagnose(record, RIG, settings=DiagnosisSettings(without=others)).result)
     except RseaError as error:
         entry |= {"outcome": "refused", "reason": str(error)}
     except Exception:
@@ -148,7 +148,7 @@ def truth(bench: Bench) -> dict[str, float]:
                                "command_delay": bench.plant.delay}  # fmt: skip
 
 
-def said(d: Diagnosis) -> dict[str, Any]:
+def summary_of(d: Diagnosis) -> dict[str, Any]:
     """Return the result of a diagnosis, rounded: parameters, causes, faults, verdict."""
     parameters = {p.name: [p.value, *p.ci95, p.told_by_data] for p in final_values(d) if p.name in TRUE}
     causes = [
@@ -166,13 +166,13 @@ def said(d: Diagnosis) -> dict[str, Any]:
             "parameters": parameters, "causes": causes}  # fmt: skip
 
 
-def rounded(value: Any) -> Any:
+def round_numbers(value: Any) -> Any:
     """Return a value of JSON with five significant digits in every number."""
     if isinstance(value, float):
         return float(f"{value:.5g}")
     if isinstance(value, dict):
-        return {k: rounded(v) for k, v in value.items()}
-    return [rounded(v) for v in value] if isinstance(value, list) else value
+        return {k: round_numbers(v) for k, v in value.items()}
+    return [round_numbers(v) for v in value] if isinstance(value, list) else value
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -189,10 +189,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     for entry in read_log(args.log):
         done.setdefault(entry["name"], {}).update(entry)
     every = list(plans())
-    for step, key in ((played, "outcome"), (identified, "identified")):
+    for step, key in ((play, "outcome"), (identify_run, "identified")):
         for plan in every:
             if key not in done.get(plan.name, {}) and time.perf_counter() < end:
-                _kept(args.log, done, rounded(step(plan)))
+                _keep(args.log, done, round_numbers(step(plan)))
     told = [sum(key in e for e in done.values()) for key in ("outcome", "identified")]
     print(f"of {len(every)} recordings {told[0]} diagnosed, {told[1]} identified")
     print(f"healthy joints have {COULOMB:g} N·m of dry friction")
@@ -202,7 +202,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _kept(log: Path, done: dict[str, dict[str, Any]], entry: dict[str, Any]) -> None:
+def _keep(log: Path, done: dict[str, dict[str, Any]], entry: dict[str, Any]) -> None:
     """Write the outcome of a recording to the log and the screen."""
     done.setdefault(entry["name"], {}).update(entry)
     append_to_log(log, entry)

@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bench.health_runs import FAULTS, drawn, faulty, monitor_of, pieces, watch, work
-from bench.sections import chosen, parser_of
+from bench.health_runs import FAULTS, draw_bench, faulty, monitor_of, pieces, watch, work
+from bench.sections import choose, parser_of
 from rsea_ros.cli._node_process import start, stop
 from rsea_ros.health.cusum import Cusum, threshold
 from rsea_ros.health.look import events_of
@@ -58,13 +58,13 @@ def alarms(args: argparse.Namespace) -> Iterator[str]:
     hours, findings, seen = 0.0, 0, dict.fromkeys(RATES, 0)
     for seed in args.seeds:
         rng = np.random.default_rng([seed, 1])
-        bench, rig = drawn(rng)
+        bench, rig = draw_bench(rng)
         with _noted() as rows:
-            found = list(watch(monitor_of(rig), pieces(bench, 3600.0 * args.hours, rng)))
-        hours, findings = hours + args.hours, findings + len(found)
+            raised = list(watch(monitor_of(rig), pieces(bench, 3600.0 * args.hours, rng)))
+        hours, findings = hours + args.hours, findings + len(raised)
         for rate in RATES:
             seen[rate] += _again(rows, rate)
-        told = "; ".join(f"{f.code} {f.name} {f.size:.3g} at {at:.0f} s" for at, f in found)
+        told = "; ".join(f"{f.code} {f.name} {f.size:.3g} at {at:.0f} s" for at, f in raised)
         yield f"seed {seed}: {args.hours:g} h, findings: {told or 'none'}"
     yield f"{hours:g} h of work, {findings} false findings at {RATES[-1]:g} an hour"
     for rate, count in seen.items():
@@ -78,11 +78,11 @@ class _noted:
         rows: list[tuple[Cusum, tuple[np.ndarray, ...]]] = []
         self._take = take = Cusum.take
 
-        def noting(cusum: Cusum, *args: np.ndarray) -> bool:
+        def note(cusum: Cusum, *args: np.ndarray) -> bool:
             rows.append((cusum, args))
             return take(cusum, *args)
 
-        Cusum.take = noting  # type: ignore[method-assign]
+        Cusum.take = note  # type: ignore[method-assign]
         return rows
 
     def __exit__(self, *_: object) -> None:
@@ -107,15 +107,15 @@ def faults(args: argparse.Namespace) -> Iterator[str]:
     for seed in args.seeds:
         for name, fault in FAULTS.items():
             rng = np.random.default_rng([seed, 2])
-            bench, rig = drawn(rng)
+            bench, rig = draw_bench(rng)
             monitor = monitor_of(rig)
             early = list(watch(monitor, pieces(bench, CLEAN, rng)))
-            found = list(watch(monitor, pieces(faulty(bench, fault), WORN, rng, START)))
+            raised = list(watch(monitor, pieces(faulty(bench, fault), WORN, rng, START)))
             names = [f.code for f in monitor.changes.findings.values()] if monitor.changes else []
-            times = [at - START for at, f in found if f.code == fault.code]
-            sizes = [f.size for _, f in found if f.code == fault.code]
+            times = [at - START for at, f in raised if f.code == fault.code]
+            sizes = [f.size for _, f in raised if f.code == fault.code]
             right = set(names) == {fault.code}
-            told = ", ".join(f"{f.code} {f.name} {f.size:.4g} after {at - START:.1f} s" for at, f in found)
+            told = ", ".join(f"{f.code} {f.name} {f.size:.4g} after {at - START:.1f} s" for at, f in raised)
             yield f"seed {seed} {name}: {'right' if right else 'WRONG'}; {told or 'nothing'}"
             if early:
                 yield f"  false before: {', '.join(f.code for _, f in early)}"
@@ -183,7 +183,7 @@ def main() -> None:
     parser.add_argument("--hours", type=float, default=0.5, help="of clean work for each seed")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--seconds", type=float, default=60.0, help="of the node's CPU")
-    args, sections = chosen(parser, SECTIONS)
+    args, sections = choose(parser, SECTIONS)
     with threadpool_limits(1):
         for name, section in sections:
             print(f"== {name}")

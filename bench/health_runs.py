@@ -51,7 +51,7 @@ FAULTS: Mapping[str, Fault] = {
 }
 
 
-def drawn(rng: np.random.Generator) -> tuple[Bench, Rig]:
+def draw_bench(rng: np.random.Generator) -> tuple[Bench, Rig]:
     """Return a bench of its own values with dry friction, and the rig that its last identification left."""
     plant = Bench().plant
     values = {
@@ -68,13 +68,15 @@ def drawn(rng: np.random.Generator) -> tuple[Bench, Rig]:
         quantities[name] = Quantity(value, 0.05, "drawn", (value - Z95 * sigma, value + Z95 * sigma))
     torque = values["coulomb"] * (1.0 + FRICTION_DOUBT * rng.standard_normal())
     known = replace(rig, quantities=quantities)
-    return Bench().having(**values), known.with_effects(EffectSetting("coulomb_friction", {"torque": torque}))
+    return Bench().with_values(**values), known.with_effects(
+        EffectSetting("coulomb_friction", {"torque": torque})
+    )
 
 
 def faulty(bench: Bench, fault: Fault) -> Bench:
     """Return the bench with a fault."""
     now = {**bench.plant._asdict(), **bench.outside._asdict()}
-    return bench.having(**{k: v * now[k] if fault.times else v for k, v in fault.change.items()})
+    return bench.with_values(**{k: v * now[k] if fault.times else v for k, v in fault.change.items()})
 
 
 def work(seconds: float, rng: np.random.Generator, rate: float = RATE) -> FloatArray:
@@ -86,7 +88,7 @@ def work(seconds: float, rng: np.random.Generator, rate: float = RATE) -> FloatA
         on = (t >= at) & (t < at + length)
         since = t[on] - at
         fade = np.clip(np.minimum(since, length - since) / 0.5, 0.0, 1.0)
-        u[on] = fade * (_cyclic(since, rng) if rng.random() < 0.7 else _reaching(since, rng))
+        u[on] = fade * (_cyclic(since, rng) if rng.random() < 0.7 else _reach_loads(since, rng))
         at += length + rng.uniform(0.0, 6.0)
     return u
 
@@ -99,7 +101,7 @@ def _cyclic(t: FloatArray, rng: np.random.Generator) -> FloatArray:
     return total
 
 
-def _reaching(t: FloatArray, rng: np.random.Generator) -> FloatArray:
+def _reach_loads(t: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return holds at levels that are reached within 0.15 to 0.6 s, N m."""
     u, at, level = np.zeros(len(t)), 0.0, 0.0
     while at < t[-1]:

@@ -44,11 +44,13 @@ def main() -> None:
     rig = load_rig("paper_high_impedance")
     true = np.array([OFF * rig[n] for n in NAMES])
     rows = [_one(rig, true, args.duration, seed) for seed in range(args.seeds)]
-    hand, here, sigma = (100.0 * np.sqrt(np.mean([row[k] ** 2 for row in rows], axis=0)) for k in range(3))
+    hand, identified, sigma = (
+        100.0 * np.sqrt(np.mean([row[k] ** 2 for row in rows], axis=0)) for k in range(3)
+    )
     print(f"{args.duration:g} s at {RATE:g} Hz, {args.seeds} records\n{'% of the true value':28}", end="")
     print(f"{'by hand':>10}{'identify':>10}{'one sigma':>11}")
     for i, name in enumerate(NAMES):
-        print(f"{name:28}{hand[i]:10.4f}{here[i]:10.4f}{sigma[i]:11.4f}")
+        print(f"{name:28}{hand[i]:10.4f}{identified[i]:10.4f}{sigma[i]:11.4f}")
     seconds = [statistics.median(row[k] for row in rows) for k in (3, 4)]
     print(f"{'seconds':28}{seconds[0]:10.2f}{seconds[1]:10.2f}")
 
@@ -63,11 +65,11 @@ def _one(
     start = time.perf_counter()
     hand = by_hand(record, rig)
     middle = time.perf_counter()
-    found = {p.name: p for p in identify([record], rig).parameters}
+    parameters = {p.name: p for p in identify([record], rig).parameters}
     end = time.perf_counter()
-    here = np.array([found[n].value for n in NAMES])
-    sigma = np.array([0.25 * np.ptp(found[n].ci95) for n in NAMES])
-    return hand / true - 1.0, here / true - 1.0, sigma / true, middle - start, end - middle
+    identified = np.array([parameters[n].value for n in NAMES])
+    sigma = np.array([0.25 * np.ptp(parameters[n].ci95) for n in NAMES])
+    return hand / true - 1.0, identified / true - 1.0, sigma / true, middle - start, end - middle
 
 
 def by_hand(record: Record, rig: Rig) -> FloatArray:
@@ -78,7 +80,7 @@ def by_hand(record: Record, rig: Rig) -> FloatArray:
     known = np.log(_values(rig))
 
     def residual(x: FloatArray) -> FloatArray:
-        simulated = _simulated(np.exp(x), u, rig["chassis.inertia"])
+        simulated = _simulate(np.exp(x), u, rig["chassis.inertia"])
         return np.concatenate([(simulated[n] - record[n].y)[SETTLE:] / noises[n] for n in channels])
 
     return np.asarray(np.exp(least_squares(residual, known, x_scale=0.1).x))
@@ -88,7 +90,7 @@ def _values(rig: Rig) -> FloatArray:
     return np.array([rig[n] for n in NAMES])
 
 
-def _simulated(values: FloatArray, u: FloatArray, chassis: float) -> dict[str, FloatArray]:
+def _simulate(values: FloatArray, u: FloatArray, chassis: float) -> dict[str, FloatArray]:
     """Return the readings of the sensors at the end of each period of the held command."""
     j_m, b_m, k_s, b_s = values
     below = [j_m + chassis, b_m + b_s, k_s]

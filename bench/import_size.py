@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         folder = Path(name)
         (folder / "map.yaml").write_text(MAP)
         _write(folder, rows)
-        largest = max(_imported(folder, suffix) for suffix in ("parquet", "csv"))
+        largest = max(_import(folder, suffix) for suffix in ("parquet", "csv"))
     return int(largest > CEILING)
 
 
@@ -54,7 +54,7 @@ def _write(folder: Path, rows: int) -> None:
             text.writelines(f"{a:.3f},{b:.5f},{c:.6f}\n" for a, b, c in zip(t, u, x, strict=True))
 
 
-def _imported(folder: Path, suffix: str) -> float:
+def _import(folder: Path, suffix: str) -> float:
     """Import a file in a child; print and return its memory, bytes."""
     arguments = ["import", f"run.{suffix}", "--map", "map.yaml", "--out", suffix]
     program = f"import sys; from rsea_ros.cli.main import main; sys.exit(main({arguments!r}))"

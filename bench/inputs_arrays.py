@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from inputs_bytes import damaged
+from inputs_bytes import damage_bytes
 
 ODD_ARRAYS: tuple[Callable[[int], np.ndarray], ...] = (
     lambda n: np.arange(n, dtype="i1"),
@@ -36,12 +36,12 @@ _HEADER += (b"False", b"True "), (b"descr", b"DESCR"), (b"(60,)", b"(7, 9)"), (b
 def damaged_npz(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return an NPZ file with members changed, renamed, doubled or dropped, or other bytes in them."""
     if rng.random() < 0.3:
-        return damaged(rng, data, other)
+        return damage_bytes(rng, data, other)
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = {name: archive.read(name) for name in archive.namelist()}
     except Exception:
-        return damaged(rng, data, other)
+        return damage_bytes(rng, data, other)
     for _ in range(rng.choice((1, 1, 3))):
         name = rng.choice([*members] or ["t.npy"])
         _member(rng, members, name)
@@ -72,7 +72,7 @@ def _member(rng: random.Random, members: dict[str, bytes], name: str) -> None:
     elif kind == 4:
         members[name] = held[: rng.randrange(len(held) + 1)]
     else:
-        members[name] = damaged(rng, held, held) if held else b""
+        members[name] = damage_bytes(rng, held, held) if held else b""
 
 
 ODD_COLUMNS: tuple[Callable[[int], pa.Array], ...] = (
@@ -99,12 +99,12 @@ ODD_COLUMNS: tuple[Callable[[int], pa.Array], ...] = (
 def damaged_parquet(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return a Parquet file with columns changed, renamed, doubled or dropped, or other bytes in it."""
     if rng.random() < 0.5:
-        return damaged(rng, data, other)
+        return damage_bytes(rng, data, other)
     try:
         table = pq.read_table(io.BytesIO(data), use_threads=False)
         columns = [(name, table.column(name)) for name in table.column_names]
     except Exception:
-        return damaged(rng, data, other)
+        return damage_bytes(rng, data, other)
     for _ in range(rng.choice((1, 1, 3))):
         at, kind = rng.randrange(len(columns)), rng.randrange(5)
         name = columns[at][0]

@@ -10,7 +10,7 @@ import zlib
 from contextlib import suppress
 from pathlib import Path
 
-from inputs_bytes import ODD_DOUBLES, ODD_NUMBERS, damaged
+from inputs_bytes import ODD_DOUBLES, ODD_NUMBERS, damage_bytes
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK, MESSAGE = 0x06, 0x05
@@ -20,19 +20,19 @@ Records = list[tuple[int, bytes]]
 
 def records_of(data: bytes) -> Records | None:
     """Return the records of an MCAP file or chunk, None for one that is not whole."""
-    at, found = 0, []
+    at, ends = 0, []
     while at < len(data):
         if at + 9 > len(data):
             return None
         opcode, size = struct.unpack_from("<BQ", data, at)
         if at + 9 + size > len(data):
             return None
-        found.append((opcode, data[at + 9 : at + 9 + size]))
+        ends.append((opcode, data[at + 9 : at + 9 + size]))
         at += 9 + size
-    return found
+    return ends
 
 
-def joined(records: Records) -> bytes:
+def join_records(records: Records) -> bytes:
     """Return records as bytes, with their right lengths."""
     return b"".join(struct.pack("<BQ", opcode, len(body)) + body for opcode, body in records)
 
@@ -41,8 +41,8 @@ def damaged_mcap(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return an MCAP file damaged in its bytes, among its records, inside a chunk, or in its messages."""
     records = records_of(data[len(MAGIC) : -len(MAGIC)]) if data.startswith(MAGIC) else None
     if records is None or rng.random() < 0.25:
-        return damaged(rng, data, other)
-    return MAGIC + joined(_records(rng, records)) + rng.choice((MAGIC, MAGIC, MAGIC, b""))
+        return damage_bytes(rng, data, other)
+    return MAGIC + join_records(_records(rng, records)) + rng.choice((MAGIC, MAGIC, MAGIC, b""))
 
 
 def _records(rng: random.Random, records: Records) -> Records:
@@ -60,7 +60,7 @@ def _records(rng: random.Random, records: Records) -> Records:
         elif kind == 2:
             records[at] = (rng.choice((0, 1, 3, 4, 5, 6, 0x0F, 0x0B, 0x42, 0xFF)), records[at][1])
         else:
-            records[at] = (records[at][0], damaged(rng, records[at][1]))
+            records[at] = (records[at][0], damage_bytes(rng, records[at][1]))
         if not records:
             return [(1, b"")]
     return records
@@ -77,9 +77,9 @@ def _chunk(rng: random.Random, body: bytes) -> bytes:
     if inside:
         inner = _inside(rng, inside)
     elif inner:
-        inner = damaged(rng, inner)
+        inner = damage_bytes(rng, inner)
     named = rng.choice((b"", b"", b"", b"", b"zstd", b"lz4", b"gzip", b"\xff", b"x" * 1000))
-    packed = _packed(rng, named, inner)
+    packed = _pack(rng, named, inner)
     declared = rng.choice((len(inner), len(inner), len(inner), rng.choice(ODD_NUMBERS)))
     checksum = rng.choice((zlib.crc32(inner), zlib.crc32(inner), 0, 1))
     head = CHUNK_HEAD.pack(start, stop, declared, checksum) + struct.pack("<I", len(named)) + named
@@ -90,25 +90,25 @@ def _inside(rng: random.Random, records: Records) -> bytes:
     kind = rng.randrange(6)
     messages = [k for k, (opcode, body) in enumerate(records) if opcode == MESSAGE and len(body) > 22]
     if kind == 0:
-        return joined(_nested(records, rng.choice((1, 2, 5, 60, 400))))
+        return join_records(_nest(records, rng.choice((1, 2, 5, 60, 400))))
     if kind in (1, 2) or not messages:
-        return joined([r if rng.random() > 0.02 else (r[0], damaged(rng, r[1])) for r in records])
+        return join_records([r if rng.random() > 0.02 else (r[0], damage_bytes(rng, r[1])) for r in records])
     for k in rng.sample(messages, min(len(messages), rng.choice((1, 3, 100)))):
         body = records[k][1]
         records[k] = (MESSAGE, body[:22] + damaged_message(rng, body[22:]))
-    return joined(records)
+    return join_records(records)
 
 
-def _nested(records: Records, depth: int) -> Records:
+def _nest(records: Records, depth: int) -> Records:
     """Return chunks in chunks, which the format forbids."""
     for _ in range(depth):
-        inner = joined(records)
+        inner = join_records(records)
         head = CHUNK_HEAD.pack(0, 0, len(inner), 0) + struct.pack("<IQ", 0, len(inner))
         records = [(CHUNK, head + inner)]
     return records
 
 
-def _packed(rng: random.Random, named: bytes, inner: bytes) -> bytes:
+def _pack(rng: random.Random, named: bytes, inner: bytes) -> bytes:
     from lz4.frame import compress as lz4
 
     try:
@@ -122,14 +122,14 @@ def _packed(rng: random.Random, named: bytes, inner: bytes) -> bytes:
         inner = zstd.compress(inner)
     elif named == b"lz4":
         inner = lz4(inner)
-    return damaged(rng, inner) if inner and rng.random() < 0.3 else inner
+    return damage_bytes(rng, inner) if inner and rng.random() < 0.3 else inner
 
 
 def damaged_message(rng: random.Random, raw: bytes, other: bytes = b"") -> bytes:
     """Return a serialised message with odd lengths, stamps, values, header or end."""
     kind = rng.randrange(6)
     if kind == 0:
-        return damaged(rng, raw)
+        return damage_bytes(rng, raw)
     if kind == 1:
         return rng.choice((b"\x00\x00", b"\x00\x02", b"\x00\x03", b"\x00\x0a", b"\xff\xff")) + raw[2:]
     at = 4 * rng.randrange(1, max(2, len(raw) // 4))
@@ -167,7 +167,7 @@ LARGEST = 50_000_000
 def damaged_sqlite(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return a database damaged in its bytes or by statements that a program could have run on it."""
     if rng.random() < 0.4:
-        return damaged(rng, data, other)
+        return damage_bytes(rng, data, other)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "x.db3"
         path.write_bytes(data)

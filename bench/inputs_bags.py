@@ -97,7 +97,7 @@ def record_of(case: Mapping[str, Any], rig: Rig) -> Record:
             channels["ft"] = Channel(t + 1.0 / rate, np.zeros(len(t)))
         targets = Channel(t, TARGETS[rig.loop is not None] * u)
         asked = Record({**channels, "reference": targets})
-        measured = _measured(asked, _bench(rig, case["bench"]), case["noise"])
+        measured = _measure(asked, _bench(rig, case["bench"]), case["noise"])
         if "ft" in case["channels"] and rig.rigid_spring:
             measured["ft"] = Channel(t + 1.0 / rate, 0.01 * _noise(len(t)))
         record = Record({"command": channels["command"], **measured}, epoch_ns=case["epoch"])
@@ -114,7 +114,7 @@ def _bench(rig: Rig, bench: str) -> Rig:
     return rig.with_effects(*rig.effects, EffectSetting("mains_interference", {}))
 
 
-def _measured(asked: Record, rig: Rig, noise: bool) -> dict[str, Channel]:
+def _measure(asked: Record, rig: Rig, noise: bool) -> dict[str, Channel]:
     rng = np.random.default_rng(11)
     effects = tuple(e for e in rig.effects if e.name != "mains_interference")
     try:
@@ -139,7 +139,7 @@ def _each(change: Callable[[Channel], Channel], *names: str) -> Callable[[Record
     return changed
 
 
-def _stepped(c: Channel, by: float) -> Channel:
+def _step(c: Channel, by: float) -> Channel:
     return Channel(np.where(np.arange(len(c)) > len(c) // 2, c.t + by, c.t), c.y)
 
 
@@ -149,7 +149,7 @@ def _gap(c: Channel, share: float) -> Channel:
     return Channel(c.t[keep], c.y[keep])
 
 
-def _jittered(c: Channel) -> Channel:
+def _jitter(c: Channel) -> Channel:
     step = float(np.median(np.diff(c.t)))
     return Channel(c.t + 0.4 * step * np.random.default_rng(2).uniform(-1, 1, len(c)), c.y)
 
@@ -161,50 +161,50 @@ def _late(c: Channel) -> Channel:
 MEASURED = CHANNELS
 STAMPS: Mapping[str, Callable[[Record], Record]] = {
     "even": lambda r: r,
-    "hour forward": _each(lambda c: _stepped(c, 3600.0)),
-    "year forward": _each(lambda c: _stepped(c, 3.15e7)),
-    "states hour forward": _each(lambda c: _stepped(c, 3600.0), *MEASURED),
-    "command hour forward": _each(lambda c: _stepped(c, 3600.0), "command"),
-    "back": _each(lambda c: _stepped(c, -0.3 * float(c.t[-1] - c.t[0]))),
+    "hour forward": _each(lambda c: _step(c, 3600.0)),
+    "year forward": _each(lambda c: _step(c, 3.15e7)),
+    "states hour forward": _each(lambda c: _step(c, 3600.0), *MEASURED),
+    "command hour forward": _each(lambda c: _step(c, 3600.0), "command"),
+    "back": _each(lambda c: _step(c, -0.3 * float(c.t[-1] - c.t[0]))),
     "gap": _each(lambda c: _gap(c, 0.1)),
     "wide gap": _each(lambda c: _gap(c, 0.8)),
     "gap of states": _each(lambda c: _gap(c, 0.3), *MEASURED),
-    "jitter": _each(_jittered),
+    "jitter": _each(_jitter),
     "same": _each(lambda c: Channel(np.full(len(c), c.t[0]), c.y)),
     "apart": _each(_late, *MEASURED),
     "repeated": _each(lambda c: Channel(np.repeat(c.t[::2], 2)[: len(c)], c.y)),
 }
 
 
-def _held(c: Channel, value: float) -> Channel:
+def _hold(c: Channel, value: float) -> Channel:
     return Channel(c.t, np.full(len(c), value))
 
 
-def _frozen(c: Channel) -> Channel:
+def _freeze(c: Channel) -> Channel:
     return Channel(c.t, np.where(np.arange(len(c)) > len(c) // 3, c.y[len(c) // 3], c.y))
 
 
-def _spiked(c: Channel, value: float) -> Channel:
+def _spike(c: Channel, value: float) -> Channel:
     return Channel(c.t, np.where(np.arange(len(c)) == len(c) // 2, value, c.y))
 
 
 SENSORS: Mapping[str, Callable[[Record], Record]] = {
     "none": lambda r: r,
-    "all still": _each(lambda c: _held(c, 0.125), *MEASURED),
-    "all zero": _each(lambda c: _held(c, 0.0), *MEASURED),
-    "ft zero": _each(lambda c: _held(c, 0.0), "ft"),
-    "ft constant": _each(lambda c: _held(c, 1.7), "ft"),
-    "position zero": _each(lambda c: _held(c, 0.0), "position"),
-    "velocity zero": _each(lambda c: _held(c, 0.0), "velocity"),
-    "motor torque zero": _each(lambda c: _held(c, 0.0), "motor_torque"),
-    "frozen": _each(_frozen, "ft", "position"),
-    "nan": _each(lambda c: _spiked(c, np.nan), *MEASURED),
-    "infinite": _each(lambda c: _spiked(c, np.inf), "ft", "velocity"),
-    "1e308": _each(lambda c: _spiked(c, 1e308), *MEASURED),
+    "all still": _each(lambda c: _hold(c, 0.125), *MEASURED),
+    "all zero": _each(lambda c: _hold(c, 0.0), *MEASURED),
+    "ft zero": _each(lambda c: _hold(c, 0.0), "ft"),
+    "ft constant": _each(lambda c: _hold(c, 1.7), "ft"),
+    "position zero": _each(lambda c: _hold(c, 0.0), "position"),
+    "velocity zero": _each(lambda c: _hold(c, 0.0), "velocity"),
+    "motor torque zero": _each(lambda c: _hold(c, 0.0), "motor_torque"),
+    "frozen": _each(_freeze, "ft", "position"),
+    "nan": _each(lambda c: _spike(c, np.nan), *MEASURED),
+    "infinite": _each(lambda c: _spike(c, np.inf), "ft", "velocity"),
+    "1e308": _each(lambda c: _spike(c, 1e308), *MEASURED),
     "all 1e300": _each(lambda c: Channel(c.t, c.y * 1e300), *MEASURED),
     "all 1e-300": _each(lambda c: Channel(c.t, c.y * 1e-300), *MEASURED),
     "few": _each(lambda c: Channel(c.t[:5], c.y[:5]), *MEASURED),
-    "nan all": _each(lambda c: _held(c, np.nan), "ft", "velocity"),
-    "command nan": _each(lambda c: _spiked(c, np.nan), "command"),
+    "nan all": _each(lambda c: _hold(c, np.nan), "ft", "velocity"),
+    "command nan": _each(lambda c: _spike(c, np.nan), "command"),
     "squared": _each(lambda c: Channel(c.t, np.abs(c.y)), *MEASURED),
 }

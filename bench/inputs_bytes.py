@@ -21,7 +21,7 @@ ODD_DOUBLES = (
 )
 
 
-def damaged(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def damage_bytes(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return bytes with one or a few places changed. other: bytes that may be spliced in."""
     for _ in range(rng.choice((1, 1, 1, 2, 4, 16))):
         data = rng.choice(_KINDS)(rng, data, other) if data else rng.randbytes(8)

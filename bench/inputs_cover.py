@@ -13,7 +13,7 @@ _TRIED = 40
 """Random candidates for each case: more of them make the design a little smaller."""
 
 
-def covering(
+def cover_pairs(
     factors: Mapping[str, Sequence[Any]], rng: random.Random, must: Sequence[Case] = ()
 ) -> tuple[list[Case], int]:
     """Return cases that hold every pair of values of two factors, and how many pairs that are.
@@ -26,7 +26,7 @@ def covering(
     total, cases = len(left), []
     waiting = list(must)
     while waiting or left:
-        given = waiting.pop() if waiting else _given(min(left, key=repr))
+        given = waiting.pop() if waiting else _case_of(min(left, key=repr))
         drawn = [{n: given.get(n, rng.choice(factors[n])) for n in names} for _ in range(_TRIED)]
         best = max(drawn, key=lambda case: len(pairs(case, names) & left))
         left -= pairs(best, names)
@@ -39,6 +39,6 @@ def pairs(case: Case, names: Sequence[str]) -> set[Pair]:
     return {(a, case[a], b, case[b]) for a, b in combinations(names, 2)}
 
 
-def _given(pair: Pair) -> Case:
+def _case_of(pair: Pair) -> Case:
     a, x, b, y = pair
     return {a: x, b: y}

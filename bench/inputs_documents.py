@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any
 
 import yaml
-from inputs_bytes import damaged
+from inputs_bytes import damage_bytes
 
 ODD_VALUES: tuple[Any, ...] = (
     None, True, False, 0, 1, -1, 2, 10**30, 10**400, 0.0, -0.0, 1e308, -1e308, 5e-324, 1e-300, 1e30,
@@ -37,14 +37,14 @@ def damaged_yaml(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     try:
         document = yaml.safe_load(data.decode("utf-8"))
     except Exception:
-        return damaged(rng, data, other)
+        return damage_bytes(rng, data, other)
     kind = rng.random()
     if kind < 0.6:
         with suppress(RecursionError):  # what was damaged before may be nested deeper than it can be written
             return yaml.safe_dump(
-                changed(rng, document), sort_keys=False, allow_unicode=rng.random() < 0.5
+                change_nodes(rng, document), sort_keys=False, allow_unicode=rng.random() < 0.5
             ).encode()
-    return damaged_text(rng, data, other) if kind < 0.85 else damaged(rng, data, other)
+    return damaged_text(rng, data, other) if kind < 0.85 else damage_bytes(rng, data, other)
 
 
 def damaged_json(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
@@ -52,18 +52,18 @@ def damaged_json(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     try:
         document = json.loads(data)
     except Exception:
-        return damaged(rng, data, other)
+        return damage_bytes(rng, data, other)
     kind = rng.random()
     if kind < 0.6:
         with suppress(RecursionError):
-            return json.dumps(changed(rng, document)).encode()
+            return json.dumps(change_nodes(rng, document)).encode()
     if kind < 0.7:
         depth = rng.choice((10, 1000, 100_000))
         return b"[" * depth + b"]" * rng.choice((0, depth))
-    return damaged_text(rng, data, other) if kind < 0.85 else damaged(rng, data, other)
+    return damaged_text(rng, data, other) if kind < 0.85 else damage_bytes(rng, data, other)
 
 
-def changed(rng: random.Random, document: Any) -> Any:
+def change_nodes(rng: random.Random, document: Any) -> Any:
     """Return a document with some nodes replaced, removed, renamed, doubled or nested."""
     document = copy.deepcopy(document)
     for _ in range(rng.choice((1, 1, 2, 4))):
@@ -155,7 +155,7 @@ _LINE_KINDS = tuple(map(_line, (
 def damaged_table(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return a table of text with cells, rows, separators, quotes or bytes changed."""
     if rng.random() < 0.2:
-        return damaged(rng, data, other)
+        return damage_bytes(rng, data, other)
     if rng.random() < 0.15:
         return damaged_text(rng, data, other)
     rows = [line.split(",") for line in data.decode("utf-8", "replace").splitlines()] or [[""]]

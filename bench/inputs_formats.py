@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from inputs_arrays import damaged_npz, damaged_parquet
 from inputs_bag_files import bag_of_views, damaged_mcap, damaged_sqlite
-from inputs_bytes import damaged
+from inputs_bytes import damage_bytes
 from inputs_documents import damaged_json, damaged_table, damaged_yaml
 from inputs_outcome import REFUSED, RESULT, Outcome, Play, call
 from inputs_tables import (
@@ -59,7 +59,7 @@ class Format:
     play: Play
 
 
-def tried(*readers: Callable[[], object]) -> Outcome:
+def try_readers(*readers: Callable[[], object]) -> Outcome:
     """Call readers; each may succeed or refuse with an error of the package."""
     refusals = []
     for reader in readers:
@@ -93,7 +93,7 @@ def _play_bag(suffix: str) -> Play:
     def play(folder: Path, data: bytes, number: int) -> Outcome:
         bag = folder / f"bag{suffix}"
         bag.write_bytes(data)
-        outcome = tried(lambda: read_record([bag]), lambda: read_record([bag], strict=False),
+        outcome = try_readers(lambda: read_record([bag]), lambda: read_record([bag], strict=False),
                         lambda: sum(1 for _ in iterate([bag])))  # fmt: skip
         if number % EVERY == 0:
             return call([("predict", "identify", "diagnose")[number // EVERY % 3],
@@ -116,7 +116,7 @@ def _play_metadata(folder: Path, data: bytes, number: int) -> Outcome:
     (bag / "metadata.yaml").write_bytes(data)
     (bag / "bag.mcap").write_bytes(_bag(".mcap"))
     (bag / f"bag{number}.mcap").write_bytes(_bag(".mcap"))
-    return tried(lambda: read_record([bag]), lambda: read_record([bag], strict=False))
+    return try_readers(lambda: read_record([bag]), lambda: read_record([bag], strict=False))
 
 
 def _rigs() -> list[bytes]:
@@ -130,7 +130,7 @@ EXPORTED = ("mjcf", "urdf", "sdf", "isaac", "bam")
 def _play_rig(folder: Path, data: bytes, number: int) -> Outcome:
     rig = folder / "rig.yaml"
     rig.write_bytes(data)
-    outcome = tried(lambda: load_rig(rig))
+    outcome = try_readers(lambda: load_rig(rig))
     if outcome.kind != RESULT and number % EVERY:
         return outcome
     bag = folder / f"rig{number}.mcap"
@@ -150,7 +150,7 @@ def _units() -> list[bytes]:
 def _play_units(folder: Path, data: bytes, number: int) -> Outcome:
     file = folder / "units.yaml"
     file.write_bytes(data)
-    outcome = tried(lambda: catalogue(file))
+    outcome = try_readers(lambda: catalogue(file))
     if outcome.kind == RESULT and number % EVERY == 0:
         return call(["design", "--catalogue", str(file), "--out", str(folder / "design")])
     return outcome
@@ -164,7 +164,7 @@ BOMB = (b'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' +
 
 
 def _play_page(folder: Path, data: bytes, number: int) -> Outcome:
-    return tried(lambda: parse(data).wrench((1, 2, 3, 4, 5, 6)))
+    return try_readers(lambda: parse(data).wrench((1, 2, 3, 4, 5, 6)))
 
 
 def _noise() -> list[bytes]:
@@ -176,7 +176,7 @@ def _noise() -> list[bytes]:
 def _play_noise(folder: Path, data: bytes, number: int) -> Outcome:
     file = folder / "identification.json"
     file.write_bytes(data)
-    return tried(lambda: noise_from(load_rig(RIG), str(file)))
+    return try_readers(lambda: noise_from(load_rig(RIG), str(file)))
 
 
 def _settings() -> list[bytes]:
@@ -187,7 +187,7 @@ def _settings() -> list[bytes]:
 
 def _play_setting(folder: Path, data: bytes, number: int) -> Outcome:
     text = data.decode("utf-8", "surrogateescape").replace("\x00", "")
-    outcome = tried(lambda: parse_effect(text))
+    outcome = try_readers(lambda: parse_effect(text))
     if outcome.kind != RESULT:
         return outcome
     return call(
@@ -223,7 +223,7 @@ def _damaged_setting(rng: random.Random, data: bytes, other: bytes) -> bytes:
         return "=".join(parts).encode()
     if kind == 1:
         return (text + "," + text.partition(":")[2]).encode()
-    return damaged(rng, data, other)
+    return damage_bytes(rng, data, other)
 
 
 FORMATS = (
@@ -242,16 +242,16 @@ FORMATS = (
         damaged_yaml,
         play_import("run.csv", True),
     ),
-    Format("structs.mat", struct_files, damaged, play_import("run.mat", False, STRUCTS)),
+    Format("structs.mat", struct_files, damage_bytes, play_import("run.mat", False, STRUCTS)),
     Format("npz", npz_files, damaged_npz, play_import("run.npz", False, LISTED)),
     Format("parquet", parquet_files, damaged_parquet, play_import("run.parquet", False, LISTED)),
     Format("json.table", json_tables, damaged_json, play_import("run.json", False, LISTED)),
     Format("csv", lambda: [CSV.encode()], damaged_table, play_import("run.csv", False)),
     Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damaged_table, play_import("run.tsv", False)),
     Format("csv.gz", lambda: [gzip.compress(CSV.encode())], damaged_gzip, play_import("run.csv.gz", False)),
-    Format("mat", mat_files, damaged, play_import("run.mat", False)),
+    Format("mat", mat_files, damage_bytes, play_import("run.mat", False)),
     Format("catalogue", _units, damaged_yaml, _play_units),
-    Format("calibration", lambda: [PAGE, BOMB], damaged, _play_page),
+    Format("calibration", lambda: [PAGE, BOMB], damage_bytes, _play_page),
     Format("json", _noise, damaged_json, _play_noise),
     Format("effect", _settings, _damaged_setting, _play_setting),
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from inputs_bags import CHANNELS, COMMANDS, SENSORS, STAMPS, bag_of
-from inputs_cover import Case, covering
+from inputs_cover import Case, cover_pairs
 from inputs_outcome import Outcome, call, limit_child
 from inputs_server import Work
 
@@ -65,7 +65,7 @@ def bag_cases(seed: int, quick: bool) -> tuple[list[Case], str]:
         if not (r in rigid and "deflection" in c)
     )
     must = [{"rig": r, "verb": v, "channels": c, **whole} for r, v, c in triples]
-    cases, pairs = covering(factors, rng, must)
+    cases, pairs = cover_pairs(factors, rng, must)
     said = f"each of {len(must)} rigs × verbs × subsets of channels; {pairs} pairs of {len(factors)} factors"
     rng.shuffle(cases)
     if quick:
@@ -103,14 +103,14 @@ def other_cases(seed: int, quick: bool) -> list[Case]:
     """Return the cases of the verbs that take a rig, numbers, or a table."""
     rng = random.Random(seed)
     names = rigs()
-    simulate = covering(
+    simulate = cover_pairs(
         {"rig": names, "verb": ["simulate"], "excitation": sorted(KINDS),
          "rate": [280.0, 1.0, 10.0, 1000.0, 2000.0],
          "duration": [10.0, 2.0, 0.001, 60.0], "effect": [None, *catalogue()],
          "amplitude": [20.0, 0.0, -5.0, 1e-300],
          "period": [4.0, 0.001, 10.0, 1e9], "low": [0.05, 1e-9, 100.0], "high": [100.0, 1e-3, 1e9],
          "no_noise": [False, True]}, rng)[0]  # fmt: skip
-    control = covering({"verb": ["control"], "rig": names, "rate": [280.0, 1000.0, 50.0, 2000.0, 10000.0],
+    control = cover_pairs({"verb": ["control"], "rig": names, "rate": [280.0, 1000.0, 50.0, 2000.0, 10000.0],
                         "free": [None, *names]}, rng)[0]  # fmt: skip
     export = [{"verb": "export", "rig": r} for r in names]
     odd = [1e-300, 1e-3, 1.0, 1e3, 1e300, 0.0, -1.0, "nan", "inf"]
@@ -150,7 +150,7 @@ _ARGUMENTS: Mapping[str, Callable[[Case, Path], list[str]]] = {
 }
 
 
-def described(case: Mapping[str, Any]) -> str:
+def describe(case: Mapping[str, Any]) -> str:
     """Return a case in one line, in a form that `--only` can search."""
     texts = {k: "+".join(v) or "command alone" if k == "channels" else v for k, v in case.items()}
     return " ".join(f"{k}={v}" for k, v in texts.items())
@@ -159,5 +159,5 @@ def described(case: Mapping[str, Any]) -> str:
 def works(cases: Sequence[Case], play: Callable[[Case, Path], Outcome], letter: str) -> Iterator[Work]:
     """Return name and work of each case."""
     for number, case in enumerate(cases):
-        name = f"{letter}{number:04d} {described(case)}"
+        name = f"{letter}{number:04d} {describe(case)}"
         yield name, lambda folder, case=case: play(case, folder)

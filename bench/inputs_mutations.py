@@ -19,7 +19,7 @@ from pathlib import Path
 from types import FrameType
 
 from inputs_formats import FORMATS, SHARES, Format
-from inputs_outcome import Outcome, ended, limit_memory, limit_seconds, more_memory, place
+from inputs_outcome import Outcome, limit_memory, limit_seconds, more_memory, outcome_of_end, place
 
 BATCH = 50
 SLOW = 20
@@ -121,13 +121,13 @@ def run(seed: int, count: int, folder: Path, jobs: int, only: list[str]) -> Iter
             form, number, after = waiting.pop(0)
             inside = folder / f"{form.name}-{number}"
             inside.mkdir(exist_ok=True)
-            running[_forked(form, number, inside, after)] = (form, number, inside)
+            running[_fork(form, number, inside, after)] = (form, number, inside)
         pid, status, usage = os.wait4(-1, 0)
         form, number, inside = running.pop(pid)
         done = list(_lines(inside / "log"))
         unfinished = [k for k, outcome in done if outcome is None]
         if unfinished:
-            _finish(inside / "log", ended(status, usage))
+            _finish(inside / "log", outcome_of_end(status, usage))
             (inside / f"fault-{unfinished[-1]}").write_bytes((inside / "last").read_bytes())
             waiting.insert(0, (form, number, unfinished[-1]))
             continue
@@ -139,7 +139,7 @@ def run(seed: int, count: int, folder: Path, jobs: int, only: list[str]) -> Iter
                 yield f"{form.name} {number} {k} ({inside}/fault-{k})", outcome
 
 
-def _forked(form: Format, seed: int, inside: Path, after: int) -> int:
+def _fork(form: Format, seed: int, inside: Path, after: int) -> int:
     pid = os.fork()
     if pid:
         return pid

@@ -84,7 +84,7 @@ def call(arguments: list[str]) -> Outcome:
         if issubclass(category, RuntimeWarning):
             warned.append(f"{_at(traceback.extract_stack()) or f'{_short(filename)}:{lineno}'} {message}")
 
-    with warnings.catch_warnings(), captured() as (out, err):
+    with warnings.catch_warnings(), capture() as (out, err):
         warnings.simplefilter("always")
         warnings.showwarning = note
         try:
@@ -104,7 +104,7 @@ def call(arguments: list[str]) -> Outcome:
 
 
 @contextlib.contextmanager
-def captured() -> Iterator[tuple[int, int]]:
+def capture() -> Iterator[tuple[int, int]]:
     """Redirect stdout and stderr to files, for libraries in C too; yield the descriptors of the files."""
     kept, files = [os.dup(1), os.dup(2)], [os.memfd_create("out"), os.memfd_create("err")]
     sys.stdout.flush()
@@ -182,7 +182,7 @@ def _pattern(message: str) -> str:
     return re.sub(r"\b[0-9][0-9a-fx.e+-]*|'[^']*'", "#", message)[:160]
 
 
-def forked(work: Callable[[], Outcome], answer: Path) -> int:
+def fork(work: Callable[[], Outcome], answer: Path) -> int:
     """Start a child that writes the outcome of `work` to a file; return its process id."""
     sys.stdout.flush()
     sys.stderr.flush()
@@ -204,20 +204,20 @@ def forked(work: Callable[[], Outcome], answer: Path) -> int:
         os._exit(status)
 
 
-def collected(status: int, usage: resource.struct_rusage, answer: Path, late: bool) -> Outcome:
+def collect(status: int, usage: resource.struct_rusage, answer: Path, late: bool) -> Outcome:
     """Return the outcome that a child has left in its file."""
     if late:
         return Outcome("time-out", "neither done nor at work")
     try:
         outcome = Outcome(**json.loads(answer.read_text(encoding="utf-8")))
     except (FileNotFoundError, ValueError):  # it ended before or while it answered
-        return ended(status, usage)
+        return outcome_of_end(status, usage)
     outcome.seconds = usage.ru_utime + usage.ru_stime
     outcome.megabytes = usage.ru_maxrss / 1024
     return outcome
 
 
-def ended(status: int, usage: resource.struct_rusage) -> Outcome:
+def outcome_of_end(status: int, usage: resource.struct_rusage) -> Outcome:
     """Return the outcome of a child that ended without an answer."""
     outcome = Outcome("crash", f"ended with status {os.waitstatus_to_exitcode(status)} without an answer")
     if os.WIFSIGNALED(status):

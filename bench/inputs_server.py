@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from inputs_outcome import Outcome, call, collected, forked
+from inputs_outcome import Outcome, call, collect, fork
 
 from rsea_ros.effects.catalogue import catalogue
 
@@ -61,30 +61,30 @@ def serve(work: Iterable[Work], folder: Path, jobs: int, wall: float = WALL) -> 
     running: dict[int, tuple[str, Path, float]] = {}
     for number, (name, one) in enumerate(work):
         while len(running) >= jobs:
-            yield from _ended(running, wall)
+            yield from _end(running, wall)
         inside = folder / str(number)
         inside.mkdir()
-        pid = forked(lambda one=one, inside=inside: one(inside), folder / f"{number}.json")
+        pid = fork(lambda one=one, inside=inside: one(inside), folder / f"{number}.json")
         running[pid] = (name, folder / f"{number}.json", time.monotonic())
     while running:
-        yield from _ended(running, wall)
+        yield from _end(running, wall)
 
 
-def _ended(running: dict[int, tuple[str, Path, float]], wall: float) -> Iterator[tuple[str, Outcome]]:
+def _end(running: dict[int, tuple[str, Path, float]], wall: float) -> Iterator[tuple[str, Outcome]]:
     """Wait until at least one child ends, or a late one is ended."""
     while True:
         for pid, (name, answer, since) in list(running.items()):
             late = time.monotonic() - since > wall
             if late:
                 os.kill(pid, signal.SIGKILL)
-            done, status, usage = _waited(pid, block=late)
+            done, status, usage = _wait(pid, block=late)
             if done:
                 del running[pid]
                 shutil.rmtree(answer.with_suffix(""), ignore_errors=True)
-                yield name, collected(status, usage, answer, late)
+                yield name, collect(status, usage, answer, late)
                 return
         time.sleep(0.01)
 
 
-def _waited(pid: int, block: bool) -> tuple[int, int, resource.struct_rusage]:
+def _wait(pid: int, block: bool) -> tuple[int, int, resource.struct_rusage]:
     return os.wait4(pid, 0 if block else os.WNOHANG)

@@ -9,7 +9,7 @@ import random
 from pathlib import Path
 
 import numpy as np
-from inputs_bytes import damaged
+from inputs_bytes import damage_bytes
 from inputs_documents import damaged_table
 from inputs_outcome import Outcome, Play, call
 
@@ -119,7 +119,7 @@ def damaged_gzip(rng: random.Random, data: bytes, other: bytes) -> bytes:
     try:
         plain = gzip.decompress(data)
     except Exception:
-        return damaged(rng, data, other)
+        return damage_bytes(rng, data, other)
     if rng.random() < 0.02:
         return gzip.compress(bytes(400_000_000), compresslevel=1)
-    return gzip.compress(damaged_table(rng, plain)) if rng.random() < 0.5 else damaged(rng, data, other)
+    return gzip.compress(damaged_table(rng, plain)) if rng.random() < 0.5 else damage_bytes(rng, data, other)

@@ -33,12 +33,12 @@ CLOCKS = {"ft": "ft", "command": "command", "position": "joint", "velocity": "jo
 Spoil = Callable[[Record, np.random.Generator], Record]
 
 
-def unspoiled(record: Record, rng: np.random.Generator) -> Record:
+def keep_record(record: Record, rng: np.random.Generator) -> Record:
     """Return the record as it is."""
     return record
 
 
-def coloured(record: Record, rng: np.random.Generator) -> Record:
+def with_coloured_noise(record: Record, rng: np.random.Generator) -> Record:
     """Return the record with noise of first order, 0.9 from sample to sample, on F/T torque and position."""
     changed = {}
     for name, rms in COLOURED.items():
@@ -48,7 +48,7 @@ def coloured(record: Record, rng: np.random.Generator) -> Record:
     return record.with_channels(**changed)
 
 
-def jittered(clocks: Sequence[str], by: float = 3e-4) -> Spoil:
+def jitter(clocks: Sequence[str], by: float = 3e-4) -> Spoil:
     """Return a function that shifts every stamp of these clocks by up to `by` s."""
 
     def spoil(record: Record, rng: np.random.Generator) -> Record:
@@ -62,23 +62,23 @@ def jittered(clocks: Sequence[str], by: float = 3e-4) -> Spoil:
 
 
 SCENARIOS: dict[str, tuple[dict[str, float], Spoil]] = {
-    "white noise": ({}, unspoiled),
-    "coloured noise, AR 0.9": ({}, coloured),
-    "sensor stamps off by 0.3 ms": ({}, jittered(("ft", "joint"))),
-    "command stamps off by 0.3 ms": ({}, jittered(("command",))),
-    "all stamps off by 0.3 ms": ({}, jittered(("command", "ft", "joint"))),
-    "Coulomb friction 0.02 N·m": ({"coulomb": 0.02}, unspoiled),
-    "Coulomb friction 0.1 N·m": ({"coulomb": 0.1}, unspoiled),
-    "Coulomb friction 0.3 N·m": ({"coulomb": 0.3}, unspoiled),
-    "motor constant 10 % off": ({"torque_gain": 1.1}, unspoiled),
-    "F/T gain 10 % off": ({"ft_gain": 1.1}, unspoiled),
-    "command delay 2 ms": ({"delay": 2e-3}, unspoiled),
+    "white noise": ({}, keep_record),
+    "coloured noise, AR 0.9": ({}, with_coloured_noise),
+    "sensor stamps off by 0.3 ms": ({}, jitter(("ft", "joint"))),
+    "command stamps off by 0.3 ms": ({}, jitter(("command",))),
+    "all stamps off by 0.3 ms": ({}, jitter(("command", "ft", "joint"))),
+    "Coulomb friction 0.02 N·m": ({"coulomb": 0.02}, keep_record),
+    "Coulomb friction 0.1 N·m": ({"coulomb": 0.1}, keep_record),
+    "Coulomb friction 0.3 N·m": ({"coulomb": 0.3}, keep_record),
+    "motor constant 10 % off": ({"torque_gain": 1.1}, keep_record),
+    "F/T gain 10 % off": ({"ft_gain": 1.1}, keep_record),
+    "command delay 2 ms": ({"delay": 2e-3}, keep_record),
 }
 
 
 def bench_of(seed: int, hidden: dict[str, float]) -> Bench:
     """Return the bench of a seed with something hidden in it."""
-    return drawn_bench(np.random.default_rng(seed)).having(**hidden)
+    return drawn_bench(np.random.default_rng(seed)).with_values(**hidden)
 
 
 def outcome(name: str, seed: int, duration: float) -> tuple[Identification, dict[str, float]]:

@@ -28,7 +28,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import Score, score
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.effects.catalogue import lent
+from rsea_ros.effects.catalogue import lend
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import simulate_cases
 from rsea_ros.laws.fitting import gain_of
@@ -46,12 +46,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(table(read_log(args.log)))
         return 0
     if args.group == "time":
-        return _timed(args.duration or 160.0)
+        return _time(args.duration or 160.0)
     done = {entry["name"] for entry in read_log(args.log)}
     for case in cases(args.clean):
         if case.group != args.group or case.name in done or args.select not in case.name:
             continue
-        row = _kept(case, args.duration or 30.0)
+        row = _keep(case, args.duration or 30.0)
         append_to_log(args.log, row)
         print(_line(row), flush=True)
     return 0
@@ -74,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _kept(case: LawCase, duration: float) -> dict[str, object]:
+def _keep(case: LawCase, duration: float) -> dict[str, object]:
     """Return the outcome of a case, or that it broke: one must not stop the others."""
     try:
         return outcome(case, duration)
@@ -112,14 +112,14 @@ def fresh_gains(
 ) -> tuple[float, float]:
     """Return the gains on the fresh record of the true effect, fitted, and of the law."""
     assert case.effect is not None
-    with lent(case.effect, *(w.effect for w in result.laws)):
+    with lend(case.effect, *(w.effect for w in result.laws)):
         true = rig.with_effects(EffectSetting(case.effect.name, dict(case.parameters)))
-        base, best, law = (_fitted(r, record) for r in (rig, true, result.rig if result.laws else rig))
+        base, best, law = (_fit(r, record) for r in (rig, true, result.rig if result.laws else rig))
         scores = [_score(r, fresh, rig) for r in (base, best, law)]
     return gain_of(scores[0], scores[1])[0], gain_of(scores[0], scores[2])[0]
 
 
-def _fitted(rig: Rig, record: Record) -> tuple[Rig, object]:
+def _fit(rig: Rig, record: Record) -> tuple[Rig, object]:
     """Return a rig refitted to a record with its effects and clocks: `identify` with the law."""
     from rsea_ros.identification.unknowns import apply
 
@@ -136,7 +136,7 @@ def _score(fitted: tuple[Rig, object], fresh: Record, rig: Rig) -> Score:
     return score(replace(problem, rig=rig), problem.cases, outputs, DEFAULT.blocks)
 
 
-def _timed(duration: float) -> int:
+def _time(duration: float) -> int:
     case = next(c for c in cases(0) if c.name == "stribeck_friction")
     record, _ = case.records(duration)
     start, used = time.perf_counter(), time.process_time()

@@ -22,7 +22,7 @@ from independent.bench import drawn_bench, record_run
 from independent.excitations import chirp_noise, odd_multisine
 
 from rsea_ros.effects import signal_table as st
-from rsea_ros.effects.catalogue import catalogue, lent
+from rsea_ros.effects.catalogue import catalogue, lend
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -52,16 +52,16 @@ class LawCase:
         """Return a record to learn from and one that judges."""
         if self.values is not None:
             rng = np.random.default_rng(self.seed)
-            bench = drawn_bench(rng).having(**self.values)
+            bench = drawn_bench(rng).with_values(**self.values)
             return record_run(bench, 10 * self.seed, "chirp_noise", duration), record_run(
                 bench, 10 * self.seed + 1, "multisine", duration
             )
-        rig = _moved(load_rig(self.rig), self.seed)
+        rig = _move(load_rig(self.rig), self.seed)
         hidden = (
             rig.with_effects(EffectSetting(self.effect.name, dict(self.parameters))) if self.effect else rig
         )
         made = []
-        with lent(*([self.effect] if self.effect else [])):
+        with lend(*([self.effect] if self.effect else [])):
             for k, excitation in enumerate((chirp_noise, odd_multisine)):
                 command = excitation(duration, np.random.default_rng([self.seed, k]))
                 channel = Channel(np.arange(len(command)) / RATE, command)
@@ -69,7 +69,7 @@ class LawCase:
         return made[0], made[1]
 
 
-def _moved(rig: Rig, seed: int) -> Rig:
+def _move(rig: Rig, seed: int) -> Rig:
     """Return a rig whose inertia, damping and stiffness differ from its file."""
     rng = np.random.default_rng(seed)
     spans = {"rotor.reflected_inertia": 0.15, "rotor.reflected_damping": 0.1, "spring.stiffness": 0.03}
@@ -131,7 +131,7 @@ def _soft(s, p, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _warming(s, p, x):  # type: ignore[no-untyped-def]
+def _warm(s, p, x):  # type: ignore[no-untyped-def]
     x[0] += (s[st.COMMAND] * s[st.COMMAND] - x[0]) * s[st.STEP] / p[1]
     s[st.COMMAND] *= 1.0 - p[0] * x[0]
 
@@ -164,7 +164,7 @@ WRITTEN = (
              coefficient=("N m s^2/rad^2", 20.0)),
      ("speed",)),
     (_effect("soft_saturation", Port.MOTOR, _soft, (), 0, limit=("N m", 40.0)), ("command",)),
-    (_effect("warming_motor", Port.MOTOR, _warming, (), 1, loss=("1/(N m)^2", 6e-4), heating_time=("s", 8.0)),
+    (_effect("warming_motor", Port.MOTOR, _warm, (), 1, loss=("1/(N m)^2", 6e-4), heating_time=("s", 8.0)),
      ("command and temperature",)),
     (_effect("cable_drag", Port.GEAR, _cable, (st.GEAR_ANGLE,), 2, torque=("N m", 1.5), angle=("rad", 1e-3),
              bend=("N m/rad^2", 3000.0)),

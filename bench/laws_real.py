@@ -73,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     read, rig_name, is_diagnosed = MACHINES[args.machine]
     record, rig = read(), load_rig(rig_name)
-    named, rig = _named(record, rig) if is_diagnosed else ([e.name for e in rig.effects], rig)
+    named, rig = _name_causes(record, rig) if is_diagnosed else ([e.name for e in rig.effects], rig)
     result = learn([record], rig)
     write_law(result, args.out / args.machine)
     (args.out / args.machine / "named.json").write_text(json.dumps(named), encoding="utf-8")
@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _named(record: Record, rig: Rig) -> tuple[list[str], Rig]:
+def _name_causes(record: Record, rig: Rig) -> tuple[list[str], Rig]:
     """Return the causes that a diagnosis names, and the rig with them."""
     result = diagnose([record], rig)
     return [c.name for c in result.causes], replace(result.extended_rig, name=rig.name)

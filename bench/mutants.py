@@ -70,7 +70,7 @@ class Played:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the mutants and print the table; status 1 where one got through without a reason."""
     args = _arguments(argv)
-    known = _resumed(args.resume)
+    known = _resume(args.resume)
     log = args.log.open("a") if args.log else None
     explained = yaml.safe_load(EXPLAINED.read_text()) or {}
     failures, begun = 0, time.monotonic()
@@ -148,7 +148,7 @@ def _reasons(places: Mapping[str, Mapping[str, str]]) -> Reasons:
     return {(where, text): reason for where, said in places.items() for text, reason in said.items()}
 
 
-def _resumed(path: Path | None) -> dict[tuple[str, ...], str]:
+def _resume(path: Path | None) -> dict[tuple[str, ...], str]:
     entries = [] if path is None else read_log(path)
     return {tuple(each["key"]): each["outcome"] for each in entries}
 

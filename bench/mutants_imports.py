@@ -17,8 +17,8 @@ def warm(target: str, tests: Iterable[Path]) -> None:
     names = set()
     for test in tests:
         names |= set(_imports(test))
-    for name in sorted(names | set().union(*(_reached(n) for n in names))):
-        if target not in {name, *_reached(name)} and not name.startswith("test"):
+    for name in sorted(names | set().union(*(_reachable(n) for n in names))):
+        if target not in {name, *_reachable(name)} and not name.startswith("test"):
             try:
                 import_module(name)
             except ImportError:  # a helper beside the tests
@@ -26,7 +26,7 @@ def warm(target: str, tests: Iterable[Path]) -> None:
 
 
 @cache
-def _reached(name: str) -> frozenset[str]:
+def _reachable(name: str) -> frozenset[str]:
     """Return the modules of this repository that a module imports, directly or not."""
     reached: set[str] = set()
     waiting = [name]

@@ -76,7 +76,7 @@ def mutants_of(source: str) -> list[Mutant]:
     return sorted(listed, key=lambda m: (m.line, m.place, m.choice))
 
 
-def mutated(source: str, mutant: Mutant) -> ast.Module:
+def mutate(source: str, mutant: Mutant) -> ast.Module:
     """Return the syntax tree of a module with one fault in it."""
     tree = ast.parse(source)
     node = list(ast.walk(tree))[mutant.place]
@@ -97,21 +97,21 @@ def replacements(node: ast.expr | ast.stmt) -> Iterator[ast.expr | ast.stmt]:
         case ast.Compare():
             for k, op in enumerate(node.ops):
                 for other in COMPARISONS[type(op)]:
-                    yield _changed(node, ops=[*node.ops[:k], other(), *node.ops[k + 1 :]])
+                    yield _change(node, ops=[*node.ops[:k], other(), *node.ops[k + 1 :]])
         case ast.BoolOp():
-            yield _changed(node, op=ast.Or() if isinstance(node.op, ast.And) else ast.And())
+            yield _change(node, op=ast.Or() if isinstance(node.op, ast.And) else ast.And())
         case ast.BinOp() if type(node.op) in OPERATORS:
-            yield _changed(node, op=OPERATORS[type(node.op)]())
+            yield _change(node, op=OPERATORS[type(node.op)]())
         case ast.UnaryOp(op=ast.Not() | ast.USub()):
             yield node.operand
         case ast.Constant():
             yield from _constants(node.value)
         case ast.Call(func=ast.Name(id=name)) if name in CALLS:
-            yield _changed(node, func=_changed(node.func, id=CALLS[name]))
+            yield _change(node, func=_change(node.func, id=CALLS[name]))
         case ast.Call(func=ast.Attribute(attr=name)) if name in CALLS:
-            yield _changed(node, func=_changed(node.func, attr=CALLS[name]))
+            yield _change(node, func=_change(node.func, attr=CALLS[name]))
         case ast.IfExp() | ast.If() | ast.While():
-            yield _changed(node, test=ast.UnaryOp(ast.Not(), node.test))
+            yield _change(node, test=ast.UnaryOp(ast.Not(), node.test))
         case ast.ListComp() | ast.SetComp() | ast.GeneratorExp() | ast.DictComp():
             yield from _filters(node)
         case _:
@@ -148,8 +148,8 @@ def _filters(node: ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp)
     for k, loop in enumerate(node.generators):
         for i, test in enumerate(loop.ifs):
             ifs = [*loop.ifs[:i], ast.UnaryOp(ast.Not(), test), *loop.ifs[i + 1 :]]
-            changed = _changed(loop, ifs=ifs)
-            yield _changed(node, generators=[*node.generators[:k], changed, *node.generators[k + 1 :]])
+            changed = _change(loop, ifs=ifs)
+            yield _change(node, generators=[*node.generators[:k], changed, *node.generators[k + 1 :]])
 
 
 def _quiet(tree: ast.Module) -> Iterator[ast.AST]:
@@ -201,7 +201,7 @@ def _line(node: ast.AST) -> str:
     return ast.unparse(ast.fix_missing_locations(node)).split("\n", 1)[0]
 
 
-def _changed(node: ast.AST, **fields: object) -> ast.AST:
+def _change(node: ast.AST, **fields: object) -> ast.AST:
     new = copy.copy(node)
     for name, value in fields.items():
         setattr(new, name, value)

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mutants_imports import ROOT, warm
-from mutants_operators import Mutant, mutated
+from mutants_operators import Mutant, mutate
 
 KILLED, SURVIVED, TIMEOUT = "killed", "survived", "timeout"
 MEMORY = 8 * 2**30
@@ -71,7 +71,7 @@ def _serve(target: str, tests: Sequence[str], mutants: Sequence[Mutant], outlet:
         outcome, cpu, wall = _fork(lambda: _play(name, path, ast.parse(source), files), 600.0, 600.0)
         os.write(outlet, f"baseline {outcome} {cpu}\n".encode())
         for k, mutant in enumerate(mutants if outcome == SURVIVED else ()):
-            tree = mutated(source, mutant)
+            tree = mutate(source, mutant)
             outcome, _, took = _fork(
                 lambda tree=tree: _play(name, path, tree, files), 3.0 * cpu + 3.0, 5.0 * wall + 15.0
             )

@@ -25,7 +25,7 @@ from bench.observer_flag import noise, sines
 from bench.observer_flag_error import flag
 from bench.observer_tight import tight
 from bench.observer_timing import timing
-from bench.sections import chosen, parser_of
+from bench.sections import choose, parser_of
 
 SECTIONS: dict[str, Callable[[argparse.Namespace], Iterable[str]]] = {
     "rigs": rigs, "effects": effects, "walk": walk, "sines": sines, "noise": noise, "flag": flag,
@@ -40,7 +40,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0, help="of each run of the node")
     parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="of `timing`, Hz")
     parser.add_argument("--priority", type=int, nargs="+", default=[0, 80], help="of `timing`; 0: none")
-    args, sections = chosen(parser, SECTIONS)
+    args, sections = choose(parser, SECTIONS)
     for name, section in sections:
         print(f"== {name}")
         for line in section(args):

@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.observer_truth import Truth, true_run
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.observer import Noise, Observer, noise_of, observe
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
@@ -53,10 +53,12 @@ def rigs(args: argparse.Namespace) -> Iterator[str]:
         rig = load_rig(name)
         truth = true_run(rig, command(), RATE, seed=2)
         size = float(np.sqrt(np.mean(truth.proximal**2)))
-        own, other = errors(rig, truth), errors(lumped(rig), truth)
-        line = f"{name:24}{size:11.3f}{own[0]:14.4f}{own[1]:9.4f}{other[0]:12.3f}{other[1]:9.3f}"
+        unlumped, other = errors(rig, truth), errors(lumped_rig(rig), truth)
+        line = f"{name:24}{size:11.3f}{unlumped[0]:14.4f}{unlumped[1]:9.4f}{other[0]:12.3f}{other[1]:9.3f}"
         if "ft" in rig.sensors:
-            blind = replace(lumped(rig), sensors={n: s for n, s in rig.sensors.items() if n != "position"})
+            blind = replace(
+                lumped_rig(rig), sensors={n: s for n, s in rig.sensors.items() if n != "position"}
+            )
             by_ft = errors(blind, truth)
             line += f"{by_ft[0]:12.3f}{by_ft[1]:9.3f}"
         yield line

@@ -19,7 +19,7 @@ PARTS = (0.1, 0.5, 0.9, 0.95, 1.05, 1.1, 1.5, 2.0)
 CHUNK = 280 * 600
 
 
-def settled(rig: Rig, rate: float) -> ErrorModel:
+def settle(rig: Rig, rate: float) -> ErrorModel:
     """Return the estimates of an observer from noise alone, once it has run for a second."""
     observer = Observer(rig)
     for k in range(round(rate)):
@@ -35,7 +35,7 @@ def sines(args: argparse.Namespace) -> Iterator[str]:
     for name in ("paper_high_impedance", "prototype_knee"):
         for rate in (280.0, 1000.0):
             rig = load_rig(name)
-            error = settled(rig, rate)
+            error = settle(rig, rate)
             cells = [_worst(rig, rate, error, part) for part in PARTS]
             yield f"{name + f', {rate:g} Hz':34}" + "".join(f"{cell:7.2f}" for cell in cells)
 

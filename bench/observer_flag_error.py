@@ -112,8 +112,8 @@ def outcome(rig: Rig, command: FloatArray, rate: float, settings: ErrorSettings,
     t, rows = observe(Observer(model), truth.record)
     flag = ErrorFlag(model, settings)
     said = np.array([flag.take(s, TorqueEstimate._make(row)) for s, row in zip(t, rows, strict=True)])
-    share = windowed(truth.proximal - truth.distal, rate, settings.window)
-    share /= np.maximum(windowed(truth.distal, rate, settings.window), 1e-9)
+    share = window_rms(truth.proximal - truth.distal, rate, settings.window)
+    share /= np.maximum(window_rms(truth.distal, rate, settings.window), 1e-9)
     keep = np.arange(len(share)) > SETTLE * rate
     clear = keep & (np.abs(share / settings.tolerance - 1.0) > BAND)
     right = np.where(share <= settings.tolerance, PURE, BEYOND)
@@ -124,7 +124,7 @@ def outcome(rig: Rig, command: FloatArray, rate: float, settings: ErrorSettings,
     return Outcome(median, judged, agree, changes, longest(wrong) / rate)
 
 
-def windowed(y: FloatArray, rate: float, window: float) -> FloatArray:
+def window_rms(y: FloatArray, rate: float, window: float) -> FloatArray:
     """Return the RMS over the last seconds at every sample."""
     n = round(window * rate)
     total = np.concatenate([[0.0], np.cumsum(y**2)])

@@ -27,7 +27,7 @@ def main() -> int:
     rows: list[tuple[int, ...]] = []
     spent = [0, 0]
 
-    def noted(kind: Any, name: str) -> None:
+    def note(kind: Any, name: str) -> None:
         original = getattr(kind, name)
 
         def take(*args: Any, **named: Any) -> Any:
@@ -41,7 +41,7 @@ def main() -> int:
 
     work = model.ModelNode._work
 
-    def woken(self: model.ModelNode) -> None:
+    def wake(self: model.ModelNode) -> None:
         spent[:], before = [0, 0], self._assess.count
         wall, cpu = time.perf_counter_ns(), time.thread_time_ns()
         work(self)
@@ -49,10 +49,10 @@ def main() -> int:
         if self._assess.count == before + 1:
             rows.append((time.monotonic_ns(), wall, cpu, *spent))
 
-    noted(Observer, "_take")
-    noted(PureTorque, "take")
-    noted(ErrorFlag, "take")
-    model.ModelNode._work = woken  # type: ignore[method-assign]
+    note(Observer, "_take")
+    note(PureTorque, "take")
+    note(ErrorFlag, "take")
+    model.ModelNode._work = wake  # type: ignore[method-assign]
     atexit.register(lambda: np.save(os.environ[MARK], np.array(rows, dtype=np.int64).reshape(-1, 5)))
     return model.main()
 

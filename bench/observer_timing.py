@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.bare_loop import BareLoop, permitted
+from bench.bare_loop import BareLoop, may_have
 from bench.observer_node import MARK
 from bench.reception import Reception
 from msg_adapters.ros import JointState, WrenchStamped
@@ -37,7 +37,7 @@ def timing(args: argparse.Namespace) -> Iterator[str]:
     os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     yield f"{'what':58} {'asked':18} p50, p99"
-    for rate, priority in product(args.rate, filter(permitted, args.priority)):
+    for rate, priority in product(args.rate, filter(may_have, args.priority)):
         with tempfile.TemporaryDirectory() as folder:
             yield from _at(rate, priority, args.seconds, Path(folder))
 
@@ -72,22 +72,22 @@ def _at(rate: float, priority: int, seconds: float, folder: Path) -> Iterator[st
             node.wait()
     rows = np.load(times)
     rows = rows[(rows[:, 0] > begin) & (rows[:, 0] < end)]
-    here = f"{rate:g} Hz" + (f", FIFO {priority}: " if priority else ": ")
-    yield from _told(here, rows, estimates, wrenches, lateness, cpu / seconds)
+    setup = f"{rate:g} Hz" + (f", FIFO {priority}: " if priority else ": ")
+    yield from _report(setup, rows, estimates, wrenches, lateness, cpu / seconds)
 
 
-def _told(
-    here: str, rows: FloatArray, estimates: FloatArray, wrenches: FloatArray, lateness: FloatArray,
+def _report(
+    setup: str, rows: FloatArray, estimates: FloatArray, wrenches: FloatArray, lateness: FloatArray,
     cpu: float,
 ) -> Iterator[str]:  # fmt: skip
-    yield _line(here + "observer and flag, µs", "p99 < 60", rows[:, 3] / 1e3)
-    yield _line(here + "the same, CPU time of the thread, µs", "", rows[:, 4] / 1e3)
-    yield _line(here + "ft callback to torque_estimate published, ms", "p99 < 0.3", rows[:, 1] / 1e6)
-    yield _line(here + "the same, CPU time of the thread, ms", "", rows[:, 2] / 1e6)
-    yield _line(here + "ft stamp to torque_estimate received, ms", "p99 < 1.2 at 1 kHz", estimates)
-    yield _line(here + "ft stamp to ft itself received, ms", "", wrenches)
-    yield _line(here + "bare loop, off its period, ms", "", lateness)
-    yield f"{here + 'CPU of the model node':58} {'< 15 % at 280 Hz':18} {100.0 * cpu:.1f} % of a core"
+    yield _line(setup + "observer and flag, µs", "p99 < 60", rows[:, 3] / 1e3)
+    yield _line(setup + "the same, CPU time of the thread, µs", "", rows[:, 4] / 1e3)
+    yield _line(setup + "ft callback to torque_estimate published, ms", "p99 < 0.3", rows[:, 1] / 1e6)
+    yield _line(setup + "the same, CPU time of the thread, ms", "", rows[:, 2] / 1e6)
+    yield _line(setup + "ft stamp to torque_estimate received, ms", "p99 < 1.2 at 1 kHz", estimates)
+    yield _line(setup + "ft stamp to ft itself received, ms", "", wrenches)
+    yield _line(setup + "bare loop, off its period, ms", "", lateness)
+    yield f"{setup + 'CPU of the model node':58} {'< 15 % at 280 Hz':18} {100.0 * cpu:.1f} % of a core"
 
 
 def _line(what: str, asked: str, values: FloatArray) -> str:

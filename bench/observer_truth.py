@@ -19,7 +19,7 @@ from rsea_ros.model.drive import steps_per_sample
 from rsea_ros.model.equations import C, H, P, mechanics
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build, measure, run
-from rsea_ros.model.structure import structured
+from rsea_ros.model.structure import with_structure
 from rsea_ros.signals import Channel, FloatArray, Record
 
 
@@ -36,7 +36,7 @@ def true_run(rig: Rig, command: FloatArray, rate: float, seed: int = 0) -> Truth
     """Simulate a rig on a command (N m, one a sample) and return what was measured and what was true."""
     count = max(2, steps_per_sample(1.0 / rate))
     h, n = 1.0 / rate / count, len(command)
-    machine, changed = build(rig, h, n / rate), structured(rig)
+    machine, changed = build(rig, h, n / rate), with_structure(rig)
     placement = mechanics(changed).placement
     out, rows = np.empty((count, 4)), np.empty((n, 4))
     spring, housing, sprung = np.empty(n), np.empty(n), math.isfinite(rig["proximal_spring.stiffness"])

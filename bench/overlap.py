@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _play(args.log, args.records, args.hidden, args.max_causes)
     else:
         entries = read_log(args.log)
-        print(table(entries), scored(entries), sep="\n\n")
+        print(table(entries), score_text(entries), sep="\n\n")
     return 0
 
 
@@ -69,7 +69,7 @@ def _play(log: Path, records: int, hidden: int, most: int) -> None:
         print(entry, flush=True)
 
 
-def made(seed: int, number: int) -> tuple[Record, Mapping[str, Mapping[str, float]], str]:
+def make_record(seed: int, number: int) -> tuple[Record, Mapping[str, Mapping[str, float]], str]:
     """Return a record, the parameters of a number of effects hidden in it by name, and its kind of work."""
     rng = np.random.default_rng([12, seed])
     mechanisms = MECHANISMS if number <= len(MECHANISMS) else (*MECHANISMS, *FURTHER)
@@ -84,7 +84,7 @@ def made(seed: int, number: int) -> tuple[Record, Mapping[str, Mapping[str, floa
 
 
 def _outcome(seed: int, number: int, most: int) -> dict[str, Any]:
-    record, hidden, work = made(seed, number)
+    record, hidden, work = make_record(seed, number)
     start = time.process_time()
     result = diagnose([record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(most))
     rivals = [a.name for a in result.alternatives]
@@ -107,20 +107,20 @@ def _outcome(seed: int, number: int, most: int) -> dict[str, Any]:
 def table(entries: Sequence[Mapping[str, Any]]) -> str:
     """Return a row for each record: what is hidden in it with the status it got, and what else was said."""
     rows = [
-        f"| {e['seed']} | {e['work']} | {', '.join(_named(n, e) for n in e['hidden'])} "
-        f"| {', '.join(_named(n, e) for n in e['causes'] if n not in e['hidden'])} | {e['verdict']} |"
+        f"| {e['seed']} | {e['work']} | {', '.join(_name_causes(n, e) for n in e['hidden'])} "
+        f"| {', '.join(_name_causes(n, e) for n in e['causes'] if n not in e['hidden'])} | {e['verdict']} |"
         for e in entries
     ]
     head = "| seed | work | hidden: status | other causes: status | verdict |\n|--:|---|---|---|---|"
     return "\n".join([head, *rows])
 
 
-def _named(name: str, entry: Mapping[str, Any]) -> str:
+def _name_causes(name: str, entry: Mapping[str, Any]) -> str:
     as_rival = "rival" if name in entry["rivals"] else "missed"
     return f"{name}: {entry['causes'].get(name, as_rival)}"
 
 
-def scored(entries: Sequence[Mapping[str, Any]]) -> str:
+def score_text(entries: Sequence[Mapping[str, Any]]) -> str:
     """Return shares of hidden effects that were named and of said causes that are false."""
     hidden, named, said, false = (
         sum(len(e[k]) for e in entries) for k in ("hidden", "named", "causes", "false")

@@ -51,7 +51,7 @@ def main() -> int:
             inputs = [str(folder / w) if (folder / w).exists() else w for w in words]
             with redirect_stdout(io.StringIO()):
                 rsea([verb, *inputs, "--out", str(folder / verb)])
-            size, drawn, errors = opened(folder / verb / "report.html", browser)
+            size, drawn, errors = open_page(folder / verb / "report.html", browser)
             wrong += errors > 0 or (size > LARGEST and "3-D" not in kind)
             print(f"{kind:<16} {1e-6 * size:6.3f}  {drawn:7d}  {errors:6d}", flush=True)
     return int(wrong > 0)
@@ -64,7 +64,7 @@ def records(folder: Path) -> None:
             rsea(["simulate", RIG, "--duration", "160", *more, "--out", str(folder / name)])
 
 
-def opened(page: Path, browser: str) -> tuple[int, int, int]:
+def open_page(page: Path, browser: str) -> tuple[int, int, int]:
     """Return a page's bytes, the figures that a browser drew of it, and the lines of its console."""
     words = [browser, *FLAGS, f"--user-data-dir={page.parent / 'profile'}", page.as_uri()]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True)

@@ -21,7 +21,7 @@ sys.path.append(str(Path(__file__).resolve().parent / "peers"))
 from independent.bench import Bench, record_run
 from scipy.io import loadmat
 from scipy.signal import butter, lfilter
-from second_order import NAMES, simulated
+from second_order import NAMES, simulate_run
 
 from rsea_ros.signals import FloatArray
 
@@ -67,7 +67,7 @@ class PeerRecord:
 
 def _sea(name: str, cause: str, **hidden: float) -> PeerRecord:
     values = {"j_m": 1.08 * 0.953, "b_m": 0.93 * 23.088, "k_s": 1.02 * 1530.456, **hidden}
-    bench = Bench().having(**values)
+    bench = Bench().with_values(**values)
     plant = bench.plant
     record = record_run(bench, 11, "chirp_noise", 20.0)
     truth = {"inertia": plant.j_m + plant.j_sc, "damping": plant.b_m + plant.b_s, "stiffness": plant.k_s}
@@ -101,7 +101,7 @@ def pendulum() -> PeerRecord:
     u = np.sin(2.0 * np.pi * t[:, None] * lines + phases) @ (1.0 / np.sqrt(lines))
     u *= 1.6 / u.std()
     p = np.array([{**dict.fromkeys(NAMES, 0.0), **truth, **friction}[name] for name in NAMES])
-    q = simulated(p, np.repeat(u, FINER), 1.0 / rate / FINER, False)[FINER - 1 :: FINER]
+    q = simulate_run(p, np.repeat(u, FINER), 1.0 / rate / FINER, False)[FINER - 1 :: FINER]
     velocity = np.gradient(q, 1.0 / rate) + 0.02 * rng.normal(size=n)
     y, noise = q + 5e-4 * rng.normal(size=n), 5e-4
     name, cause, split = "pendulum, BAM's friction", "friction", 3 * n // 4

@@ -27,7 +27,7 @@ def main(arguments: Sequence[str]) -> int:
     if not DATA.is_dir():
         print(f"{DATA}: no such folder, expected the measurements of real machines", file=sys.stderr)
         return 2
-    timed = [_timed(part.scores) for part in (public_emps, public_silverbox, public_boucwen)]
+    timed = [_time(part.scores) for part in (public_emps, public_silverbox, public_boucwen)]
     rows = [_row(score, seconds) for scores, seconds in timed for score in scores]
     table = HEAD + "\n".join(rows) + "\n"
     print(table)
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str]) -> int:
     return int(any(s.error > s.asked for scores, _ in timed for s in scores))
 
 
-def _timed(run: Callable[[], list[Score]]) -> tuple[list[Score], float]:
+def _time(run: Callable[[], list[Score]]) -> tuple[list[Score], float]:
     """Return scores and the processor time that they took, s."""
     start = time.process_time()
     return run(), time.process_time() - start

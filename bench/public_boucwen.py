@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from bench.public_fit import DATA, RIGS, Score, case_of, error_from, fitted, record_of, rig_of
+from bench.public_fit import DATA, RIGS, Score, case_of, error_from, fit_rig, record_of, rig_of
 from bench.public_hdf5 import arrays
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
@@ -44,6 +44,6 @@ def _rig(record: Record) -> Rig:
     sizes = product((2.0, 10.0), (5e-4, 2e-3), (-1.0, 0.0))
     laws = [{"torque": t, "angle": a, "gamma": g} for t, a, g in sizes]
     rigs = [begun.with_effects(EffectSetting("spring_hysteresis", law)) for law in laws]
-    tried = [fitted(rig, [case_of(rig, start, SETTLED, refine=1)], iterations=15) for rig in rigs]
+    tried = [fit_rig(rig, [case_of(rig, start, SETTLED, refine=1)], iterations=15) for rig in rigs]
     best = rig_of(min(tried, key=lambda s: s.cost))
-    return rig_of(fitted(best, [case_of(best, record, SETTLED)]))
+    return rig_of(fit_rig(best, [case_of(best, record, SETTLED)]))

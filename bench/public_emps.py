@@ -18,7 +18,7 @@ from itertools import product
 import numpy as np
 from scipy.io import loadmat
 
-from bench.public_fit import DATA, RIGS, Score, case_of, error_from, fitted, record_of, rig_of
+from bench.public_fit import DATA, RIGS, Score, case_of, error_from, fit_rig, record_of, rig_of
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.prediction_errors import predict
@@ -42,10 +42,10 @@ def scores() -> list[Score]:
     train, test = (_record(name) for name in FILES)
     part = train.start + TWO_THIRDS
     first, last = train.between(train.start, part), train.between(part, np.inf)
-    length, held = min(CHOICES, key=lambda choice: _error(_fitted(first, *choice), last))
+    length, held = min(CHOICES, key=lambda choice: _error(_fit(first, *choice), last))
     law = "Coulomb, one-sided" + ("" if ALIKE in held else ", viscous by direction")
     published = "baselines from 5.17; published values of the drive 8.4 here"
-    error = _error(_fitted(train, length, held), test)
+    error = _error(_fit(train, length, held), test)
     free = Score(f"EMPS, free run ({law}; pieces of {length:g} s)", error, "mm", published, 4.9)
     none = "none alike: those above have the force as input"
     return [free, Score("EMPS, free run in its loop, targets as input", _error_in_loop(), "mm", none, np.inf)]
@@ -54,7 +54,7 @@ def scores() -> list[Score]:
 def both_ways() -> str:
     """Return what the law fitted to each whole record leaves of both, mm."""
     records = [_record(name) for name in FILES]
-    rigs = [_fitted(r, r.stop - r.start, HELD) for r in records]
+    rigs = [_fit(r, r.stop - r.start, HELD) for r in records]
     rows = [" | ".join(f"{_error(rig, r):.2f}" for r in records) for rig in rigs]
     return "\n".join(f"fitted to {name}: {row} mm" for name, row in zip(FILES, rows, strict=True))
 
@@ -73,13 +73,13 @@ def _record(name: str) -> Record:
     return record_of(force.astype(float), np.ravel(data["qm"]).astype(float), RATE)
 
 
-def _fitted(record: Record, length: float, held: set[str]) -> Rig:
+def _fit(record: Record, length: float, held: set[str]) -> Rig:
     """Return the drive fitted to pieces of a record, `length` s each."""
     rig = replace(load_rig("emps").with_effects(COULOMB, ONE_SIDED), known=frozenset(held))
     starts = np.arange(record.start, record.stop - 0.5 * length, length)
     pieces = [(record.between(t, t + length), _state(record, t)) for t in starts]
     cases = [case_of(rig, piece, 0, refine=1, initial=state) for piece, state in pieces]
-    return rig_of(fitted(rig, cases, iterations=30))
+    return rig_of(fit_rig(rig, cases, iterations=30))
 
 
 def _error(rig: Rig, record: Record) -> float:

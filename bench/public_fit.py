@@ -66,7 +66,7 @@ def case_of(
     )
 
 
-def fitted(rig: Rig, cases: Sequence[Case], iterations: int = 60) -> Solution:
+def fit_rig(rig: Rig, cases: Sequence[Case], iterations: int = 60) -> Solution:
     """Return the fit of all free values of a rig and its effects, by output error on position."""
     unknowns = tuple(u for u in unknowns_of(rig, cases) if not u.is_clock)
     return solve(Problem(tuple(cases), rig, unknowns, ("position",)), iterations=iterations)
@@ -115,11 +115,11 @@ def _initial(rig: Rig, drive: Drive, measured: FloatArray) -> tuple[float, float
     speed = np.ptp(measured) / max(drive.step * steps, 1e-9)
     state, scale = np.array([measured[0], 0.0]), np.array([1e-3 * np.ptp(measured), 1e-3 * speed])
 
-    def simulated(at: FloatArray) -> FloatArray:
+    def simulate_run(at: FloatArray) -> FloatArray:
         return simulate_drive(rig, replace(short, initial=(float(at[0]), float(at[1]))))["position"]
 
     for _ in range(6):
-        now = simulated(state)
-        slope = np.column_stack([(simulated(state + s) - now) / s.sum() for s in np.diag(scale)])
+        now = simulate_run(state)
+        slope = np.column_stack([(simulate_run(state + s) - now) / s.sum() for s in np.diag(scale)])
         state = state - np.linalg.lstsq(slope, now - measured, rcond=None)[0]
     return float(state[0]), float(state[1])

@@ -36,14 +36,14 @@ def _walk(data: bytes, entry: int, name: str) -> dict[str, tuple[int, int]]:
         return {name: _layout(data, header)}
     tree, heap = struct.unpack_from("<QQ", data, entry + 24)
     names = struct.unpack_from("<Q", data, heap + 24)[0]
-    found: dict[str, tuple[int, int]] = {}
+    members: dict[str, tuple[int, int]] = {}
     for node in _leaves(data, tree):
         for i in range(struct.unpack_from("<H", data, node + 6)[0]):
             child = node + 8 + i * _ENTRY
             start = names + struct.unpack_from("<Q", data, child)[0]
             word = data[start : data.index(b"\0", start)].decode()
-            found |= _walk(data, child, f"{name}/{word}")
-    return found
+            members |= _walk(data, child, f"{name}/{word}")
+    return members
 
 
 def _leaves(data: bytes, tree: int) -> list[int]:

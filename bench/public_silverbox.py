@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.public_fit import DATA, RIGS, Score, case_of, error_of, fitted, record_of, rig_of
+from bench.public_fit import DATA, RIGS, Score, case_of, error_of, fit_rig, record_of, rig_of
 from rsea_ros.model.rig_file import load_rig
 
 RATE = 1e7 / 2**14
@@ -28,7 +28,7 @@ def scores() -> list[Score]:
     pieces = {n: slice(*ends) for n, ends in {"train": TRAIN, **{n: t[:2] for n, t in TESTS.items()}}.items()}
     records = {n: record_of(TORQUE * u[at], ANGLE * y[at], RATE) for n, at in pieces.items()}
     rig = load_rig(RIGS / "silverbox.yaml")
-    rig = rig_of(fitted(rig, [case_of(rig, records["train"], skip=200)]))
+    rig = rig_of(fit_rig(rig, [case_of(rig, records["train"], skip=200)]))
     return [
         Score(f"silverbox, {n}", 1e3 * error_of(rig, records[n], WINDOW) / ANGLE, "mV", published, asked)
         for n, (_, _, published, asked) in TESTS.items()

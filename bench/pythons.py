@@ -31,11 +31,11 @@ def main() -> int:
     formatter = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=formatter)
     parser.add_argument("--only", nargs="+", choices=VERSIONS, default=list(VERSIONS))
-    results = [tried(version) for version in parser.parse_args().only]
+    results = [try_version(version) for version in parser.parse_args().only]
     return 1 if "failed" in results else 0
 
 
-def tried(version: str) -> str:
+def try_version(version: str) -> str:
     """Try a version, print the outcome, and return passed, failed or untried."""
     interpreter = interpreter_of(version)
     if interpreter is None:

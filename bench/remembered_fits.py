@@ -95,7 +95,7 @@ def _text(part: Any) -> str:
 
 
 @contextmanager
-def remembered() -> Iterator[None]:
+def remember_fits() -> Iterator[None]:
     """Keep fits within a with statement, wherever the package has imported them."""
     kept = Remembered()
     modules = [m for name, m in sys.modules.items() if name.startswith("rsea_ros.diagnosis")]

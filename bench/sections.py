@@ -14,7 +14,7 @@ def parser_of(text: str | None) -> argparse.ArgumentParser:
     return argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
 
 
-def chosen(
+def choose(
     parser: argparse.ArgumentParser, sections: Mapping[str, Section]
 ) -> tuple[argparse.Namespace, Iterator[tuple[str, Section]]]:
     """Return the arguments, and name and function of each section that they ask for."""

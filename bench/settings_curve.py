@@ -15,6 +15,7 @@ from diagnosis_cases import plan
 from diagnosis_outcome import Outcome, run_case
 
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.report.diagnosis.settings import value_text
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -22,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
     if args.list or args.setting is None:
         for s in DEFAULT.listed():
-            print(f"{s.name:<30}{s.value:>8g} {s.unit:<3} {s.meaning}: {s.reason}")
+            print(f"{s.name:<30}{value_text(s.value):>8} {s.unit:<3} {s.meaning}: {s.reason}")
         return 0
     plans = [p for p in plan(args.seed) if args.select in f"{p.name} {p.group}"]
     count = min(args.limit or len(plans), len(plans))
@@ -35,8 +36,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def with_value(settings: DiagnosisSettings, name: str, value: float) -> DiagnosisSettings:
-    """Return the settings with one number changed, `group.field`. Raises SystemExit for another name."""
-    known = {s.name: s.value for s in settings.listed()}
+    """Return the settings with one number changed, `group.field`. Raises SystemExit for any other name."""
+    known = {s.name: s.value for s in settings.listed() if not isinstance(s.value, tuple)}
     if name not in known:
         raise SystemExit(f"{name}: no such setting, expected one of {', '.join(known)}")
     group, field = name.split(".")

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from diagnosis_cases import Case, Plan, plan
 from diagnosis_outcome import run_case
-from remembered_fits import remembered
+from remembered_fits import remember_fits
 from settings_curve import with_value
 
 from rsea_ros.diagnosis.settings import DEFAULT
@@ -85,7 +85,7 @@ def _play(log: Path) -> None:
         if not wanted:
             continue
         case = one.make()
-        with remembered(), log.open("a") as lines:
+        with remember_fits(), log.open("a") as lines:
             for setting, value in wanted:
                 lines.write(json.dumps(asdict(_played(case, setting, value))) + "\n")
                 lines.flush()
@@ -117,7 +117,7 @@ def read(log: Path) -> list[Played]:
 
 def page(played: Sequence[Played]) -> str:
     """Return docs/settings.md: for each setting the outcomes over its values, and whether they change."""
-    own = {s.name: s for s in DEFAULT.listed()}
+    in_use = {s.name: s for s in DEFAULT.listed()}
     done = {(p.case, p.setting, p.value) for p in played}
     whole = [name for name in CASES if all((name, s, v) in done for s, v in _values())]
     names = ", ".join(f"`{name}`" for name in whole)
@@ -135,33 +135,33 @@ def page(played: Sequence[Played]) -> str:
         "",
     ]  # fmt: skip
     for name in CURVES:
-        rows = list(_rows(name, float(own[name].value), [p for p in played if p.case in whole]))
+        rows = list(_rows(name, float(in_use[name].value), [p for p in played if p.case in whole]))
         flat = all(changed == 0 for *_, changed in rows)
-        parts += [f"## {name}", "", f"{own[name].meaning[:1].upper()}{own[name].meaning[1:]}.", ""]
+        parts += [f"## {name}", "", f"{in_use[name].meaning[:1].upper()}{in_use[name].meaning[1:]}.", ""]
         parts += ["| value | right | wrong | missed | changed |", "|---|---|---|---|---|"]
         for value, right, wrong, missed, changed in rows:
-            shown = f"**{value:g}**" if value == own[name].value else f"{value:g}"
+            shown = f"**{value:g}**" if value == in_use[name].value else f"{value:g}"
             parts.append(f"| {shown} | {right} | {wrong} | {missed} | {changed} |")
         parts += ["", *(["Flat: no outcome changes on these records.", ""] if flat else [])]
     return "\n".join(parts)
 
 
-def _rows(name: str, own: float, played: Sequence[Played]) -> Iterator[tuple[float, int, int, int, int]]:
+def _rows(name: str, in_use: float, played: Sequence[Played]) -> Iterator[tuple[float, int, int, int, int]]:
     """Yield value, right, wrong, missed and changed."""
     base = {p.case: p for p in played if p.setting == ""}
     curve = {v: {p.case: p for p in played if (p.setting, p.value) == (name, v)} for v in CURVES[name]}
-    for value, outcomes in sorted({**curve, own: base}.items()):
+    for value, outcomes in sorted({**curve, in_use: base}.items()):
         some = list(outcomes.values())
         yield (
             value,
             sum(p.right for p in some),
             sum(len(set(p.named) - set(p.truth)) for p in some),
             sum(len(set(p.truth) - set(p.named)) for p in some),
-            sum(_said(p) != _said(base[p.case]) for p in some),
+            sum(_summary(p) != _summary(base[p.case]) for p in some),
         )
 
 
-def _said(played: Played) -> tuple[object, ...]:
+def _summary(played: Played) -> tuple[object, ...]:
     return played.named, played.statuses, played.verdict
 
 

@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for effect in effects:
         for times in (1.0, *args.times):
             if (effect.name, times) not in played:
-                played[effect.name, times] = _played(effect, times)
+                played[effect.name, times] = _play(effect, times)
                 append_to_log(args.log, played[effect.name, times])
     rows = [row for e in effects for row in _rows(e.name, args.times, played)]
     print("| effect | times | on the machine | on the similar one | largest change of a size |")
@@ -57,13 +57,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     return int(not all(same for _, same in rows))
 
 
-def _played(effect: Effect, times: float) -> dict[str, Any]:
+def _play(effect: Effect, times: float) -> dict[str, Any]:
     tried = {effect.name, *BESIDE, *(e.name for e in look_alikes(effect.name, catalogue().values()))}
     without = tuple(n for n in catalogue() if n not in tried)
     record, begin = record_with(RIG, effect, times, DURATION), time.perf_counter()
     d = diagnose([record], similar(RIG, times), settings=replace(DEFAULT, without=without))
-    found = [(f"{c.name}.{n}", p) for c in d.causes for n, p in c.parameters.items()]
-    sizes = {name: p.value / factor(p.unit, times) for name, p in found}
+    parameters = [(f"{c.name}.{n}", p) for c in d.causes for n, p in c.parameters.items()]
+    sizes = {name: p.value / factor(p.unit, times) for name, p in parameters}
     return {"effect": effect.name, "times": times, "verdict": d.verdict, "causes": [c.name for c in d.causes],
             "sizes": sizes, "seconds": round(time.perf_counter() - begin, 1)}  # fmt: skip
 
@@ -75,15 +75,15 @@ def _rows(name: str, every: Sequence[float], played: dict[Any, Any]) -> Iterator
         same = (one["causes"], one["verdict"]) == (other["causes"], other["verdict"])
         shared = one["sizes"].keys() & other["sizes"].keys()
         change = max((_change(one["sizes"][n], other["sizes"][n]) for n in shared), default=0.0)
-        said = ("same" if same else _said(other)) if other is not one else ""
-        yield f"| {name} | {times:g} | {_said(one)} | {said} | {change:.1e} |", same
+        said = ("same" if same else _summary(other)) if other is not one else ""
+        yield f"| {name} | {times:g} | {_summary(one)} | {said} | {change:.1e} |", same
 
 
 def _change(a: float, b: float) -> float:
     return abs(b - a) / abs(a) if a else abs(b)
 
 
-def _said(played: dict[str, Any]) -> str:
+def _summary(played: dict[str, Any]) -> str:
     return f"{' + '.join(played['causes']) or 'no cause'}, {played['verdict'].replace('_', ' ')}"
 
 

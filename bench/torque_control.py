@@ -30,16 +30,16 @@ from bench.torque_control_stiffest import stiffest as limited
 from rsea_ros.cli.control import motors
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.harness import Arrivals, irregular
-from rsea_ros.control.human import measured
-from rsea_ros.control.impedance import moved
+from rsea_ros.control.human import measure_impedance
+from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.large_signal import largest
 from rsea_ros.control.link import LinkShare, link_share, linked_set
-from rsea_ros.control.loads import LOCKED, load_range, locked
+from rsea_ros.control.loads import LOCKED, load_range, lock
 from rsea_ros.control.robustness import robustness
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
-from rsea_ros.control.trials import LEARNED, sine, tracked
+from rsea_ros.control.trials import LEARNED, sine, tracking_error
 from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, corners
 from rsea_ros.control.virtual import Virtual, passive_to, stiffest
 from rsea_ros.model.rig import Rig
@@ -59,25 +59,27 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def trials(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     """Design, run all trials, sweep the set densely."""
-    found = study(rig, free, rates, motors(rig))
-    shown = [f"{at.design.rate:g} Hz" for at in found.rates]
-    yield "\n".join(tables.gains_words(found))
-    for at in found.rates:
+    designed = study(rig, free, rates, motors(rig))
+    shown = [f"{at.design.rate:g} Hz" for at in designed.rates]
+    yield "\n".join(tables.gains_words(designed))
+    for at in designed.rates:
         for u in (Uncertainty(), Uncertainty(mode=DAMPED)):
-            swept = robustness(found.rig, load_range(rig, free), at.design, u=u)
+            swept = robustness(designed.rig, load_range(rig, free), at.design, u=u)
             m = swept.margins
             yield (
                 f"{at.design.rate:g} Hz, mode {u.mode}, {swept.cases} benches, {swept.unstable} unstable: "
                 f"least phase margin {m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
                 f"|S| {swept.sensitivity:.2f} ({swept.where})"
             )
-        yield from followed(rig, free, at.design)
-    yield markdown(tables.trial_head(found), tables.trial_rows(found))
-    yield markdown(["compensated", "sine of 10 N·m", *shown], tables.compensation_rows(found))
-    yield markdown(["motor", "amplitude", "clamped: up to", "free: up to"], tables.reach_rows(found))
+        yield from follow_sine(rig, free, at.design)
+    yield markdown(tables.trial_head(designed), tables.trial_rows(designed))
+    yield markdown(["compensated", "sine of 10 N·m", *shown], tables.compensation_rows(designed))
+    yield markdown(
+        ["motor", "amplitude", "clamped: up to", "free: up to"], tables.reach_rows(designed)
+    )
 
 
-def followed(rig: Rig, free: Rig, designed: ControllerDesign) -> Iterator[str]:
+def follow_sine(rig: Rig, free: Rig, designed: ControllerDesign) -> Iterator[str]:
     """Follow the sine on the rig with each load and on every corner of the set: the worst of each load."""
     loads = load_range(rig, free)
     cases = corners(tuple(loads), Uncertainty())
@@ -98,35 +100,36 @@ _followed: dict[str, Any] = {}
 
 
 def _follow(case: BenchVariant) -> float:
-    return tracked(case=case, **_followed)
+    return tracking_error(case=case, **_followed)
 
 
 def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     """Follow sines on the free load, which the controller does not know, at what the motor can do there."""
     loads = load_range(rig, free)
-    for found in designs(rig, loads, rates):
-        share = link_share(rig, loads, found)
+    for designed in designs(rig, loads, rates):
+        share = link_share(rig, loads, designed)
         for hz in (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0):
             most = min(10.0, 0.8 * largest(free, hz, TorqueLimits().torque, math.inf))
             errors = [
-                sine(free, locked(rig), found, part * most, hz, span=LEARNED, link=link)
+                sine(free, lock(rig), designed, part * most, hz, span=LEARNED, link=link)
                 for link in (None, share)
                 for part in (1.0, 0.3)
             ]
             cells = ", ".join(f"{100.0 * error:.1f}" for error in errors)
-            yield f"{found.rate:g} Hz, {hz:g} Hz, {most:.1f} N·m: error {cells} % (all, 0.3 of it; with link)"
+            label = f"{designed.rate:g} Hz, {hz:g} Hz, {most:.1f} N·m"
+            yield f"{label}: error {cells} % (all, 0.3 of it; with link)"
 
 
-def linked(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+def with_link(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     """Print the output impedance without and with an encoder on the link."""
     loads = load_range(rig, free)
-    for found in designs(rig, loads, rates):
-        share = link_share(rig, loads, found)
-        yield f"{found.rate:g} Hz: {share}"
-        spring = np.abs(moved(rig, found.rate, SWEEP).spring)
-        benches = linked_set(rig, loads, found)
+    for designed in designs(rig, loads, rates):
+        share = link_share(rig, loads, designed)
+        yield f"{designed.rate:g} Hz: {share}"
+        spring = np.abs(distal_responses(rig, designed.rate, SWEEP).spring)
+        benches = linked_set(rig, loads, designed)
         for name, link in (("without", LinkShare()), ("with", share)):
-            over = np.abs(measured(rig, found, Virtual(0.0, 0.0), SWEEP, link)) / spring
+            over = np.abs(measure_impedance(rig, designed, Virtual(0.0, 0.0), SWEEP, link)) / spring
             cells = [f"{f:g} Hz {r:.2f}" for f, r in zip(SWEEP, over, strict=True)]
             most = benches.sensitivity(link).max()
             yield f"{name}: |Z| over the spring's {', '.join(cells)}; largest |S| of the set {most:.2f}"
@@ -134,32 +137,32 @@ def linked(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
 
 def outer(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     """State the passive range of the outer loop, and measure it with a human-like load."""
-    for found in designs(rig, load_range(rig, free), rates):
+    for designed in designs(rig, load_range(rig, free), rates):
         for damping in (0.0, 2.0, 5.0):
-            most = stiffest(rig, found, damping, 20.0)
-            to = passive_to(rig, found, Virtual(0.9 * most, damping))
+            most = stiffest(rig, designed, damping, 20.0)
+            to = passive_to(rig, designed, Virtual(0.9 * most, damping))
             yield (
-                f"{found.rate:g} Hz, D_v {damping:g}: Re Z > 0 to 20 Hz for K_v <= {most:.0f} N·m/rad; "
+                f"{designed.rate:g} Hz, D_v {damping:g}: Re Z > 0 to 20 Hz for K_v <= {most:.0f} N·m/rad; "
                 f"0.9 of that to {to:.0f} Hz"
             )
         for virtual in (Virtual(0.0, 0.0), Virtual(200.0, 2.0)):
-            z = measured(rig, found, virtual, SWEEP)
-            over = np.abs(z) / np.abs(moved(rig, found.rate, SWEEP).spring)
+            z = measure_impedance(rig, designed, virtual, SWEEP)
+            over = np.abs(z) / np.abs(distal_responses(rig, designed.rate, SWEEP).spring)
             cells = [f"{f:g} Hz {r:.2f}" for f, r in zip(SWEEP, over, strict=True)]
             yield f"{virtual}: |Z| over the spring's {', '.join(cells)}; least Re Z {z.real.min():.1f}"
 
 
 def late(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     """Let measurements and commands arrive irregularly: largest |ft| and command for 10 N m at 5 Hz."""
-    for found in designs(rig, load_range(rig, free), rates):
-        for name, (taken, acting) in _kinds(round(3.0 * found.rate)).items():
-            wanted = 10.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(len(taken)) / found.rate)
-            controller = TorqueController(rig, found.rate, found.gains)
-            run = irregular(rig, found.rate, controller, wanted, Arrivals(taken, acting))
+    for designed in designs(rig, load_range(rig, free), rates):
+        for name, (taken, acting) in _kinds(round(3.0 * designed.rate)).items():
+            wanted = 10.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(len(taken)) / designed.rate)
+            controller = TorqueController(rig, designed.rate, designed.gains)
+            run = irregular(rig, designed.rate, controller, wanted, Arrivals(taken, acting))
             after = run.t > 1.0
             ft, command = np.abs(run.ft[after]).max(), np.abs(run.command[after]).max()
             error = f"error {run.error(1.0):.1%}"
-            yield f"{found.rate:g} Hz, {name}: |ft| {ft:.1f}, command {command:.1f} N·m, {error}"
+            yield f"{designed.rate:g} Hz, {name}: |ft| {ft:.1f}, command {command:.1f} N·m, {error}"
 
 
 def _kinds(n: int) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
@@ -178,16 +181,16 @@ def _kinds(n: int) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
 
 def cost(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     """Print the time of a step as a share of its period; medians of 1000."""
-    for found in designs(rig, load_range(rig, free), rates):
-        controller, times = TorqueController(rig, found.rate, found.gains), []
+    for designed in designs(rig, load_range(rig, free), rates):
+        controller, times = TorqueController(rig, designed.rate, designed.gains), []
         for k in range(1000):
             reading = Measurement(math.sin(0.1 * k), 0.01 * math.cos(0.1 * k), 0.0, 1.0)
             begin = time.perf_counter()
             controller.step(reading, math.sin(0.1 * k))
             times.append(time.perf_counter() - begin)
         middle = statistics.median(times)
-        part = f"{100 * middle * found.rate:.1f} % of the period"
-        yield f"{found.rate:g} Hz: {1e6 * middle:.0f} µs a step, {part}"
+        part = f"{100 * middle * designed.rate:.1f} % of the period"
+        yield f"{designed.rate:g} Hz: {1e6 * middle:.0f} µs a step, {part}"
 
 
 def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[ControllerDesign]:
@@ -196,7 +199,7 @@ def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[
 
 
 SECTIONS: dict[str, Callable[[Rig, Rig, Sequence[float]], Iterator[str]]] = {
-    "trials": trials, "free": unknown, "impedance": outer, "link": linked,
+    "trials": trials, "free": unknown, "impedance": outer, "link": with_link,
     "stiffest": limited, "late": late, "baselines": baselines, "cost": cost,
 }  # fmt: skip
 

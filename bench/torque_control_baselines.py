@@ -33,8 +33,8 @@ from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import design
-from rsea_ros.control.trials import amplitude_of, disturbed
-from rsea_ros.control.uncertainty import BenchVariant, bench
+from rsea_ros.control.trials import amplitude_of, disturbed_rig
+from rsea_ros.control.uncertainty import BenchVariant, variant_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Plant
 from rsea_ros.signals import FloatArray
@@ -158,18 +158,18 @@ def cases() -> dict[str, BenchVariant]:
     }
 
 
-def tuned(name: str, rig: Rig, loads: Mapping[str, Rig], rate: float) -> Values:
+def tune(name: str, rig: Rig, loads: Mapping[str, Rig], rate: float) -> Values:
     """Return the gains of a method with the least errors on the locked bench, in time and late.
 
     They keep the benches of WITHIN stable: without that, each of the four follows better and is unstable on
     one of them.
     """
     method, start = METHODS[name]
-    followed = [(case, disturbed(loads, case)) for case in (IN_TIME, LATE)]
-    within = [(case, disturbed(loads, case)) for case in WITHIN]
+    followed = [(case, disturbed_rig(loads, case)) for case in (IN_TIME, LATE)]
+    within = [(case, disturbed_rig(loads, case)) for case in WITHIN]
 
     def error(x: Values, case: BenchVariant, true: Rig) -> float:
-        amplitude = amplitude_of(bench(loads[case.load], case))
+        amplitude = amplitude_of(variant_rig(loads[case.load], case))
         return error_of(method(rig, 1.0 / rate, x), true, rate, amplitude, case.samples)
 
     def cost(x: FloatArray) -> float:
@@ -180,8 +180,8 @@ def tuned(name: str, rig: Rig, loads: Mapping[str, Rig], rate: float) -> Values:
 
     simplex = np.log(start) + np.vstack([np.zeros(len(start)), STRIDE * np.eye(len(start))])
     options = {"maxfev": TRIED, "xatol": 1e-2, "fatol": 1e-3, "adaptive": True, "initial_simplex": simplex}
-    found = minimize(cost, np.log(start), method="Nelder-Mead", options=options) if start else None
-    return [float(value) for value in np.exp(found.x)] if found else start
+    optimum = minimize(cost, np.log(start), method="Nelder-Mead", options=options) if start else None
+    return [float(value) for value in np.exp(optimum.x)] if optimum else start
 
 
 def error_of(step: Step, true: Rig, rate: float, amplitude: float, late: int) -> float:
@@ -218,8 +218,8 @@ def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
         for name, begin in made.items():
             cells = []
             for case in cases().values():
-                amplitude = amplitude_of(bench(loads[case.load], case))
-                error = error_of(begin(), disturbed(loads, case), rate, amplitude, case.samples)
+                amplitude = amplitude_of(variant_rig(loads[case.load], case))
+                error = error_of(begin(), disturbed_rig(loads, case), rate, amplitude, case.samples)
                 cells.append(f"{100.0 * error:.1f}" if error < UNSTABLE else "unstable")
             yield f"| {name} | " + " | ".join(cells) + " |"
 
@@ -231,8 +231,8 @@ _searched: dict[str, Any] = {}
 def _all_tuned(rig: Rig, loads: Mapping[str, Rig], rate: float) -> list[Values]:
     _searched.update(rig=rig, loads=loads, rate=rate)
     with ProcessPoolExecutor(2, get_context("fork")) as pool:
-        return list(pool.map(_tuned, METHODS))
+        return list(pool.map(_tune, METHODS))
 
 
-def _tuned(name: str) -> Values:
-    return tuned(name, **_searched)
+def _tune(name: str) -> Values:
+    return tune(name, **_searched)

@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import rclpy
 
-from bench.bare_loop import permitted
+from bench.bare_loop import may_have
 from msg_adapters.ros import DiagnosticArray, JointState, torque_command_message
 from msg_adapters.topic_map import AXES, JOINT_STATE, WRENCH
 from rsea_ros.control.settings import TorqueLimits
@@ -98,7 +98,7 @@ class Outside:
 
 
 @contextmanager
-def running(name: str, priority: int, **parameters: object) -> Iterator[None]:
+def run_node_process(name: str, priority: int, **parameters: object) -> Iterator[None]:
     """Run a node in its own process. priority: of SCHED_FIFO for all of it, 0: none."""
     words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={value}")]
     command = [sys.executable, "-m", f"rsea_ros.nodes.{name}", "--ros-args", *words]
@@ -119,8 +119,8 @@ def measure(case: Case, rate: float, priority: int, folder: Path) -> tuple[float
         save_rig(rig, path)
     outside = Outside()
     with (
-        running("plant", priority and priority + 1, rig=f"'{paths[0]}'", rate=rate),
-        running(
+        run_node_process("plant", priority and priority + 1, rig=f"'{paths[0]}'", rate=rate),
+        run_node_process(
             "controller", 0, rig=f"'{paths[1]}'", rate=rate, stale=1.0, realtime_priority=priority,
             torque_limit=case.limit,
         ),
@@ -178,14 +178,14 @@ def main() -> None:
     rclpy.init()
     head = f"{'':18}{'sine of 5 Hz':34}{'asked %':>8}{'error %':>9}{'worst %':>9}"
     print(f"{head}{'ahead ms':>10}{'late':>7}")
-    for rate, priority in product(args.rate, filter(permitted, args.priority)):
-        here = f"{rate:g} Hz" + (f", FIFO {priority}" if priority else "")
+    for rate, priority in product(args.rate, filter(may_have, args.priority)):
+        setup = f"{rate:g} Hz" + (f", FIFO {priority}" if priority else "")
         for case in cases():
             with tempfile.TemporaryDirectory() as folder:
                 error, worst, lead, late = measure(case, rate, priority, Path(folder))
             asked = "" if case.asked is None else f"{case.asked:.1f}"
             numbers = f"{asked:>8}{error:9.2f}{worst:9.2f}{lead:10.2f}{late:>7}"
-            print(f"{here:18}{case.name:34}{numbers}", flush=True)
+            print(f"{setup:18}{case.name:34}{numbers}", flush=True)
     rclpy.shutdown()
 
 

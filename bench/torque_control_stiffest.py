@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from rsea_ros.control import synthesis
-from rsea_ros.control.impedance import Moved, moved, moved_bench
+from rsea_ros.control.impedance import Moved, distal_responses, moved_bench
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.synthesis import DesignLimits, check, design, grid
@@ -32,7 +32,7 @@ def stiffest(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
         set_of = _set(rig, rate)
         gains = {"1.2 for the rig": design(rig, loads, rate).gains}
         for limit in LIMITS:
-            gains[f"{limit or 'none'} for the set"] = _limited(rig, loads, rate, set_of, limit)
+            gains[f"{limit or 'none'} for the set"] = _limit(rig, loads, rate, set_of, limit)
         for name, each in gains.items():
             yield f"{rate:g} Hz, {name}: {_row(rig, loads, rate, set_of, each)}"
 
@@ -47,7 +47,7 @@ def _worst(rig: Rig, rate: float, set_of: Sequence[Moved], gains: Gains) -> floa
     return max(float(bench.ratio(law).max()) for bench in set_of)
 
 
-def _limited(
+def _limit(
     rig: Rig, loads: Mapping[str, Rig], rate: float, set_of: Sequence[Moved], limit: float | None
 ) -> Gains:
     """Return the best gains with the worst of the set limited; None: those with the smallest worst."""
@@ -57,7 +57,7 @@ def _limited(
     def cost(x: np.ndarray) -> float:
         gains = synthesis._gains(x, rate)
         score, worst = synthesis._score(problem, gains), _worst(rig, rate, set_of, gains)
-        beyond = 20.0 * synthesis._lacking(problem, score, DesignLimits())
+        beyond = 20.0 * synthesis._shortfall(problem, score, DesignLimits())
         if limit is None:
             return float(np.log(worst)) + beyond
         soft = np.interp(synthesis.SOFT, problem.moved.hz, score.softness)
@@ -71,11 +71,11 @@ def _limited(
 
 
 def _row(rig: Rig, loads: Mapping[str, Rig], rate: float, set_of: Sequence[Moved], gains: Gains) -> str:
-    found = check(rig, loads, rate, gains)
-    soft = moved(rig, rate, np.array(synthesis.SOFT)).ratio(law_of(rig, rate, gains))
+    margins = check(rig, loads, rate, gains)
+    soft = distal_responses(rig, rate, np.array(synthesis.SOFT)).ratio(law_of(rig, rate, gains))
     at = ", ".join(f"{hz:g} Hz {ratio:.3f}" for hz, ratio in zip(synthesis.SOFT, soft, strict=True))
     worst = _worst(rig, rate, set_of, gains)
     return (
-        f"|Z| over the spring's at most {found.impedance:.2f}, worst of the set {worst:.2f}; at {at}; "
-        f"friction left {found.friction_left:.2f} N·m per N·m; |S| {found.sensitivity:.2f}; {gains}"
+        f"|Z| over the spring's at most {margins.impedance:.2f}, worst of the set {worst:.2f}; at {at}; "
+        f"friction left {margins.friction_left:.2f} N·m per N·m; |S| {margins.sensitivity:.2f}; {gains}"
     )

@@ -43,24 +43,24 @@ def main() -> int:
     print("    rate  pages    core  frames/s   kB/s  plant's missed cycles/s before, with")
     wrong = False
     for rate in given.rate:
-        for pages, share, delays, row in measured(rate, given.seconds):
+        for pages, share, delays, row in measure_pages(rate, given.seconds):
             print(f"{rate:6.0f}Hz {pages:6d} {share:7.1%} {row}{'  delays the loop' * delays}", flush=True)
             wrong |= delays or (rate <= 280.0 and share > MOST)
     return int(wrong)
 
 
-def measured(rate: float, seconds: float) -> Iterator[tuple[int, float, bool, str]]:
+def measure_pages(rate: float, seconds: float) -> Iterator[tuple[int, float, bool, str]]:
     """Yield pages, share of a core, whether the loop is delayed, the rest of the row: no page, then one."""
     with tempfile.TemporaryDirectory() as folder, Processes(Path(folder), DOMAIN) as nodes:
         nodes.start("plant", {"rate": rate})
         nodes.start("model", {})
         time.sleep(8.0)
-        before = missed(seconds)
+        before = missed_rate(seconds)
         nodes.start("watch", {"port": 0})
-        address = awaited(lambda: ADDRESS.search(nodes.log("watch").read_text()))
+        address = wait_for(lambda: ADDRESS.search(nodes.log("watch").read_text()))
         time.sleep(3.0)
         for pages in (0, 1):
-            share, frames, size, late = asyncio.run(watched(nodes.pid("watch"), address, pages, seconds))
+            share, frames, size, late = asyncio.run(watch_run(nodes.pid("watch"), address, pages, seconds))
             row = f"{frames:9.1f} {size:6.1f}  {before:.2f}, {late:.2f}"
             yield pages, share, is_more(late * seconds, before * seconds), row
 
@@ -70,7 +70,7 @@ def is_more(late: float, before: float) -> bool:
     return not late - before <= CHANCE * max(1.0, late + before) ** 0.5
 
 
-async def watched(
+async def watch_run(
     pid: int, address: re.Match[str], pages: int, seconds: float
 ) -> tuple[float, float, float, float]:
     """Return share of a core, frames/s, kB/s and the plant's missed cycles/s while some pages are open."""
@@ -88,20 +88,20 @@ async def watched(
 
     readers = [asyncio.ensure_future(read(s)) for s in sockets]
     used, begin = processor_time(pid), time.monotonic()
-    late = await asyncio.get_running_loop().run_in_executor(None, missed, seconds)
+    late = await asyncio.get_running_loop().run_in_executor(None, missed_rate, seconds)
     span = time.monotonic() - begin
     for each in readers:
         each.cancel()
     return (processor_time(pid) - used) / span, counts[0] / span, 1e-3 * counts[1] / span, late
 
 
-def missed(seconds: float) -> float:
+def missed_rate(seconds: float) -> float:
     """Return the plant's missed cycles a second, as its diagnostics say; NaN without any."""
     from rsea_ros.nodes._listener import Listener
-    from rsea_ros.nodes._visitor import visiting
+    from rsea_ros.nodes._visitor import visit
 
     values = []
-    with visiting("bench_watch") as node:
+    with visit("bench_watch") as node:
         deadline = time.monotonic() + seconds
         for text in Listener(node).messages("/diagnostics", sys.maxsize, 5.0):
             if "/rsea/plant" in text and (count := re.search(r"missed_cycles\n\s+value: '?(\d+)", text)):
@@ -117,7 +117,7 @@ def processor_time(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def awaited(ask: Callable[[], Any], seconds: float = 30.0) -> Any:
+def wait_for(ask: Callable[[], Any], seconds: float = 30.0) -> Any:
     """Return the first true result of a function within some seconds."""
     deadline = time.monotonic() + seconds
     while not (result := ask()):

@@ -78,7 +78,7 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
         raise BagError(f"{path}: no such bag")
     if not path.is_dir():
         return [_scan(path, contents)]
-    known = metadata.known(path, contents)
+    known = metadata.metadata_of(path, contents)
     files = known.files or sorted(file for file in path.iterdir() if _suffix(file) in SCANNERS)
     if not files:
         raise BagError(f"{path}: no bag, expected a directory with .mcap or .db3 files")

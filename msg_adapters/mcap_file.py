@@ -218,7 +218,7 @@ class _Scanner:
         """Take the records of a chunk; of one that breaks off only where they are not compressed."""
         where = f"chunk at byte {first - RECORD.size}"
         try:
-            records = self._unpacked(buffer, first, stop, complete)
+            records = self._unpack(buffer, first, stop, complete)
         except (*ERRORS, ValueError, struct.error) as error:
             if complete:
                 self.damage.add("damaged_chunks", f"{where} left out: {error}")
@@ -234,7 +234,7 @@ class _Scanner:
         if complete and at < len(records):
             self.damage.add("damaged_chunks", f"{where} breaks off after {at} of {len(records)} bytes")
 
-    def _unpacked(self, buffer: Buffer, first: int, stop: int, complete: bool) -> bytes:
+    def _unpack(self, buffer: Buffer, first: int, stop: int, complete: bool) -> bytes:
         """Return the records of a chunk. Raises ValueError where they contradict its header."""
         if first + CHUNK_HEAD.size > stop:
             raise ValueError(f"it has {stop - first} bytes")

@@ -68,7 +68,7 @@ class McapStorage:
         self._counts[key] = 0
         qos = _text("offered_qos_profiles") + _text("[]")
         head = struct.pack("<HH", key, self._types[msgtype])
-        record = _record(CHANNEL, head, _text(topic), _text("cdr"), _sized(qos))
+        record = _record(CHANNEL, head, _text(topic), _text("cdr"), _with_size(qos))
         self._channels += record
         self._chunk += record
         return key
@@ -92,11 +92,11 @@ class McapStorage:
         for key, entries in self._index.items():
             offsets += struct.pack("<HQ", key, self._end + len(chunk) + len(indices))
             packed = b"".join(struct.pack("<QQ", *entry) for entry in entries)
-            indices += _record(MESSAGE_INDEX, struct.pack("<H", key), _sized(packed))
+            indices += _record(MESSAGE_INDEX, struct.pack("<H", key), _with_size(packed))
         place = struct.pack("<QQQQ", min(times), max(times), self._end, len(chunk))
         sizes = (struct.pack("<Q", len(indices)), _text(""), length, length)
         self._put(chunk + indices)
-        self._chunks.append(_record(CHUNK_INDEX, place, _sized(offsets), *sizes))
+        self._chunks.append(_record(CHUNK_INDEX, place, _with_size(offsets), *sizes))
         for key, entries in self._index.items():
             self._counts[key] += len(entries)
         self._times += [min(times), max(times)] if self._index else []
@@ -108,7 +108,7 @@ class McapStorage:
         if texts:
             self._remarks += 1
             pairs = b"".join(_text(name) + _text(text) for name, text in texts.items())
-            self._put(_record(METADATA, _text(REMARKS), _sized(pairs)))
+            self._put(_record(METADATA, _text(REMARKS), _with_size(pairs)))
 
     def close(self) -> None:
         """Write the rest and the summary."""
@@ -134,7 +134,7 @@ class McapStorage:
         declared = (sum(self._counts.values()), len(self._types), len(self._counts))
         numbers = (*declared, 0, self._remarks, len(self._chunks))
         counts = b"".join(struct.pack("<HQ", key, count) for key, count in self._counts.items())
-        return _record(STATISTICS, STATISTICS_HEAD.pack(*numbers, min(times), max(times)), _sized(counts))
+        return _record(STATISTICS, STATISTICS_HEAD.pack(*numbers, min(times), max(times)), _with_size(counts))
 
     def _put(self, data: bytes) -> None:
         """Write at the end. The end moves only when all is written, so that a second try mends the first."""
@@ -147,9 +147,9 @@ def _record(opcode: int, *parts: bytes | bytearray) -> bytes:
     return RECORD.pack(opcode, len(content)) + content
 
 
-def _sized(data: bytes) -> bytes:
+def _with_size(data: bytes) -> bytes:
     return struct.pack("<I", len(data)) + data
 
 
 def _text(text: str) -> bytes:
-    return _sized(text.encode())
+    return _with_size(text.encode())

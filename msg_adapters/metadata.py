@@ -40,7 +40,7 @@ class Known:
     remarks: Remarks = field(default_factory=Remarks)
 
 
-def known(bag: Path, contents: Contents) -> Known:
+def metadata_of(bag: Path, contents: Contents) -> Known:
     """Return the metadata of a bag; empty without the file (recorder killed).
 
     Topics and types come from the files themselves; the metadata add the order, notes, and the number of
@@ -50,7 +50,7 @@ def known(bag: Path, contents: Contents) -> Known:
     """
     path = bag / NAME
     try:
-        known_content = _known(bag, yaml_text.load(path))
+        known_content = _metadata_from(bag, yaml_text.load(path))
     except FileNotFoundError:
         contents.notes.append(f"{bag}: without {NAME} (recorder killed?), read from its files")
         return Known()
@@ -76,7 +76,7 @@ def remarks_in(path: Path, data: bytes) -> Remarks:
     return remarks_of(custom if isinstance(custom, dict) else {})
 
 
-def _known(bag: Path, document: Any) -> Known:
+def _metadata_from(bag: Path, document: Any) -> Known:
     """Raise NotUnderstood, TypeError, ValueError or KeyError for content that rosbag2 does not write."""
     root = document[ROOT] if isinstance(document, dict) else None
     if not isinstance(root, dict):

@@ -58,7 +58,7 @@ class RawReader:
             raise ParameterError(f"no {self._msgtype}: {error}") from None
         place = self._place(layout.names)
         self._at = [_position(layout, name, place + index) for name, index in self._fields]
-        self._fixed = [(a, b, raw[a:b]) for a, b in _joined(layout.structure)]
+        self._fixed = [(a, b, raw[a:b]) for a, b in _join_runs(layout.structure)]
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))
         self._length = len(raw)
 
@@ -101,7 +101,7 @@ def _position(layout: MessageLayout, name: str, index: int) -> int:
     return first + 8 * index if index < count else 0
 
 
-def _joined(runs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+def _join_runs(runs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
     """Return first and end of the runs, those that touch as one."""
     joined: list[tuple[int, int]] = []
     for first, end in runs:

@@ -113,18 +113,18 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
         if (topic := topics.topic(role)) not in contents.topics:
             near = did_you_mean(topic, contents.topics)
             raise BagError(
-                f"{source}: no topic {brief(topic)} for {role}{near}; the bag holds {_held(contents)}"
+                f"{source}: no topic {brief(topic)} for {role}{near}; the bag holds {_topics_text(contents)}"
             )
     for roles, others in _NEEDED if strict else [(ROLES, ())]:
         if not filled.intersection((*roles, *others)):
             wanted = " or ".join(topics.topic(role) for role in roles)
             raise BagError(
-                f"{source}: no message on {wanted}; the bag holds {_held(contents)}{contents.remarks()}; "
-                "record one, or name its topic with --topic or --namespace"
+                f"{source}: no message on {wanted}; the bag holds {_topics_text(contents)}"
+                f"{contents.remarks()}; record one, or name its topic with --topic or --namespace"
             )
 
 
-def _held(contents: Contents) -> str:
+def _topics_text(contents: Contents) -> str:
     """Return the topics of a bag with their types, for a message."""
     topics = sorted(contents.topics.items())[:_MOST_NAMED]
     return ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics) or "no topic at all"

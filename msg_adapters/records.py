@@ -63,7 +63,7 @@ class _Series:
     def rows(self, part: slice) -> Iterator[tuple[int, str, str, bytes]]:
         """Yield log time, topic, type and content of some messages."""
         values = {field: column[part] for field, column in self.values.items()}
-        messages = _encoded(self.stamps[part], values, self.topics)
+        messages = _encode(self.stamps[part], values, self.topics)
         name, msgtype = self.topics.topic(self.role), TYPES[self.role]
         for log_time, raw in zip(self.log_times[part].tolist(), messages, strict=True):
             yield log_time, name, msgtype, raw
@@ -117,7 +117,7 @@ def _stamps(record: Record, name: str, t: FloatArray) -> IntArray:
     return record.epoch_ns + np.rint(t * 1e9).astype(np.int64)
 
 
-def _encoded(stamps: IntArray, values: Mapping[str, FloatArray], topics: TopicMap) -> list[bytes]:
+def _encode(stamps: IntArray, values: Mapping[str, FloatArray], topics: TopicMap) -> list[bytes]:
     if "wrench" not in values:
         return encoding.joint_states(stamps, topics.joint or JOINT, **values)
     wrench = np.zeros((len(stamps), len(AXES)))

@@ -72,7 +72,7 @@ def tell_health(contents: Contents, report: Contents) -> None:
     if messages is None or messages.msgtype != TYPE or not messages.raw:
         return
     begin = min(min(m.log_times) for m in contents.topics.values() if m.raw)
-    states = _followed(messages, begin)
+    states = _follow(messages, begin)
     for (node, key), counter in states.counters.items():
         if counter.grown:
             kind, unit = COUNTERS[key]
@@ -85,7 +85,7 @@ def tell_health(contents: Contents, report: Contents) -> None:
         report.tell("damaged_messages", DIAGNOSTICS, detail, states.damaged, "messages", share)
 
 
-def _followed(messages: Messages, begin: int) -> _States:
+def _follow(messages: Messages, begin: int) -> _States:
     states = _States()
     for log_time, raw in zip(messages.log_times, messages.raw, strict=True):
         try:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rsea_ros.errors import BagError, ParameterError
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
@@ -41,7 +41,7 @@ def check_topic(topic: str) -> None:
     """Refuse a name that no node can have: rosbag2 could not play it. Raises BagError."""
     if not _NAME.fullmatch(topic) or len(topic) > _LONGEST:
         expected = f"letters, digits and _ between slashes, none beginning with a digit, up to {_LONGEST}"
-        raise BagError(f"topic {shown(topic)}: is not a name of ROS, expected {expected} characters")
+        raise BagError(f"topic {quote(topic)}: is not a name of ROS, expected {expected} characters")
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class TopicMap:
         name: str = getattr(self, role)
         return name if name.startswith("/") else f"/{self.namespace.strip('/')}/{name}".replace("//", "/")
 
-    def renamed(self, assignments: Sequence[str]) -> TopicMap:
+    def rename(self, assignments: Sequence[str]) -> TopicMap:
         """Return the map with `role=topic` assignments applied, as the command line gives them.
 
         Those topics are required of a bag. Raises ParameterError for an unknown role.

@@ -20,7 +20,7 @@ from msg_adapters.storage import Storage
 from msg_adapters.topic_map import check_topic
 from rsea_ros import files
 from rsea_ros.errors import BagError, OutputError
-from rsea_ros.interrupts import undisturbed
+from rsea_ros.interrupts import hold_signals
 from rsea_ros.staging import Stage, make_stage
 
 STORAGES: Mapping[str, tuple[str, Callable[[Path], Storage]]] = {
@@ -68,7 +68,7 @@ class BagWriter:
         self._check_name()
         self._made: list[Path] = []
         try:
-            with undisturbed():
+            with hold_signals():
                 self._made = files.make_folder(self.path.parent)
                 self.partial = self._new_directory()
                 self._made.insert(0, self.partial)
@@ -87,7 +87,7 @@ class BagWriter:
         Raises BagError for a topic that ROS could not have, and for a topic of another type than before.
         """
         try:
-            key, known = self._topics.get(topic) or self._declared(topic, msgtype)
+            key, known = self._topics.get(topic) or self._declare(topic, msgtype)
             if known.msgtype != msgtype:
                 raise BagError(f"topic {topic}: is {known.msgtype} and {msgtype}, expected one type")
             self._storage.write(key, log_time, raw)
@@ -98,7 +98,7 @@ class BagWriter:
             raise self._error(error) from None
         self.keep_up()
 
-    def _declared(self, topic: str, msgtype: str) -> tuple[int, Topic]:
+    def _declare(self, topic: str, msgtype: str) -> tuple[int, Topic]:
         """Return key and topic of a new one."""
         check_topic(topic)
         known = Topic(topic, msgtype, definition(msgtype).digest)
@@ -135,7 +135,7 @@ class BagWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         complete = kind is None or (self._recording and issubclass(kind, KeyboardInterrupt))
-        with undisturbed():
+        with hold_signals():
             self._disk.shutdown()
             try:
                 if complete:
@@ -152,7 +152,7 @@ class BagWriter:
         """Refuse a name that is taken by something that may not be replaced. Raises BagError."""
         if self.path.exists() or self.path.is_symlink():
             if not self._force:
-                raise BagError(str(files.taken(self.path)))
+                raise BagError(str(files.taken_error(self.path)))
             try:
                 files.check_replaceable(self.path)
             except OutputError as error:
@@ -163,7 +163,7 @@ class BagWriter:
 
     def _new_directory(self) -> Path:
         """Make a directory that nobody has: a stage, or NAME.partial, which a killed recorder leaves."""
-        with files.naming(self.path):
+        with files.name_errors(self.path):
             if not self._recording:
                 self._stage = make_stage(self.path.parent, 0o777)
                 return self._stage.path

@@ -8,7 +8,7 @@ from typing import Any
 
 from rsea_ros.errors import FieldError
 from rsea_ros.units import plain, same_unit
-from rsea_ros.wording import did_you_mean, shown
+from rsea_ros.wording import did_you_mean, quote
 
 
 def number(value: Any, name: str, unit: str) -> float:
@@ -19,7 +19,7 @@ def number(value: Any, name: str, unit: str) -> float:
     except OverflowError:
         converted = math.nan
     if math.isnan(converted):
-        raise FieldError(f"{name} = {shown(value)}, expected a number ({plain(unit) or 1})", name)
+        raise FieldError(f"{name} = {quote(value)}, expected a number ({plain(unit) or 1})", name)
     return converted
 
 
@@ -27,21 +27,21 @@ def switch(body: Mapping[str, Any], name: str) -> bool:
     """Return true or false of a group. Raises FieldError when it is something else."""
     value = body.get(name.split(".")[-1], False)
     if not isinstance(value, bool):
-        raise FieldError(f"{name} = {shown(value)}, expected true or false", name)
+        raise FieldError(f"{name} = {quote(value)}, expected true or false", name)
     return value
 
 
 def text(value: Any, name: str) -> str:
     """Return a text. Raises FieldError for a value of another type."""
     if not isinstance(value, str):
-        raise FieldError(f"{name} = {shown(value)}, expected text", name)
+        raise FieldError(f"{name} = {quote(value)}, expected text", name)
     return value
 
 
 def mapping(value: Any, name: str, expected: str = "a mapping") -> Mapping[str, Any]:
     """Return a mapping. Raises FieldError for a value of another type."""
     if not isinstance(value, Mapping):
-        raise FieldError(f"{name} = {shown(value)}, expected {expected}", name)
+        raise FieldError(f"{name} = {quote(value)}, expected {expected}", name)
     return value
 
 
@@ -51,11 +51,11 @@ def only_keys(body: Mapping[str, Any], allowed: set[str], where: str) -> None:
         if key not in allowed:
             expected = ", ".join(sorted(allowed)) + did_you_mean(str(key), allowed)
             raise FieldError(
-                f"{where}: unknown key {shown(key)}, expected one of {expected}", f"{where}.{key}"
+                f"{where}: unknown key {quote(key)}, expected one of {expected}", f"{where}.{key}"
             )
 
 
 def unit(value: Any, name: str, expected: str) -> None:
     """Raise FieldError for another unit than the one expected, however that is written."""
     if not same_unit(value, expected):
-        raise FieldError(f"{name} = {shown(value)}, expected {expected!r}", name)
+        raise FieldError(f"{name} = {quote(value)}, expected {expected!r}", name)

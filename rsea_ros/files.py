@@ -15,7 +15,7 @@ from itertools import chain
 from pathlib import Path
 
 from rsea_ros.errors import OutputError
-from rsea_ros.interrupts import undisturbed
+from rsea_ros.interrupts import hold_signals
 from rsea_ros.replaced import Replaced, putting_aside
 
 NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS}
@@ -52,7 +52,7 @@ def write_at(descriptor: int, data: bytes, offset: int = 0) -> None:
 def write_new(path: Path, content: str | bytes) -> None:
     """Write a new file, text as UTF-8; bytes of a file name that are not UTF-8 are escaped."""
     data = content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")
-    with naming(path):
+    with name_errors(path):
         descriptor = create(path)
         try:
             write_at(descriptor, data)
@@ -62,7 +62,7 @@ def write_new(path: Path, content: str | bytes) -> None:
 
 def sync(path: Path) -> None:
     """Wait until a file, or the names in a folder, are on the disk."""
-    with naming(path):
+    with name_errors(path):
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
         try:
             os.fsync(descriptor)
@@ -83,10 +83,10 @@ def give_names(pairs: Sequence[tuple[Path, Path]], *, force: bool = False) -> No
         for path in chain(source.iterdir() if source.is_dir() else (), [source]):
             sync(path)
     undo: Undo = []
-    with undisturbed(), putting_aside() as replaced:
+    with hold_signals(), putting_aside() as replaced:
         try:
             for source, target in pairs:
-                with naming(target):
+                with name_errors(target):
                     _take(source, target, replaced if force else None, undo)
             for folder in {target.parent for _, target in pairs}:
                 sync(folder)
@@ -100,7 +100,7 @@ def give_names(pairs: Sequence[tuple[Path, Path]], *, force: bool = False) -> No
             remove(path)
 
 
-def taken(path: Path) -> OutputError:
+def taken_error(path: Path) -> OutputError:
     """Return the error of a name that is taken."""
     return OutputError(f"{path}: exists already, expected a new name")
 
@@ -134,7 +134,7 @@ def _take(source: Path, target: Path, replaced: Replaced | None, undo: Undo) -> 
     try:
         _take_free(source, target, undo)
     except FileExistsError:
-        raise taken(target) from None
+        raise taken_error(target) from None
 
 
 def _take_free(source: Path, target: Path, undo: Undo) -> None:
@@ -144,7 +144,7 @@ def _take_free(source: Path, target: Path, undo: Undo) -> None:
         undo.append(target.rmdir)
         os.rename(source, target)
         undo[-1] = lambda: os.rename(target, source)
-    elif _linked(source, target):
+    elif _link(source, target):
         undo.append(target.unlink)
     else:
         os.close(create(target))  # takes the name, or fails
@@ -160,7 +160,7 @@ def _exchange(source: Path, target: Path, aside: Path, undo: Undo) -> None:
         os.rename(source, target)
         undo.append(lambda: os.rename(target, source))
         return
-    if _linked(target, aside):
+    if _link(target, aside):
         undo.append(aside.unlink)
     else:
         os.rename(target, aside)
@@ -170,7 +170,7 @@ def _exchange(source: Path, target: Path, aside: Path, undo: Undo) -> None:
     undo[-1] = lambda: os.rename(aside, target)
 
 
-def _linked(source: Path, target: Path) -> bool:
+def _link(source: Path, target: Path) -> bool:
     """Give a file one more name; return whether the file system can. Raises FileExistsError."""
     try:
         os.link(source, target, follow_symlinks=False)
@@ -182,7 +182,7 @@ def _linked(source: Path, target: Path) -> bool:
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
+def name_errors(path: Path) -> Iterator[None]:
     """Put the path into an error of the system, which does not know it once the file is open."""
     try:
         yield

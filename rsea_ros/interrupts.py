@@ -38,7 +38,7 @@ class Stops:
         self._handlers = {}
         self._hook = sys.unraisablehook
         if threading.current_thread() is threading.main_thread():
-            sys.unraisablehook = self._swallowed
+            sys.unraisablehook = self._swallow
             for number in STOPPING:
                 if (handler := signal.getsignal(number)) is not signal.SIG_IGN:
                     self._handlers[number] = handler
@@ -54,7 +54,7 @@ class Stops:
         self.last = Stopped(number)
         raise self.last
 
-    def _swallowed(self, report: sys.UnraisableHookArgs) -> None:
+    def _swallow(self, report: sys.UnraisableHookArgs) -> None:
         if not isinstance(report.exc_value, Stopped):
             self._hook(report)
             return
@@ -79,7 +79,7 @@ def deaf_to_interrupts() -> Iterator[None]:
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def hold_signals() -> Iterator[None]:
     """Hold signals back until the block is over; the first of them counts then."""
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread receives signals

@@ -69,7 +69,7 @@ def make_locked(parent: Path, kind: str, mode: int = 0o700) -> LockedFolder:
     return LockedFolder(path, lock)
 
 
-def left(parent: Path, kind: str) -> Iterator[AbandonedFolder]:
+def abandoned_folders(parent: Path, kind: str) -> Iterator[AbandonedFolder]:
     """Yield folders of a kind and of this user in a folder whose process is gone; each is locked meanwhile.
 
     Safe for two processes at once, and beside running writers: the lock of a folder is held while it is
@@ -79,13 +79,13 @@ def left(parent: Path, kind: str) -> Iterator[AbandonedFolder]:
     with suppress(OSError):
         entries = [entry.path for entry in os.scandir(parent) if entry.name.startswith(name_of(kind))]
     for entry in entries:
-        with suppress(OSError), _locked(Path(entry)) as folder:
+        with suppress(OSError), _hold_lock(Path(entry)) as folder:
             if folder.st_uid == os.geteuid():
                 yield AbandonedFolder(Path(entry), folder.st_mtime)
 
 
 @contextmanager
-def _locked(path: Path) -> Iterator[os.stat_result]:
+def _hold_lock(path: Path) -> Iterator[os.stat_result]:
     """Hold the lock of a folder; raise OSError where another process has it, or where it is no folder."""
     folder = os.open(path, _FOLDER)
     try:

@@ -24,7 +24,7 @@ _SAME = 0.25
 
 def without_mixed_rows(record: Record) -> tuple[Record, list[Fault]]:
     """Return the record without its rows of two times, and their fault."""
-    spans = [_doubled(c) for c in record.channels.values() if len(c) > 4 * _AROUND]
+    spans = [_doubled_stretch(c) for c in record.channels.values() if len(c) > 4 * _AROUND]
     known = [span for span in spans if span is not None]
     if len(known) < 2 or len(known) < len(spans) or np.ptp(np.array(known), axis=0).max() > _APART:
         return record, []
@@ -43,7 +43,7 @@ def without_mixed_rows(record: Record) -> tuple[Record, list[Fault]]:
     return record.with_channels(**left), [Fault("mixed_rows", "command", share, detail, end - begin, "s")]
 
 
-def _doubled(channel: Channel) -> tuple[float, float] | None:
+def _doubled_stretch(channel: Channel) -> tuple[float, float] | None:
     """Return begin and end (s) of the one stretch in which samples come twice as often, or None."""
     t = channel.t
     if np.any(np.diff(t) < 0.0):

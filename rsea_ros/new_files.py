@@ -19,11 +19,11 @@ from rsea_ros.files import (
     check_replaceable,
     give_names,
     make_folder,
-    naming,
-    taken,
+    name_errors,
+    taken_error,
     write_new,
 )
-from rsea_ros.interrupts import undisturbed
+from rsea_ros.interrupts import hold_signals
 from rsea_ros.replaced import put_back
 from rsea_ros.staging import Stage, make_stage
 
@@ -56,16 +56,16 @@ class NewFiles:
 
     def __enter__(self) -> NewFiles:
         try:
-            with undisturbed():
+            with hold_signals():
                 self.folder = self._make_folder()
-                with naming(self.folder):
+                with name_errors(self.folder):
                     self._stage = make_stage(self.folder)
         except BaseException:
             self._clear(complete=False)
             raise
         return self
 
-    def staged(self, name: str) -> Path:
+    def stage(self, name: str) -> Path:
         """Return where another writer puts the file that will have this name."""
         assert self._stage is not None
         self._names.append(name)
@@ -73,7 +73,7 @@ class NewFiles:
 
     def write(self, name: str, content: str | bytes) -> Path:
         """Write a file, and return the path that it will have."""
-        write_new(self.staged(name), content)
+        write_new(self.stage(name), content)
         return self.folder / name
 
     def __exit__(
@@ -81,7 +81,7 @@ class NewFiles:
     ) -> None:
         assert self._stage is not None
         complete = False
-        with undisturbed():
+        with hold_signals():
             try:
                 if error is None:
                     pairs = [(self._stage.path / name, self.folder / name) for name in self._names]
@@ -110,7 +110,7 @@ class NewFiles:
 
     def _clear(self, complete: bool) -> None:
         """Remove the stage, and the new folders if nothing was written."""
-        with undisturbed():
+        with hold_signals():
             if self._stage is not None:
                 self._stage.remove()
             for folder in () if complete else self._made:
@@ -120,7 +120,7 @@ class NewFiles:
 
 def write_file(path: str | Path, content: str | bytes, *, force: bool = False) -> Path:
     """Write one file into a folder that exists, and return its path. Raises as NewFiles does."""
-    with naming(Path(path)):
+    with name_errors(Path(path)):
         Path(path).parent.stat()
     with NewFiles(Destination(Path(path).parent, force)) as new:
         return new.write(Path(path).name, content)
@@ -137,7 +137,7 @@ def siblings(path: Path) -> Iterator[Path]:
     yield from (path.with_name(f"{path.name}-{number}") for number in count(2))
 
 
-def unused(path: Path) -> Path:
+def unused_path(path: Path) -> Path:
     """Return the first of NAME, NAME-2, NAME-3, … that does not exist."""
     return next(one for one in siblings(path) if not os.path.lexists(one))
 
@@ -159,7 +159,7 @@ def check_free(
                 raise OutputError(f"{path}: is the input {one} or lies in it, expected another name")
         if os.path.lexists(path):
             if not force:
-                raise OutputError(f"{taken(path)}{'' if force is None else ' or --force'}")
+                raise OutputError(f"{taken_error(path)}{'' if force is None else ' or --force'}")
             check_replaceable(path)
 
 

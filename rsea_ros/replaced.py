@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from rsea_ros.locked_folder import AbandonedFolder, LockedFolder, left, make_locked, new_name
+from rsea_ros.locked_folder import AbandonedFolder, LockedFolder, abandoned_folders, make_locked, new_name
 
 KIND, REMOVABLE = "old", "stage"
 """A folder of the first kind is put back, one of the second is removed by the next writer."""
@@ -61,7 +61,7 @@ def put_back(parent: Path) -> None:
     A file that has taken the name since is replaced only where it is the killed writer's; else the old one
     gets the first free of NAME.old, NAME.old-2, …
     """
-    for folder in left(parent, KIND):
+    for folder in abandoned_folders(parent, KIND):
         with suppress(OSError):  # a file that cannot be put back stays, and stops nothing
             names = os.listdir(folder.path)
             for name in names:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rsea_ros.files import remove
-from rsea_ros.locked_folder import LockedFolder, left, make_locked
+from rsea_ros.locked_folder import LockedFolder, abandoned_folders, make_locked
 from rsea_ros.replaced import put_back
 
 KIND = "stage"
@@ -32,6 +32,6 @@ def make_stage(parent: Path, mode: int = 0o700) -> Stage:
 
 def remove_left(parent: Path) -> None:
     """Remove stages of this user in a folder whose process is gone, and that are older than LEFT_AFTER."""
-    for folder in left(parent, KIND):
+    for folder in abandoned_folders(parent, KIND):
         if folder.is_old:
             remove(folder.path)

@@ -48,7 +48,7 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     faults += [*shared, *mixed]
     channels = {}
     for name, channel in record.channels.items():
-        channel, jumps = _without_jumps(channel, name, _expected_span(record, name), _paused(record, name))
+        channel, jumps = _without_jumps(channel, name, _expected_span(record, name), _pauses(record, name))
         channel, disorder = sort_by_stamp(channel, name)
         repeated = np.diff(channel.t, prepend=-np.inf) <= _repeat(channel.t)
         faults += [*jumps, *disorder]
@@ -137,7 +137,7 @@ def _expected_span(record: Record, name: str) -> float:
     return float(np.median([span for _, span in spans])) if spans else 0.0
 
 
-def _paused(record: Record, name: str) -> FloatArray:
+def _pauses(record: Record, name: str) -> FloatArray:
     """Return begin and end (s) of the pauses of the channel that a span is expected from, shape (2, n)."""
     others = [n for n in record.channels if n != name]
     beside = next((n for n in others if n == "command"), next(iter(others), name))

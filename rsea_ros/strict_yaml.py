@@ -17,7 +17,7 @@ import yaml
 
 from rsea_ros.decimal_number import decimal, is_decimal
 from rsea_ros.errors import FieldError
-from rsea_ros.wording import no_utf_8, shown
+from rsea_ros.wording import no_utf_8, quote
 
 LARGEST = 1 << 20
 """Bytes. The largest rig has 4 kB."""
@@ -85,7 +85,7 @@ def parse(text: str) -> Document:
     """Return the document of a text. Raises FieldError with line, key, value and the expected value."""
     lines: dict[Way, int] = {}
     try:
-        events = _checked(yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
+        events = _check_events(yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
         first = next(events, None)
         content = None if first is None else _value(first, events, (), lines)
         if next(events, None) is not None:
@@ -99,14 +99,14 @@ class _Dumper(yaml.SafeDumper):
     """Quotes every text that would otherwise be read as another value."""
 
 
-def _quoted(dumper: _Dumper, text: str) -> yaml.ScalarNode:
+def _quote(dumper: _Dumper, text: str) -> yaml.ScalarNode:
     doubtful = any(pattern.fullmatch(text) for pattern in _DOUBTFUL.values())
     style = "'" if doubtful or is_decimal(text) or text in _CONSTANTS else None
     style = '"' if any(mark in text for mark in "\x85\u2028\u2029") else style  # line breaks, to YAML
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 
-_Dumper.add_representer(str, _quoted)
+_Dumper.add_representer(str, _quote)
 
 
 def dump(document: Mapping[str, Any]) -> str:
@@ -114,7 +114,7 @@ def dump(document: Mapping[str, Any]) -> str:
     return str(yaml.dump(document, Dumper=_Dumper, sort_keys=False, allow_unicode=True))
 
 
-def _checked(events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
+def _check_events(events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
     """Yield the events that carry content; refuse the others."""
     depth = 0
     for event in events:
@@ -122,7 +122,7 @@ def _checked(events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
             raise _refusal(event, "an anchor or alias (& or *), expected the value written out")
         tag = getattr(event, "tag", None)
         if tag not in (None, "!"):
-            raise FieldError(f"not YAML: line {_line(event)}: tag {shown(tag)}, expected none")
+            raise FieldError(f"not YAML: line {_line(event)}: tag {quote(tag)}, expected none")
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:
@@ -152,7 +152,7 @@ def _mapping(events: Iterator[yaml.Event], way: Way, lines: dict[Way, int]) -> d
         key = _scalar(event, "key")
         name = (*way, str(key))
         if name in lines:
-            raise _refusal(event, f"key {shown(key)} stands twice, first in line {lines[name]}")
+            raise _refusal(event, f"key {quote(key)} stands twice, first in line {lines[name]}")
         lines[name] = _line(event)
         body[key] = _value(next(events), events, name, lines)
     return body
@@ -176,7 +176,7 @@ def _scalar(event: yaml.ScalarEvent, key: str) -> Any:
     for kind, pattern in _DOUBTFUL.items():
         if pattern.fullmatch(text):
             expected = "expected a decimal number, or a text in quotes"
-            raise _refusal(event, f"{key}: {shown(text)} is {kind}, {expected}")
+            raise _refusal(event, f"{key}: {quote(text)} is {kind}, {expected}")
     if re.fullmatch(r"[-+]?[0-9]+", text):
         return int(text)
     return decimal(text) if is_decimal(text) else text

@@ -48,7 +48,7 @@ def _began(command: Channel, torque: Channel) -> bool:
     if np.count_nonzero(at_edge) < _FEWEST:
         return False
     y, began, was = torque.y[at_edge], command.y[begun[at_edge]], command.y[ended[at_edge]]
-    return _left(_scaled(y), _scaled(began)) < _BETTER * _left(_scaled(y), _scaled(was))
+    return _rms_left(_scale(y), _scale(began)) < _BETTER * _rms_left(_scale(y), _scale(was))
 
 
 def _period(channel: Channel) -> float:
@@ -56,12 +56,12 @@ def _period(channel: Channel) -> float:
     return float(np.median(np.diff(channel.t)))
 
 
-def _scaled(values: FloatArray) -> FloatArray:
+def _scale(values: FloatArray) -> FloatArray:
     """Return values over the largest of them, so that no square overflows."""
     return np.asarray(values / (np.max(np.abs(values)) or 1.0))
 
 
-def _left(y: FloatArray, u: FloatArray) -> float:
+def _rms_left(y: FloatArray, u: FloatArray) -> float:
     """Return the RMS that a constant and a gain on the command leave of a torque, in the torque's unit."""
     y, u = y - y.mean(), u - u.mean()
     power = float(u @ u)

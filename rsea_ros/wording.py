@@ -12,7 +12,7 @@ _PLAIN, _COLOURED = re.compile(f"{_CONTROLS}|\x1b"), re.compile(f"{_CONTROLS}|{_
 _LONGEST = 60
 
 
-def listed(names: Sequence[str], last: str = "and") -> str:
+def list_names(names: Sequence[str], last: str = "and") -> str:
     """Return names as `a, b and c`; last: the word before the last of them."""
     return f" {last} ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
 
@@ -33,7 +33,7 @@ def printable(text: str, *, colours: bool = False) -> str:
     return pattern.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
-def shown(value: object, longest: int = 60) -> str:
+def quote(value: object, longest: int = 60) -> str:
     """Return a value for a message: quoted, and shortened if it is long."""
     text = repr(value)
     return text if len(text) <= longest else f"{text[: longest - 1]}…"

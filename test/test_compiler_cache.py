@@ -32,7 +32,7 @@ print(table[GEAR_TORQUE])
 """
 
 
-def evaluated(root: Path, cache: Path) -> float:
+def evaluate(root: Path, cache: Path) -> float:
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     environment |= {"PYTHONPATH": str(root), "XDG_CACHE_HOME": str(cache)}
     done = subprocess.run(
@@ -48,12 +48,12 @@ def evaluated(root: Path, cache: Path) -> float:
 
 def test_a_changed_helper_is_recompiled(tmp_path):
     copy = shutil.copytree(PACKAGE, tmp_path / "rsea_ros", ignore=shutil.ignore_patterns("__pycache__"))
-    assert evaluated(tmp_path, tmp_path / "cache") == -3.0
+    assert evaluate(tmp_path, tmp_path / "cache") == -3.0
     helper = copy / "effects" / "_friction.py"
     text = helper.read_text()
     assert text.count("        return size\n") == 1
     helper.write_text(text.replace("        return size\n", "        return size * 2.0\n"))
-    assert evaluated(tmp_path, tmp_path / "cache") == -6.0
+    assert evaluate(tmp_path, tmp_path / "cache") == -6.0
     assert len(list((tmp_path / "cache" / "rsea_ros").iterdir())) == 2
 
 
@@ -173,7 +173,7 @@ def of_others(monkeypatch, folders: set[Path]) -> None:
     """Give some folders to another user."""
     true = {name: getattr(Path, name) for name in ("stat", "lstat")}
 
-    def changed(name):
+    def change(name):
         def look(path, **options):
             seen = true[name](path, **options)
             owner = os.geteuid() + 1 if path in folders else seen.st_uid
@@ -182,7 +182,7 @@ def of_others(monkeypatch, folders: set[Path]) -> None:
         return look
 
     for name in true:
-        monkeypatch.setattr(Path, name, changed(name))
+        monkeypatch.setattr(Path, name, change(name))
 
 
 def test_a_cache_folder_that_the_user_names_is_used(monkeypatch):
@@ -202,15 +202,15 @@ def compiled_anew(limit: int | None = None):
     """Return the value of a newly compiled function at 1.0; limit: largest size of a file, bytes."""
 
     @njit(cache=True)
-    def doubled(x):
+    def double(x):
         return 2.0 * x
 
     if limit is None:
-        return doubled(1.0)
+        return double(1.0)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
     try:
-        return doubled(1.0)
+        return double(1.0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
@@ -264,12 +264,12 @@ def test_an_effect_is_compiled_on_a_full_disk(kept_in):
     try:
 
         @compiler.cfunc("float64(float64)", cache=True)
-        def tripled(x):
+        def triple(x):
             return 3.0 * x
 
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert tripled.ctypes(1.0) == 3.0
+    assert triple.ctypes(1.0) == 3.0
 
 
 START = """

@@ -13,7 +13,7 @@ FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_fil
 STAMPS = {"coarse_clock", "coverage", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order",
           "torque_edge"}  # fmt: skip
 FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
-BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
+BASE = FACTS | {"progress", "setting", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 AROUND = {"laws", "experiment", "health", "trends", "exports"}
 OWN = {
@@ -31,6 +31,7 @@ OWN = {
     "fast_length": set(),
     "normal": set(),
     "progress": set(),
+    "setting": set(),
     "wording": set(),
     "version": set(),
     "plugins": {"errors"},
@@ -146,8 +147,8 @@ def offences(path: Path, source: str) -> list[str]:
     """Return the forbidden imports of a source at that path."""
     layer = layer_of(name_of(path))
     where = path.relative_to(ROOT)
-    found = [(module, line) for module, line in imports(path, source) if not may_import(layer, module)]
-    return [f"{where}:{line}: layer {layer} may not import {module}" for module, line in found]
+    forbidden = [(module, line) for module, line in imports(path, source) if not may_import(layer, module)]
+    return [f"{where}:{line}: layer {layer} may not import {module}" for module, line in forbidden]
 
 
 def may_import(layer: str, module: str) -> bool:

@@ -18,7 +18,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, RigError
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.problem import case_from
-from rsea_ros.model.extent import bounded, check_extent
+from rsea_ros.model.extent import bound_values, check_extent
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import drive_of, synthesize
@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
 from inputs import kept_promises
 from inputs_bags import bag_of, record_of
-from inputs_cover import covering, pairs
+from inputs_cover import cover_pairs, pairs
 from inputs_matrix import BAG_VERBS
 from inputs_outcome import Outcome, judge
 from inputs_server import MODULES
@@ -181,7 +181,7 @@ def test_a_channel_without_a_valid_sample_is_left_out():
 
 def test_numbers_beyond_any_measurement_count_as_missing():
     y = np.array([1.0, 1e31, -1e300, 1e-31, -5e-324, 0.0, np.inf])
-    channel = bounded(Record({"ft": Channel(np.arange(7.0), y)}))["ft"]
+    channel = bound_values(Record({"ft": Channel(np.arange(7.0), y)}))["ft"]
     assert np.array_equal(channel.y, [1.0, np.nan, np.nan, 0.0, 0.0, 0.0, np.nan], equal_nan=True)
 
 
@@ -241,7 +241,7 @@ def test_an_interrupted_gate_resumes_without_the_cases_that_passed(tmp_path):
 
 def test_the_covering_design_holds_every_pair():
     factors = {"a": [1, 2, 3], "b": ["x", "y"], "c": [True, False], "d": [0.1, 0.2, 0.3, 0.4]}
-    cases, count = covering(factors, random.Random(0), must=[{"a": 1, "d": 0.4}])
+    cases, count = cover_pairs(factors, random.Random(0), must=[{"a": 1, "d": 0.4}])
     covered = set().union(*(pairs(case, list(factors)) for case in cases))
     assert len(covered) == count == 3 * 2 + 3 * 2 + 3 * 4 + 2 * 2 + 2 * 4 + 2 * 4
     assert len(cases) < 3 * 2 * 2 * 4

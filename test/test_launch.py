@@ -55,8 +55,8 @@ def describe(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[Part]]:
 def configurations(part: Any) -> set[str]:
     """Return the names of the launch arguments that a part uses, at any depth."""
     if isinstance(part, Part):
-        own = {part.arguments[0]} if part.kind == "LaunchConfiguration" else set()
-        return own | configurations([part.arguments, part.options])
+        parameters = {part.arguments[0]} if part.kind == "LaunchConfiguration" else set()
+        return parameters | configurations([part.arguments, part.options])
     if isinstance(part, dict):
         return configurations(list(part.values()))
     return set().union(*map(configurations, part)) if isinstance(part, list | tuple) else set()
@@ -108,10 +108,10 @@ def test_only_the_first_node_model_and_identify_start_by_default(describe):
 
 def test_a_node_gets_a_parameter_file_and_parameters_that_it_declares(describe):
     for name, node in nodes(describe("graph")).items():
-        file, own = node["parameters"]
+        file, parameters = node["parameters"]
         if isinstance(file, Part):
             file = defaults(describe("graph"))[file.arguments[0]]
-        given = set(yaml.safe_load(Path(file).read_text())["/**"]["ros__parameters"]) | set(own)
+        given = set(yaml.safe_load(Path(file).read_text())["/**"]["ros__parameters"]) | set(parameters)
         table = importlib.import_module(f"rsea_ros.nodes.{name}").TABLE
         assert given <= {parameter.name for parameter in table}, name
 
@@ -119,8 +119,8 @@ def test_a_node_gets_a_parameter_file_and_parameters_that_it_declares(describe):
 def test_hardware_launches_a_real_device_and_activates_it_only_on_request(describe):
     """It started the simulation whatever was connected."""
     parts = describe("graph")
-    own = nodes(parts)["driver"]["parameters"][1]
-    given = {name: defaults(parts)[part.arguments[0]] for name, part in own.items()}
+    parameters = nodes(parts)["driver"]["parameters"][1]
+    given = {name: defaults(parts)[part.arguments[0]] for name, part in parameters.items()}
     assert given["device"] == "dynamixel_netft" and given["autostart"] == "false"
     assert {"port", "baud", "ft_host", "rig"} < set(given)
 

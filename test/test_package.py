@@ -85,8 +85,8 @@ def test_every_config_and_launch_file_is_installed(workspace, top):
 
 def files(top: Path, pattern: str) -> set[str]:
     """Return the files under a directory, relative to it."""
-    found = (path for path in top.rglob(pattern) if path.is_file() and path.suffix != ".pyc")
-    return {str(path.relative_to(top)) for path in found}
+    packaged = (path for path in top.rglob(pattern) if path.is_file() and path.suffix != ".pyc")
+    return {str(path.relative_to(top)) for path in packaged}
 
 
 def test_rsea_is_a_command_of_the_sourced_workspace(workspace):

@@ -44,12 +44,12 @@ DESIGNS = {
 
 
 @functools.cache
-def imported(file: str, mapping: str) -> Record:
+def import_file(file: str, mapping: str) -> Record:
     """Return a file of measurements as a record."""
     return import_record(REAL / file, load_map(CONFIG / f"imports/{mapping}.yaml"))
 
 
-def identified(file: str, mapping: str, rig: str, folder: Path) -> dict:
+def identify_file(file: str, mapping: str, rig: str, folder: Path) -> dict:
     """Import a file, identify the bag, and return identification.json."""
     bag, out = folder / f"{mapping}_bag", folder / f"{mapping}_results"
     assert main(["import", str(REAL / file), "--map", mapping, "--out", str(bag)]) == 0
@@ -61,22 +61,22 @@ def identified(file: str, mapping: str, rig: str, folder: Path) -> dict:
 def emps(tmp_path_factory):
     """Identify the drive once; return the folder of its bag and results, and what was identified."""
     folder = tmp_path_factory.mktemp("emps")
-    return folder, identified("emps/DATA_EMPS.mat", "emps_identification", "emps", folder)
+    return folder, identify_file("emps/DATA_EMPS.mat", "emps_identification", "emps", folder)
 
 
 def test_emps_has_the_published_values(emps):
     """Janot, Gautier, Brunot 2019: M 95.109 kg, 203.503 N s/m, 20.394 N, offset -3.165 N."""
-    found = emps[1]["parameters"]
+    outcome = emps[1]["parameters"]
     published = {
         "rotor.reflected_inertia": (95.109, 0.02),
         "rotor.reflected_damping": (203.503, 0.02),
         "coulomb_friction.torque": (20.394, 0.03),
         "asymmetric_friction.offset": (-3.165, 0.10),
     }
-    assert set(found) == set(published)
+    assert set(outcome) == set(published)
     for name, (value, tolerance) in published.items():
-        assert found[name]["value"] == pytest.approx(value, rel=tolerance), name
-        low, high = found[name]["ci95"]
+        assert outcome[name]["value"] == pytest.approx(value, rel=tolerance), name
+        low, high = outcome[name]["ci95"]
         assert low < value < high, name
         assert high - low < 0.3 * abs(value), name
 
@@ -93,7 +93,7 @@ def test_emps_predicts_the_run_with_pulses(emps, tmp_path):
 
 def test_the_pendulum_has_its_published_gravity(tmp_path):
     file = "pendulum/gravity_compensation.measured.csv.gz"
-    result = identified(file, "pendulum", "pendulum", tmp_path)
+    result = identify_file(file, "pendulum", "pendulum", tmp_path)
     gravity = result["parameters"]["spring_end.gravity"]
     assert gravity["value"] == pytest.approx(3.31, abs=0.01)
     assert gravity["ci95"][0] < 3.31 < gravity["ci95"][1]
@@ -113,7 +113,7 @@ def test_the_statics_of_every_cycloidal_design_are_as_published(design):
 
 
 def ramps(design: str, which: str) -> Statics:
-    record = imported(f"cycloidal/2024-{design}.csv.gz", f"cycloidal_{which}_ramps")
+    record = import_file(f"cycloidal/2024-{design}.csv.gz", f"cycloidal_{which}_ramps")
     statics = statics_of(record, load_rig("cycloidal"))
     assert statics is not None
     return statics
@@ -122,7 +122,7 @@ def ramps(design: str, which: str) -> Statics:
 @pytest.mark.parametrize("design", list(DESIGNS)[::5])
 def test_a_cycloidal_gear_is_identified(design, tmp_path, capsys):
     file = f"cycloidal/2024-{design}.csv.gz"
-    short = identified(file, "cycloidal_short_ramps", "cycloidal", tmp_path)
+    short = identify_file(file, "cycloidal_short_ramps", "cycloidal", tmp_path)
     stiffness = short["parameters"]["spring.stiffness"]
     assert 100.0 < stiffness["ci95"][0] < stiffness["ci95"][1] < 900.0
     assert short["parameters"]["coulomb_friction.torque"]["ci95"][0] > 0.0
@@ -134,31 +134,31 @@ def test_a_cycloidal_gear_is_identified(design, tmp_path, capsys):
 
 def test_cycloidal_saturation_is_seen_and_fitted():
     """One of the three long ramps."""
-    record = imported(f"cycloidal/2024-{next(iter(DESIGNS))}.csv.gz", "cycloidal_long_ramps")
+    record = import_file(f"cycloidal/2024-{next(iter(DESIGNS))}.csv.gz", "cycloidal_long_ramps")
     result = identify([record.between(record.start, record.start + 20.0)], load_rig("cycloidal"))
     assert result.statics is not None and result.statics.limit is not None
     assert "stops at 24.9 N·m where 40.0 N·m are commanded" in statics_sentences(result.statics)[-1]
-    found = {p.name: p.value for p in result.parameters}
-    assert found["torque_saturation.limit"] == pytest.approx(result.statics.limit, rel=0.1)
-    assert found["spring.stiffness"] == pytest.approx(result.statics.stiffness, rel=0.25)
+    outcome = {p.name: p.value for p in result.parameters}
+    assert outcome["torque_saturation.limit"] == pytest.approx(result.statics.limit, rel=0.1)
+    assert outcome["spring.stiffness"] == pytest.approx(result.statics.stiffness, rel=0.25)
 
 
 def test_emps_is_diagnosed_with_coulomb_friction_and_its_asymmetry():
     """Coulomb friction first, then its difference between directions; no Stribeck; tested on another run."""
-    run = imported("emps/DATA_EMPS.mat", "emps_identification")
-    pulses = imported("emps/DATA_EMPS_PULSES.mat", "emps_pulses")
-    found = diagnose([run], load_rig("emps"), holdout=pulses)
-    assert [c.name for c in found.causes] == ["coulomb_friction", "asymmetric_friction"]
-    assert found.causes[0].parameters["torque"].value == pytest.approx(20.394, rel=0.03)
-    assert "stribeck_friction" in {r.name for r in found.rejected}
+    run = import_file("emps/DATA_EMPS.mat", "emps_identification")
+    pulses = import_file("emps/DATA_EMPS_PULSES.mat", "emps_pulses")
+    outcome = diagnose([run], load_rig("emps"), holdout=pulses)
+    assert [c.name for c in outcome.causes] == ["coulomb_friction", "asymmetric_friction"]
+    assert outcome.causes[0].parameters["torque"].value == pytest.approx(20.394, rel=0.03)
+    assert "stribeck_friction" in {r.name for r in outcome.rejected}
     rms = float(np.sqrt(np.mean(pulses["motor_torque"].y ** 2)))
-    assert found.extended_residual_rms["motor_torque"] < 0.047 * rms
+    assert outcome.extended_residual_rms["motor_torque"] < 0.047 * rms
 
 
 def test_pendulum_is_not_given_a_friction_that_gains_nothing():
-    found = diagnose([imported("pendulum/ddp.measured.csv.gz", "pendulum")], load_rig("pendulum"))
-    assert found.verdict == "unexplained" and not found.causes
-    gains = {r.name: r.gain_holdout for r in found.rejected}
+    outcome = diagnose([import_file("pendulum/ddp.measured.csv.gz", "pendulum")], load_rig("pendulum"))
+    assert outcome.verdict == "unexplained" and not outcome.causes
+    gains = {r.name: r.gain_holdout for r in outcome.rejected}
     frictions = ("coulomb_friction", "stribeck_friction", "load_dependent_friction")
     assert all(gains[name] < 0.1 for name in frictions)
 
@@ -178,9 +178,9 @@ def test_cycloidal_backlash_is_named_in_run_in_gears():
     """
     file = "cycloidal/2024-07-18__10-58-26__torqueramp__base_onyx_runin1.csv.gz"
     settings = DiagnosisSettings(without=tuple(name for name in catalogue() if name not in MECHANICAL))
-    record = imported(file, "cycloidal_short_ramps")
+    record = import_file(file, "cycloidal_short_ramps")
     ramps = record.between(record.start, record.start + 12.0)
-    found = diagnose([ramps], load_rig("cycloidal"), settings=settings)
-    causes = {c.name: c for c in found.causes}
+    outcome = diagnose([ramps], load_rig("cycloidal"), settings=settings)
+    causes = {c.name: c for c in outcome.causes}
     assert {"coulomb_friction", "backlash"} <= set(causes)
     assert 0.5 * np.radians(1.95) < causes["backlash"].parameters["gap"].value < np.radians(1.95)

@@ -30,16 +30,16 @@ class Killer:
         if name not in CALLS:
             return call
 
-        def counted(*arguments, **options):
+        def count(*arguments, **options):
             self._left -= 1
             if self._left == 0:
                 os.kill(os.getpid(), signal.SIGKILL)
             return call(*arguments, **options)
 
-        return counted
+        return count
 
 
-def killed(work: Callable[[], object], n: int) -> bool:
+def kill_after(work: Callable[[], object], n: int) -> bool:
     """Do the work in a child that is killed before its n-th step; return whether it reached that step."""
     pid = os.fork()
     if pid == 0:
@@ -94,7 +94,7 @@ def outcomes(
         folder = tmp_path / str(n)
         folder.mkdir()
         old(folder)
-        was_killed = killed(lambda at=folder: give(at), n)
+        was_killed = kill_after(lambda at=folder: give(at), n)
         check_free([folder / "another"])
         later(folder)  # for a folder that is empty: it might have been about to get its lock
         put_back(folder)
@@ -109,7 +109,7 @@ def outcomes(
 @pytest.mark.parametrize("links", [True, False])
 def test_a_set_of_files_is_old_or_new_as_a_whole(tmp_path, monkeypatch, links):
     if not links:
-        monkeypatch.setattr(files, "_linked", lambda source, target: False)
+        monkeypatch.setattr(files, "_link", lambda source, target: False)
     seen = list(outcomes(give_set, old_set, tmp_path))
     assert all(one in (dict.fromkeys("abc", "old"), dict.fromkeys("abc", "new")) for one in seen)
     assert seen[0] != seen[-1]

@@ -26,7 +26,7 @@ KILLED = (
 )
 
 
-def aged(path: Path, seconds: float = 2.0 * LEFT_AFTER) -> Path:
+def age(path: Path, seconds: float = 2.0 * LEFT_AFTER) -> Path:
     os.utime(path, (time.time() - seconds,) * 2)
     return path
 
@@ -39,26 +39,26 @@ def left_by_a_killed_writer(folder: Path) -> Path:
     return path
 
 
-def left(folder: Path) -> Path:
+def leave_stage(folder: Path) -> Path:
     """Return a stage as a killed writer leaves it, without killing one."""
     stage = make_stage(folder)
     (stage.path / "report.html").write_text("half of it")
     stage.release()
-    return aged(stage.path)
+    return age(stage.path)
 
 
 def test_the_next_writer_removes_what_a_killed_one_left(tmp_path):
     path = left_by_a_killed_writer(tmp_path)
     remove_left(tmp_path)
     assert path.exists(), "younger than a minute"
-    aged(path)
+    age(path)
     with NewFiles(tmp_path) as new:
         new.write("report.html", "whole")
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
 def test_the_next_bag_removes_what_a_killed_writer_left(tmp_path):
-    left(tmp_path)
+    leave_stage(tmp_path)
     with BagWriter(tmp_path / "bag.mcap", recording=False):
         pass
     assert [p.name for p in tmp_path.iterdir()] == ["bag.mcap"]
@@ -68,7 +68,7 @@ def test_a_writer_at_work_keeps_its_stage_however_old(tmp_path):
     with NewFiles(tmp_path) as first:
         first.write("first", "1")
         (stage,) = tmp_path.iterdir()
-        aged(stage)
+        age(stage)
         with NewFiles(tmp_path) as second:
             second.write("second", "2")
         assert stage.exists()
@@ -77,7 +77,7 @@ def test_a_writer_at_work_keeps_its_stage_however_old(tmp_path):
 
 def test_a_bag_being_written_is_kept_and_lets_go_when_complete(tmp_path):
     with BagWriter(tmp_path / "bag", recording=False) as bag:
-        aged(bag.partial)
+        age(bag.partial)
         remove_left(tmp_path)
         assert bag.partial.exists()
     assert [p.name for p in tmp_path.iterdir()] == ["bag"]
@@ -85,15 +85,15 @@ def test_a_bag_being_written_is_kept_and_lets_go_when_complete(tmp_path):
 
 
 def stage_of_another_machine(folder: Path) -> Path:
-    path = left(folder)
-    return aged(path.rename(path.with_name(f"{PREFIX}stage-00000000-{path.name[-16:]}")))
+    path = leave_stage(folder)
+    return age(path.rename(path.with_name(f"{PREFIX}stage-00000000-{path.name[-16:]}")))
 
 
 def replaced_file(folder: Path) -> Path:
     """Return the only copy of a file, put aside by a writer that was killed while replacing it."""
     path = folder / f"{PREFIX}old-0123abcd"
     path.mkdir()
-    return aged(path)
+    return age(path)
 
 
 def link_of_that_name(folder: Path) -> Path:
@@ -106,7 +106,7 @@ def link_of_that_name(folder: Path) -> Path:
 def file_of_that_name(folder: Path) -> Path:
     path = folder / f"{name_of(KIND)}0123456789abcdef"
     path.write_text("of somebody")
-    return aged(path)
+    return age(path)
 
 
 KEPT = (stage_of_another_machine, replaced_file, link_of_that_name, file_of_that_name)
@@ -120,7 +120,7 @@ def test_a_folder_that_is_not_a_leftover_stage_stays(tmp_path, make):
 
 
 def test_a_stage_of_another_user_stays(tmp_path, monkeypatch):
-    path = left(tmp_path)
+    path = leave_stage(tmp_path)
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     remove_left(tmp_path)
     assert path.exists()
@@ -137,13 +137,13 @@ def test_files_put_aside_can_be_removed_only_once_all_new_ones_have_their_names(
     (aside,) = seen
     assert (aside / "target" / "file").read_text() == "target"
     assert (target / "file").read_text() == "source"
-    aged(aside)
+    age(aside)
     remove_left(tmp_path)
     assert not aside.exists()
 
 
 def test_two_processes_that_clean_up_at_once_agree(tmp_path):
-    paths = [left(tmp_path) for _ in range(20)]
+    paths = [leave_stage(tmp_path) for _ in range(20)]
     with ThreadPoolExecutor(2) as both:
         list(both.map(remove_left, [tmp_path] * 2))
     assert not any(path.exists() for path in paths)

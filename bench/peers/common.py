@@ -83,7 +83,7 @@ def main(fit: Callable[[PeerCase], PeerResult]) -> None:
         json.dump(contents, file)
 
 
-def scaled(case: PeerCase) -> tuple[Array, Array, float, float]:
+def scale(case: PeerCase) -> tuple[Array, Array, float, float]:
     """Return u and the known y, both scaled by the training samples; and mean and deviation of y."""
     u, y = case.u, case.y[: case.split]
     return (u - u[: case.split].mean()) / u[: case.split].std(), (y - y.mean()) / y.std(), y.mean(), y.std()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cma
 import numpy as np
 from common import NotApplicable, PeerCase
-from second_order import NAMES, simulated
+from second_order import NAMES, simulate_run
 
 SIGMA, SHORTEST = 0.3, 0.2
 """First step, in units of a value's scale; share of the budget that is left for the last simulation."""
@@ -42,7 +42,7 @@ def evolve(
 
     def cost(x):
         p = np.array([values_of(x)[n] for n in NAMES])
-        error = simulated(p, case.u[:stop], case.period, torque_output) - measured
+        error = simulate_run(p, case.u[:stop], case.period, torque_output) - measured
         total = float(np.mean(error**2))
         return total if np.isfinite(total) else 1e30
 
@@ -51,7 +51,7 @@ def evolve(
     return values_of(best), cost(best)
 
 
-def predicted(case: PeerCase, values: dict[str, float]):
+def predict(case: PeerCase, values: dict[str, float]):
     """Return y of a run over all samples, from `split` on."""
     p = np.array([values[n] for n in NAMES])
-    return simulated(p, case.u, case.period, case.meta["physics"] == "sea")[case.split :]
+    return simulate_run(p, case.u, case.period, case.meta["physics"] == "sea")[case.split :]

@@ -21,7 +21,7 @@ NAMES = (
 
 
 @njit(cache=True)
-def simulated(p, u, period, torque_output):
+def simulate_run(p, u, period, torque_output):
     """Return y, shape (n,), of a run from rest; p: values in the order of NAMES."""
     inertia, damping, stiffness, gravity, friction, stribeck, v_s, alpha = p[:8]
     motor, external, motor_s, external_s, quadratic_m, quadratic_e, delay, bias, b_s = p[8:]

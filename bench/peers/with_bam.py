@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from common import PeerCase, PeerResult, main
-from evolution import evolve, predicted
-from second_order import NAMES, simulated
+from evolution import evolve, predict
+from second_order import NAMES, simulate_run
 
 STRIBECK = ("stribeck", "stribeck_velocity")
 LOAD = ("load_motor", "load_external")
@@ -34,12 +34,12 @@ def fit(case: PeerCase) -> PeerResult:
     for law, names in LAWS.items():
         values, _ = evolve(case, _free(case, names), begin, SHARES * whole)
         p = np.array([values[n] for n in NAMES])
-        y = simulated(p, case.u[: case.split], case.period, case.meta["physics"] == "sea")
+        y = simulate_run(p, case.u[: case.split], case.period, case.meta["physics"] == "sea")
         tried[law] = (float(np.mean((y - case.y[: case.split])[begin:] ** 2)), values)
     law = min(tried, key=lambda name: tried[name][0])
     values = tried[law][1]
     fitted = ("inertia", "damping", "friction", *LAWS[law])
-    return PeerResult(predicted(case, values), {n: values[n] for n in fitted}, f"friction {law}")
+    return PeerResult(predict(case, values), {n: values[n] for n in fitted}, f"friction {law}")
 
 
 def _free(case: PeerCase, names: tuple[str, ...]) -> dict[str, tuple[float, bool]]:

@@ -7,7 +7,7 @@ else, such as the stiffness of a spring, stays as stated.
 from __future__ import annotations
 
 from common import PeerCase, PeerResult, main
-from evolution import evolve, predicted
+from evolution import evolve, predict
 
 
 def fit(case: PeerCase) -> PeerResult:
@@ -17,7 +17,7 @@ def fit(case: PeerCase) -> PeerResult:
     free |= {"delay": (5e-3, False), "bias": (case.meta["bias"], False)}
     values, _ = evolve(case, free, case.split, 0.9 * case.seconds_left)
     shown = {n: values[n] for n in ("inertia", "damping", "friction", "delay")}
-    return PeerResult(predicted(case, values), shown)
+    return PeerResult(predict(case, values), shown)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from common import PeerCase, PeerResult, free_run, main, narx_rows, scaled
+from common import PeerCase, PeerResult, free_run, main, narx_rows, scale
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, DotProduct, WhiteKernel
 
@@ -12,7 +12,7 @@ LAGS, POINTS = 8, 500
 
 def fit(case: PeerCase) -> PeerResult:
     """Fit to POINTS random samples and run freely."""
-    u, y, mean, size = scaled(case)
+    u, y, mean, size = scale(case)
     rows, targets = narx_rows(u, y, LAGS)
     chosen = np.random.default_rng(1).permutation(len(rows))[:POINTS]
     kernel = DotProduct() + RBF(np.full(rows.shape[1], 5.0), (0.1, 1e4)) + WhiteKernel(1e-4, (1e-12, 1.0))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import jax
 import numpy as np
-from common import PeerCase, PeerResult, main, scaled
+from common import PeerCase, PeerResult, main, scale
 from jax_sysid.models import LinearModel
 
 STATES, ROUNDS = 4, 300
@@ -16,7 +16,7 @@ STATES, ROUNDS = 4, 300
 def fit(case: PeerCase) -> PeerResult:
     """Fit a linear model, the example of its documentation."""
     jax.config.update("jax_enable_x64", True)
-    u, y, mean, size = scaled(case)
+    u, y, mean, size = scale(case)
     model = LinearModel(STATES, 1, 1, feedthrough=False)
     model.loss(rho_x0=1e-3, rho_th=1e-2)
     model.optimization(lbfgs_epochs=ROUNDS, iprint=-1)

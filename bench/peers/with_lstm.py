@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import torch
-from common import PeerCase, PeerResult, main, scaled
+from common import PeerCase, PeerResult, main, scale
 
 HIDDEN, LENGTH, BATCH, SKIP, RATE = 32, 300, 16, 30, 3e-3
 """Units; samples of a sequence; sequences of a step; samples at a sequence's start that no loss looks at."""
@@ -26,7 +26,7 @@ def fit(case: PeerCase) -> PeerResult:
     """Train, and run over all inputs."""
     torch.manual_seed(1)
     torch.set_num_threads(1)
-    u, y, mean, size = scaled(case)
+    u, y, mean, size = scale(case)
     inputs, targets = (torch.tensor(a, dtype=torch.float32) for a in (u, y))
     network = Network()
     optimizer = torch.optim.Adam(network.parameters(), RATE)

@@ -36,14 +36,14 @@ def fit(case: PeerCase) -> PeerResult:
     times = np.arange(len(fine)) * model.opt.timestep
     state = sysid.create_initial_state(model, data.qpos, data.qvel, data.act)
     used = case.split * PARTS
-    measured = _measured(case, model)
+    measured = _measure(case, model)
     controls = sysid.TimeSeries(times[:used], fine[:used])
     group = sysid.ModelSequences("case", spec, "train", state, controls, measured)
-    found, _ = sysid.optimize(
+    optimum, _ = sysid.optimize(
         initial_params=_parameters(start, stated["gravity"]), optimizer="mujoco", verbose=False,
         residual_fn=sysid.build_residual_fn(models_sequences=[group], n_threads=1),
     )  # fmt: skip
-    values = {name: float(found[name].value[0]) for name in found.keys()}  # noqa: SIM118
+    values = {name: float(optimum[name].value[0]) for name in optimum.keys()}  # noqa: SIM118
     run = _run(_xml(case, values, values.get("gravity", 0.0)), fine)
     q, v = run[PARTS - 1 :: PARTS].T
     is_sea = case.meta["physics"] == "sea"
@@ -87,7 +87,7 @@ def _setter(field: str):
     return modifier
 
 
-def _measured(case: PeerCase, model):
+def _measure(case: PeerCase, model):
     """Return the position, and the velocity where it is measured, at the ends of the samples."""
     times = (np.arange(case.split) + 1) * case.period
     position = case.position[: case.split] if case.position.size else case.y[: case.split]

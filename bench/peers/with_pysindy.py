@@ -23,11 +23,11 @@ def fit(case: PeerCase) -> PeerResult:
     model = pysindy.SINDy(optimizer=pysindy.STLSQ(threshold=THRESHOLD), feature_library=library)
     model.fit(scaled, t=case.period, u=u[: case.split])
     outputs = np.linalg.lstsq(scaled, case.y[: case.split], rcond=None)[0]
-    run = _simulated(model, scaled[-1], u[case.split - 1 :, 0], case.period)
+    run = _simulate(model, scaled[-1], u[case.split - 1 :, 0], case.period)
     return PeerResult(run[1:] @ outputs, note=f"degree {DEGREE}, threshold {THRESHOLD:g}")
 
 
-def _simulated(model, state, u, period):
+def _simulate(model, state, u, period):
     """Return the states of a run, shape (n, 2), by Runge-Kutta 4; a run that escapes stays put."""
     law = model.coefficients().T
     library = model.feature_library

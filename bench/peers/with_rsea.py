@@ -14,7 +14,7 @@ from common import NotApplicable, PeerCase, PeerResult, main
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))
 
-from bench.public_fit import RIGS, case_of, fitted, record_of, rig_of
+from bench.public_fit import RIGS, case_of, fit_rig, record_of, rig_of
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.errors import RigError
 from rsea_ros.model.rig_file import load_rig
@@ -77,7 +77,7 @@ def _duffing(case: PeerCase) -> PeerResult:
     rig = load_rig(RIGS / "silverbox.yaml")
     n, rate = case.split, 1.0 / case.period
     train = record_of(TORQUE * case.u[:n], ANGLE * case.y[:n], rate)
-    rig = rig_of(fitted(rig, [case_of(rig, train, skip=200)]))
+    rig = rig_of(fit_rig(rig, [case_of(rig, train, skip=200)]))
     whole = record_of(TORQUE * case.u, np.zeros(len(case.u)), rate)
     drive = case_of(rig, whole, skip=0).drive
     return PeerResult(simulate_drive(rig, drive)["position"][n:] / ANGLE, note="rig with stated effects")

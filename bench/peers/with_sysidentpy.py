@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from common import PeerCase, PeerResult, main, scaled
+from common import PeerCase, PeerResult, main, scale
 from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
@@ -13,7 +13,7 @@ LAGS, TERMS = 8, 30
 
 def fit(case: PeerCase) -> PeerResult:
     """Select terms and run freely."""
-    u, y, mean, size = scaled(case)
+    u, y, mean, size = scale(case)
     model = FROLS(
         order_selection=True, n_info_values=TERMS, ylag=LAGS, xlag=LAGS, info_criteria="aic",
         estimator=LeastSquares(), basis_function=Polynomial(degree=2),

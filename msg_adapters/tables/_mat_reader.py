@@ -68,14 +68,14 @@ def vector(place: dict[str, Any], variables: dict[str, Any]) -> Any:
     """Return the numbers of a place as a vector."""
     import numpy as np
 
-    values = np.asarray(_descended(place, variables))
+    values = np.asarray(_descend(place, variables))
     _check_shape(place, values.shape, values.dtype, is_number=values.dtype.kind in "iufb")
     if place["index"] is None:
         return values.ravel()
     return values[place["index"]] if place["is_row"] else values[:, place["index"]]
 
 
-def _descended(place: dict[str, Any], variables: dict[str, Any]) -> Any:
+def _descend(place: dict[str, Any], variables: dict[str, Any]) -> Any:
     """Return the value at a path like `log.motor(2).current`."""
     value: Any = None
     way = ""

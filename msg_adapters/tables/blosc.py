@@ -94,7 +94,7 @@ def _block(chunk: _Chunk, number: int) -> bytes:
         at += _LENGTH.size
         parts.append(_stream(chunk, chunk.packed[at : at + length], size // streams))
         at += length
-    return _unshuffled(b"".join(parts), chunk.width) if chunk.flags & _SHUFFLED else b"".join(parts)
+    return _unshuffle(b"".join(parts), chunk.width) if chunk.flags & _SHUFFLED else b"".join(parts)
 
 
 def _stream(chunk: _Chunk, packed: bytes, size: int) -> bytes:
@@ -104,7 +104,7 @@ def _stream(chunk: _Chunk, packed: bytes, size: int) -> bytes:
     return part
 
 
-def _unshuffled(block: bytes, width: int) -> bytes:
+def _unshuffle(block: bytes, width: int) -> bytes:
     """Return the numbers of a block that holds all their first bytes, then all their second ones, …"""
     whole = len(block) - len(block) % width
     numbers = np.frombuffer(block[:whole], np.uint8).reshape(width, -1).T

@@ -25,7 +25,7 @@ import numpy as np
 from msg_adapters.tables.column_table import Table, checked_lengths, index_of
 from msg_adapters.tables.elements import place_of
 from rsea_ros.signals import FloatArray
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 PROGRAM = Path(__file__).with_name("_child.py")
 
@@ -49,7 +49,7 @@ class Reader:
             if "names" in answer:
                 index_of(answer["column"], answer["names"])
             if "sizes" not in answer:
-                raise ValueError(shown(str(answer.get("error")), 200)[1:-1])
+                raise ValueError(quote(str(answer.get("error")), 200)[1:-1])
             sizes = dict(zip(columns, answer["sizes"], strict=True))
             checked_lengths(sizes)
             vectors = {name: _vector(output, size) for name, size in sizes.items()}

@@ -11,7 +11,7 @@ LONG = 1.5
 """Where the clock moved this many times its usual tick, whole ticks passed without a sample."""
 
 
-def repaired(t: FloatArray) -> tuple[FloatArray, str]:
+def spread_repeats(t: FloatArray) -> tuple[FloatArray, str]:
     """Spread samples with equal stamps evenly until the clock's next tick; return a note.
 
     Where all stamps fit one even clock, that is used. Otherwise the first sample after a tick is dated by it

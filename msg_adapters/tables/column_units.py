@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from rsea_ros.units import same_unit
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 FACTORS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
@@ -64,4 +64,4 @@ def canonical(text: object) -> str:
             if same_unit(text, name):
                 return name
     known = ", ".join(name for factors in FACTORS.values() for name in factors)
-    raise ValueError(f"unit {shown(text)} unknown, expected one of {known}")
+    raise ValueError(f"unit {quote(text)} unknown, expected one of {known}")

@@ -63,7 +63,7 @@ def number_in(cell: str, index: int) -> str:
     return numbers[index]
 
 
-def chosen(column: str, index: int | None) -> str:
+def choose_element(column: str, index: int | None) -> str:
     """Return a column, or an expression, with the chosen number in the place of each `[#]` and `##`."""
     if index is None:
         return column
@@ -73,4 +73,4 @@ def chosen(column: str, index: int | None) -> str:
 
 def is_open(text: str) -> bool:
     """Return whether a column or an expression still waits for a number in the place of `#`."""
-    return chosen(text, 0) != text
+    return choose_element(text, 0) != text

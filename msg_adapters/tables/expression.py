@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rsea_ros.signals import FloatArray
-from rsea_ros.wording import brief, shown
+from rsea_ros.wording import brief, quote
 
 LONGEST, SIZE = 1000, 200
 """Characters, and parts of the syntax tree."""
@@ -72,11 +72,11 @@ class Expression:
                 result = evaluator.run(tree, expr=self.text)
                 values = np.broadcast_to(np.asarray(result, np.float64), t.shape).copy()
         except Exception as error:  # asteval may raise anything for an error in a function
-            raise ValueError(f"{shown(self.text)} cannot be computed: {_reason(error)}") from None
+            raise ValueError(f"{quote(self.text)} cannot be computed: {_reason(error)}") from None
         if np.isinf(values).any():
             at = int(np.argmax(np.isinf(values)))
             raise ValueError(
-                f"{shown(self.text)} is {values[at]} at sample {at + 1}, expected a finite number"
+                f"{quote(self.text)} is {values[at]} at sample {at + 1}, expected a finite number"
             )
         return np.asarray(values, np.float64)
 
@@ -95,12 +95,12 @@ def parse(text: str) -> Expression:
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"is {shown(text)}, expected columns, numbers, + - * / ** and functions") from None
+        raise ValueError(f"is {quote(text)}, expected columns, numbers, + - * / ** and functions") from None
     nodes = list(ast.walk(tree))
     if len(nodes) > SIZE:
         raise ValueError(f"has {len(nodes)} parts, expected at most {SIZE}")
     functions = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
-    quoted = {id(text): text.value for text in map(_quoted, nodes) if text is not None}
+    quoted = {id(text): text.value for text in map(_column_name, nodes) if text is not None}
     for node in nodes:
         _check(node, text, is_quoted=id(node) in quoted)
     plain = [n.id for n in nodes if isinstance(n, ast.Name) and id(n) not in functions]
@@ -109,11 +109,11 @@ def parse(text: str) -> Expression:
             raise ValueError(f"has the function {name} without values, expected column({name!r}) or a call")
     columns = (*plain, *map(str, quoted.values()))
     if not columns:
-        raise ValueError(f"is {shown(text)}, which names no column, expected one or more")
+        raise ValueError(f"is {quote(text)}, which names no column, expected one or more")
     return Expression(text, tuple(dict.fromkeys(columns)))
 
 
-def _quoted(node: ast.AST) -> ast.Constant | None:
+def _column_name(node: ast.AST) -> ast.Constant | None:
     """Return the text of a node that is `column("…")`, else None."""
     if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == COLUMN):
         return None
@@ -128,10 +128,10 @@ def _check(node: ast.AST, text: str, *, is_quoted: bool) -> None:
     if not isinstance(node, _NODES):
         part = brief(ast.get_source_segment(text.strip(), node) or text)
         raise ValueError(f"has {part!r}, expected columns, numbers, + - * / ** and functions")
-    if isinstance(node, ast.Call) and _quoted(node) is None:
+    if isinstance(node, ast.Call) and _column_name(node) is None:
         _check_call(node)
     if isinstance(node, ast.Constant) and not is_quoted and not _is_plain(node.value):
-        raise ValueError(f"has {shown(node.value)}, expected a plain number")
+        raise ValueError(f"has {quote(node.value)}, expected a plain number")
 
 
 def _is_plain(value: object) -> bool:

@@ -23,13 +23,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from msg_adapters.tables.column_units import CHANNELS, LINEAR, unit
-from msg_adapters.tables.elements import chosen, is_open
+from msg_adapters.tables.elements import choose_element, is_open
 from msg_adapters.tables.layout import DELIMITERS
 from msg_adapters.tables.map_keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
 from msg_adapters.tables.map_terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
 from rsea_ros import strict_yaml
 from rsea_ros.errors import FieldError, ImportMapError
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class ImportMap:
         channels = {
             name: tuple(term.at(index) for term in terms) for name, terms in self.channels.items()
         }
-        where = self.where and replace(self.where, column=chosen(self.where.column, index))
+        where = self.where and replace(self.where, column=choose_element(self.where.column, index))
         columns = [t.column for terms in channels.values() for t in terms] + ([where.column] if where else [])
         left = [column for column in columns if is_open(column)]
         if left:
@@ -141,13 +141,13 @@ def _runs(value: object) -> str:
 def _header(value: object) -> bool | None:
     if value is None or isinstance(value, bool):
         return value
-    raise FieldError(f"header is {shown(value)}, expected true or false", "header")
+    raise FieldError(f"header is {quote(value)}, expected true or false", "header")
 
 
 def _decimal(value: object) -> str:
     if value in (".", ","):
         return str(value)
-    raise FieldError(f"decimal is {shown(value)}, expected '.' or ','", "decimal")
+    raise FieldError(f"decimal is {quote(value)}, expected '.' or ','", "decimal")
 
 
 def _one_kind(channels: dict[str, tuple[ChannelTerm, ...]]) -> dict[str, tuple[ChannelTerm, ...]]:
@@ -178,4 +178,4 @@ def _delimiter(value: object) -> str | None:
     if value is None or (isinstance(value, str) and value in DELIMITERS):
         return None if value is None else DELIMITERS[value]
     known = ", ".join(repr(key) for key in DELIMITERS)
-    raise FieldError(f"delimiter is {shown(value)}, expected one of {known}", "delimiter")
+    raise FieldError(f"delimiter is {quote(value)}, expected one of {known}", "delimiter")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from msg_adapters.tables.clock import repaired
+from msg_adapters.tables.clock import spread_repeats
 from msg_adapters.tables.column_files import read_columns
 from msg_adapters.tables.column_table import Table
 from msg_adapters.tables.column_units import LINEAR, canonical, unit
@@ -82,13 +82,13 @@ def import_records(
                 _part(_file(Path(path), name, mapping), table, joint.of_file(name), run)
                 for name, table in tables.items()
             ]
-            with _naming(path, mapping, run):
+            with _name_errors(path, mapping, run):
                 record = _record(path, parts, joint)
             yield Imported(record, joint, index, run)
 
 
 @contextmanager
-def _naming(path: str | Path, mapping: ImportMap, run: float | None) -> Iterator[None]:
+def _name_errors(path: str | Path, mapping: ImportMap, run: float | None) -> Iterator[None]:
     """Let an error name file and run. Raises ImportMapError."""
     where = f"{path}" if run is None else f"{path}: {mapping.runs} = {run:g}"
     try:
@@ -122,7 +122,7 @@ def _runs(path: str | Path, tables: Mapping[str, Table], mapping: ImportMap) -> 
 
 
 def _part(path: Path, table: Table, mapping: ImportMap, run: float | None) -> _Part:
-    with _naming(path, mapping, run):
+    with _name_errors(path, mapping, run):
         keep, undated = _rows_kept(table, mapping, run)
         stamps, repeats = _stamps(path, table, mapping, keep)
         values = {name: _values(table, terms, keep, stamps) for name, terms in mapping.channels.items()}
@@ -153,14 +153,14 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
     """Return a summary of the import, for a person to compare with the machine."""
     lines = list(record.notes)
     for name, channel in record.channels.items():
-        columns = " + ".join(_described(term) for term in mapping.channels[name])
+        columns = " + ".join(_describe(term) for term in mapping.channels[name])
         low, high = channel.y.min(), channel.y.max()
         si = plain(in_motion(UNITS[name], linear=_is_linear(mapping)))
         lines.append(f"{name}: {len(channel)} samples of {columns}, {low:.6g} to {high:.6g} {si}")
     return lines
 
 
-def _described(term: ChannelTerm) -> str:
+def _describe(term: ChannelTerm) -> str:
     """Return `tau [N·m]`, however the map writes the unit."""
     return f"{term.column} [{plain(canonical(term.unit)) or 1}]"
 
@@ -259,7 +259,7 @@ def _stamps(
         raise ImportMapError(f"{mapping.time.column} of row {dated[at] + 1} goes back ({steps})")
     if t[-1] == t[0]:
         raise ImportMapError(f"{mapping.time.column} is {t[0]:g} s in every row, expected a clock that runs")
-    spread, detail = repaired(t)
+    spread, detail = spread_repeats(t)
     share = float(np.mean(np.diff(t, prepend=-np.inf) == 0.0))
     faults = [Fault("coarse_stamps", path.name, share, detail)] if detail else []
     return spread[keep[dated]], faults

@@ -18,7 +18,7 @@ from msg_adapters.tables.child import finite_table
 from msg_adapters.tables.column_table import Table, check_size, index_of
 from msg_adapters.tables.elements import ElementAddress, place_of
 from rsea_ros.signals import FloatArray
-from rsea_ros.wording import brief, no_utf_8, shown
+from rsea_ros.wording import brief, no_utf_8, quote
 
 LARGEST_FILE = 200_000_000
 """Bytes: read as a whole, they take about eight times as much memory."""
@@ -41,16 +41,16 @@ def _document(path: Path) -> Any:
     try:
         text = path.read_text(encoding="utf-8-sig")
         if path.suffix not in LINES:
-            return _parsed(text)
+            return _parse(text)
         lines = ((number, line) for number, line in enumerate(text.split("\n"), 1) if line.strip())
-        return [_parsed(line, number) for number, line in lines]
+        return [_parse(line, number) for number, line in lines]
     except UnicodeDecodeError as error:
         raise ValueError(f"{no_utf_8(error)}, expected JSON in UTF-8") from None
     except RecursionError:
         raise ValueError("JSON of too many levels, expected records or columns of numbers") from None
 
 
-def _parsed(text: str, line: int | None = None) -> Any:
+def _parse(text: str, line: int | None = None) -> Any:
     try:
         return json.loads(text, object_pairs_hook=_once)
     except json.JSONDecodeError as error:
@@ -64,7 +64,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(mapping) < len(pairs):
         names = [name for name, _ in pairs]
         twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"key {shown(twice)} stands twice in a mapping, expected once")
+        raise ValueError(f"key {quote(twice)} stands twice in a mapping, expected once")
     return mapping
 
 
@@ -78,7 +78,7 @@ def _vector(column: str, document: Any) -> FloatArray:
     if place.is_row:
         cells = _element(cells, place, column, 0)
     if not isinstance(cells, list) or len(cells) < 2:
-        raise ValueError(f"column {column!r} is {shown(cells)}, expected a list of numbers")
+        raise ValueError(f"column {column!r} is {quote(cells)}, expected a list of numbers")
     return np.array([_number(cell, place, column, at) for at, cell in enumerate(cells)], np.float64)
 
 
@@ -123,7 +123,7 @@ def _element(cell: Any, place: ElementAddress, column: str, at: int) -> Any:
     assert place.index is not None
     if not isinstance(cell, list) or place.index >= len(cell):
         raise ValueError(
-            f"sample {at + 1}, column {column!r} is {shown(cell)}, expected a list of more than {place.index}"
+            f"sample {at + 1}, column {column!r} is {quote(cell)}, expected a list of more than {place.index}"
         )
     return cell[place.index]
 
@@ -140,5 +140,5 @@ def _number(cell: Any, place: ElementAddress, column: str, at: int) -> float:
         return float(cell)
     hint = f": {column}[0]" if isinstance(cell, list) else ""
     raise ValueError(
-        f"sample {at + 1}, column {brief(column)!r} is {shown(cell)}, expected a finite number{hint}"
+        f"sample {at + 1}, column {brief(column)!r} is {quote(cell)}, expected a finite number{hint}"
     )

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from msg_adapters.tables.column_units import CHANNELS, LINEAR, unit
-from msg_adapters.tables.elements import chosen
+from msg_adapters.tables.elements import choose_element
 from msg_adapters.tables.expression import Expression, parse
 from msg_adapters.tables.map_keys import TERM
 from rsea_ros.errors import FieldError
 from rsea_ros.keys import NEEDED, Key
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 LARGEST = 1e300
 """Of the numbers in a map: products of two of them and a unit stay finite."""
@@ -43,8 +43,8 @@ class ChannelTerm:
     def at(self, index: int | None) -> ChannelTerm:
         """Return the term for one number of lists in cells."""
         if self.expression is None:
-            return replace(self, column=chosen(self.column, index))
-        text = chosen(self.expression.text, index)
+            return replace(self, column=choose_element(self.column, index))
+        text = choose_element(self.expression.text, index)
         return replace(self, column=text, expression=parse(text))
 
 
@@ -101,7 +101,7 @@ def _expression(body: Mapping[str, Any], field: str) -> Expression | None:
     text = body["expression"]
     if not isinstance(text, str):
         where = f"{field}.expression"
-        raise FieldError(f"{where} is {shown(text)}, expected a text in quotes", where)
+        raise FieldError(f"{where} is {quote(text)}, expected a text in quotes", where)
     try:
         return parse(text)
     except ValueError as error:
@@ -111,38 +111,38 @@ def _expression(body: Mapping[str, Any], field: str) -> Expression | None:
 def _flag(value: object, field: str) -> bool:
     if isinstance(value, bool):
         return value
-    raise FieldError(f"{field} is {shown(value)}, expected true or false", field)
+    raise FieldError(f"{field} is {quote(value)}, expected true or false", field)
 
 
 def number(value: object, field: str) -> float:
     if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < LARGEST:
         return float(value)
-    raise FieldError(f"{field} is {shown(value)}, expected a number", field)
+    raise FieldError(f"{field} is {quote(value)}, expected a number", field)
 
 
 def column_name(value: object, field: str) -> str:
     """Return the name of a column, or its number."""
     if isinstance(value, (str, int)) and not isinstance(value, bool):
         return str(value).strip()
-    raise FieldError(f"{field} is {shown(value)}, expected a name; put quotes around it", field)
+    raise FieldError(f"{field} is {quote(value)}, expected a name; put quotes around it", field)
 
 
 def _file(value: object, field: str) -> str:
     """Return the plain name of a file."""
     if isinstance(value, str) and value == Path(value).name:
         return value
-    raise FieldError(f"{field} is {shown(value)}, expected the name of a file in the directory", field)
+    raise FieldError(f"{field} is {quote(value)}, expected the name of a file in the directory", field)
 
 
 def checked_keys(value: object, field: str, keys: Sequence[Key]) -> Mapping[str, Any]:
     """Return a mapping that has only these keys, and all of them that are needed."""
     allowed = ", ".join(sorted(key.name for key in keys))
     if not isinstance(value, Mapping):
-        held = "empty" if value is None else shown(value)
+        held = "empty" if value is None else quote(value)
         raise FieldError(f"{field} is {held}, expected a mapping with {allowed}", field)
     for name in value:
         if name not in [key.name for key in keys]:
-            raise FieldError(f"{field}: unknown key {shown(name)}, expected {allowed}", f"{field}.{name}")
+            raise FieldError(f"{field}: unknown key {quote(name)}, expected {allowed}", f"{field}.{name}")
     needed = sorted(key.name for key in keys if key.default == NEEDED)
     for name in needed:
         if name not in value:

@@ -27,7 +27,7 @@ def read_npz(path: Path, columns: Sequence[str]) -> Table:
     try:
         with zipfile.ZipFile(path) as archive:
             sizes = {n.removesuffix(".npy"): archive.getinfo(n).file_size for n in archive.namelist()}
-            places = {column: _known(place_of(column), list(sizes)) for column in columns}
+            places = {column: _check_address(place_of(column), list(sizes)) for column in columns}
             arrays: dict[str, Any] = {}
             for place in places.values():
                 name = _root(place.base, sizes)
@@ -54,7 +54,7 @@ def read_npy(path: Path, columns: Sequence[str]) -> Table:
     return finite_table(vectors)
 
 
-def _known(place: ElementAddress, names: Sequence[str]) -> ElementAddress:
+def _check_address(place: ElementAddress, names: Sequence[str]) -> ElementAddress:
     """Return a place whose array is in the file. Raises ValueError for another."""
     if _root(place.base, names) not in names:
         index_of(place.base, names)

@@ -16,7 +16,7 @@ from msg_adapters.tables.numerals import has_decimal_comma, numeral
 from msg_adapters.tables.text_lines import blocks_of_lines
 from rsea_ros.decimal_number import is_decimal
 from rsea_ros.signals import FloatArray
-from rsea_ros.wording import brief, shown
+from rsea_ros.wording import brief, quote
 
 MISSING = {"", "-", "--", "na", "n/a", "#n/a", "nan", "nil", "none", "null"}
 """What stands, in small letters, where there is no value."""
@@ -156,7 +156,7 @@ class _Reader:
         try:
             number = number_in(cell, element)
         except ValueError as error:
-            raise ValueError(f"line {line}, column {column!r} is {shown(cell)}, {error}") from None
+            raise ValueError(f"line {line}, column {column!r} is {quote(cell)}, {error}") from None
         return _value(line, column, number, self._decimal)
 
 
@@ -167,4 +167,4 @@ def _value(line: int, column: str, cell: str, decimal: str) -> float:
     if cell.lower() in MISSING:
         return float("nan")
     hint = ', with a decimal point (or `decimal: ","` in the map)' if has_decimal_comma(cell) else ""
-    raise ValueError(f"line {line}, column {column!r} is {shown(cell)}, expected a finite number{hint}")
+    raise ValueError(f"line {line}, column {column!r} is {quote(cell)}, expected a finite number{hint}")

@@ -22,7 +22,7 @@ _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BO
 def blocks_of_lines(path: Path) -> Iterator[list[str]]:
     """Yield the lines of a file without their ends. Raises ValueError for a file that is not text."""
     rest = ""
-    with _opened(path) as file:
+    with _open(path) as file:
         text = io.TextIOWrapper(cast("IO[bytes]", file), encoding=_encoding(path), errors="replace")
         while chunk := text.read(BLOCK):
             lines = (rest + chunk).split("\n")
@@ -35,7 +35,7 @@ def blocks_of_lines(path: Path) -> Iterator[list[str]]:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[IO[bytes] | gzip.GzipFile]:
+def _open(path: Path) -> Iterator[IO[bytes] | gzip.GzipFile]:
     if stat.S_ISFIFO(path.stat().st_mode):
         raise ValueError("is a pipe, expected a file")
     with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as file:
@@ -44,7 +44,7 @@ def _opened(path: Path) -> Iterator[IO[bytes] | gzip.GzipFile]:
 
 def _encoding(path: Path) -> str:
     """Return the encoding: by its mark, else UTF-8 where the beginning is that, else Latin-1."""
-    with _opened(path) as file:
+    with _open(path) as file:
         head = file.read(_HEAD)
     for mark, name in _MARKS.items():
         if head.startswith(mark):

@@ -19,9 +19,9 @@ from msg_adapters.tables.blosc import unpack_blosc
 from msg_adapters.tables.child import finite_table
 from msg_adapters.tables.column_table import Table, check_size, index_of
 from msg_adapters.tables.elements import place_of
-from msg_adapters.tables.zarr_store import ARRAY, ArrayStore, opened
+from msg_adapters.tables.zarr_store import ARRAY, ArrayStore, open_zarr
 from rsea_ros.signals import FloatArray
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 _LARGEST_HEADER = 1 << 16
 _LARGEST_CHUNK = 1 << 31
@@ -30,7 +30,7 @@ _DTYPE = re.compile(r"[<>|](?:[iu][1248]|f[248]|b1)")
 _KEYS = ("shape", "chunks", "dtype", "compressor", "filters", "order", "zarr_format")
 
 
-def _copied(packed: bytes, size: int, count: int) -> bytes:
+def _copy(packed: bytes, size: int, count: int) -> bytes:
     if len(packed) != size:
         raise ValueError(f"a chunk has {len(packed)} bytes, expected {size}; a damaged file?")
     return packed[:count]
@@ -41,7 +41,7 @@ def _unpack_zlib(packed: bytes, size: int, count: int) -> bytes:
 
 
 _CODECS: Mapping[str, Callable[[bytes, int, int], bytes]] = {
-    "none": _copied,
+    "none": _copy,
     "blosc": unpack_blosc,
     "zlib": _unpack_zlib,
 }
@@ -61,7 +61,7 @@ class _Array:
 
 def read_zarr(path: Path, columns: Sequence[str]) -> Table:
     """Return the requested arrays, or columns of them. Raises OSError and ValueError with the array."""
-    with opened(path) as store:
+    with open_zarr(path) as store:
         if not store.arrays:
             raise ValueError("a zarr group without arrays, expected one of its subgroups")
         return finite_table({column: _column(store, column, len(columns)) for column in columns})
@@ -106,9 +106,9 @@ def _array(name: str, content: bytes) -> _Array:
         held = f"shape {shape} in chunks of {chunks}"
         raise ValueError(f"array {name!r} has {held}, expected a vector or a matrix")
     if not (isinstance(dtype, str) and _DTYPE.fullmatch(dtype)):
-        raise ValueError(f"array {name!r} is of type {shown(dtype)}, expected numbers")
+        raise ValueError(f"array {name!r} is of type {quote(dtype)}, expected numbers")
     if header["filters"] or (order != "C" and len(shape) > 1):
-        raise ValueError(f"array {name!r} has filters or the order {shown(order)}, expected none and 'C'")
+        raise ValueError(f"array {name!r} has filters or the order {quote(order)}, expected none and 'C'")
     if (size := int(np.prod(chunks, dtype=object)) * np.dtype(dtype).itemsize) > _LARGEST_CHUNK:
         raise ValueError(f"array {name!r} has chunks of {size} bytes, expected at most {_LARGEST_CHUNK}")
     separator = "/" if header.get("dimension_separator") == "/" else "."
@@ -128,12 +128,12 @@ def _header(name: str, content: bytes) -> Mapping[str, Any]:
 def _whole(name: str, key: str, value: object) -> tuple[int, ...]:
     numbers = value if isinstance(value, list) else [None]
     if any(isinstance(n, bool) or not isinstance(n, int) or n < 0 for n in numbers):
-        raise ValueError(f"array {name!r}: {key} is {shown(value)}, expected whole numbers")
+        raise ValueError(f"array {name!r}: {key} is {quote(value)}, expected whole numbers")
     return tuple(numbers)
 
 
 def _codec(name: str, compressor: object) -> Callable[[bytes, int, int], bytes]:
     kind = "none" if compressor is None else str(compressor.get("id")) if isinstance(compressor, dict) else ""
     if kind not in _CODECS:
-        raise ValueError(f"array {name!r} is packed by {shown(kind)}, expected one of {', '.join(_CODECS)}")
+        raise ValueError(f"array {name!r} is packed by {quote(kind)}, expected one of {', '.join(_CODECS)}")
     return _CODECS[kind]

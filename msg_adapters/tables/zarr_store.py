@@ -33,7 +33,7 @@ class _Directory:
     def read(self, array: str, name: str) -> bytes:
         file = self.path / array / name
         if not file.is_file():
-            raise _missing(array, name)
+            raise _missing_error(array, name)
         _check_size(array, name, file.stat().st_size)
         return file.read_bytes()
 
@@ -48,7 +48,7 @@ class _Tar:
         member = self.members.get(f"{array}/{name}")
         file = member and self.tar.extractfile(member)
         if not (member and file):
-            raise _missing(array, name)
+            raise _missing_error(array, name)
         _check_size(array, name, member.size)
         content = file.read()
         if len(content) < member.size:
@@ -62,7 +62,7 @@ def is_group(path: Path) -> bool:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[ArrayStore]:
+def open_zarr(path: Path) -> Iterator[ArrayStore]:
     """Give the files of a group. Raises OSError and ValueError for a path that holds none."""
     if path.is_dir():
         if not is_group(path):
@@ -89,7 +89,7 @@ def _of_tar(tar: tarfile.TarFile) -> _Tar:
     return _Tar(tar, held, tuple(name for name in names if "/" not in name))
 
 
-def _missing(array: str, name: str) -> ValueError:
+def _missing_error(array: str, name: str) -> ValueError:
     return ValueError(f"array {array!r} has no file {name!r}, expected it; a download cut off?")
 
 

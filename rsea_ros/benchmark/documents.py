@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from rsea_ros.errors import BenchmarkError
-from rsea_ros.wording import no_utf_8, shown
+from rsea_ros.wording import no_utf_8, quote
 
-text_of = shown
+text_of = quote
 
 
 def read_text(path: Path) -> str:
@@ -35,5 +35,5 @@ def json_object(text: str, where: str) -> dict[str, Any]:
         reason = error.msg if isinstance(error, json.JSONDecodeError) else type(error).__name__
         raise BenchmarkError(f"{where}: {reason}, expected JSON") from None
     if not isinstance(value, dict):
-        raise BenchmarkError(f"{where}: {shown(value)}, expected a JSON object")
+        raise BenchmarkError(f"{where}: {quote(value)}, expected a JSON object")
     return value

@@ -13,7 +13,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
 
 
-def diagnosed(record: Record, rig: Rig) -> Answer:
+def diagnosis_answer(record: Record, rig: Rig) -> Answer:
     """Return the causes of a diagnosis, and their alternatives, with the probabilities that it states."""
     result = diagnose([record], rig)
     rivals = {a.name: a.probability for a in result.alternatives}
@@ -32,10 +32,10 @@ def largest_gain(record: Record, rig: Rig) -> Answer:
         present = fit_candidate(FitSetup(problem.cases, DEFAULT, pools.run), problem)
         effects = searched_effects(problem, ())
         fits = StepFits(present, effects, pools, DEFAULT, lambda step, share: None)
-        pieces = fits.fit_pieces(fits.screened(fits.on_pieces)[: DEFAULT.forward.piece_fits])
+        pieces = fits.fit_pieces(fits.screen(fits.on_pieces)[: DEFAULT.forward.piece_fits])
     best = min(pieces, key=lambda s: s.cost, default=None)
     return Answer({best.name: 1.0} if best else {})
 
 
-ENTRIES = {"diagnose": diagnosed, "largest_gain": largest_gain}
+ENTRIES = {"diagnose": diagnosis_answer, "largest_gain": largest_gain}
 """Entries by name."""

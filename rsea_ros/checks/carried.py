@@ -18,7 +18,7 @@ from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Record
 from rsea_ros.torque_edge import behind_the_edge
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
           "clipping", "nan", "coarse_steps", "early_torque", "held_samples",
@@ -34,10 +34,10 @@ def held_against(record: Record, rig: Rig, axis: str = "torque.z", *, masks: boo
     """
     check_pace(record)
     require_motion(record)
-    return with_faults(noted(record, rig), check_record(record, rig, axis), masks=masks)
+    return with_faults(note_unused(record, rig), check_record(record, rig, axis), masks=masks)
 
 
-def noted(record: Record, rig: Rig) -> Record:
+def note_unused(record: Record, rig: Rig) -> Record:
     """Return the record with a note of the channels that its rig makes no use of."""
     sentence = unused_sentence(record, rig)
     return replace(record, notes=(*record.notes, sentence)) if sentence else record
@@ -62,7 +62,7 @@ def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     kept = (*record.faults, *(f for f in findings.faults if f.kind not in again and f not in record.faults))
     record = replace(record, channels=channels, faults=kept)
     record = _with_even_clocks(record, findings) if masks else record
-    return record if masks else _sound(_repaired(record), findings)
+    return record if masks else _sound(_repair(record), findings)
 
 
 def _with_even_clocks(record: Record, findings: Findings) -> Record:
@@ -78,7 +78,7 @@ def _with_even_clocks(record: Record, findings: Findings) -> Record:
     return at_rates(replace(record, faults=faults), rates)
 
 
-def _repaired(record: Record) -> Record:
+def _repair(record: Record) -> Record:
     """Return the record as the check used it, with its reported faults repaired."""
     for repair in (without_mixed_rows, without_held_samples, behind_the_edge):
         record, _ = repair(record)
@@ -105,4 +105,4 @@ def _reasons(record: Record, findings: Findings) -> str:
         if f.kind == "dead_channel":
             channels.setdefault(f.detail or f.kind, []).append(f.channel)
     driver = [f"{f.channel} latched a fault, {f.detail}" for f in record.faults if f.kind == "device_fault"]
-    return "; ".join([*driver, *(f"{listed(names)}: {why}" for why, names in channels.items())])
+    return "; ".join([*driver, *(f"{list_names(names)}: {why}" for why, names in channels.items())])

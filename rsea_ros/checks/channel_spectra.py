@@ -78,7 +78,7 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
     longest = next_fast_length(max(_FEWEST, int(_LONGEST / period)))
     length = min(len(even) // _SEGMENTS, longest)
     pp = _segments(p, length)
-    if _captured(pp, p) < _ENOUGH:  # slow: its lines lie below those of short segments
+    if _captured_share(pp, p) < _ENOUGH:  # slow: its lines lie below those of short segments
         length = len(even) // _SEGMENTS
         pp = _segments(p, length)
     yy = _segments(y, length)
@@ -104,11 +104,11 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
         related=float(np.sum(share * np.abs(cross) ** 2 / (power_y * power_p))),
         measured=float(np.std(y)),
         predicted=float(np.std(p)),
-        captured=_captured(pp, p),
+        captured=_captured_share(pp, p),
     )
 
 
-def _captured(spectra: ComplexArray, values: FloatArray) -> float:
+def _captured_share(spectra: ComplexArray, values: FloatArray) -> float:
     """Return the share of a signal's power that its segments' lines hold."""
     length = 2.0 * spectra.shape[1]
     power = 2.0 * float(np.mean(np.sum(np.abs(spectra) ** 2, axis=1))) / (0.375 * length**2)

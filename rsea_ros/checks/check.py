@@ -37,10 +37,10 @@ from rsea_ros.checks.standstill import standstill_findings
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
-from rsea_ros.model.extent import bounded
+from rsea_ros.model.extent import bound_values
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.pace import is_too_fast
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
 from rsea_ros.stamps import repair_stamps
@@ -73,14 +73,14 @@ def check_record(
     with one_blas_thread(), np.errstate(all="ignore"):
         if rig.loop is not None and "reference" not in record:
             return Findings(record.source, rig.name, (_no_targets(record),), record.faults)
-        record = bounded(record if rig.loop is None else commanded(record, rig))
+        record = bound_values(record if rig.loop is None else with_command(record, rig))
         checked = check(record, rig)
         every = [*_topics(record, rig), *(fault_finding(f) for f in checked.faults)]
         every += [*order(record), *rates(record, rig)]
         if "command" in checked.record and len(checked.record["command"]) > 2:
             every += excitation(checked.record, rig)
             every += jump_findings(checked.record)
-            every += [] if _bridged(checked) else standstill_findings(checked.record)
+            every += [] if _bridged_channels(checked) else standstill_findings(checked.record)
             if is_commanded(checked.record) and not is_too_fast(checked.record):
                 every += _against_rig(checked, rig, axis, values)
         every += _other_axes(checked, rig, axis, wrench)
@@ -141,14 +141,14 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
             )
         ]
     both = checked.compared if checked.compared is not None else sides(checked.record, rig)
-    findings, linear = _compared(checked, both, rig, axis, {}, values)
+    findings, linear = _compare(checked, both, rig, axis, {}, values)
     if linear is None or not linear.is_clear:
         start = float(checked.record["command"].t[0])
         lines = lag_lines({n: s for n, s in both.items() if n in _whole(checked)}, start)
         rates = clock_rates(lines)
         if rates:
             even = replace(checked, record=at_rates(checked.record, rates))
-            again, cleared = _compared(even, sides(even.record, rig), rig, axis, rates, values)
+            again, cleared = _compare(even, sides(even.record, rig), rig, axis, rates, values)
             if cleared is not None and cleared.is_clear:
                 return again
         if linear is not None:
@@ -164,7 +164,7 @@ def _with_drifts(findings: list[Finding], drifts: list[Finding]) -> list[Finding
     return [*(f for f in findings if f not in fitted and f not in vague), *drifts]
 
 
-def _compared(
+def _compare(
     checked: Checked,
     both: Mapping[str, Side],
     rig: Rig,
@@ -187,13 +187,13 @@ def _compared(
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
     if elsewhere := angle_offset_findings(rig, compared):
         return [*findings, *elsewhere], None
-    readings, matched = _matched(record, compared, rig, axis)
+    readings, matched = _match(record, compared, rig, axis)
     scaled = any(f.kind == "scale" and f.channel == "ft" and f.light == "red" for f in matched)
     matched += [] if scaled else offset_findings(record, compared)
-    findings += [*noises(record, rig, but=_bridged(checked)), *matched]
+    findings += [*noises(record, rig, but=_bridged_channels(checked)), *matched]
     if readings is None or late or _is_elsewhere(findings):
         return findings, None
-    more, linear = _linearised(checked, rig, readings, rates, values)
+    more, linear = _linearise(checked, rig, readings, rates, values)
     return [*findings, *more], linear
 
 
@@ -202,12 +202,12 @@ def _whole(checked: Checked) -> set[str]:
     return {n for n, bad in checked.masked.items() if np.count_nonzero(bad) < _WHOLE * len(bad)}
 
 
-def _bridged(checked: Checked) -> set[str]:
+def _bridged_channels(checked: Checked) -> set[str]:
     """Return the channels of which so much was masked and bridged that what is between says nothing."""
     return {n for n, bad in checked.masked.items() if np.count_nonzero(bad) > _BRIDGED * len(bad)}
 
 
-def _matched(
+def _match(
     record: Record, compared: Mapping[str, Side], rig: Rig, axis: str
 ) -> tuple[Readings | None, list[Finding]]:
     """Return the readings of the channels, and findings on signs, scales and the rig."""
@@ -233,7 +233,7 @@ def _is_elsewhere(findings: list[Finding]) -> bool:
     return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in findings)
 
 
-def _linearised(
+def _linearise(
     checked: Checked, rig: Rig, readings: Readings, rates: Mapping[str, float], values: bool
 ) -> tuple[list[Finding], LinearisedFit | None]:
     if is_inverse(rig):

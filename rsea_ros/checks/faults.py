@@ -12,7 +12,7 @@ import numpy as np
 
 from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side, sides
-from rsea_ros.checks.frozen import SMALLEST_SHARE, frozen, held_together, longest, while_others_moved
+from rsea_ros.checks.frozen import SMALLEST_SHARE, frozen_samples, held_together, longest, while_others_moved
 from rsea_ros.checks.moved_spans import is_commanded
 from rsea_ros.checks.rounded_stamps import rounded_stamps
 from rsea_ros.held_samples import repeats_of
@@ -51,15 +51,15 @@ def check(record: Record, rig: Rig) -> Checked:
     """Find and mask the faults of a record; a channel of one sample, or without a good one, is missing."""
     few = {n: 1 if n in ("command", "reference") else 2 for n in record.channels}
     record = _without(record, {n for n, c in record.channels.items() if len(c) < few[n]})
-    faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
+    faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing_channels(record, rig))]
     repaired, clock_faults = repair_stamps(record)
     faults += [f for n, c in repaired.channels.items() for f in rounded_stamps(c, n)]
     masked, marked = {}, {}
     for name in repaired.channels:
-        masked[name], marked[name] = _masked(repaired, name)
+        masked[name], marked[name] = _mask(repaired, name)
     frozen_ones = {n for n, marks in marked.items() if any(f.kind == "frozen_samples" for f in marks)}
     finite = {n: not_finite(c, n) for n, c in repaired.channels.items()}
-    filled = _filled(repaired, finite)
+    filled = _fill(repaired, finite)
     compared = sides(filled, rig) if is_commanded(filled) else {}
     dead = dead_channels(filled, compared, rig, frozen_ones)
     repaired = _without(repaired, {f.channel for f in dead})
@@ -71,7 +71,7 @@ def check(record: Record, rig: Rig) -> Checked:
     repaired, masked = _without_unknown_commands(repaired, masked)
     alive = _without(repaired, {n for n, bad in masked.items() if bad.all() and n != "command"})
     whole = not dead and not any(bad.any() for bad in masked.values())
-    return Checked(_filled(alive, masked), masked, tuple(faults), compared if whole else None)
+    return Checked(_fill(alive, masked), masked, tuple(faults), compared if whole else None)
 
 
 def _without_unknown_commands(
@@ -93,7 +93,7 @@ def _has_steps(record: Record, name: str) -> bool:
     return name in record and len(np.unique(record["command"].y)) > FEW * len(record["command"])
 
 
-def _masked(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
+def _mask(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
     """Return which samples of a channel must not count, and its faults."""
     channel, faults = record[name], []
     bad = np.zeros(len(channel), bool)
@@ -117,7 +117,7 @@ def _without(record: Record, names: Collection[str]) -> Record:
     return replace(record, channels={n: c for n, c in record.channels.items() if n not in names})
 
 
-def missing(record: Record, rig: Rig) -> tuple[str, ...]:
+def missing_channels(record: Record, rig: Rig) -> tuple[str, ...]:
     """Return the channels of the rig's sensors that the record lacks."""
     return tuple(n for n in rig.sensors if n not in record)
 
@@ -208,12 +208,12 @@ _WHILE_MOVING = ("clipping", "frozen_samples")
 FINDERS: Mapping[str, Callable[[Channel, str], BoolArray]] = {
     "nan": not_finite,
     "clipping": clipping,
-    "frozen_samples": frozen,
+    "frozen_samples": frozen_samples,
     "outliers": outliers,
 }
 
 
-def _filled(record: Record, masked: Mapping[str, BoolArray]) -> Record:
+def _fill(record: Record, masked: Mapping[str, BoolArray]) -> Record:
     """Return the record with bad values bridged by straight lines, so that a simulation can run."""
     channels = {}
     for name, channel in record.channels.items():

@@ -40,7 +40,7 @@ _STRETCH = 32
 """Samples of a stretch, enough for the median of their fourth differences."""
 
 
-def frozen(channel: Channel, name: str) -> BoolArray:
+def frozen_samples(channel: Channel, name: str) -> BoolArray:
     """Return which samples repeat the one before more often than a quantum explains.
 
     With a quantum, neighbouring values may be equal by chance; then as many differ by one quantum, plus or

@@ -67,7 +67,7 @@ def _of_channel(r: ChannelCorrection, axis: str) -> list[Finding]:
             )
         )
     if r.factor is not None:
-        findings.append(_scaled(r, r.factor))
+        findings.append(_scale_finding(r, r.factor))
     if r.odd or not findings:
         findings.append(
             Finding(
@@ -84,7 +84,7 @@ def _of_channel(r: ChannelCorrection, axis: str) -> list[Finding]:
     return findings
 
 
-def _scaled(r: ChannelCorrection, factor: Factor) -> Finding:
+def _scale_finding(r: ChannelCorrection, factor: Factor) -> Finding:
     """Return the finding of a channel in another unit; its factor, or the measured one where that is off."""
     meant = " or ".join(f.meaning for f in (factor, *r.also))
     measured = factor.value * math.exp(r.gain)

@@ -73,17 +73,19 @@ def readings_of(quotients: Mapping[str, Quotient], rig: Rig) -> Readings | None:
         return Readings(
             {n: ChannelCorrection(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain
         )
-    return _tried(fit, plain, quotients, rig)
+    return _try_corrections(fit, plain, quotients, rig)
 
 
-def _tried(fit: ShapeFit, plain: FittedShape, quotients: Mapping[str, Quotient], rig: Rig) -> Readings:
+def _try_corrections(
+    fit: ShapeFit, plain: FittedShape, quotients: Mapping[str, Quotient], rig: Rig
+) -> Readings:
     """Return the readings where something is off: signs first, then factors, then both against none."""
     signs = _signs(fit)
     free = fit.fit({n: Prior(signs[n], 0.0, _FREE) for n in fit.channels})
     command, signs, gains = _command_apart(fit.channels, signs, free.gain)
-    by_channel = {n: _named(n, signs[n], gains[n], rig) for n in fit.channels}
+    by_channel = {n: _correction_for(n, signs[n], gains[n], rig) for n in fit.channels}
     if command is not None:
-        by_channel["command"] = _named("command", command[0], command[1], rig)
+        by_channel["command"] = _correction_for("command", command[0], command[1], rig)
     elif any(r.odd for r in by_channel.values()):
         by_channel = _in_a_unit_of_the_command(signs, gains, rig) or by_channel
     applied = fit.fit({n: _prior(n, by_channel) for n in fit.channels})
@@ -92,10 +94,10 @@ def _tried(fit: ShapeFit, plain: FittedShape, quotients: Mapping[str, Quotient],
         return Readings(
             {n: ChannelCorrection(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain
         )
-    return Readings({n: _believed(r, quotients, applied) for n, r in by_channel.items()}, plain, applied)
+    return Readings({n: _believe(r, quotients, applied) for n, r in by_channel.items()}, plain, applied)
 
 
-def _believed(
+def _believe(
     reading: ChannelCorrection, quotients: Mapping[str, Quotient], applied: FittedShape
 ) -> ChannelCorrection:
     """Return the reading, unchanged where the channel does not have the rig's shape or may be limited."""
@@ -159,7 +161,7 @@ def _in_a_unit_of_the_command(
     tried = []
     for factor in factors("command", rig):
         moved = {n: gain + math.log(factor.value) for n, gain in gains.items()}
-        readings = {n: _named(n, signs[n], gain, rig) for n, gain in moved.items()}
+        readings = {n: _correction_for(n, signs[n], gain, rig) for n, gain in moved.items()}
         exact = not any(r.odd or abs(r.gain) > _EXACT for r in readings.values())
         if exact and any(r.factor is None for n, r in readings.items() if n != "motor_torque"):
             readings["command"] = ChannelCorrection("command", 1.0, factor, 0.0)
@@ -172,7 +174,7 @@ def _oddness(readings: Mapping[str, ChannelCorrection]) -> tuple[int, float]:
     return sum(r.factor is not None for r in readings.values()), sum(abs(r.gain) for r in readings.values())
 
 
-def _named(channel: str, sign: float, gain: float, rig: Rig) -> ChannelCorrection:
+def _correction_for(channel: str, sign: float, gain: float, rig: Rig) -> ChannelCorrection:
     """Return the reading whose factor is nearest to a gain; without a factor for an allowed gain."""
     if abs(gain) < ALLOWED:
         return ChannelCorrection(channel, sign, None, gain)

@@ -82,7 +82,7 @@ def _correlation(y: FloatArray, p: FloatArray, period: float, reach: float) -> t
 
 def lag_findings(lags: Mapping[str, float], channels: int) -> list[Finding]:
     """Return a finding for each lag, one for the command where all channels share it."""
-    all_of_them = shared(lags, channels)
+    all_of_them = shared_lag(lags, channels)
     off = {"command": -all_of_them} if all_of_them else lags
     against = "all that was measured" if all_of_them else "the command"
     return [
@@ -100,7 +100,7 @@ def lag_findings(lags: Mapping[str, float], channels: int) -> list[Finding]:
     ]
 
 
-def shared(lags: Mapping[str, float], channels: int) -> float:
+def shared_lag(lags: Mapping[str, float], channels: int) -> float:
     """Return the lag (s) that all channels share, an error of the command's stamps; 0 for none.
 
     The motor torque, where it is measured, repeats the command and shows the lag best.

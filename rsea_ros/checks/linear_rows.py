@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.identification.confidence import BLOCK
+from rsea_ros.identification.interval_settings import DEFAULT
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import Unknown, clocks
@@ -34,7 +34,7 @@ class LinearState(NamedTuple):
     offset: FloatArray
     drift: FloatArray
 
-    def moved(self, step: FloatArray) -> LinearState:
+    def move(self, step: FloatArray) -> LinearState:
         """Return the state after a step; a clock that reads later than stamped is stamped early."""
         n, m = len(self.theta), len(self.offset)
         return LinearState(
@@ -152,6 +152,6 @@ def rows_of(setting: LinearSetting, left: FitResidual, known: Slope | None = Non
     columns = [moved[:, n:] * (t - setting.start)[:, None]]
     columns += [of_channel * column[:, None] for column in left.plain.T]
     weight = 1.0 / np.maximum(left.misfit, _LEAST_MISFIT)[left.of]
-    block = np.floor((t - t.min()) / min(BLOCK, case.duration / _BLOCKS)).astype(np.int64)
+    block = np.floor((t - t.min()) / min(DEFAULT.block, case.duration / _BLOCKS)).astype(np.int64)
     matrix = np.column_stack([moved, *columns]) * weight[:, None]
     return LinearisedRows(left, known, left.residual * weight, matrix, block)

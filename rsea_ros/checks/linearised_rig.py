@@ -77,7 +77,7 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
     where the record has no channel of the rig's, or all their samples are masked.
     """
     setting, state = _setting(record, masked, rig, shape)
-    state, rows, sd, settled = _descended(setting, state)
+    state, rows, sd, settled = _descend(setting, state)
     return _linear(setting, state, rows, sd, settled)
 
 
@@ -94,17 +94,17 @@ def _setting(
     values = unknowns_of_rig(rig)
     theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
 
-    def begun(timed: Sequence[str]) -> LinearState:
+    def start_state(timed: Sequence[str]) -> LinearState:
         return LinearState(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
 
-    case = case_from(on_time(record, start, sensed, begun(sensed)), rig, masked)
+    case = case_from(on_time(record, start, sensed, start_state(sensed)), rig, masked)
     timed = tuple(n for n in sensed if case.mask[n].any())
     if not timed:
         raise IdentificationError(f"{record.source}: no sample of {rig.name}'s sensors is left to compare")
-    return LinearSetting(record, start, case, rig, timed, values), begun(timed)
+    return LinearSetting(record, start, case, rig, timed, values), start_state(timed)
 
 
-def _descended(
+def _descend(
     setting: LinearSetting, state: LinearState
 ) -> tuple[LinearState, LinearisedRows, FloatArray, bool]:
     """Return where the rounds end: the state, rows, one sigma of each unknown, whether the clocks stand."""
@@ -113,7 +113,7 @@ def _descended(
     settled = False
     for k in range(_ROUNDS):
         parts = _PARTS[k // 2 :]  # whole steps turn to and fro about the end
-        tried = ((at, left_of(setting, at)) for at in (state.moved(part * step) for part in parts))
+        tried = ((at, left_of(setting, at)) for at in (state.move(part * step) for part in parts))
         better = next((t for t in tried if t[1].loss < _WORSE * rows.left.loss), None)
         if better is None:
             break
@@ -122,7 +122,7 @@ def _descended(
         settled = _clocks_stand(setting, step, sd)
         if settled:
             break
-    return state.moved(0.5 * step), rows, sd, settled
+    return state.move(0.5 * step), rows, sd, settled
 
 
 def _clocks_stand(setting: LinearSetting, step: FloatArray, sd: FloatArray) -> bool:

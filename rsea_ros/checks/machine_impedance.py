@@ -103,10 +103,10 @@ def impedance_of(side: Side, rig: Rig) -> ImpedanceFit | None:
         return None
     w = 2.0 * np.pi * q.frequency[keep]
     nominal = m.stiffness[0, 0] - m.mass[0, 0] * w**2 + 1j * w * m.damping[0, 0]
-    return _fitted(nominal / q.value[keep], w, q, q.sd[keep])
+    return _fit(nominal / q.value[keep], w, q, q.sd[keep])
 
 
-def _fitted(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> ImpedanceFit:
+def _fit(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> ImpedanceFit:
     """Return K and J from the real part of Z, each line by its doubt."""
     doubt = np.abs(z) * np.hypot(sd, _MODEL_ERROR)
     rows = np.column_stack([np.ones(len(w)), -(w**2)])

@@ -56,10 +56,10 @@ def left_of(motion: Motion) -> tuple[float, float]:
     moving = [motion.a, motion.v, sign, np.ones_like(motion.v)]
     known = motion.counts if motion.counts.any() else np.ones(len(motion.t), bool)
     without, held = ([c[known] for c in columns] for columns in (moving, [*moving, *holding]))
-    return _left(without, motion.torque[known]), _left(held, motion.torque[known])
+    return _rms_left(without, motion.torque[known]), _rms_left(held, motion.torque[known])
 
 
-def _left(columns: list[FloatArray], torque: FloatArray) -> float:
+def _rms_left(columns: list[FloatArray], torque: FloatArray) -> float:
     edge = int(_EDGE * len(torque))
     inside = slice(edge, len(torque) - edge)
     rows = np.column_stack(columns)[inside]

@@ -32,7 +32,7 @@ def rounded_stamps(channel: Channel, name: str) -> list[Fault]:
     uneven = float(np.mean(np.abs(off) > 0.5 * step))
     if step / np.sqrt(12.0) < SCATTER * period or uneven < _OFTEN:
         return []
-    detail = f"whole {_named(step)}, off by up to {1e3 * step / 2:g} ms at {channel.rate:.4g} Hz"
+    detail = f"whole {_step_text(step)}, off by up to {1e3 * step / 2:g} ms at {channel.rate:.4g} Hz"
     return [Fault("rounded_stamps", name, 1.0, detail)]
 
 
@@ -43,7 +43,7 @@ def _is_whole(interval: FloatArray, step: float) -> bool:
     return bool(np.all((whole > 0.0) & (np.abs(places - whole) < _NEAR)))
 
 
-def _named(step: float) -> str:
+def _step_text(step: float) -> str:
     """Return a step, s, in the unit in which it is whole."""
     if step >= 1.0:
         return "s"

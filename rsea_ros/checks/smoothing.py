@@ -75,16 +75,16 @@ def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: floa
     size = np.sin(number * turn) / (number * np.sin(turn))
     averages = np.asarray(size * np.exp(-1j * (number - 1.0) * turn), dtype=np.complex128)
     none = np.ones((1, len(f)), complex)
-    tried = _left(response, np.vstack([none, averages, none, size[1::2]]), weight)
+    tried = _share_left(response, np.vstack([none, averages, none, size[1::2]]), weight)
     lags = np.asarray(1.0 / (1.0 + 2j * np.pi * f * _LAGS[:, None]), dtype=np.complex128)
-    lagged = _left(response, lags, weight).min()
+    lagged = _share_left(response, lags, weight).min()
     best = int(np.argmin(tried))
     if not (tried[best] < _FALLS * min(tried[0], lagged) and tried[best] < _FITS**2):
         return 1, False
     return (best + 1, False) if best < _MOST else (2 * (best - _MOST) + 1, True)
 
 
-def _left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> FloatArray:
+def _share_left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> FloatArray:
     """Return the share of a response's power that each filter leaves at its best gain. h: shape (k, n)."""
     gain = (h.conj() * response).real @ weight / (np.abs(h) ** 2 @ weight)
     left: FloatArray = np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight)

@@ -56,17 +56,17 @@ def _lines(dataset: Dataset, entry: str, partial: Path, tell: Progress) -> Itera
 
     partial: keeps the answers as they come; a run that was stopped goes on from there.
     """
-    known = _kept(dataset, entry, partial)
+    known = _kept_answers(dataset, entry, partial)
     for number, name in enumerate(dataset.hashes):
         tell(name, number / len(dataset.hashes))
         if name not in known:
-            known[name] = _answered(dataset, entry, name)
+            known[name] = _answer(dataset, entry, name)
             marked = ({**line, "entry": entry, "truth": dataset.hashes[n]} for n, line in known.items())
             write_text(partial, "".join(f"{json.dumps(line)}\n" for line in marked), force=True)
         yield known[name]
 
 
-def _kept(dataset: Dataset, entry: str, partial: Path) -> dict[str, dict[str, Any]]:
+def _kept_answers(dataset: Dataset, entry: str, partial: Path) -> dict[str, dict[str, Any]]:
     """Return the answers of a stopped run of this entry to these very records, by record."""
     kept = {}
     for text in partial.read_text(encoding="utf-8").splitlines() if partial.exists() else ():
@@ -79,7 +79,7 @@ def _kept(dataset: Dataset, entry: str, partial: Path) -> dict[str, dict[str, An
     return kept
 
 
-def _answered(dataset: Dataset, entry: str, name: str) -> dict[str, Any]:
+def _answer(dataset: Dataset, entry: str, name: str) -> dict[str, Any]:
     """Return the answer to a record; one that cannot be diagnosed names no effect."""
     from rsea_ros.benchmark.answers import Answer
     from rsea_ros.benchmark.entry import ENTRIES as FUNCTIONS

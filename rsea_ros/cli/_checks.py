@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rsea_ros.checks.carried import noted, with_faults
+from rsea_ros.checks.carried import note_unused, with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings
 from rsea_ros.checks.unused import unused_sentence
@@ -17,7 +17,9 @@ from rsea_ros.report.check.terminal import warnings
 from rsea_ros.signals import Record
 
 
-def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, masks: bool) -> list[Record]:
+def check_records(
+    records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, masks: bool
+) -> list[Record]:
     """Return the records, each with the faults that the checks found; a dead channel is left out.
 
     Prints a line for each warning unless quiet. masks: see with_faults.
@@ -31,7 +33,7 @@ def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, mask
     checks = [check_record(record, rig, axis) for record in records]
     if not quiet:
         print_warnings(checks, rig)
-    kept = [with_faults(noted(r, rig), f, masks=masks) for r, f in zip(records, checks, strict=True)]
+    kept = [with_faults(note_unused(r, rig), f, masks=masks) for r, f in zip(records, checks, strict=True)]
     if not quiet:
         for sentence in dict.fromkeys(filter(None, (unused_sentence(r, rig) for r in records))):
             say(sentence)

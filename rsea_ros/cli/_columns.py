@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rsea_ros.cli import _lines
-from rsea_ros.report.wrapped_lines import wrapped
+from rsea_ros.report.wrapped_lines import wrap
 
 _NARROWEST = 16
 """Columns of the last cell at least; where fewer are left it is not wrapped."""
@@ -18,4 +18,4 @@ def columns(rows: Sequence[Sequence[str]]) -> str:
     width = _lines.columns()
     width = width if width - indent >= _NARROWEST else indent + widths[-1]
     lines = ("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows)
-    return "\n".join(wrapped(line, width, indent) if len(line) > width else line for line in lines)
+    return "\n".join(wrap(line, width, indent) if len(line) > width else line for line in lines)

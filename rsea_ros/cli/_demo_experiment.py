@@ -33,8 +33,8 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
     """Hide a cause, record slow work, let the experiment node find the cause, and print what was hidden."""
     rig = load_rig(RIG)
     name, parameters = HIDDEN[int(np.random.default_rng(args.seed).integers(len(HIDDEN)))]
-    bench = demo.bench_of(rig, args.seed).with_effect(name, **parameters)
-    save_rig(bench, out / "bench.yaml")
+    true_rig = demo.drawn_rig(rig, args.seed).with_effect(name, **parameters)
+    save_rig(true_rig, out / "bench.yaml")
     print(f"{RIG}, with values up to {100.0 * demo.SPREAD:g} % off and a cause known to the plant only")
     with Processes(out / "log", domain) as nodes:
         with demo.source(nodes, out, args) as first:
@@ -45,7 +45,7 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
     for line in lines:
         if "[INFO]" in line:
             say(line.partition("]: ")[2], indent=2)
-    print(f"hidden cause: {hidden(bench)}")
+    print(f"hidden cause: {hidden_cause_text(true_rig)}")
     return 0
 
 
@@ -68,9 +68,9 @@ def _session(nodes: Processes, out: Path, bag: Path) -> None:
         nodes.wait("experiment", SESSION, tell)
 
 
-def hidden(bench: Rig) -> str:
+def hidden_cause_text(true_rig: Rig) -> str:
     """Return the hidden cause in words."""
-    cause = bench.effects[-1]
+    cause = true_rig.effects[-1]
     main = effect_named(cause.name).main
     size = f"{main.name.replace('_', ' ')} {cause.parameters[main.name]:g} {words.unit(main.unit)}"
     return f"{words.effect(cause.name)}, {size}"

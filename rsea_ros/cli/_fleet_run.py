@@ -54,7 +54,7 @@ def add_work(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Process new recordings, and print the outcomes."""
     check_options(args)
-    summary = worked(args, args.out, bags_in(args))
+    summary = write_rows(args, args.out, bags_in(args))
     print(summary.sentence())
     for joint, bag, why in summary.quarantined[:MOST_SHOWN]:
         print(f"quarantined: {joint}: {bag}: {why}")
@@ -76,15 +76,15 @@ def bags_in(args: argparse.Namespace) -> list[Held]:
     return bags_of(args.sources, joints)
 
 
-def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunSummary:
+def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunSummary:
     """Write the rows of all new recordings, and return the outcomes."""
     from rsea_ros.fleet.engine import Engine, EngineLimits
     from rsea_ros.fleet.plan import is_anything_new
-    from rsea_ros.fleet.store import locked, open_store
+    from rsea_ros.fleet.store import hold_lock, open_store
     from rsea_ros.fleet.task import work
 
     store = open_store(out, create=True)
-    with locked(store, None if args.no_wait else _say_waiting):
+    with hold_lock(store, None if args.no_wait else _say_waiting):
         store.finish()
         if args.again:
             store.take_out({"quarantined"})

@@ -6,7 +6,7 @@ import argparse
 import time
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._fleet_run import add_work, bags_in, check_options, worked
+from rsea_ros.cli._fleet_run import add_work, bags_in, check_options, write_rows
 from rsea_ros.cli._output import FOUND
 from rsea_ros.errors import ParameterError
 
@@ -48,7 +48,7 @@ def _look(args: argparse.Namespace, held: list[Held], at_first: bool) -> int:
     from rsea_ros.fleet.alarm_files import write_alarms
     from rsea_ros.fleet.store import open_store
 
-    summary = worked(args, args.store, held)
+    summary = write_rows(args, args.store, held)
     if summary.rows:
         print(summary.sentence(), flush=True)
     alarms = write_alarms(open_store(args.store)) if summary.rows or at_first else []

@@ -10,7 +10,7 @@ from typing import Any
 from rsea_ros import strict_yaml
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import rig_folders
-from rsea_ros.wording import did_you_mean, listed
+from rsea_ros.wording import did_you_mean, list_names
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,11 @@ def node_calls(graph: str, assignments: Sequence[str]) -> list[NodeCall]:
     """
     names = graph_names()
     if graph not in names:
-        raise ParameterError(f"graph {graph!r}, expected {listed(names, 'or')}{did_you_mean(graph, names)}")
-    values = {name: default for name, (default, _) in arguments_of_graphs().items()} | _given(assignments)
+        raise ParameterError(
+            f"graph {graph!r}, expected {list_names(names, 'or')}{did_you_mean(graph, names)}"
+        )
+    values = {name: default for name, (default, _) in arguments_of_graphs().items()}
+    values |= _parse_assignments(assignments)
     content = _graph()
     first = content["graphs"][graph]
     chosen = {first: content["first"][first]}
@@ -59,7 +62,7 @@ def node_calls(graph: str, assignments: Sequence[str]) -> list[NodeCall]:
     return [_call(name, settings, values) for name, settings in chosen.items()]
 
 
-def _given(assignments: Sequence[str]) -> dict[str, str]:
+def _parse_assignments(assignments: Sequence[str]) -> dict[str, str]:
     known = arguments_of_graphs()
     given: dict[str, str] = {}
     for assignment in assignments:

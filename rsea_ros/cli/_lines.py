@@ -6,7 +6,7 @@ import shutil
 import sys
 from typing import TYPE_CHECKING
 
-from rsea_ros.report.wrapped_lines import WIDTH, wrapped
+from rsea_ros.report.wrapped_lines import WIDTH, wrap
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -23,7 +23,7 @@ def columns() -> int:
 
 def say(text: str, indent: int = 0) -> None:
     """Print text in lines that fit, all but the first indented. A path stays whole."""
-    print(wrapped(text, columns(), indent), flush=True)
+    print(wrap(text, columns(), indent), flush=True)
 
 
 def show(table: Table) -> None:

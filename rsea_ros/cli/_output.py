@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rsea_ros.errors import OutputError
-from rsea_ros.new_files import Destination, check_free, unused
+from rsea_ros.new_files import Destination, check_free, unused_path
 
 FOUND = 1
 """Exit status for a finding listed in --fail-on."""
@@ -66,7 +66,7 @@ def results_place(
     folder of an input.
     """
     if args.out is None:
-        check_free([unused(Path(default))], inputs=list(filter(None, inputs)))
+        check_free([unused_path(Path(default))], inputs=list(filter(None, inputs)))
         return Destination(Path(default), fresh=True)
     folder = Path(args.out)
     if folder.exists() and not folder.is_dir():

@@ -14,7 +14,7 @@ from types import TracebackType
 
 from rsea_ros.cli._node_process import POLL, start, stop
 from rsea_ros.errors import RseaError
-from rsea_ros.interrupts import undisturbed
+from rsea_ros.interrupts import hold_signals
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -41,7 +41,7 @@ class Processes:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with undisturbed():
+        with hold_signals():
             self.stop(*self._running)
 
     def log(self, node: str) -> Path:
@@ -57,7 +57,7 @@ class Processes:
         options = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_text(value)}")]
         names = (self._logs / (f"{node}-{k}.log" if k > 1 else f"{node}.log") for k in count(1))
         self._log_of[node] = next(name for name in names if not name.exists())
-        with undisturbed(), self.log(node).open("xb") as log:
+        with hold_signals(), self.log(node).open("xb") as log:
             self._running[node] = start(
                 node, ["--ros-args", *options], env=self._environment, stdout=log, stderr=subprocess.STDOUT
             )

@@ -35,7 +35,7 @@ class EscapedStream:
 
 
 @contextmanager
-def shown() -> Iterator[None]:
+def show_controls() -> Iterator[None]:
     """In this block stdout shows control characters, and stdout and stderr accept every character."""
     codecs.register_error("rsea", _instead)
     replaced = open_closed_streams()

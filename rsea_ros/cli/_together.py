@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.cli._node_process import POLL, start, stop
-from rsea_ros.interrupts import undisturbed
+from rsea_ros.interrupts import hold_signals
 
 
 def together(nodes: Mapping[str, Sequence[str]]) -> int:
@@ -19,19 +19,19 @@ def together(nodes: Mapping[str, Sequence[str]]) -> int:
     running: dict[str, subprocess.Popen[bytes]] = {}
     try:
         for name, arguments in nodes.items():
-            with undisturbed():
+            with hold_signals():
                 running[name] = start(name, arguments)
         while any(process.poll() is None for process in running.values()):
-            if failed := _failed(running):
+            if failed := _first_failure(running):
                 print(f"{failed} ended with status {running[failed].returncode}: stopping the others")
                 return running[failed].returncode
             time.sleep(POLL)
-        failed = _failed(running)
+        failed = _first_failure(running)
         return running[failed].returncode if failed else 0
     finally:
-        with undisturbed():
+        with hold_signals():
             stop(list(running.values()))
 
 
-def _failed(running: Mapping[str, subprocess.Popen[bytes]]) -> str | None:
+def _first_failure(running: Mapping[str, subprocess.Popen[bytes]]) -> str | None:
     return next((name for name, process in running.items() if process.poll() not in (None, 0)), None)

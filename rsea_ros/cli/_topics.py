@@ -36,7 +36,7 @@ def add_topic_options(parser: argparse.ArgumentParser) -> None:
 
 def topic_map(args: argparse.Namespace) -> TopicMap:
     """Return the topic map of the options. Raises ParameterError for an impossible one."""
-    return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).renamed(args.topic)
+    return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).rename(args.topic)
 
 
 def topic_options(args: argparse.Namespace) -> tuple[str, ...]:
@@ -91,7 +91,7 @@ def cut(record: Record, args: argparse.Namespace) -> Record:
     Which channels cover the whole of it is for the checks to say again.
     Raises ParameterError for an invalid or empty window, and for a shift of an unknown channel.
     """
-    record = _shifted(record, args.shift)
+    record = _shift_stamps(record, args.shift)
     begin, end = _window(args)
     if begin == -math.inf and end == math.inf:
         return record
@@ -107,7 +107,7 @@ def cut(record: Record, args: argparse.Namespace) -> Record:
     return replace(part, channels=channels, faults=faults)
 
 
-def _shifted(record: Record, shifts: Sequence[str]) -> Record:
+def _shift_stamps(record: Record, shifts: Sequence[str]) -> Record:
     """Return the record with shifted stamps of some channels. shifts: CHANNEL=S each."""
     for shift in shifts:
         name, _, text = shift.partition("=")

@@ -1,4 +1,4 @@
-"""`rsea bench`: the paper's bench on simulated wires, to try the driver without hardware."""
+"""`rsea bench`: a simulated bench behind real wires, to try the driver without hardware."""
 
 from __future__ import annotations
 

@@ -28,9 +28,9 @@ def run(args: argparse.Namespace) -> int:
     """List, or call."""
     need_ros()
     from rsea_ros.nodes._caller import Caller
-    from rsea_ros.nodes._visitor import visiting
+    from rsea_ros.nodes._visitor import visit
 
-    with visiting("rsea_call") as node:
+    with visit("rsea_call") as node:
         caller = Caller(node)
         for action in args.action:
             print(caller.call(args.node, action), flush=True)

@@ -30,7 +30,7 @@ from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
-from rsea_ros.new_files import unused
+from rsea_ros.new_files import unused_path
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.units import plain
 
@@ -79,13 +79,13 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.cli._demo_experiment import show
 
         return show(out, domain, args)
-    bench = bench_of(load_rig(RIG), args.seed)
-    save_rig(bench, out / "bench.yaml")
+    true_rig = drawn_rig(load_rig(RIG), args.seed)
+    save_rig(true_rig, out / "bench.yaml")
     print(f"{RIG}, with true values up to {100.0 * SPREAD:g} % off, known to the plant only")
     with Processes(out / "log", domain) as nodes:
-        bag = recorded(nodes, out, duration, args)
+        bag = record_bench(nodes, out, duration, args)
         evaluate(nodes, bag, out, duration)
-        print(table(load_rig(RIG), bench, load_rig(out / "model.yaml")))
+        print(table(load_rig(RIG), true_rig, load_rig(out / "model.yaml")))
         print(losses(bag, nodes.log("identify")))
     print(f"report: {out / 'report.html'}")
     return 0
@@ -94,14 +94,14 @@ def run(args: argparse.Namespace) -> int:
 def directory(out: Path | None) -> Path:
     """Return the directory of all results. Raises ParameterError if it already holds some of them."""
     if out is None:
-        return unused(Path("out") / time.strftime("demo-%Y%m%d-%H%M%S"))
+        return unused_path(Path("out") / time.strftime("demo-%Y%m%d-%H%M%S"))
     for name in NAMES:
         if os.path.lexists(out / name):
             raise ParameterError(f"--out {out}: holds a {name} already, expected a new directory")
     return out
 
 
-def recorded(nodes: Processes, out: Path, duration: float, args: argparse.Namespace) -> Path:
+def record_bench(nodes: Processes, out: Path, duration: float, args: argparse.Namespace) -> Path:
     """Record the bench, a second time if this machine was too busy; return the bag."""
     for bag, consequence in (
         (out / "bag", "recording once more"),
@@ -116,7 +116,7 @@ def recorded(nodes: Processes, out: Path, duration: float, args: argparse.Namesp
     return bag
 
 
-def bench_of(rig: Rig, seed: int) -> Rig:
+def drawn_rig(rig: Rig, seed: int) -> Rig:
     """Return a rig whose free values differ at random by up to SPREAD."""
     rng = np.random.default_rng(seed)
     return rig.with_values({n: rig[n] * (1.0 + SPREAD * rng.uniform(-1.0, 1.0)) for n in rig.free()})

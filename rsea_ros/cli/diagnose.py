@@ -61,9 +61,9 @@ def run(args: argparse.Namespace) -> int:
         tell("reading", 0.0)
         runs = each_once([*args.bags, *([args.holdout] if args.holdout else [])])
         records = [readable(bag, topics, args) for bag in runs]
-        from rsea_ros.cli._checks import checked
+        from rsea_ros.cli._checks import check_records
 
-        raw, records = records[0], checked(records, rig, topics.axis, quiet=args.json, masks=True)
+        raw, records = records[0], check_records(records, rig, topics.axis, quiet=args.json, masks=True)
         holdout = records.pop() if args.holdout else None
         from rsea_ros.cli._provenance import provenance
         from rsea_ros.diagnosis.diagnose import (
@@ -92,9 +92,9 @@ def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None)
     Raises BagError or IdentificationError for a run that cannot be diagnosed.
     """
     from rsea_ros.checks.usable import check_diagnosable
-    from rsea_ros.model.extent import bounded
+    from rsea_ros.model.extent import bound_values
 
-    record = bounded(read_record([bag], topics=topics, strict=False))
+    record = bound_values(read_record([bag], topics=topics, strict=False))
     record = record if args is None else cut(record, args)
     check_diagnosable(record)
     return record

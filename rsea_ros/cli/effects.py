@@ -34,14 +34,14 @@ def run(args: argparse.Namespace) -> int:
         say(line, indent=len(line) - len(line.lstrip()) + 2)
     print()
     for paragraph in page.description.split("\n\n"):
-        for line in flowing(paragraph):
+        for line in flow(paragraph):
             say(line)
         print()
     say(f"Bounds and sizes are for {MACHINE}; on others they grow as named, in powers of four.")
     return 0
 
 
-def flowing(paragraph: str) -> list[str]:
+def flow(paragraph: str) -> list[str]:
     """Return a paragraph as one line that may be broken anew; equations, which are indented, line by line."""
     lines = paragraph.strip("\n").splitlines()
     return lines if any(line.startswith(" ") for line in lines) else [" ".join(lines)]

@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         tell("reading", 0.0)
         hypotheses, noise, excluded = _possible(models, args, pools.run)
         advice = replace(advise(hypotheses, asked, noise, pools.run, tell), excluded=excluded)
-    report = written(advice, place, args)
+    report = write_advice(advice, place, args)
     if args.json:
         print_file(report.parent / EXPERIMENT_JSON)
     else:
@@ -121,7 +121,7 @@ def _possible(
     return kept, dict(weighing.cases[0].noise), excluded
 
 
-def written(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
+def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
     from rsea_ros.experiment.run_file import run_text
     from rsea_ros.report.experiment.json import advice_json
@@ -154,7 +154,7 @@ def _print(advice: Advice, report: Path) -> None:
                 if i != j:
                     rivals = f"{plain_name(a)} over {plain_name(b)}"
                     say(f"separates   {rivals}: S = {p.table[i, j]:.3g}", indent=LABEL)
-        for name, expected, level, limit, unit in limit_rows(p, advice.asked.limits.stated()):
+        for name, expected, level, limit, unit in limit_rows(p, advice.asked.limits.finite_limits()):
             allowed = f"of {limit} {plain(unit)}" if limit != "none" else f"{plain(unit)} (no limit stated)"
             say(f"asks        {name} {expected}, at most {level} {allowed}", indent=LABEL)
         print(f"run         {report.parent / COMMANDS}")

@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or Path(f"{rig.name}{suffix}")
     check_free([out], force=args.force, inputs=[source])
     made = _exporters(args)[target](rig)
-    difference, not_played = _played(made, rig, args)
+    difference, not_played = _play(made, rig, args)
     write_file(out, made.content, force=args.force)
     if args.json:
         print(json.dumps(_document(made, rig, out, difference, not_played), indent=2))
@@ -96,7 +96,7 @@ def _exporters(args: argparse.Namespace) -> Mapping[str, Callable[[Rig], Export]
     }  # fmt: skip
 
 
-def _played(made: Export, rig: Rig, args: argparse.Namespace) -> tuple[tuple[Difference, ...], str]:
+def _play(made: Export, rig: Rig, args: argparse.Namespace) -> tuple[tuple[Difference, ...], str]:
     """Return the differences to our simulation, and the reason if there are none.
 
     Raises ParameterError if --limit needs them and they are not available.

@@ -44,9 +44,9 @@ def run(args: argparse.Namespace) -> int:
     with progress("identify") as tell:
         tell("reading", 0.0)
         records = [cut(read_record([bag], topics=topics), args) for bag in each_once(args.bags)]
-        from rsea_ros.cli._checks import checked
+        from rsea_ros.cli._checks import check_records
 
-        records = checked(records, rig, topics.axis, quiet=args.json, masks=False)
+        records = check_records(records, rig, topics.axis, quiet=args.json, masks=False)
         from rsea_ros.cli._provenance import provenance
         from rsea_ros.identification.identify import (
             identify,

@@ -70,7 +70,7 @@ def _write_several(args: argparse.Namespace, mapping: ImportMap) -> list[str]:
                 if name in names:
                     raise OutputError(f"{folder / name}: is the bag of two inputs, expected other file names")
                 names.add(name)
-                write_record(imported.record, new.staged(name), topic_map(args), args.storage)
+                write_record(imported.record, new.stage(name), topic_map(args), args.storage)
                 lines += _lines_on(imported, folder / name)
     return lines
 

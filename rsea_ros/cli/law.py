@@ -37,11 +37,11 @@ def run(args: argparse.Namespace) -> int:
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("law") as tell:
         tell("reading", 0.0)
-        from rsea_ros.cli._checks import checked
+        from rsea_ros.cli._checks import check_records
         from rsea_ros.cli.diagnose import readable
 
         records = [readable(bag, topics, args) for bag in each_once(args.bags)]
-        records = checked(records, rig, topics.axis, quiet=args.json, masks=True)
+        records = check_records(records, rig, topics.axis, quiet=args.json, masks=True)
         from rsea_ros.cli._provenance import provenance
         from rsea_ros.laws.effect_source import LawProvenance
         from rsea_ros.laws.learn import learn

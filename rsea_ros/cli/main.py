@@ -17,10 +17,10 @@ from typing import NoReturn, Protocol, cast
 from rsea_ros.cli import _lines
 from rsea_ros.cli._columns import columns
 from rsea_ros.cli._compiling import compilation_announced
-from rsea_ros.cli._shown import shown
+from rsea_ros.cli._shown import show_controls
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.interrupts import Stopped, Stops
-from rsea_ros.report.wrapped_lines import wrapped
+from rsea_ros.report.wrapped_lines import wrap
 from rsea_ros.wording import did_you_mean, printable
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
@@ -45,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = arguments[0] if arguments else "--help"
     prefix = f"rsea {name}" if name in verbs() else "rsea"
-    with shown(), compilation_announced(), Stops() as stops:
+    with show_controls(), compilation_announced(), Stops() as stops:
         try:
             status = _call(name, arguments[1:])
             sys.stdout.flush()
@@ -58,10 +58,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         except OSError as error:
             return _fail(prefix, _describe(error))
         except KeyboardInterrupt as error:
-            return _stopped(prefix, error)
+            return _report_stop(prefix, error)
         except Exception as error:
             if stops.last is not None:  # the import of a library has turned the interrupt into another error
-                return _stopped(prefix, stops.last)
+                return _report_stop(prefix, stops.last)
             return _fail(prefix, _fault(error))
 
 
@@ -75,7 +75,7 @@ def overview() -> str:
     """Return the help text with one line for each verb, without importing the verbs."""
     rows = [(f"  {name}", summary(path)) for name, path in verbs().items()]
     closing = "rsea VERB --help shows the arguments of a verb with units, and an example; rsea --version."
-    return "\n".join(["usage: rsea VERB …", "", columns(rows), "", wrapped(closing, _lines.columns())])
+    return "\n".join(["usage: rsea VERB …", "", columns(rows), "", wrap(closing, _lines.columns())])
 
 
 def summary(path: Path) -> str:
@@ -122,7 +122,7 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     )
     verb.add_arguments(parser)
     parser.words = arguments
-    args, rest = parser.parse_known_args(attached(arguments))
+    args, rest = parser.parse_known_args(attach_axis(arguments))
     if "pass_on" in args:
         args.pass_on = rest
     elif rest:
@@ -130,7 +130,7 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     return verb.run(args)
 
 
-def attached(arguments: Sequence[str]) -> list[str]:
+def attach_axis(arguments: Sequence[str]) -> list[str]:
     """Return the arguments with a reversed axis, `--axis -torque.z`, joined to one word.
 
     argparse would take the value for an option.
@@ -183,7 +183,7 @@ def _fault(error: Exception) -> str:
     return f"{FAULT}: {type(error).__name__} in {where}: {error} (RSEA_TRACEBACK=1 shows more)"
 
 
-def _stopped(prefix: str, error: KeyboardInterrupt) -> int:
+def _report_stop(prefix: str, error: KeyboardInterrupt) -> int:
     """Report that a signal stopped the work, and return its status."""
     if isinstance(error, Stopped) and error.status != INTERRUPTED:
         return _fail(prefix, f"stopped by {error}", error.status)

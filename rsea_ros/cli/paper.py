@@ -115,7 +115,7 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
     from rsea_ros.signals import Channel
 
     def bag(name: str, record: Record) -> Record:
-        return through_bag(new.staged(f"{name}.mcap"), record)
+        return through_bag(new.stage(f"{name}.mcap"), record)
 
     tell("high impedance", 0.0)
     values = excitation("chirp", ExcitationSettings(rate=RATE, duration=args.duration, seed=args.seed))

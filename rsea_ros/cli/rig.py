@@ -72,14 +72,14 @@ def _row(rig: Rig, name: str) -> tuple[str, ...]:
 def remarks(rig: Rig) -> list[str]:
     """Return a summary of the rig: moving ends, fitted values, sensors."""
     from rsea_ros.model.rig_fields import END_NAMES
-    from rsea_ros.wording import listed
+    from rsea_ros.wording import list_names
 
     ends = [f"{end} {'moves' if rig.end_is_free(end) else 'is clamped'}" for end in END_NAMES]
     noisy = [f"{name} ({sensor.noise:g})" for name, sensor in rig.sensors.items() if sensor.noise > 0.0]
     lines = [
-        f"ends: {listed(ends)}",
-        f"identify fits: {listed(rig.free()) if rig.free() else 'nothing: every value is fixed'}",
-        f"noise stated for: {listed(noisy) if noisy else 'no channel; it is estimated from each record'}",
+        f"ends: {list_names(ends)}",
+        f"identify fits: {list_names(rig.free()) if rig.free() else 'nothing: every value is fixed'}",
+        f"noise stated for: {list_names(noisy) if noisy else 'no channel; it is estimated from each record'}",
     ]
     if not rig.free():
         lines.append("give a value a spread (0.3: known to 30 %) if identify should estimate it")

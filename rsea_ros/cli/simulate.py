@@ -23,7 +23,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.new_files import check_free
 from rsea_ros.signals import Channel
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 HELP = "simulate a rig and write a bag, with any effect of the catalogue switched on"
 EXAMPLE = "rsea simulate paper_high_impedance --effect backlash:gap=0.004 --out worn"
@@ -125,13 +125,13 @@ def parse_effect(text: str) -> EffectSetting:
     name, _, rest = text.partition(":")
     effect = effect_named(name)
     values: dict[str, float] = {}
-    cut = shown(text)[1:-1]
+    cut = quote(text)[1:-1]
     for item in filter(None, rest.split(",")):
         key, _, value = (part.strip() for part in item.partition("="))
         if not is_decimal(value):
             bounds = "".join(f" ({p.name}: {p.bounds})" for p in effect.parameters if p.name == key)
             expected = f"expected NAME:param=value with a number in SI{bounds}"
-            raise ParameterError(f"--effect {cut}: {key[:40]} = {shown(value)}, {expected}")
+            raise ParameterError(f"--effect {cut}: {key[:40]} = {quote(value)}, {expected}")
         if key in values:
             raise ParameterError(f"--effect {cut}: {key} is given twice, expected once")
         values[key] = float(value)

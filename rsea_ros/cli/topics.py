@@ -39,9 +39,9 @@ def run(args: argparse.Namespace) -> int:
     """Listen, and print."""
     need_ros()
     from rsea_ros.nodes._listener import Listener
-    from rsea_ros.nodes._visitor import visiting
+    from rsea_ros.nodes._visitor import visit
 
-    with visiting("rsea_topics") as node:
+    with visit("rsea_topics") as node:
         listener = Listener(node)
         if args.action == "rate":
             print(listener.rate(args.topic, args.seconds))

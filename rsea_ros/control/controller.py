@@ -27,10 +27,10 @@ from rsea_ros.control.compensation import Compensation, compensation
 from rsea_ros.control.law import FeedbackLaw, FeedbackState, Gains, feedback, hold, law_of
 from rsea_ros.control.learning import Learning
 from rsea_ros.control.link import LinkMotion, LinkShare
-from rsea_ros.control.loads import lightest, load_range, locked
+from rsea_ros.control.loads import lightest, load_range, lock
 from rsea_ros.control.prediction import Prediction
 from rsea_ros.control.reference import Reference
-from rsea_ros.control.sampled import sampled
+from rsea_ros.control.sampled import sample_rig
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import design
 from rsea_ros.model.rig import Rig
@@ -95,7 +95,7 @@ class TorqueController:
         gains = gains or design(rig, load_range(rig, lightest(rig)), rate).gains
         self._law: FeedbackLaw = law_of(rig, rate, gains)
         self.learned = Learning(rig, self._law)
-        self._reference = Reference(sampled(locked(rig), rate), self._law, self.learned)
+        self._reference = Reference(sample_rig(lock(rig), rate), self._law, self.learned)
         self._compensation: Compensation = compensation(rig, settings.compensate)
         self._prediction, self._acted = Prediction(settings.corner, 1.0 / rate), Acted(1.0 / rate)
         self._preview, self._learn, self._limits = settings.preview, settings.learn, limits
@@ -145,9 +145,9 @@ class TorqueController:
         error, slowness, reading = self._compare(reading, offset)
         self._hear(reading, missed, error, slowness, in_time=trust == 1.0 and not late)
         back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
-        back += self._link.torque(reading.link, model.yielding, missed, offset)
+        back += self._link.torque(reading.link, model.yield_speed, missed, offset)
         back = 0.0 if late else trust * back
-        compensated, crossing = self._compensated(reading, forward), self._crossing(ahead)
+        compensated, crossing = self._compensating_torque(reading, forward), self._crossing(ahead)
         known = learned + compensated
         asked = forward + more + back + lead + compensated + crossing
         torque = min(max(asked, self._sent - most, -largest), self._sent + most, largest)
@@ -214,7 +214,7 @@ class TorqueController:
             applied=acted,
         )
 
-    def _compensated(self, reading: Measurement, forward: float) -> float:
+    def _compensating_torque(self, reading: Measurement, forward: float) -> float:
         """Return the torque against friction and ripple, N m, of the motion that the model will make."""
         c, model = self._compensation, self._reference
         if not (c.frictions or c.ripples):

@@ -13,7 +13,7 @@ import numpy as np
 
 from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.harness import closed_loop
-from rsea_ros.control.loads import locked
+from rsea_ros.control.loads import lock
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.rig import Rig
@@ -92,12 +92,12 @@ class Step:
     settling: float
 
 
-def following(
+def follow(
     true: Rig, model: Rig, design: ControllerDesign, *, late: int = 0, learn: bool = True
 ) -> Following:
     """Follow sines on a bench without noise and limits; the controller does not know its load."""
     hz = np.array([f for f in SINES if f < HIGHEST * design.rate])
-    responses = [_sine(true, locked(model), design, float(f), late, learn) for f in hz]
+    responses = [_sine(true, lock(model), design, float(f), late, learn) for f in hz]
     return Following(hz, np.array([t for t, _ in responses]), np.array([m for _, m in responses]))
 
 
@@ -121,7 +121,7 @@ def step_response(
     """Return the answer to a step from rest, within the motor's limits, without noise."""
     rate = design.rate
     wanted = np.where(np.arange(round(seconds * rate)) < 0.3 * rate, 0.0, STEP)
-    controller = TorqueController(locked(model), rate, design.gains)
+    controller = TorqueController(lock(model), rate, design.gains)
     run = closed_loop(true, rate, controller, wanted, noise=False, late=late)
     begin = int(np.argmax(wanted > 0.0))
     t, ft = run.t[begin:] - run.t[begin], run.ft[begin:] / STEP

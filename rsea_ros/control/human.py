@@ -59,14 +59,16 @@ class Held:
         return Measurement(ft, velocity, position, torque, link=link), distal
 
 
-def measured(
+def measure_impedance(
     rig: Rig, design: ControllerDesign, virtual: Virtual, hz: FloatArray, link: LinkShare | None = None
 ) -> ComplexArray:
     """Return Z, N m s/rad, that a muscle's sine feels at each frequency, Hz: the code that runs."""
-    return np.array([_felt(rig, design, virtual, float(f), link) for f in hz])
+    return np.array([_measure_line(rig, design, virtual, float(f), link) for f in hz])
 
 
-def _felt(rig: Rig, design: ControllerDesign, virtual: Virtual, hz: float, link: LinkShare | None) -> complex:
+def _measure_line(
+    rig: Rig, design: ControllerDesign, virtual: Virtual, hz: float, link: LinkShare | None
+) -> complex:
     rate, k_s = design.rate, rig["spring.stiffness"]
     bench = Held(rig, rate)
     settings = ControllerSettings(learn=False)

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.control.law import FeedbackLaw, Gains, law_of
-from rsea_ros.control.loads import locked
+from rsea_ros.control.loads import lock
 from rsea_ros.control.loop import actions, returns
-from rsea_ros.control.sampled import FT, responses, sampled, z_of
-from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench, lags_of, mode_of
+from rsea_ros.control.sampled import FT, responses, sample_rig, z_of
+from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, lags_of, mode_of, variant_rig
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output
@@ -67,24 +67,24 @@ class Moved:
         return np.abs(self.impedance(law, on_link) / self.spring)
 
 
-def moved(rig: Rig, rate: float, hz: FloatArray) -> Moved:
+def distal_responses(rig: Rig, rate: float, hz: FloatArray) -> Moved:
     """Return the responses to a moved distal side of a rig, its housing clamped. hz: below half the rate."""
     s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
     torque, speed = _without_motor(rig, hz, s)
     spring = -(rig["spring.stiffness"] / s + rig["spring.damping"])
-    return Moved(hz, responses(sampled(locked(rig), rate), hz), torque, speed, spring)
+    return Moved(hz, responses(sample_rig(lock(rig), rate), hz), torque, speed, spring)
 
 
 def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: BenchVariant, u: Uncertainty) -> Moved:
     """Return what moving the distal side of a bench of the set does. hz: below half the rate."""
     path, current = lags_of(case, rate, hz)
-    still = moved(bench(rig, case), rate, hz)
+    still = distal_responses(variant_rig(rig, case), rate, hz)
     return replace(still, sensor=mode_of(u.mode, case.participation, hz), path=path, current=current)
 
 
 def impedance(rig: Rig, rate: float, gains: Gains, hz: FloatArray) -> OutputImpedance:
     """Return the impedance of the distal side against a clamped housing. hz: below half the rate."""
-    felt = moved(rig, rate, hz)
+    felt = distal_responses(rig, rate, hz)
     return OutputImpedance(hz, felt.impedance(law_of(rig, rate, gains)), felt.torque, felt.spring)
 
 

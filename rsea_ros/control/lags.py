@@ -15,7 +15,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
 
 
-def lagging(rig: Rig, plant: Sampled, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+def lag_responses(rig: Rig, plant: Sampled, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """Return the response of a sampled rig, shape (4, n), and of the path from command to current, (n,)."""
     response, path = responses(plant, hz), np.ones(len(hz), dtype=np.complex128)
     s = np.asarray(2j * np.pi * hz, dtype=np.complex128)

@@ -119,7 +119,7 @@ class Learning:
         ])  # fmt: skip
         self._ft, self._velocity, self._parts = ft, velocity, parts
         seen = self._band(rows)
-        if self._stopped(seen[0]):
+        if self._has_stopped(seen[0]):
             self.load, self._moments[0] = LOCKED, 0.0
         self._power += self._period / PAUSE * (max(seen[0, 0] ** 2, seen[0, 3] ** 2) - self._power)
         if sure and self._power > 0.5 * MOVES**2:
@@ -129,7 +129,7 @@ class Learning:
                 self.load = self._solve(0, self.load)
             elif self._turn == EVERY // 2:
                 self.drive = self._solve(1, self.drive)
-                in_time = self._left(2, self.drive) < FLOORS[1] ** 2
+                in_time = self._power_left(2, self.drive) < FLOORS[1] ** 2
                 self.acting = self.drive if in_time else self._solve(2, self.acting)
 
     def _band(self, rows: FloatArray) -> FloatArray:
@@ -143,7 +143,7 @@ class Learning:
             rows = rows - state
         return rows
 
-    def _stopped(self, seen: FloatArray) -> bool:
+    def _has_stopped(self, seen: FloatArray) -> bool:
         """Return whether the gear no longer turns as the torque would have its load turn."""
         quick = self._period / QUICK
         expected = float(self.load[1:] @ seen[1:3])
@@ -151,7 +151,7 @@ class Learning:
         self._followed += quick * (expected * float(seen[3] - self.load[0] * seen[0]) - self._followed)
         return self._expected > FOLLOWS**2 and self._followed < STOPPED * self._expected
 
-    def _left(self, which: int, x: FloatArray) -> float:
+    def _power_left(self, which: int, x: FloatArray) -> float:
         """Return the mean square that a solution leaves of a fit."""
         m = self._moments[which]
         return float(m[3, 3] - 2.0 * x @ m[:3, 3] + x @ m[:3, :3] @ x)
@@ -160,7 +160,7 @@ class Learning:
         """Return the least squares of a fit, within its bounds."""
         m, kind = self._moments[which], min(which, 1)
         known, precision = self._priors[kind]
-        weight = max(FLOORS[kind] ** 2, self._left(which, before)) / INDEPENDENT * precision
+        weight = max(FLOORS[kind] ** 2, self._power_left(which, before)) / INDEPENDENT * precision
         matrix, right = m[:3, :3] + np.diag(weight), m[:3, 3] + weight * known
         low, high = self._bounds[kind]
         inside = _within(matrix, right, low, high)

@@ -18,9 +18,9 @@ from itertools import product
 
 import numpy as np
 
-from rsea_ros.control.impedance import moved
+from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import FeedbackLaw, law_of
-from rsea_ros.control.loop import linked, returns
+from rsea_ros.control.loop import link_response, returns
 from rsea_ros.control.margins import encirclements
 from rsea_ros.control.sampled import LINK
 from rsea_ros.control.synthesis import SOFT, ControllerDesign, DesignLimits, grid
@@ -106,7 +106,7 @@ class LinkedSet:
 
     def on_link(self, share: LinkShare) -> ComplexArray:
         """Return the torque for the angle of the link, N m/rad, shape (n,)."""
-        return linked(self.law, share.inertia, share.damping, share.corner, self.hz)
+        return link_response(self.law, share.inertia, share.damping, share.corner, self.hz)
 
     def sensitivity(self, share: LinkShare) -> FloatArray:
         """Return the largest sensitivity of each bench, shape (m,)."""
@@ -127,7 +127,7 @@ def link_share(
 ) -> LinkShare:
     """Return the parts that make the output softest with every bench of the set as robust as demanded."""
     demand, benches = demand or DesignLimits(), linked_set(rig, loads, design)
-    still = moved(rig, design.rate, benches.hz)
+    still = distal_responses(rig, design.rate, benches.hz)
     demanded = MORE * np.where(benches.nominal, demand.sensitivity, demand.robust)
     allowed = np.maximum(demanded, benches.sensitivity(LinkShare()))
     best, softest = LinkShare(), math.inf

@@ -24,7 +24,7 @@ def load_range(rig: Rig, free: Rig | None = None) -> Mapping[str, Rig]:
     all. Raises ParameterError where `free` has no free end, or nothing can be controlled.
     """
     check_controllable(rig)
-    loads = {LOCKED: locked(rig)}
+    loads = {LOCKED: lock(rig)}
     light = with_ends(rig, free or rig)
     ends = [end for end in END_NAMES if light.end_is_free(end)]
     if free is not None and not ends:
@@ -44,7 +44,7 @@ def lightest(rig: Rig, name: str = "") -> Rig:
     return load_rig(LIGHTEST) if rig.clamped == set(END_NAMES) else rig
 
 
-def locked(rig: Rig) -> Rig:
+def lock(rig: Rig) -> Rig:
     """Return the rig with both ends clamped."""
     return replace(rig, clamped=frozenset(END_NAMES))
 

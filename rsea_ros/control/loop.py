@@ -25,7 +25,9 @@ def actions(law: FeedbackLaw, hz: FloatArray) -> tuple[ComplexArray, ComplexArra
     return on_ft, g.k_w * wash + q * explained, q * back
 
 
-def linked(law: FeedbackLaw, inertia: float, damping: float, corner: float, hz: FloatArray) -> ComplexArray:
+def link_response(
+    law: FeedbackLaw, inertia: float, damping: float, corner: float, hz: FloatArray
+) -> ComplexArray:
     """Return the law's response to the link's angle (N m/rad), with its delay of one sample (link.py)."""
     back, pole = 1.0 / z_of(law.period, hz), np.exp(-2.0 * np.pi * corner * law.period)
     rate = (1.0 - back) / law.period

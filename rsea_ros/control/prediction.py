@@ -68,11 +68,11 @@ class Prediction:
         self._trust(surprise, desired)
         rate, second = self._state[1:]
         j = AHEAD - off + np.arange(samples)
-        along: FloatArray = self._smoothed(desired, samples)
+        along: FloatArray = self._low_pass(desired, samples)
         along += self.trust * (desired + j * rate + 0.5 * j * j * second - along)
         return along
 
-    def _smoothed(self, desired: float, samples: int) -> FloatArray:
+    def _low_pass(self, desired: float, samples: int) -> FloatArray:
         """Return the low pass of the desired torque at this sample, and its course from there on."""
         first, second = self._smooth
         path = np.empty(samples)

@@ -93,7 +93,7 @@ class Reference:
         return torque, self.turning + part * (self._turning - self.turning)
 
     @property
-    def yielding(self) -> float:
+    def yield_speed(self) -> float:
         """The speed at which the learned load should give way at this sample, rad/s."""
         return self.turning - float(self.now[VELOCITY])
 

@@ -32,7 +32,7 @@ class Sampled:
     period: float
 
 
-def sampled(rig: Rig, rate: float) -> Sampled:
+def sample_rig(rig: Rig, rate: float) -> Sampled:
     """Return a rig behind a zero-order hold at `rate`, Hz. Its effects are left out.
 
     Raises ParameterError for a rig whose torque a controller cannot feel.

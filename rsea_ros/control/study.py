@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.control.following import Following, following
+from rsea_ros.control.following import Following, follow
 from rsea_ros.control.impedance import OutputImpedance, impedance
 from rsea_ros.control.large_signal import Reach, reach
 from rsea_ros.control.loads import LOCKED, load_range, with_ends
@@ -100,8 +100,8 @@ def natural_frequency(rig: Rig) -> float:
 def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], designed: ControllerDesign) -> AtRate:
     swept = robustness(clamped, loads, designed, steps=3)
     grid = np.geomspace(0.1, 0.45 * designed.rate, 300)
-    near = following(clamped, clamped, designed)
-    far = following(hard(loads), clamped, designed, late=1)
+    near = follow(clamped, clamped, designed)
+    far = follow(hard(loads), clamped, designed, late=1)
     apart, softest = spread(clamped, loads, designed, (LOCKED,)), softness(clamped, designed, grid)
     return AtRate(
         designed,
@@ -109,7 +109,7 @@ def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], designed: Contr
         tuple(trials(clamped, loads, designed, swept, near, far, apart, softest.worst)),
         tuple(compensations(clamped, designed)),
         near,
-        following(light, clamped, designed),
+        follow(light, clamped, designed),
         apart,
         spread(clamped, loads, designed),
         impedance(clamped, designed.rate, designed.gains, grid),

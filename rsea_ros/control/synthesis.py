@@ -24,11 +24,11 @@ from types import MappingProxyType
 import numpy as np
 from scipy.optimize import minimize
 
-from rsea_ros.control.impedance import Moved, moved
+from rsea_ros.control.impedance import Moved, distal_responses
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.loop import largest_pole, returns
 from rsea_ros.control.margins import Margins, encirclements, margins
-from rsea_ros.control.sampled import FT, sampled
+from rsea_ros.control.sampled import FT, sample_rig
 from rsea_ros.control.uncertainty import Family, Uncertainty, corners, family
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig
@@ -116,10 +116,10 @@ def design(
         score = _score(problem, _gains(x, rate))
         soft = np.interp(SOFT, problem.moved.hz, score.softness)
         wanted = np.log(score.friction.max()) + np.mean(np.log(soft))
-        return float(wanted) + 20.0 * _lacking(problem, score, demand) + 20.0 * _stiff(score, demand)
+        return float(wanted) + 20.0 * _shortfall(problem, score, demand) + 20.0 * _stiff(score, demand)
 
     gains = _gains(_search(cost, np.log(_START)), rate)
-    if _lacking(problem, _score(problem, gains), demand) > _SHORT:
+    if _shortfall(problem, _score(problem, gains), demand) > _SHORT:
         nearest = _design(problem, gains)
         raise ParameterError(
             f"rig {rig.name}: no gains keep the whole set of benches stable with its margins at {rate:g} Hz: "
@@ -133,7 +133,7 @@ def check(rig: Rig, loads: Mapping[str, Rig], rate: float, gains: Gains) -> Cont
     law = law_of(rig, rate, gains)
     for name, load in loads.items():
         for share in SHARES:
-            pole = largest_pole(law, sampled(load, rate), share)
+            pole = largest_pole(law, sample_rig(load, rate), share)
             if pole > MARGINAL:
                 raise ParameterError(
                     f"rig {rig.name}: unstable at {rate:g} Hz with load {name!r}, {share:.0%} of the torque: "
@@ -172,7 +172,7 @@ def grid(rate: float, points: int = 150) -> FloatArray:
 def _problem(rig: Rig, loads: Mapping[str, Rig], rate: float, hz: FloatArray) -> SynthesisProblem:
     u = Uncertainty()
     benches = family(loads, corners(tuple(loads), u), u, rate, hz)
-    return SynthesisProblem(rig, rate, benches, moved(rig, rate, grid(rate)))
+    return SynthesisProblem(rig, rate, benches, distal_responses(rig, rate, grid(rate)))
 
 
 def _score(problem: SynthesisProblem, gains: Gains) -> RobustnessScore:
@@ -214,7 +214,7 @@ def _design(problem: SynthesisProblem, gains: Gains) -> ControllerDesign:
     )
 
 
-def _lacking(problem: SynthesisProblem, score: RobustnessScore, demand: DesignLimits) -> float:
+def _shortfall(problem: SynthesisProblem, score: RobustnessScore, demand: DesignLimits) -> float:
     """Return by how much sensitivities are beyond the demand, as parts of it, added up; 0 when met."""
     allowed = np.where(problem.family.nominal, demand.sensitivity, demand.robust)
     over = np.maximum(0.0, score.sensitivity / allowed - 1.0)

@@ -18,12 +18,12 @@ from rsea_ros.control.following import Following, Step, fall, step_response
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.large_signal import largest
 from rsea_ros.control.link import LinkShare
-from rsea_ros.control.loads import LOCKED, locked
+from rsea_ros.control.loads import LOCKED, lock
 from rsea_ros.control.robustness import Robustness
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.spread import Spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
-from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench
+from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, variant_rig
 from rsea_ros.model.rig import EffectSetting, Rig
 
 HZ, AMPLITUDE = 5.0, 10.0
@@ -120,9 +120,9 @@ def trials(
     yield TrialResult("crossover", nominal[LOCKED].crossover, "Hz", worst=worst.crossover)
     yield TrialResult("output impedance, largest over the spring's", design.impedance, "1",
                       demand.impedance, worst=stiffest)  # fmt: skip
-    yield from _followed(rig, loads, design)
+    yield from _sine_results(rig, loads, design)
     yield from _bandwidth(near, far, apart)
-    yield from _stepped(step_response(rig, rig, design), step_response(hard(loads), rig, design, late=1))
+    yield from _step_results(step_response(rig, rig, design), step_response(hard(loads), rig, design, late=1))
     rough = rig.with_effects(EFFECTS[0])
     yield TrialResult("3 N·m friction, not in the model", 100.0 * sine(rough, rig, design), "%", 6.0)
     yield TrialResult("3 N·m friction, in the model", 100.0 * sine(rough, rough, design), "%", 2.5)
@@ -131,15 +131,18 @@ def trials(
     )
 
 
-def _followed(rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign) -> Iterator[TrialResult]:
+def _sine_results(rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign) -> Iterator[TrialResult]:
     near = list(loads)[1:4]
-    errors = {case: 100.0 * tracked(rig, loads, case, design) for case in hardest(loads)}
+    errors = {case: 100.0 * tracking_error(rig, loads, case, design) for case in hardest(loads)}
     yield TrialResult(
         "5 Hz, 10 N·m, locked", 100.0 * sine(rig, rig, design), "%", 2.0,
         worst=max(errors.values()), allowed=8.0,
     )  # fmt: skip
     for name in near:
-        error, amplitude = 100.0 * tracked(rig, loads, BenchVariant(name), design), amplitude_of(loads[name])
+        error, amplitude = (
+            100.0 * tracking_error(rig, loads, BenchVariant(name), design),
+            amplitude_of(loads[name]),
+        )
         worst = max(error, *(errors[case] for case in lagging_corners(name)))
         yield TrialResult(f"5 Hz, {amplitude:.1f} N·m, {name}, load unknown", error, "%", 5.0,
                           worst=worst, allowed=5.0)  # fmt: skip
@@ -157,7 +160,7 @@ def _bandwidth(near: Following, far: Following, apart: Spread) -> Iterator[Trial
     yield TrialResult("motor torque per N·m at 20 Hz", near.motor_at(20.0), "1", worst=far.motor_at(20.0))
 
 
-def _stepped(near: Step, far: Step) -> Iterator[TrialResult]:
+def _step_results(near: Step, far: Step) -> Iterator[TrialResult]:
     yield TrialResult("step of 5 N·m: 10 to 90 %", 1e3 * near.rise, "ms", worst=1e3 * far.rise)
     yield TrialResult("its overshoot", 100.0 * near.overshoot, "%", worst=100.0 * far.overshoot)
     yield TrialResult("within 5 % after", 1e3 * near.settling, "ms", worst=1e3 * far.settling)
@@ -180,10 +183,11 @@ def lagging_corners(name: str, *, every: bool = False) -> list[BenchVariant]:
 def hard(loads: Mapping[str, Rig]) -> Rig:
     """Return the locked bench that is stiffer, drags less, lags, and has the mode."""
     u = Uncertainty()
-    return disturbed(loads, BenchVariant(LOCKED, 1.0 + u.stiffness, 1.0 - u.damping, 0, u.delay, u.mode[2]))
+    stiff = BenchVariant(LOCKED, 1.0 + u.stiffness, 1.0 - u.damping, 0, u.delay, u.mode[2])
+    return disturbed_rig(loads, stiff)
 
 
-def disturbed(loads: Mapping[str, Rig], case: BenchVariant) -> Rig:
+def disturbed_rig(loads: Mapping[str, Rig], case: BenchVariant) -> Rig:
     """Return the bench of a case as a rig with effects; samples that are late are for the harness."""
     u, effects = Uncertainty(), []
     if case.delay:
@@ -192,7 +196,7 @@ def disturbed(loads: Mapping[str, Rig], case: BenchVariant) -> Rig:
         hz, ratio, _ = u.mode
         shape = {"frequency": hz, "damping_ratio": ratio, "participation": case.participation}
         effects.append(EffectSetting("structural_resonance", shape))
-    return bench(loads[case.load], case).with_effects(*effects)
+    return variant_rig(loads[case.load], case).with_effects(*effects)
 
 
 def amplitude_of(load: Rig) -> float:
@@ -200,10 +204,10 @@ def amplitude_of(load: Rig) -> float:
     return min(AMPLITUDE, 0.8 * largest(load.with_effects(), HZ, TorqueLimits().torque, math.inf))
 
 
-def tracked(rig: Rig, loads: Mapping[str, Rig], case: BenchVariant, design: ControllerDesign) -> float:
+def tracking_error(rig: Rig, loads: Mapping[str, Rig], case: BenchVariant, design: ControllerDesign) -> float:
     """Return the error of the sine on a bench of the set, once it has been learned."""
-    true, amplitude = disturbed(loads, case), amplitude_of(bench(loads[case.load], case))
-    return sine(true, locked(rig), design, amplitude, span=LEARNED, late=case.samples)
+    true, amplitude = disturbed_rig(loads, case), amplitude_of(variant_rig(loads[case.load], case))
+    return sine(true, lock(rig), design, amplitude, span=LEARNED, late=case.samples)
 
 
 def compensations(rig: Rig, design: ControllerDesign) -> Iterator[Compensated]:

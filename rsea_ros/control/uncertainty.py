@@ -18,8 +18,8 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from rsea_ros.control.lags import lagging
-from rsea_ros.control.sampled import FT, sampled, z_of
+from rsea_ros.control.lags import lag_responses
+from rsea_ros.control.sampled import FT, sample_rig, z_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
 
@@ -95,7 +95,7 @@ def dense(loads: Sequence[str], u: Uncertainty, steps: int = 5) -> list[BenchVar
     return [BenchVariant(load, float(k), float(b), *path, part) for load, k, b, path, part in grid]
 
 
-def bench(load: Rig, case: BenchVariant) -> Rig:
+def variant_rig(load: Rig, case: BenchVariant) -> Rig:
     """Return a rig with the stiffness and damping of a case."""
     k, b = "spring.stiffness", "rotor.reflected_damping"
     return load.with_values({k: load[k] * case.stiffness, b: load[b] * case.damping})
@@ -110,8 +110,8 @@ def family(
     for case in cases:
         key = case.load, case.stiffness, case.damping
         if key not in made:
-            rig = bench(loads[case.load], case)
-            made[key] = lagging(rig, sampled(rig, rate), hz)
+            rig = variant_rig(loads[case.load], case)
+            made[key] = lag_responses(rig, sample_rig(rig, rate), hz)
         response, path = made[key]
         seen = response.copy()
         seen[FT] *= mode_of(u.mode, case.participation, hz)

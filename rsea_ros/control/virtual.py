@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.control.controller import Measurement
-from rsea_ros.control.impedance import moved
+from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import law_of
 from rsea_ros.control.prediction import prediction_response, smoothed_response
 from rsea_ros.control.settings import CORNER
@@ -44,7 +44,7 @@ class Virtual:
         return -self.stiffness * (reading.position - reading.ft / k_s) - self.damping * velocity
 
 
-def felt(
+def felt_impedance(
     rig: Rig, design: ControllerDesign, virtual: Virtual, hz: FloatArray, *, trust: bool = True
 ) -> ComplexArray:
     """Return Z, N m s/rad, of the locked rig moved at its distal side, linear, at hz below half the rate.
@@ -52,7 +52,7 @@ def felt(
     trust: whether the desired torque is predicted; else it comes through the low pass, two samples late.
     """
     s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
-    alone = -moved(rig, design.rate, hz).impedance(law_of(rig, design.rate, design.gains))
+    alone = -distal_responses(rig, design.rate, hz).impedance(law_of(rig, design.rate, design.gains))
     h = 1.0 / design.rate
     follows = prediction_response(CORNER, h, hz) if trust else smoothed_response(h, hz)
     whole: ComplexArray = alone + follows * (virtual.stiffness / s + virtual.damping)
@@ -63,7 +63,7 @@ def passive_to(rig: Rig, design: ControllerDesign, virtual: Virtual) -> float:
     """Return the frequency from which on Re Z < 0, Hz, with the desired torque predicted or not, whichever is
     lower; inf where it never is, to 0.45 of the rate."""
     hz = np.geomspace(SMALLEST, 0.45 * design.rate, 400)
-    real = [felt(rig, design, virtual, hz, trust=trust).real for trust in (True, False)]
+    real = [felt_impedance(rig, design, virtual, hz, trust=trust).real for trust in (True, False)]
     negative = np.min(real, axis=0) < 0.0
     return float(hz[np.argmax(negative)]) if negative.any() else math.inf
 

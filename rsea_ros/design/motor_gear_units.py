@@ -18,7 +18,7 @@ from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.model.rig_file import rig_folders
 from rsea_ros.model.train import TRAINS, Train, rotor_turns, spin_inertia
 from rsea_ros.units import plain
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 FILE = "motor_gear_units.yaml"
 UNITS: Mapping[str, str] = {
@@ -133,7 +133,7 @@ def _unit(name: str, item: Any) -> MotorGear:
 def train_named(name: Any, field: str) -> Train:
     """Return a train. Raises FieldError for an unknown name."""
     if name not in TRAINS:
-        raise FieldError(f"{field} = {shown(name)}, expected one of {', '.join(TRAINS)}", field)
+        raise FieldError(f"{field} = {quote(name)}, expected one of {', '.join(TRAINS)}", field)
     return TRAINS[TRAINS.index(name)]
 
 

@@ -67,7 +67,7 @@ def model_element(rig: Rig, play: float = 0.0) -> xml.Element:
     )
     is_stiff = math.isinf(rig["gear.stiffness"]) and not play
     parents = _bodies(rig, mesh, xml.SubElement(root, "worldbody"), is_stiff)
-    _joined(rig, mesh, parents, root, play)
+    _join(rig, mesh, parents, root, play)
     _sensors(root)
     return root
 
@@ -156,7 +156,7 @@ def _link(parent: xml.Element, end: str) -> None:
     )
 
 
-def _joined(
+def _join(
     rig: Rig, mesh: Mesh, parents: Mapping[str, str | None], root: xml.Element, play: float
 ) -> None:
     """Add springs, dampers, the train and the motor."""

@@ -125,7 +125,7 @@ def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
         is_nothing = is_within_clocks(last.solution, name)
         if is_nothing or not models.is_needed(last, rest):
             trial = trial_of(last, name, rest, "at_bound" if is_nothing else "redundant")
-            return without_redundant(_replaced(selection, rest, trial), models)
+            return without_redundant(_replace(selection, rest, trial), models)
     return selection
 
 
@@ -138,10 +138,10 @@ def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
         without = models.without(last)[name]
         if other.size < last.size:
             trial = trial_of(last, name, without, "no_better_than_simpler", rival)
-            return with_replacements(_replaced(selection, other, trial), models)
+            return with_replacements(_replace(selection, other, trial), models)
         if costs_priors_less(other, last, models.settings):
             trial = trial_of(last, name, without, "no_better_than_likelier", rival)
-            swapped = _replaced(selection, other, trial)
+            swapped = _replace(selection, other, trial)
             equal = _order_causes(last, [c for c in last.causes if c != name], name)
             rivals = {**selection.rivals, rival: (equal,)}
             return with_replacements(replace(swapped, rivals=rivals), models)
@@ -197,5 +197,5 @@ def _order_causes(model: Candidate, earlier: Sequence[str], newest: str) -> Cand
     return replace(model, solution=replace(model.solution, problem=replace(problem, rig=rig, newest=newest)))
 
 
-def _replaced(selection: Selection, last: Candidate, trial: Trial) -> Selection:
+def _replace(selection: Selection, last: Candidate, trial: Trial) -> Selection:
     return replace(selection, models=(selection.models[0], last), trials=(*selection.trials, trial))

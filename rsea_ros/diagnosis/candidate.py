@@ -84,7 +84,7 @@ class FitSetup:
     gain: float | None = None
     is_quick: bool = False
 
-    def masked(self, problem: Problem) -> Problem:
+    def mask(self, problem: Problem) -> Problem:
         """Return a problem on the samples and in the units of this setup."""
         misfit = None if self.weights is None else self.weights.ratios
         masked = on_blocks(problem, self.cases, self.blocks, misfit, self.settings.blocks)
@@ -106,7 +106,7 @@ def fit_candidate(
 
     near: a solution on the same blocks, with other noise, whose derivatives the fit begins with.
     """
-    masked = setup.masked(problem)
+    masked = setup.mask(problem)
     solution = setup.solve(masked, theta, None if near is None else _reweight(near, masked))
     moved = with_common_clock_in_delay(solution)
     if moved is not None:
@@ -124,9 +124,9 @@ def refit(model: Candidate, setup: FitSetup) -> Candidate:
 
 def with_noise_reestimated(model: Candidate) -> Candidate:
     """Return a candidate with the noise that its own residual shows, scored against that."""
-    ratio = model.problem.rig["gear.ratio"]
+    ratio, rule = model.problem.rig["gear.ratio"], model.settings.noise
     runs = zip(model.cases, model.outputs, strict=True)
-    return rescore(model, tuple(reestimate_noise(c, out, ratio) for c, out in runs))
+    return rescore(model, tuple(reestimate_noise(c, out, ratio, rule) for c, out in runs))
 
 
 def rescore(model: Candidate, cases: tuple[Case, ...]) -> Candidate:

@@ -24,7 +24,7 @@ _SEGMENTS = 16
 _SHORTEST = 8
 """Samples of a segment: a shorter one has no band to speak of."""
 _LOWEST = 2.0
-"""Hz: below it a drift may hide the command. All of these steer a remark and no verdict."""
+"""Hz: below it a drift may hide the command. But for _SHORTEST, these steer a remark and no verdict."""
 
 
 def missed_response(
@@ -81,7 +81,7 @@ def _segments(blocks: IntArray, good: BoolArray) -> list[IntArray]:
     blocks_of_samples = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(blocks)) + 1)
     whole = [p for p in blocks_of_samples if good[p].all()]
     length = int(np.median([len(p) for p in whole])) - 2 if whole else 0
-    return [p[:length] for p in whole if len(p) >= length > 8]
+    return [p[:length] for p in whole if len(p) >= length > _SHORTEST]
 
 
 def _spectra(parts: list[IntArray], values: FloatArray) -> ComplexArray:

@@ -103,7 +103,7 @@ def as_often_as_commands(case: Case) -> Case:
         at={n: at[every[n]] for n, at in drive.at.items()},
         impulse={n: i[every[n]] for n, i in drive.impulse.items()},
     )
-    return case.keeping(every, thinner)
+    return case.keep(every, thinner)
 
 
 def _samples_in(period: float, t: FloatArray) -> int:
@@ -149,7 +149,7 @@ def _piece(case: Case, drive: Drive, begin: float, end: float, run_up: float) ->
         restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last),
         spans=(),
     )
-    return case.within({n: t >= compared for n, t in case.t.items()}).keeping(inside, cut)
+    return case.within({n: t >= compared for n, t in case.t.items()}).keep(inside, cut)
 
 
 def state_at(case: Case, t: float) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from rsea_ros.diagnosis.evaluation import Evaluated, Examined, evaluate, held_ou
 from rsea_ros.diagnosis.naming.conclusion import conclude
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.selection import Selection
-from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
 from rsea_ros.effects.catalogue import catalogue
@@ -30,8 +30,8 @@ from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.steady import with_even_clocks
 from rsea_ros.identification.workers import Pools, worker_pools
-from rsea_ros.model.extent import bounded
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.extent import bound_values
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import MEASURED, Record
@@ -56,12 +56,12 @@ def diagnose(
     tell = progress or (lambda step, share: None)
     tell("checking the data", 0.0)
     rig = rig.with_effects(*(e for e in rig.effects if not e.guess))
-    records = [bounded(commanded(r, rig)) for r in records]
-    holdout = bounded(commanded(holdout, rig)) if holdout is not None else None
+    records = [bound_values(with_command(r, rig)) for r in records]
+    holdout = bound_values(with_command(holdout, rig)) if holdout is not None else None
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
     checked, remarks = _steady([check(r, rig) for r in records], rig)
-    nominal = nominal_problem(checked, rig)
+    nominal = nominal_problem(checked, rig, settings)
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
     examined = Examined(records, checked, tested, rig)
     with worker_pools() as pools:
@@ -74,9 +74,11 @@ def diagnose(
     return replace(result, remarks=(*remarks, *cut, *torque_scale(nominal), *result.remarks))
 
 
-def nominal_problem(checked: Sequence[Checked], rig: Rig) -> Problem:
+def nominal_problem(
+    checked: Sequence[Checked], rig: Rig, settings: DiagnosisSettings = DEFAULT
+) -> Problem:
     """Return the fit of a rig to checked records: the nominal model."""
-    cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
+    cases = tuple(case_from(c.record, rig, c.masked, settings.noise) for c in checked)
     stated = frozenset(e.name for e in rig.effects)
     return Problem(cases, rig, unknowns_of(rig, cases), MEASURED, stated=stated)
 

@@ -11,7 +11,7 @@ from rsea_ros.diagnosis.candidate import Candidate, FitSetup, fit_candidate
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
 from rsea_ros.diagnosis.score import Score, score, score_on
 from rsea_ros.diagnosis.selection import Selection
-from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, IntervalSettings
 from rsea_ros.diagnosis.stretches import spread_over
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import Case, Problem, case_from, simulate_cases
@@ -49,12 +49,14 @@ class Evaluated:
     """A model of the selection as it is reported.
 
     train: its score on the blocks that it was fitted to. test: on the test blocks, or on the held-out record.
+    intervals: how those of its values are made.
     """
 
     solution: Solution
     outputs: list[dict[str, FloatArray]]
     train: Score
     test: Score
+    intervals: IntervalSettings = DEFAULT.intervals
 
     @property
     def added(self) -> str:
@@ -64,7 +66,7 @@ class Evaluated:
     @cached_property
     def confidence(self) -> Confidence:
         """The doubt that is left of the fit's values."""
-        return confidence_of(self.solution)
+        return confidence_of(self.solution, rule=self.intervals)
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class HeldOut:
     def _case(self) -> Case | None:
         if self.record is None:
             return None
-        case = case_from(self.record.record, self.nominal, self.record.masked)
+        case = case_from(self.record.record, self.nominal, self.record.masked, self.settings.noise)
         return spread_over(replace(case, noise=self.cases[0].noise), self.nominal, self.settings)
 
     def score(
@@ -123,4 +125,4 @@ def evaluate(
     model = fit_candidate(setup, chosen.problem, chosen.solution.theta)
     train = score_on(model.problem, cases, blocks, model.outputs, settings.blocks)
     test = held_out.score_of(model)
-    return Evaluated(model.solution, model.outputs, train, test)
+    return Evaluated(model.solution, model.outputs, train, test, settings.intervals)

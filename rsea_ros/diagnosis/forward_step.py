@@ -49,24 +49,24 @@ class ForwardStep:
 
     def run(self) -> StepResult:
         """Try every effect, and two at once where none helps alone."""
-        screened = self.fits.screened(self.fits.on_pieces)
+        screened = self.fits.screen(self.fits.on_pieces)
         close = self._fitted_to_pieces(screened)
         finalists = self._finalists(screened, close)
         models = self.fits.fit_all(finalists)
         if not self._acceptable(models):
-            overlooked = self.fits.overlooked(_others(screened, finalists))
+            overlooked = self.fits.find_overlooked(_others(screened, finalists))
             finalists += overlooked
             models += self.fits.fit_all(overlooked)
         if self.fits.is_far and all(self._is_far(m) for m in self._acceptable(models)):
             models += self.fits.on_measured_angle()
-        chosen, equals = self._chosen(self._acceptable(models) or self._pairs(finalists))
+        chosen, equals = self._choose(self._acceptable(models) or self._pairs(finalists))
         if chosen is not None and any(m is chosen for m in models):
             undecided = self.fits.nearly_as_good(_others(close, finalists), chosen)
             finalists += undecided
             models += self.fits.fit_all(undecided)
-            chosen, equals = self._chosen(self._acceptable(models))
+            chosen, equals = self._choose(self._acceptable(models))
         trials = [self._far_behind(s) for s in _others(screened, finalists)]
-        trials += [self._refused(m, chosen) for m in models if m is not chosen]
+        trials += [self._refusal(m, chosen) for m in models if m is not chosen]
         return StepResult(chosen, trials, equals)
 
     @cached_property
@@ -80,7 +80,7 @@ class ForwardStep:
     def _is_far(self, model: Candidate) -> bool:
         return is_far_from_floor(model, self.settings)
 
-    def _chosen(self, models: Sequence[Candidate]) -> tuple[Candidate | None, tuple[Candidate, ...]]:
+    def _choose(self, models: Sequence[Candidate]) -> tuple[Candidate | None, tuple[Candidate, ...]]:
         """Return the model to accept and those that do as well."""
         return break_tie(models, self.present.validation, self.settings)
 
@@ -120,7 +120,7 @@ class ForwardStep:
             return []
         pairs: list[ScreenedEffect] = []
         for first in firsts[: rule.paired]:
-            seconds = fits.screened(fits.with_typical(first.effect))[: rule.paired]
+            seconds = fits.screen(fits.with_typical(first.effect))[: rule.paired]
             pairs += fits.fit_pieces(seconds)
         promising = sorted(
             (p for p in pairs if p.cost < rule.hope_two * fits.on_pieces.cost), key=lambda p: p.cost
@@ -131,7 +131,7 @@ class ForwardStep:
         problem, theta = self.fits.complete(screened)
         return Trial(screened.name, self.present, problem, theta, is_full=False, reason="far_behind")
 
-    def _refused(self, model: Candidate, chosen: Candidate | None) -> Trial:
+    def _refusal(self, model: Candidate, chosen: Candidate | None) -> Trial:
         """Return the trial of a model that was not accepted, with the reason."""
         refused = refusal(model, self.present, self.settings)
         if refused is not None or chosen is None:

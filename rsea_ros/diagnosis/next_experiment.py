@@ -53,7 +53,7 @@ EXCITATIONS = tuple(
 )
 
 
-def separating(
+def separating_run(
     accepted: Solution, rivals: Sequence[Solution], rate: float, rule: NextRunSettings = DEFAULT.next_run
 ) -> Experiment:
     """Return the cheapest allowed run that separates an accepted model from its rivals, if there is one."""

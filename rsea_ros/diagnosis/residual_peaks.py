@@ -42,7 +42,7 @@ def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dic
     if missing is None:
         return []
     position, torque = missing
-    return _repeating(position * rig["gear.ratio"], torque)
+    return _repetitions(position * rig["gear.ratio"], torque)
 
 
 def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
@@ -54,10 +54,10 @@ def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> lis
         return []
     keep = case.mask["position"]
     angle = train_ratio(rig) * case.measured["position"][keep]
-    return _repeating(angle, residual_of(case, outputs, "position")[keep])
+    return _repetitions(angle, residual_of(case, outputs, "position")[keep])
 
 
-def _repeating(angle: FloatArray, values: FloatArray) -> list[dict[str, float]]:
+def _repetitions(angle: FloatArray, values: FloatArray) -> list[dict[str, float]]:
     """Return cycles per revolution, amplitude and phase of the strongest repetitions over an angle (rad)."""
     values = values - np.mean(values)
     cycles, power = _periodogram(angle, values)

@@ -17,13 +17,9 @@ import numpy as np
 
 from rsea_ros.diagnosis.coherence import missed_response
 from rsea_ros.diagnosis.data_split import block_length, blocks_of, part
-from rsea_ros.diagnosis.settings import BlockSettings
+from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.signals import FloatArray, IntArray
-
-RESAMPLES = 1000
-"""Draws of a bootstrap over blocks. Derived: 25 of them lie beyond each end of a 95 % interval, which is
-then known to a fifth of that share (1 / sqrt(25))."""
 
 
 @dataclass(frozen=True)
@@ -109,23 +105,27 @@ def _by_block(
     return sums, np.bincount(block, minlength=length)[:length].astype(np.float64)
 
 
-def bootstrap_means(values: FloatArray, resamples: int = RESAMPLES) -> FloatArray:
+def bootstrap_means(values: FloatArray, resamples: int = DEFAULT.acceptance.resamples) -> FloatArray:
     """Return the means of resampled blocks, shape (resamples,)."""
     means: FloatArray = values[_draws(len(values), resamples)].mean(axis=1)
     return means
 
 
-def gain(with_it: Score, without: Score, channel: str) -> tuple[float, tuple[float, float]]:
+def gain(
+    with_it: Score, without: Score, channel: str, resamples: int = DEFAULT.acceptance.resamples
+) -> tuple[float, tuple[float, float]]:
     """Return 1 - RMS(residual with) / RMS(residual without) of a channel, and its 95 % bootstrap interval."""
-    return gain_of(with_it.sums[channel], without.sums[channel])
+    return gain_of(with_it.sums[channel], without.sums[channel], resamples)
 
 
-def gain_of(after: FloatArray, before: FloatArray) -> tuple[float, tuple[float, float]]:
+def gain_of(
+    after: FloatArray, before: FloatArray, resamples: int = DEFAULT.acceptance.resamples
+) -> tuple[float, tuple[float, float]]:
     """Return 1 - RMS(after) / RMS(before) and its 95 % bootstrap interval.
 
     after, before: squared residuals summed by block, shape (blocks,).
     """
-    draws = _draws(len(after), RESAMPLES)
+    draws = _draws(len(after), resamples)
     resampled = 1.0 - np.sqrt(after[draws].sum(axis=1) / np.maximum(before[draws].sum(axis=1), 1e-300))
     low, high = np.quantile(resampled, [0.025, 0.975])
     return 1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300))), (float(low), float(high))

@@ -139,7 +139,7 @@ def _with_present_derivatives(
     step = _Step(problem, np.column_stack([present.jacobian, columns]))
     best = ScreenedEffect(effect, problem, theta, step.cost(theta, residual))
     for _ in range(rule.screening_steps):
-        better = step.taken(best, residual, (1.0, rule.screening_part))
+        better = step.take(best, residual, (1.0, rule.screening_part))
         if better is None:
             break
         best, residual = better
@@ -160,7 +160,7 @@ class _Step:
         """Return the squared residual plus the cost of leaving the priors."""
         return power(residual) + float(np.sum((self._prior * (theta - self._centre)) ** 2))
 
-    def taken(
+    def take(
         self, start: ScreenedEffect, residual: FloatArray, shares: Sequence[float]
     ) -> tuple[ScreenedEffect, FloatArray] | None:
         """Return the end of a step, or of a share of it, and its residual; None where none helps."""

@@ -82,16 +82,16 @@ class StepFits:
         guesses = self.pools.fits.map(lambda e: initial_guesses(e, view), effects)
         return {e.name: g for e, g in zip(effects, guesses, strict=True)}
 
-    def screened(self, solution: Solution) -> list[ScreenedEffect]:
+    def screen(self, solution: Solution) -> list[ScreenedEffect]:
         """Return every other effect after two cheap steps beside a solution, best first."""
         effects = [e for e in self.effects if e.name not in solution.problem.acting]
         guesses = self.guesses
 
-        def tried(i: int) -> ScreenedEffect | None:
+        def try_effect(i: int) -> ScreenedEffect | None:
             self.say(effects[i].name, 0.4 * i / len(effects))
             return screen(solution, _rough(effects[i]), guesses[effects[i].name], self.settings.forward)
 
-        screened = [s for s in self.pools.fits.map(tried, range(len(effects))) if s is not None]
+        screened = [s for s in self.pools.fits.map(try_effect, range(len(effects))) if s is not None]
         rule = self.settings.forward
         if all(s.cost > rule.clear * solution.cost for s in screened):
             screened = list(self.pools.fits.map(lambda s: continue_fit(s, rule), screened))
@@ -110,7 +110,7 @@ class StepFits:
         """Fit screened effects to all training blocks."""
         return list(self.pools.fits.map(self._fit_all, screened))
 
-    def overlooked(self, left_out: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
+    def find_overlooked(self, left_out: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
         """Return those of the effects left out that surely help on the validation blocks, as fitted so far.
 
         The pieces are few: where an effect is small, it is chance in which of them it shows.
@@ -166,7 +166,7 @@ class StepFits:
             is_quick=self.is_far,
         )  # fmt: skip
         problem, theta = self.complete(screened)
-        masked = setup.masked(problem)
+        masked = setup.mask(problem)
         start = min(self._starts(problem, theta), key=lambda t: power(masked.residual(t)))
         first = fit_candidate(setup, problem, start)
         if problem.ride:

@@ -143,7 +143,7 @@ def on_slots(case: Case, slots: Sequence[int] | IntArray, settings: DiagnosisSet
         restarts=tuple(sorted([*drive.restarts, *anew])),
         spans=spans,
     )
-    return case.keeping(keep, cut)
+    return case.keep(keep, cut)
 
 
 def simulated_time(case: Case, settings: DiagnosisSettings) -> float:

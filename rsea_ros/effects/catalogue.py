@@ -14,7 +14,7 @@ import rsea_ros.effects as package
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import ParameterError
 from rsea_ros.plugins import plugin_constant, plugin_files
-from rsea_ros.wording import did_you_mean, shown
+from rsea_ros.wording import did_you_mean, quote
 
 _NOT_EFFECTS = {
     "catalogue", "compensable", "effect", "equation", "guess", "parameter", "scale", "signal_table"
@@ -40,7 +40,7 @@ def catalogue() -> Mapping[str, Effect]:
 
 
 @contextmanager
-def lent(*effects: Effect) -> Iterator[None]:
+def lend(*effects: Effect) -> Iterator[None]:
     """Add effects without a file in the catalogue for the duration of a block, such as a law just learned."""
     before = dict(_LENT)
     _LENT.update({e.name: e for e in effects})
@@ -59,7 +59,7 @@ def effect_named(name: str) -> Effect:
     if name not in effects:
         known = ", ".join(effects)
         near = did_you_mean(name, effects)
-        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {known}{near}")
+        raise ParameterError(f"effect {quote(name)}: not in the catalogue, expected one of {known}{near}")
     return effects[name]
 
 

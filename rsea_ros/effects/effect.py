@@ -21,7 +21,7 @@ from rsea_ros.effects.scale import Scale
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 from rsea_ros.units import with_unit
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 _SIGNATURE = types.void(_POINTER, _POINTER, _POINTER)
@@ -111,10 +111,10 @@ class Effect:
         """Return the effect with bounds, sizes and starts that suit a machine."""
         return replace(self, parameters=tuple(p.at(scale) for p in self.parameters))
 
-    def reaching(self, parameters: Mapping[str, float]) -> Effect:
+    def widen(self, parameters: Mapping[str, float]) -> Effect:
         """Return the effect with bounds that hold the parameters which a rig states."""
         values = self.complete(parameters)
-        return replace(self, parameters=tuple(p.reaching(values[p.name]) for p in self.parameters))
+        return replace(self, parameters=tuple(p.widen(values[p.name]) for p in self.parameters))
 
     @property
     def default_guesses(self) -> list[Guess]:
@@ -135,7 +135,7 @@ class Effect:
         expected = f"expected {', '.join(names)}"
         for name in parameters:
             if name not in names:
-                raise ParameterError(f"effect {self.name}: unknown parameter {shown(name)}, {expected}")
+                raise ParameterError(f"effect {self.name}: unknown parameter {quote(name)}, {expected}")
         full = self.complete(parameters)
         for name in names:
             if name not in full:

@@ -13,7 +13,7 @@ import math
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, STEP, Port
-from rsea_ros.effects.spring_hysteresis import reached
+from rsea_ros.effects.spring_hysteresis import reach
 
 
 @compiled
@@ -23,7 +23,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     ratio = w / p[3]
     level = p[0] + p[2] * math.exp(-ratio * ratio)
     way, rate = w * s[STEP], p[1] / max(level, 1e-9)
-    gain, rise = reached(rate, abs(way))
+    gain, rise = reach(rate, abs(way))
     side = math.copysign(1.0, way)
     rest = side - rate * x[0]
     mean = x[0] + (rest * rise / abs(way) if way != 0.0 else 0.0)

@@ -57,7 +57,7 @@ class Parameter:
         low, high, typical = (factor * v for v in (self.low, self.high, self.typical))
         return replace(self, low=low, high=high, typical=typical, starts=starts)
 
-    def reaching(self, value: float) -> Parameter:
+    def widen(self, value: float) -> Parameter:
         """Return the parameter with bounds that hold a value which a rig states, where that is a number."""
         if not math.isfinite(value) or (self.logarithmic and value <= 0.0):
             return self

@@ -25,7 +25,7 @@ _LARGEST = 20.0
 
 
 @njit(inline="always")
-def reached(a, u):  # type: ignore[no-untyped-def]
+def reach(a, u):  # type: ignore[no-untyped-def]
     """Return (1 - exp(-a u)) / a, the gain of z from 0 over a path u, and its integral over the path."""
     x = a * u
     if abs(x) < _SMALL:
@@ -45,11 +45,11 @@ def along(z, u, gamma):  # type: ignore[no-untyped-def]
         if 1.0 - b * z > 0.0:
             whole = math.log1p(-b * z) / b if abs(b) > 1e-9 else -z
         way = min(u, whole)
-        gain, rise = reached(b, way)
+        gain, rise = reach(b, way)
         area = z * way + (1.0 - b * z) * rise
         z = z + (1.0 - b * z) * gain if u < whole else 0.0
         u -= way
-    gain, rise = reached(a, u)
+    gain, rise = reach(a, u)
     rest = 1.0 - a * z
     return min(max(z + rest * gain, -_LARGEST), _LARGEST), area + z * u + rest * rise
 

@@ -70,11 +70,11 @@ def proofs_of(
 ) -> tuple[Proof, ...]:
     """Return the proofs for pairs that no run seems to separate; without those where one yet may."""
     named, noise = {h.name: h for h in hypotheses}, noise_by_channel(hypotheses, measured)
-    proofs = [_proved(named[a], named[b], asked, noise, run) for a, b in pairs]
+    proofs = [_prove(named[a], named[b], asked, noise, run) for a, b in pairs]
     return tuple(p for p in proofs if p is not None)
 
 
-def _proved(
+def _prove(
     a: Hypothesis, b: Hypothesis, asked: DesignRequest, noise: Mapping[str, float], run: Map
 ) -> Proof | None:
     """Return the proof that no run separates two, None where the bound leaves room for one."""

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.experiment.hypothesis import Hypothesis, motion, run_case
-from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used
+from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
 from rsea_ros.identification.excitation import ramp_ends
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, serial, solve
@@ -71,7 +71,7 @@ def bound(
     problem = replace(true.problem, cases=tuple(run_case(u, rate, noise) for _, u in sines))
     outputs = problem.outputs(true.if_there())
     cases = tuple(replace(c, measured=dict(o)) for c, o in zip(problem.cases, outputs, strict=True))
-    theta, powers = _imitated(replace(rival.problem, cases=cases), rival.theta, duration, run)
+    theta, powers = _imitate(replace(rival.problem, cases=cases), rival.theta, duration, run)
     at = np.array([f for f, _ in sines])
     worst = np.array([powers[at == f].max() for f in frequencies])
     values = {u.name: u.outer(float(v)) for u, v in zip(rival.problem.unknowns, theta, strict=True)}
@@ -91,21 +91,21 @@ def _sine(
     rig = true.rig_at(true.if_there())
     for _ in range(3):
         peaks = of_command(command, rate) | of_response(command, motion(rig, command, rate))
-        share = used(peaks, limits)
+        share = largest_share(peaks, limits)
         if share <= 1.0:
             break
         command = command * (0.98 / share if np.isfinite(share) else 0.3)
     return command
 
 
-def _imitated(
+def _imitate(
     problem: Problem, theta: FloatArray, duration: float, run: Map
 ) -> tuple[FloatArray, FloatArray]:
     """Return the values that imitate best, and the S a second that they leave, shape (cases,)."""
     weights = np.full(len(problem.cases), 1.0)
     best, least = theta, _powers(problem, theta)
     for _ in range(_LAWSON):
-        heavy = replace(problem, cases=tuple(map(_weighted, problem.cases, (weights * duration).tolist())))
+        heavy = replace(problem, cases=tuple(map(_with_weight, problem.cases, (weights * duration).tolist())))
         theta = solve(heavy, best, iterations=_ITERATIONS, run=run).theta
         powers = _powers(problem, theta)
         if powers.max() < least.max():
@@ -115,7 +115,7 @@ def _imitated(
     return best, least
 
 
-def _weighted(case: Case, weight: float) -> Case:
+def _with_weight(case: Case, weight: float) -> Case:
     return replace(case, noise={n: v / np.sqrt(max(weight, 1e-6)) for n, v in case.noise.items()})
 
 

@@ -16,7 +16,7 @@ from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.joint_weighing import RunWeighing, weigh
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_design import propose
-from rsea_ros.experiment.run_limits import used
+from rsea_ros.experiment.run_limits import largest_share
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -112,7 +112,7 @@ class _Session:
     weighing: RunWeighing
     rounds: list[Round] = field(default_factory=list)
 
-    def ended(self, end: End, proofs: tuple[Proof, ...] = (), why: str = "") -> CampaignOutcome:
+    def conclude(self, end: End, proofs: tuple[Proof, ...] = (), why: str = "") -> CampaignOutcome:
         rounds = (*self.rounds, Round(self.weighing, None))
         return CampaignOutcome(end, rounds, tuple(self.records), proofs, why)
 
@@ -131,7 +131,7 @@ class Campaign:
     tell: Progress | None = None
     hear: Callable[[Round], None] = lambda _: None
     choose: Callable[..., Proposal] = propose
-    """How the next run is chosen; a bench puts other policies here."""
+    """How the next run is chosen; a benchmark puts other policies here."""
 
     def go(self, records: Sequence[Record], first: RunWeighing | None = None) -> CampaignOutcome:
         """Run the loop from some records to its end. first: their weighing, if known.
@@ -144,7 +144,7 @@ class Campaign:
                 now = weigh(session.records, self.rig, self.causes, session.weighing, self.run)
             except IdentificationError as error:
                 session.records.pop()
-                return session.ended("failed", why=str(error))
+                return session.conclude("failed", why=str(error))
             session.weighing = now
         return outcome
 
@@ -157,28 +157,28 @@ class Campaign:
     def _round(self, session: _Session) -> CampaignOutcome | None:
         """Design a run and have it played; return the outcome, None where the loop continues."""
         weighing = session.weighing
-        if end := self._known(weighing) or self._spent(session.rounds):
-            return session.ended(end)
+        if end := self._known_end(weighing) or self._budget_end(session.rounds):
+            return session.conclude(end)
         possible, noise = self.possible(weighing), weighing.cases[0].noise
         try:
             proposal = self.choose(possible, self.asked, noise, self.run, self.tell)
         except ParameterError as error:
-            return session.ended("failed", why=str(error))
+            return session.conclude("failed", why=str(error))
         if proposal.decided < self.rules.worth and not self._widens(proposal, session.rounds):
             proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
-            return session.ended("undecidable", proofs)
+            return session.conclude("undecidable", proofs)
         self.hear(Round(weighing, proposal))
         try:
             record = self.play(proposal)
         except DeviceError as error:
-            return session.ended("broken", why=str(error))
+            return session.conclude("broken", why=str(error))
         if record is None:
-            return session.ended("declined")
+            return session.conclude("declined")
         session.rounds.append(Round(weighing, proposal))
         session.records.append(record)
         return None
 
-    def _known(self, weighing: RunWeighing) -> End | None:
+    def _known_end(self, weighing: RunWeighing) -> End | None:
         """Return the outcome by present knowledge, None where the loop continues."""
         if weighing.probability[weighing.best] < self.rules.confirmed:
             return None
@@ -193,9 +193,9 @@ class Campaign:
         before = [r.proposal.peaks.at_level["torque"] for r in rounds if r.proposal is not None]
         now = proposal.peaks
         is_larger = now.at_level["torque"] > self.rules.larger * max(before, default=0.0)
-        return is_larger and used(now.expected, self.asked.limits) < self.rules.held_back
+        return is_larger and largest_share(now.expected, self.asked.limits) < self.rules.held_back
 
-    def _spent(self, rounds: Sequence[Round]) -> End | None:
+    def _budget_end(self, rounds: Sequence[Round]) -> End | None:
         played = [r.proposal for r in rounds if r.proposal is not None]
         seconds, energy = sum(p.duration for p in played), sum(p.energy for p in played)
         budget = self.budget

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import norm
 
 from rsea_ros.experiment.hypothesis import Hypothesis, motion
-from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used
+from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -117,4 +117,4 @@ def at_ends(values: FloatArray) -> float:
 
 def share_used(peaks: Peaks, limits: RunLimits) -> float:
     """Return the largest share of a limit that is used at LEVEL."""
-    return used(peaks.at_level, limits)
+    return largest_share(peaks.at_level, limits)

@@ -34,10 +34,10 @@ def models_of(document: Mapping[str, Any], extended: Rig) -> list[ModelFile]:
     asked = next(c for c in causes if c.name == name)
     rest = tuple(e for e in extended.effects if e.name != name)
     group = [asked, *(m for n, m in others if n == name and m.name not in (e.name for e in rest))]
-    return [_placed(m, extended, rest) for m in group]
+    return [_model_file(m, extended, rest) for m in group]
 
 
-def _placed(model: ModelFile, extended: Rig, rest: tuple[EffectSetting, ...]) -> ModelFile:
+def _model_file(model: ModelFile, extended: Rig, rest: tuple[EffectSetting, ...]) -> ModelFile:
     return ModelFile(
         model.name, extended.with_effects(*rest, model.rig.effects[-1]), model.intervals, model.probability
     )

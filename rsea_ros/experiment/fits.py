@@ -23,7 +23,7 @@ _GAIN = 1e-4
 _ITERATIONS = 12
 
 
-def fitted(
+def fit_cause(
     name: str, problem: Problem, before: FloatArray | None, near: Mapping[str, float], run: Map
 ) -> Solution:
     """Return a cause fitted from the best of its guesses, and from where it was or the rig's own fit."""

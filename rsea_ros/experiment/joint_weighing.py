@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.checks.faults import check
-from rsea_ros.experiment.fits import fitted, fitted_again
+from rsea_ros.experiment.fits import fit_cause, fitted_again
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.prior import problem_of, weights_of
 from rsea_ros.identification.problem import Case, case_from
@@ -123,12 +123,12 @@ def weigh(
     names = [NOTHING, *causes]
     if before is not None:
         names = [n for n in names if before.probability.get(n, 0.0) > HOPELESS]
-    nominal = fitted(NOTHING, problem_of(NOTHING, rig, cases), _where(before, NOTHING), {}, run)
+    nominal = fit_cause(NOTHING, problem_of(NOTHING, rig, cases), _where(before, NOTHING), {}, run)
     near = dict(zip((u.name for u in nominal.problem.unknowns), nominal.theta, strict=True))
     solutions = {NOTHING: nominal}
     for name in (n for n in names if n != NOTHING):
-        solutions[name] = fitted(name, problem_of(name, rig, cases), _where(before, name), near, run)
-    return _weighed(fitted_again(solutions, run), cases)
+        solutions[name] = fit_cause(name, problem_of(name, rig, cases), _where(before, name), near, run)
+    return _weigh(fitted_again(solutions, run), cases)
 
 
 def _where(before: RunWeighing | None, name: str) -> FloatArray | None:
@@ -143,10 +143,10 @@ def information_of(solution: Solution, scale: float) -> FloatArray:
     return result
 
 
-def _weighed(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> RunWeighing:
+def _weigh(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> RunWeighing:
     samples = max(len(next(iter(solutions.values())).residual), 1)
     scale = max(1.0, min(s.cost for s in solutions.values()) / samples)
-    fits = {n: WeighedCause(n, s, _evidence(s, scale), _left(s)) for n, s in solutions.items()}
+    fits = {n: WeighedCause(n, s, _evidence(s, scale), _rms_left(s)) for n, s in solutions.items()}
     logs = np.array([f.log_evidence for f in fits.values()])
     shares = np.exp(logs - logs.max())
     return RunWeighing(cases, fits, dict(zip(fits, (shares / shares.sum()).tolist(), strict=True)), scale)
@@ -158,5 +158,5 @@ def _evidence(solution: Solution, scale: float) -> float:
     return -0.5 * solution.cost / scale - 0.5 * float(spread)
 
 
-def _left(solution: Solution) -> float:
+def _rms_left(solution: Solution) -> float:
     return float(np.sqrt(np.mean(solution.residual**2)))

@@ -16,7 +16,7 @@ SHORTEST = 4.2
 """s of a record, rest included, that the diagnosis takes."""
 
 
-def diagnosed(
+def diagnose_together(
     records: Sequence[Record], rig: Rig, causes: Sequence[str], tell: Progress | None = None
 ) -> Diagnosis:
     """Return the diagnosis of all records together, which weighs causes by held-out data."""

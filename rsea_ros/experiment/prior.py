@@ -33,11 +33,11 @@ def problem_of(name: str, rig: Rig, cases: Sequence[Case]) -> Problem:
     with_it = rig.with_effects(*rig.effects, EffectSetting(name, effect.complete(effect.null)))
     free = unknowns_of_effect(effect, effect.typical, rig.known | idle(effect, rig))
     parameters = {f"{name}.{p.name}": p for p in effect.parameters}
-    doubted = tuple(_doubted(u, parameters[u.name], u.name == f"{name}.{effect.main.name}") for u in free)
+    doubted = tuple(_with_prior(u, parameters[u.name], u.name == f"{name}.{effect.main.name}") for u in free)
     return Problem(tuple(cases), with_it, (*nominal, *doubted), MEASURED, stated=stated)
 
 
-def _doubted(unknown: Unknown, parameter: Parameter, is_size: bool) -> Unknown:
+def _with_prior(unknown: Unknown, parameter: Parameter, is_size: bool) -> Unknown:
     """Return an unknown of a cause with a prior: its size around null, the rest around typical values."""
     typical, null = unknown.inner(parameter.typical), unknown.start
     if is_size and (parameter.null > 0.0 or not parameter.logarithmic) and math.isfinite(parameter.null):

@@ -16,7 +16,7 @@ from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray
 
 
-def refined(
+def refine(
     start: Shape, value: Callable[[Shape], float], asked: DesignRequest, say: Progress
 ) -> tuple[Shape, int]:
     """Return the shape near `start` of the largest value, and how many were rated."""

@@ -18,9 +18,9 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.chance_constraint import Group, Peaks, ends_of, peaks, share_used
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
-from rsea_ros.experiment.refine import refined
+from rsea_ros.experiment.refine import refine
 from rsea_ros.experiment.run_shape import Shape
-from rsea_ros.experiment.separation import decided, refitted, separations, sharpened
+from rsea_ros.experiment.separation import decided_share, information_gain, refit, separations
 from rsea_ros.experiment.shape_rater import INSIDE, ShapeRater, noise_by_channel
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
@@ -90,13 +90,13 @@ def propose(
 
     def value(shape: Shape) -> float:
         table = separations(hypotheses, rater.responses(rater.within(shape, length)))
-        return decided(table, rater.probability, apart)
+        return decided_share(table, rater.probability, apart)
 
     again = [value(shape) for shape in shapes]
     while max(again) < _KEPT * max(values) * (_PER_RUN + length) and 2.0 * length <= asked.longest:
         length *= 2.0
         again = [value(shape) for shape in shapes]
-    shape, count = refined(shapes[int(np.argmax(again))], value, asked, say)
+    shape, count = refine(shapes[int(np.argmax(again))], value, asked, say)
     return _final(rater, shape, length, apart, 2 * len(shapes) + count)
 
 
@@ -109,7 +109,7 @@ def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[Float
         best = int(np.argmax(stack[:, i, j]))
         if stack[best, i, j] < _FAR:
             case = rater.case(rater.within(shapes[best], asked.probe), is_quick=True)
-            data = refitted(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).data
+            data = refit(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).data
             apart[i, j] = apart[j, i] = data * asked.longest / asked.probe < _HOPE
     return apart
 
@@ -119,29 +119,31 @@ def _per_second(
 ) -> list[tuple[float, float]]:
     """Return the share of cases that a shape decides per second, and the length, for several run lengths."""
     lengths = np.geomspace(asked.shortest, asked.longest, 7)
-    scaled = [(decided(table * s / asked.probe, rater.probability, apart), float(s)) for s in lengths]
+    scaled = [(decided_share(table * s / asked.probe, rater.probability, apart), float(s)) for s in lengths]
     return [(share / (_PER_RUN + s), s) for share, s in scaled]
 
 
 def _final(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
     """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
     asked, hypotheses = rater.asked, rater.hypotheses
-    command, reached = held(rater.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
+    command, reached = limit_command(rater.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
     responses = rater.responses(command, is_quick=False)
     table = _with_refits(rater, command, separations(hypotheses, responses))
     names = tuple(h.name for h in hypotheses)
     k = len(names)
     pairs = tuple((names[i], names[j]) for i in range(k) for j in range(i + 1, k) if apart[i, j])
-    narrow = sharpened(hypotheses[0], responses[0])
+    narrow = information_gain(hypotheses[0], responses[0])
     energy = float(np.sum(command**2) / asked.rate)
-    share = decided(table, rater.probability, apart) if k > 1 else 1.0
+    share = decided_share(table, rater.probability, apart) if k > 1 else 1.0
     return Proposal(
         shape, length, asked.rate, command, names, table, pairs, share, narrow, reached, tried,
         energy,
     )  # fmt: skip
 
 
-def held(command: FloatArray, asked: DesignRequest, groups: Sequence[Group]) -> tuple[FloatArray, Peaks]:
+def limit_command(
+    command: FloatArray, asked: DesignRequest, groups: Sequence[Group]
+) -> tuple[FloatArray, Peaks]:
     """Return a command as large as the limits allow for every possible bench, and its peaks.
 
     By bisection, because the worst response is not linear in the command. Raises
@@ -162,7 +164,9 @@ def held(command: FloatArray, asked: DesignRequest, groups: Sequence[Group]) -> 
         raise ParameterError(
             "no run keeps the limits for all that the bench may be, expected wider limits: at a share of "
             f"{_SMALLEST:g} still "
-            + ", ".join(f"{n} {reached.at_level[n]:.4g} of {v:g}" for n, v in asked.limits.stated().items())
+            + ", ".join(
+                f"{n} {reached.at_level[n]:.4g} of {v:g}" for n, v in asked.limits.finite_limits().items()
+            )
         )
     return best
 
@@ -173,7 +177,7 @@ def _with_refits(rater: ShapeRater, command: FloatArray, table: FloatArray) -> F
     for i, row in enumerate(table):
         j = int(np.argmin(row))
         if row[j] < _FAR:
-            table[i, j] = refitted(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).total
+            table[i, j] = refit(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).total
     return table
 
 
@@ -184,8 +188,8 @@ def _sharpest(rater: ShapeRater, say: Progress) -> Proposal:
 
     def value(shape: Shape) -> float:
         command = rater.within(shape, asked.probe)
-        return sharpened(rater.hypotheses[0], rater.responses(command)[0])
+        return information_gain(rater.hypotheses[0], rater.responses(command)[0])
 
     values = [value(shape) for shape in shapes]
-    shape, count = refined(shapes[int(np.argmax(values))], value, asked, say)
+    shape, count = refine(shapes[int(np.argmax(values))], value, asked, say)
     return _final(rater, shape, asked.longest, np.eye(1, dtype=bool), len(shapes) + count)

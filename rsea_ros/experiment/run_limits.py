@@ -12,7 +12,7 @@ from rsea_ros.decimal_number import is_decimal
 from rsea_ros.errors import ParameterError
 from rsea_ros.signals import FloatArray
 from rsea_ros.units import plain
-from rsea_ros.wording import did_you_mean, shown
+from rsea_ros.wording import did_you_mean, quote
 
 UNITS: Mapping[str, str] = {
     "torque": "N m",
@@ -56,7 +56,7 @@ class RunLimits:
                 "limit torque = inf N·m, expected a finite torque: nothing else bounds a run"
             )
 
-    def stated(self) -> dict[str, float]:
+    def finite_limits(self) -> dict[str, float]:
         """Return the finite limits by name."""
         return {f.name: v for f in fields(self) if math.isfinite(v := getattr(self, f.name))}
 
@@ -68,10 +68,10 @@ def limits_from(text: str) -> RunLimits:
         name, _, value = (part.strip() for part in item.partition("="))
         if name not in UNITS:
             near = did_you_mean(name, UNITS)
-            raise ParameterError(f"--limits: {shown(name)}, expected one of {', '.join(UNITS)}{near}")
+            raise ParameterError(f"--limits: {quote(name)}, expected one of {', '.join(UNITS)}{near}")
         if not is_decimal(value):
             expected = f"expected a number in {plain(UNITS[name])}"
-            raise ParameterError(f"--limits: {name} = {shown(value)}, {expected}")
+            raise ParameterError(f"--limits: {name} = {quote(value)}, {expected}")
         if name in values:
             raise ParameterError(f"--limits: {name} is given twice, expected once")
         values[name] = float(value)
@@ -100,7 +100,7 @@ def of_response(command: FloatArray, outputs: Mapping[str, FloatArray]) -> dict[
     return peaks
 
 
-def used(peaks: Mapping[str, float], limits: RunLimits) -> float:
+def largest_share(peaks: Mapping[str, float], limits: RunLimits) -> float:
     """Return the largest share of a limit that is used; above 1 a limit is exceeded."""
-    shares = [peaks[n] / limit for n, limit in limits.stated().items() if n in peaks]
+    shares = [peaks[n] / limit for n, limit in limits.finite_limits().items() if n in peaks]
     return max((s if math.isfinite(s) else math.inf for s in shares), default=0.0)

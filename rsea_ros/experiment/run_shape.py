@@ -58,7 +58,7 @@ def command_of(shape: Shape, duration: float, rate: float, slew: float = np.inf)
     part = KINDS[shape.kind](shape, moving, rate)
     run = ramp_ends(shape.bias + shape.amplitude * part, min(round(RAMP * rate), moving // 4))
     if np.isfinite(slew):
-        run = slowed(run, slew / rate, is_stepped=shape.kind in ("steps", "holds"))
+        run = slow(run, slew / rate, is_stepped=shape.kind in ("steps", "holds"))
     return at_rest_around(np.concatenate([run, np.zeros(n - moving)]), rate)
 
 
@@ -68,7 +68,7 @@ def at_rest_around(run: FloatArray, rate: float) -> FloatArray:
     return whole
 
 
-def slowed(command: FloatArray, most: float, *, is_stepped: bool) -> FloatArray:
+def slow(command: FloatArray, most: float, *, is_stepped: bool) -> FloatArray:
     """Return a command that changes by at most `most` from sample to sample, N m: smoothed, or smaller."""
     change = float(np.max(np.abs(np.diff(command, prepend=0.0, append=0.0))))
     if change <= most:

@@ -59,7 +59,7 @@ class Refit:
 _REFITS = 5
 
 
-def refitted(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial) -> Refit:
+def refit(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial) -> Refit:
     """Return S of a rival after a full fit: where values have to go far, one linear step leaves too much.
 
     case: the run, as run_case makes it. Gauss-Newton from the rival's values, steps halved where they fail.
@@ -94,14 +94,14 @@ def nearest(table: FloatArray, apart: BoolArray) -> FloatArray:
     return np.asarray(np.where(apart, np.inf, table).min(axis=1))
 
 
-def decided(table: FloatArray, probability: FloatArray, apart: BoolArray) -> float:
+def decided_share(table: FloatArray, probability: FloatArray, apart: BoolArray) -> float:
     """Return the share that a run is expected to decide: the mean of 1 - exp(-S / ENOUGH), S the worst."""
     worst = nearest(table, apart)
     share = np.where(np.isfinite(worst), -np.expm1(-np.minimum(worst, 1e6) / ENOUGH), 0.0)
     return float(probability @ share / max(probability.sum(), 1e-300))
 
 
-def sharpened(hypothesis: Hypothesis, seen: Response) -> float:
+def information_gain(hypothesis: Hypothesis, seen: Response) -> float:
     """Return the nats by which a run narrows a cause's own parameters, all others free (D-optimality).
 
     Half the logarithm of the ratio of the determinants of their information after and before.

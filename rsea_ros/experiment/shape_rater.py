@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
 from rsea_ros.experiment.proposal import DesignRequest
-from rsea_ros.experiment.run_limits import of_command, of_response, used
+from rsea_ros.experiment.run_limits import largest_share, of_command, of_response
 from rsea_ros.experiment.run_shape import Shape, command_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map
@@ -48,7 +48,7 @@ class ShapeRater:
         rate = self.asked.rate
         rig = hypothesis.rig_at(hypothesis.if_there())
         peaks = of_response(command, motion(rig, command, rate)) | of_command(command, rate)
-        return used(peaks, self.asked.limits)
+        return largest_share(peaks, self.asked.limits)
 
     def responses(self, command: FloatArray, *, is_quick: bool = True) -> list[Response]:
         """Return the prediction of each hypothesis for a command."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from rsea_ros.exports.others import acting, omitted_effects, omitted_parts, sized
+from rsea_ros.exports.others import finite_sizes, omitted_effects, omitted_parts, without_null_effects
 from rsea_ros.exports.represented import Export, Omitted, Represented
 from rsea_ros.model.equations import gear_inertia
 from rsea_ros.model.rig import Rig
@@ -26,8 +26,8 @@ ANY_SPEED = 1e9
 
 def export_bam(rig: Rig, actuator: str = "") -> Export:
     """Return the parameters of a rig. actuator: BAM's name of the servo, which brings its control law."""
-    rig = acting(rig)
-    effects = sized(rig)
+    rig = without_null_effects(rig)
+    effects = finite_sizes(rig)
     represented = [
         Represented("rotor.reflected_inertia", "armature"),
         Represented("rotor.reflected_damping", "friction_viscous"),

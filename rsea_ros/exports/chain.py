@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.structure import structured
+from rsea_ros.model.structure import with_structure
 from rsea_ros.units import plain
 
 GRAVITY = 9.80665
@@ -86,7 +86,7 @@ def chain_of(rig: Rig) -> Chain:
     check_rotary(rig)
     if rig.train == "lumped":
         raise RigError(f"rig {rig.name}: the lumped train cannot be exported, expected a real train")
-    rig = structured(rig.with_effects(*(one for one in rig.effects if one.name == "gravity_error")))
+    rig = with_structure(rig.with_effects(*(one for one in rig.effects if one.name == "gravity_error")))
     spring = _beside_gear(rig) if rig.rigid_spring else (rig["spring.damping"], rig["spring.stiffness"])
     b_m = rig["rotor.reflected_damping"]
     moves = rig.end_is_free("housing_end"), rig.end_is_free("spring_end")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from rsea_ros.exports.others import acting, omitted_effects, omitted_parts, sized
+from rsea_ros.exports.others import finite_sizes, omitted_effects, omitted_parts, without_null_effects
 from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.equations import gear_inertia
 from rsea_ros.model.rig import Rig
@@ -20,8 +20,8 @@ PHYSICS_STEP = 0.005
 
 def export_isaac(rig: Rig) -> Export:
     """Return the configuration of a rig's actuator."""
-    rig = acting(rig)
-    effects = sized(rig)
+    rig = without_null_effects(rig)
+    effects = finite_sizes(rig)
     represented: list[Represented] = []
     delay = effects.get("command_delay", {}).get("delay", 0.0)
     fields = _joint(rig, represented) | _loop(rig, represented)

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as xml
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import Chain, Joint, Link, chain_of
-from rsea_ros.exports.others import acting, sized
+from rsea_ros.exports.others import finite_sizes, without_null_effects
 from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.rig import Rig
 
@@ -38,7 +38,7 @@ class Language:
 
 def export_chain(rig: Rig, language: Language) -> Export:
     """Return a rig in a language. Raises RigError for one that is no chain of links (see chain.py)."""
-    rig = acting(rig)
+    rig = without_null_effects(rig)
     chain = chain_of(rig)
     represented, omitted = _coverage(rig, chain, has_springs=language.has_springs)
     root, model = language.frame(rig.name)
@@ -58,7 +58,7 @@ def _coverage(
     omitted = [Omitted(name, f"{why}; {only}") for name, why in chain.left_out.items()]
     if not has_springs and not rig.rigid_spring:
         omitted.append(Omitted("spring.stiffness", f"URDF joints have no spring; {only}"))
-    finite, has_stop = sized(rig), any(stop_of(joint, rig) for joint in chain.joints)
+    finite, has_stop = finite_sizes(rig), any(stop_of(joint, rig) for joint in chain.joints)
     for one in rig.effects:
         how = _EFFECTS.get(one.name)
         if one.name not in finite:
@@ -88,7 +88,7 @@ def _how(joint: Joint, has_springs: bool) -> str:
 
 
 def _parameters(rig: Rig, name: str) -> dict[str, float]:
-    return sized(rig).get(name, {})
+    return finite_sizes(rig).get(name, {})
 
 
 def inertia(link: Link) -> dict[str, str]:

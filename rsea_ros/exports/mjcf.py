@@ -13,10 +13,10 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import check_rotary
 from rsea_ros.exports.mjcf_effects import EFFECTS, STRUCTURES
 from rsea_ros.exports.mjcf_loop import say_loop
-from rsea_ros.exports.others import acting, sized
+from rsea_ros.exports.others import finite_sizes, without_null_effects
 from rsea_ros.exports.represented import Export, Omitted, Represented, Unrepresentable, coverage_lines
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.structure import structured
+from rsea_ros.model.structure import with_structure
 
 
 def export_mjcf(rig: Rig) -> Export:
@@ -25,9 +25,9 @@ def export_mjcf(rig: Rig) -> Export:
     Raises RigError for a rig that MJCF cannot represent (see design/mujoco_model.py).
     """
     check_rotary(rig)
-    rig = acting(rig)
-    finite = sized(rig)
-    root = model_element(structured(rig), play_of(rig))
+    rig = without_null_effects(rig)
+    finite = finite_sizes(rig)
+    root = model_element(with_structure(rig), play_of(rig))
     loop, omitted = say_loop(rig, root)
     represented = [loop]
     for setting in sorted(rig.effects, key=lambda one: effect_named(one.name).order):

@@ -37,7 +37,7 @@ def play_mujoco(model_text: str, rig: Rig, command: FloatArray) -> dict[str, Flo
     warnings: list[str] = []
     mujoco.set_mju_user_warning(warnings.append)  # else it writes them into a file in the working directory
     try:
-        sensed = _sensed(mujoco, rollout, model, np.repeat(command, hold), PIECE * hold)
+        sensed = _read_sensors(mujoco, rollout, model, np.repeat(command, hold), PIECE * hold)
     finally:
         mujoco.set_mju_user_warning(None)
     if warnings:
@@ -46,7 +46,7 @@ def play_mujoco(model_text: str, rig: Rig, command: FloatArray) -> dict[str, Flo
     return {name: y[::hold] for name, y in _channels(rig, model_text, read).items()}
 
 
-def _sensed(mujoco: Any, rollout: Any, model: Any, torque: FloatArray, piece: int) -> FloatArray:
+def _read_sensors(mujoco: Any, rollout: Any, model: Any, torque: FloatArray, piece: int) -> FloatArray:
     """Return what the model's sensors read at every step, shape (steps, sensors).
 
     torque: of every step, N m or target rad. piece: steps that are played in one call.

@@ -13,13 +13,13 @@ from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.units import plain
 
 
-def acting(rig: Rig) -> Rig:
+def without_null_effects(rig: Rig) -> Rig:
     """Return the rig without the effects that have no size: all parameters at their null values."""
     named = ((one, effect_named(one.name)) for one in rig.effects)
     return rig.with_effects(*(one for one, e in named if e.complete(one.parameters) != e.null))
 
 
-def sized(rig: Rig) -> dict[str, dict[str, float]]:
+def finite_sizes(rig: Rig) -> dict[str, dict[str, float]]:
     """Return the parameters of the effects whose every size is a finite number, by name."""
     complete = {one.name: effect_named(one.name).complete(one.parameters) for one in rig.effects}
     return {name: p for name, p in complete.items() if all(map(math.isfinite, p.values()))}
@@ -27,7 +27,7 @@ def sized(rig: Rig) -> dict[str, dict[str, float]]:
 
 def omitted_effects(rig: Rig, represented: Sequence[Represented], why: str) -> list[Omitted]:
     """Return the rig's effects that the target does not represent."""
-    names, finite = {one.name for one in represented}, sized(rig)
+    names, finite = {one.name for one in represented}, finite_sizes(rig)
     endless = "a parameter of it is infinite"
     effects = (one.name for one in rig.effects if one.name not in names)
     return [Omitted(name, why if name in finite else endless) for name in effects]

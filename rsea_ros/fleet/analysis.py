@@ -23,7 +23,7 @@ from rsea_ros.fleet.read_recording import JointRecording, read_run
 from rsea_ros.fleet.row import Row
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification, ParameterEstimate
-from rsea_ros.model.extent import bounded
+from rsea_ros.model.extent import bound_values
 from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
@@ -50,22 +50,22 @@ def analyse(row: Row, path: Path, url: str, joint: MappedJoint) -> dict[str, str
     row |= {"excitation": excitation(record), "faults": faults(record.faults)}
     check_pace(record)
     require_motion(record)
-    findings = check_record(bounded(record), rig, joint.topics.axis)
+    findings = check_record(bound_values(record), rig, joint.topics.axis)
     row["faults"] = faults(findings.faults)
     result = identify([with_faults(_fit_for_fit(run, rig), findings, masks=False)], rig)
-    row |= identified(result)
+    row |= identification_columns(result)
     files = {
         IDENTIFICATION_JSON: json_text(identification_json(result)),
         MODEL: rig_text(result.rig),
     }
     if joint.diagnose == "always" or (joint.diagnose == "misfit" and result.verdict == "misfit"):
-        files |= _diagnosed(row, with_faults(record, findings, masks=True), rig)
+        files |= _diagnose(row, with_faults(record, findings, masks=True), rig)
     return files
 
 
 def _fit_for_fit(run: JointRecording, rig: Rig) -> Record:
     """Return the run without the samples that the checks mask."""
-    checked = check(bounded(run.lenient), rig)
+    checked = check(bound_values(run.lenient), rig)
     measured = [n for n in checked.record.channels if n not in ("command", "reference")]
     if not any(checked.masked[n].any() for n in measured if n in checked.masked):
         return run.strict()
@@ -74,7 +74,7 @@ def _fit_for_fit(run: JointRecording, rig: Rig) -> Record:
     return replace(checked.record, channels=kept)
 
 
-def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
+def _diagnose(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     """Fill in the diagnosis, and return its artefacts; a failed one leaves its reason.
 
     The parameters become those beside the causes: a fit without them takes dry friction for damping and
@@ -99,7 +99,7 @@ def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     }
 
 
-def identified(result: Identification) -> dict[str, Any]:
+def identification_columns(result: Identification) -> dict[str, Any]:
     """Return the results of an identification as columns of the row."""
     times = result.times_noise
     main = next((n for n in _MAIN if n in times), next(iter(times), ""))

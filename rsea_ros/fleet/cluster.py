@@ -79,7 +79,7 @@ class OnDask:
             return None
         job, _ = self._jobs.pop(future.key)
         if future.status in ("cancelled", "lost"):
-            raise self._lost()
+            raise self._lost_error()
         try:
             return Done(job, future.result())
         except KilledWorker as error:
@@ -92,9 +92,9 @@ class OnDask:
 
     def _check(self) -> None:
         if self._client.status != "running":
-            raise self._lost()
+            raise self._lost_error()
 
-    def _lost(self) -> FleetError:
+    def _lost_error(self) -> FleetError:
         return FleetError("the scheduler is lost: what was done is in the store, run again to go on")
 
 

@@ -43,7 +43,7 @@ def take_out(rows: Path, outcomes: Collection[str]) -> None:
                 {key: value for key, value in (kept.schema.metadata or {}).items() if key != _REPLACES}
             )  # the row that comes in a removed one's place may have the name of a file that is replaced
             with NewFiles(Destination(file.parent, force=True)) as new:
-                write_table(plain, new.staged(file.name))
+                write_table(plain, new.stage(file.name))
 
 
 def finish(rows: Path) -> None:
@@ -59,7 +59,7 @@ def _replace(folder: Path, files: Sequence[Path], table: pa.Table) -> None:
     digest = hashlib.sha256("\n".join(names).encode()).hexdigest()[:16]
     marked = table.replace_schema_metadata({**(table.schema.metadata or {}), _REPLACES: json.dumps(names)})
     with NewFiles(folder) as new:
-        write_table(marked, new.staged(f"{_PART}{digest}.parquet"))
+        write_table(marked, new.stage(f"{_PART}{digest}.parquet"))
     _remove(folder, names)
 
 

@@ -58,7 +58,7 @@ class Engine:
         limits: EngineLimits | None = None,
     ) -> None:
         self._store, self._executor, self._work = store, executor, work
-        self._keys, self._recordings = store.known()
+        self._keys, self._recordings = store.known_rows()
         self._limits, self._tell = limits or EngineLimits(), tell
         self._ready: deque[Job] = deque()
         self._later: list[tuple[float, int, Job]] = []

@@ -19,7 +19,7 @@ from rsea_ros.fleet.fleet_error import JointMapError
 from rsea_ros.fleet.joint_keys import JOINT, MAP, TOPIC
 from rsea_ros.keys import names
 from rsea_ros.model.rig_file import load_rig, rig_folders, rig_text
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 Diagnose = Literal["misfit", "always", "never"]
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
@@ -88,7 +88,7 @@ def _joint(name: Any, given: Any, defaults: Mapping[str, Any], folder: Path) -> 
     where = f"joints.{name}"
     if not (isinstance(name, str) and _NAME.fullmatch(name)):
         expected = "a name of up to 64 letters, digits and _ - . that begins with a letter, a digit or _"
-        raise FieldError(f"joint {shown(name)}: expected {expected}", where)
+        raise FieldError(f"joint {quote(name)}: expected {expected}", where)
     stated = mapping(given or {}, where)
     only_keys(stated, names(JOINT), where)
     body = {**defaults, **stated}
@@ -123,11 +123,11 @@ def _table(body: Mapping[str, Any], field: str, folder: Path) -> ImportMap | Non
         return None
     name = text(body["import"], field)
     if "bags" not in body:
-        raise FieldError(f"{field} = {shown(name)}: expected bags too, which tables hold this joint", field)
+        raise FieldError(f"{field} = {quote(name)}: expected bags too, which tables hold this joint", field)
     shipped = [place.parent / "imports" / f"{name}.yaml" for place in rig_folders()]
     file = next((path for path in (folder / name, *shipped) if path.is_file()), None)
     if file is None:
-        raise FieldError(f"{field} = {shown(name)}, expected a map of config/imports or a file", field)
+        raise FieldError(f"{field} = {quote(name)}, expected a map of config/imports or a file", field)
     try:
         return load_map(file)
     except RseaError as error:
@@ -154,11 +154,11 @@ def _patterns(value: Any, field: str) -> tuple[str, ...]:
 
 def _index(value: Any, field: str) -> int | None:
     if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 0):
-        raise FieldError(f"{field} = {shown(value)}, expected a whole number, 0 or more", field)
+        raise FieldError(f"{field} = {quote(value)}, expected a whole number, 0 or more", field)
     return value
 
 
 def _diagnose(value: Any, field: str) -> Diagnose:
     if value not in get_args(Diagnose):
-        raise FieldError(f"{field} = {shown(value)}, expected one of {', '.join(get_args(Diagnose))}", field)
+        raise FieldError(f"{field} = {quote(value)}, expected one of {', '.join(get_args(Diagnose))}", field)
     return cast(Diagnose, value)

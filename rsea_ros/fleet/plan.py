@@ -15,7 +15,7 @@ Held = tuple[Bag, tuple[MappedJoint, ...]]
 
 def is_anything_new(store: Store, held: Sequence[Held]) -> bool:
     """Return whether some recording of a joint has no row, by paths, bytes and stamps."""
-    keys, recordings = store.known()
+    keys, recordings = store.known_rows()
     for bag, joints in held:
         recording = recordings.get((bag.url, bag.size, bag.stamp))
         if joints and recording is None:

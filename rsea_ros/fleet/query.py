@@ -43,13 +43,13 @@ _EMPTY = "No files found that match"
 
 
 @contextmanager
-def connected(store: Store) -> Iterator[Any]:
+def connect(store: Store) -> Iterator[Any]:
     """Give a connection to DuckDB with the views of a store, that can read the store and write nowhere.
 
     Raises FleetError for a store without rows.
     """
     rows = str(store.rows.resolve())
-    pattern = f"{_quoted(rows)}/joint=*/month=*/*.parquet"
+    pattern = f"{_quote(rows)}/joint=*/month=*/*.parquet"
     with duckdb.connect(":memory:") as database:
         try:
             database.execute(_ANALYSES.format(pattern=pattern))
@@ -60,7 +60,7 @@ def connected(store: Store) -> Iterator[Any]:
         for view in _VIEWS:
             database.execute(view)
         database.execute("SET TimeZone = 'UTC'")
-        database.execute(f"SET allowed_directories = ['{_quoted(rows)}']")
+        database.execute(f"SET allowed_directories = ['{_quote(rows)}']")
         database.execute("SET enable_external_access = false")
         database.execute("SET lock_configuration = true")
         yield database
@@ -68,7 +68,7 @@ def connected(store: Store) -> Iterator[Any]:
 
 def answer(store: Store, query: str) -> tuple[list[str], list[tuple[Any, ...]]]:
     """Return column names and rows of a query. Raises FleetError for one that fails or does not just read."""
-    with connected(store) as database:
+    with connect(store) as database:
         try:
             _check_reads(duckdb.extract_statements(query))
             table = database.sql(query).to_arrow_table()
@@ -86,6 +86,6 @@ def _check_reads(statements: Sequence[Any]) -> None:
         raise FleetError("expected one SELECT: only rsea fleet run changes a store")
 
 
-def _quoted(path: str) -> str:
+def _quote(path: str) -> str:
     """Return a path escaped for SQL."""
     return path.replace("'", "''")

@@ -58,7 +58,7 @@ def bags_of(
     return sorted(bags, key=lambda item: item[0].url)
 
 
-def relisted(bag: Bag) -> Bag:
+def relist(bag: Bag) -> Bag:
     """Return a recording with its present size and stamp. Raises FleetError where it is gone."""
     return _bag(bag.url, _parts(bag.url))
 

@@ -5,7 +5,7 @@
     artefacts/NAME/RECORDING-ANALYSIS/           identification.json, diagnosis.json, …
     alarms/                                      alarms that `rsea fleet watch` has reported
 
-One run at a time writes (see locked); readers need no lock. A file gets its name when it is complete.
+One run at a time writes (see hold_lock); readers need no lock. A file gets its name when it is complete.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Store:
         """The folder of the Parquet files."""
         return self.path / "rows"
 
-    def known(self) -> tuple[set[str], dict[tuple[str, int, str], str]]:
+    def known_rows(self) -> tuple[set[str], dict[tuple[str, int, str], str]]:
         """Return the keys of all rows, and the recording of every bag by path, bytes and stamp."""
         return known_rows(self.rows)
 
@@ -72,7 +72,7 @@ class Store:
                     new.write(file, content)
         folder = self.rows / f"joint={row['joint']}" / f"month={month_of(row['time'])}"
         with NewFiles(folder) as new:
-            write([row], new.staged(f"{name}.parquet"))
+            write([row], new.stage(f"{name}.parquet"))
         self._loose[folder] += 1
         if self._loose[folder] >= LOOSE:
             self._loose[folder] = 0
@@ -128,7 +128,7 @@ def _write_mark(mark: Path) -> None:
 
 
 @contextmanager
-def locked(store: Store, waiting: Callable[[str], None] | None) -> Iterator[None]:
+def hold_lock(store: Store, waiting: Callable[[str], None] | None) -> Iterator[None]:
     """Hold the store's lock; the system releases it when this process ends in any way.
 
     waiting: called once with the holder; the block begins when that run has ended. None: do not wait.

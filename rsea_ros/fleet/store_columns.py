@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from rsea_ros.fleet.query import connected
+from rsea_ros.fleet.query import connect
 from rsea_ros.fleet.store import open_store
 
 Columns = dict[str, npt.NDArray[Any]]
@@ -47,7 +47,7 @@ def recordings(store: str | Path) -> Columns:
 
 
 def _columns(store: str | Path, query: str) -> Columns:
-    with connected(open_store(store)) as database:
+    with connect(open_store(store)) as database:
         table = database.sql(query).to_arrow_table()
     return {name: _plain(table[name].combine_chunks()) for name in table.column_names}
 

@@ -17,9 +17,9 @@ from pathlib import Path
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.row import Row, analysis_of, empty
-from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relisted
+from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relist
 from rsea_ros.fleet.store import TaskOutcome
-from rsea_ros.fleet.time_limit import OutOfTime, limited
+from rsea_ros.fleet.time_limit import OutOfTime, limit_time
 from rsea_ros.identification.workers import on_cores
 from rsea_ros.wording import brief
 
@@ -69,9 +69,9 @@ def read_fingerprint(bag: Bag) -> tuple[Bag, str]:
 
     Raises Changed where it changed meanwhile, FleetError where it cannot be read.
     """
-    before = relisted(bag)
+    before = relist(bag)
     digest = fingerprint(before)
-    if relisted(bag) != before:
+    if relist(bag) != before:
         raise Changed(bag.url)
     return before, digest
 
@@ -88,7 +88,7 @@ def work(task: Task) -> TaskOutcome:
     _forget_peak()
     with on_cores(1):
         try:
-            with limited(task.time_limit), local_copy(task.bag) as path:
+            with limit_time(task.time_limit), local_copy(task.bag) as path:
                 files = analyse(row, path, task.bag.url, task.joint)
             row["outcome"] = "done"
         except RseaError as error:
@@ -113,7 +113,7 @@ def _too_slow(limit: float) -> str:
 
 def _now(bag: Bag) -> Bag | None:
     with suppress(RseaError):
-        return relisted(bag)
+        return relist(bag)
     return None
 
 

@@ -26,7 +26,7 @@ class OutOfTime(BaseException):
 
 
 @contextmanager
-def limited(seconds: float) -> Iterator[None]:
+def limit_time(seconds: float) -> Iterator[None]:
     """Raise OutOfTime in the block after some seconds; infinity is no limit."""
     over, thread = threading.Event(), threading.get_ident()
     on_worker = threading.current_thread() is not threading.main_thread()

@@ -56,7 +56,7 @@ class DynamixelNetft:
             self._motor.open()
             check_limits(self._limits, self._motor.torque_limit, self._stiffness)
             assert self._motor.limits is not None
-            check_own_limits(self._limits, self._motor.limits, self._motor.known.name)
+            check_own_limits(self._limits, self._motor.limits, self._motor.control_table.name)
             sample = self._motor.bus.patiently(self._motor.read)
             self.origin = 0.0 if self._absolute else sample.position
             if self._encoder is not None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
-from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, complaint, unmeasured, without
+from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, complaint, unmeasured_quantities, without
 from rsea_ros.hardware.losses import Losses
 from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring
@@ -77,7 +77,7 @@ class GuardedDevice:
 
         In a simulation, whose torque is its process's own, nothing gets hot: such limits are lifted.
         """
-        lacking = unmeasured(self._limits, self._patiently())
+        lacking = unmeasured_quantities(self._limits, self._patiently())
         simulated = self.device.protection.kind == PROCESS
         if lacking and not simulated:
             name = lacking[0]
@@ -99,7 +99,7 @@ class GuardedDevice:
         except DeviceError:
             return False
 
-    def taken(self, kept: ExitStack) -> bool:
+    def take(self, kept: ExitStack) -> bool:
         """Take the device until `kept` ends, for a cycle of several; False where somebody else has it."""
         if not self._turn.acquire(blocking=False):
             return False
@@ -112,7 +112,7 @@ class GuardedDevice:
             self.device.protection.beat()  # to wait for a reply that is lost is not to hang
             state = self._read()
         except DeviceError as error:
-            self._failed("read", error)
+            self._count_failure("read", error)
             return None
         self._losses["read"].take(lost=False)
         if state.acknowledged_late:
@@ -123,12 +123,12 @@ class GuardedDevice:
 
     def write(self, wanted: float, age: float | None) -> float:
         """Write a torque (N m) within the limits, zero when not enabled; return it. age: see Guard."""
-        torque = self.guard.allowed(wanted, age if self.enabled and not self._taring else None)
+        torque = self.guard.allowed_torque(wanted, age if self.enabled and not self._taring else None)
         try:
             self.device.protection.beat(torque != 0.0)
             self.device.write(torque)
         except DeviceError as error:
-            self._failed("write", error)
+            self._count_failure("write", error)
         else:
             self._losses["write"].take(lost=False)
         return torque
@@ -216,7 +216,7 @@ class GuardedDevice:
         state = self.device.read()
         if self._spring is None:
             return state
-        state = self._spring.felt(state)
+        state = self._spring.with_wrench(state)
         if self._inferred and not state.inferred:
             return replace(state, ft_trouble="the spring's deflection is not measured any more")
         self._inferred = state.inferred
@@ -249,7 +249,7 @@ class GuardedDevice:
                     with suppress(DeviceError):
                         self._switch_off()
 
-    def _failed(self, transfer: str, error: DeviceError) -> None:
+    def _count_failure(self, transfer: str, error: DeviceError) -> None:
         """Count a failure. One lost answer costs a cycle; many of them, and any other failure, trip."""
         self.cycles[f"failed_{transfer}s"] += 1
         if not isinstance(error, NoReply):

@@ -52,7 +52,7 @@ class Limits:
     ft_axis: int = 5
 
 
-def unmeasured(limits: Limits, state: State) -> list[str]:
+def unmeasured_quantities(limits: Limits, state: State) -> list[str]:
     """Return the quantities of NO_LIMIT that are limited and that a reading does not have."""
     return [
         name for name, none in NO_LIMIT.items()
@@ -147,7 +147,9 @@ class Guard:
 
     def look(self, state: State) -> None:
         """Latch the fault in a reading."""
-        fault = complaint(self.limits, state) or self._blind(state) or self._missing(state.motor_torque)
+        fault = (
+            complaint(self.limits, state) or self._blind(state) or self._missing_torque(state.motor_torque)
+        )
         if fault is not None:
             self.trip(fault)
 
@@ -161,7 +163,7 @@ class Guard:
         )
         if before and self._complete:
             return None
-        lacking = unmeasured(self.limits, state)
+        lacking = unmeasured_quantities(self.limits, state)
         self._measured |= NO_LIMIT.keys() - set(lacking)
         lacking = [name for name in lacking if name in self._measured]
         if state.wrench is None and not math.isinf(self.limits.ft):
@@ -176,7 +178,7 @@ class Guard:
             self._unfelt[name] = 0
         return None
 
-    def allowed(self, wanted: float, age: float | None) -> float:
+    def allowed_torque(self, wanted: float, age: float | None) -> float:
         """Return the torque to write now (N m). age: of the command, s; None without a command."""
         limits = self.limits
         if self.fault is None and age is not None and age > limits.command_timeout and self.torque != 0.0:
@@ -187,13 +189,13 @@ class Guard:
             self._open(age)
             self.torque = self._within(0.0 if age is None else wanted)
         elif self.fault.cause == COMMAND_TIMEOUT:
-            self.torque = math.copysign(self._ramped(age), self.torque)
+            self.torque = math.copysign(self._ramp_limit(age), self.torque)
         else:
             self.torque = 0.0
         self._written.append(self.torque)
         return self.torque
 
-    def _ramped(self, age: float | None) -> float:
+    def _ramp_limit(self, age: float | None) -> float:
         """Return the largest torque during the ramp: it falls with each cycle and with the time that passed.
 
         Cycles are late on a busy machine, and the torque of a dead publisher must not last as long as they.
@@ -216,7 +218,7 @@ class Guard:
         self.limited += torque != wanted
         return torque
 
-    def _missing(self, measured: float) -> DeviceFault | None:
+    def _missing_torque(self, measured: float) -> DeviceFault | None:
         """Return a fault when the motor has not made the written torque for too long."""
         if not self._written or self.fault is not None:
             return None

@@ -10,7 +10,7 @@ from typing import Any
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import Device
 from rsea_ros.plugins import plugin_constant, plugin_files
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 EXTRA_PATH = "RSEA_DEVICES"
 """Environment variable: files or folders of them, separated like PATH, each file with a DEVICE."""
@@ -40,11 +40,11 @@ def outside_device(name: str, known: Collection[str]) -> DeviceKind:
     kinds = [plugin_constant(EXTRA_PATH, str(path), "DEVICE", DeviceKind) for path in files]
     names = [*known, *(kind.name for kind in kinds)]
     if twice := sorted({each for each in names if names.count(each) > 1}):
-        raise ParameterError(f"{EXTRA_PATH}: device {', '.join(map(shown, twice))} twice, expected once")
+        raise ParameterError(f"{EXTRA_PATH}: device {', '.join(map(quote, twice))} twice, expected once")
     for kind in kinds:
         if kind.name == name:
             return kind
-    raise ParameterError(f"parameter device = {shown(name)}, expected one of {', '.join(names)}")
+    raise ParameterError(f"parameter device = {quote(name)}, expected one of {', '.join(names)}")
 
 
 def options_of(text: str) -> dict[str, str]:
@@ -53,6 +53,6 @@ def options_of(text: str) -> dict[str, str]:
     for part in filter(None, text.split(",")):
         name, is_one, value = part.partition("=")
         if not is_one or not name.strip():
-            raise ParameterError(f"parameter device_options = {shown(text)}, expected NAME=VALUE,…")
+            raise ParameterError(f"parameter device_options = {quote(text)}, expected NAME=VALUE,…")
         options[name.strip()] = value.strip()
     return options

@@ -63,7 +63,7 @@ class SimulatedDevice:
     def read(self) -> State:
         """Advance to now and measure."""
         self._advance()
-        values = {name: self._measured(name, self._values[i]) for i, name in enumerate(OUTPUTS)}
+        values = {name: self._measure(name, self._values[i]) for i, name in enumerate(OUTPUTS)}
         stamp = self._instant(self._steps)
         wrench = None if self._rig.rigid_spring else (0.0, 0.0, 0.0, 0.0, 0.0, values["ft"])
         deflection = values["deflection"] if "deflection" in self._rig.sensors else math.nan
@@ -116,12 +116,12 @@ class SimulatedDevice:
         count = int((self._clock() - begin) * self._per_second / SECOND + 1e-3)
         if count < 1:
             return
-        held = self._held(begin, count)
+        held = self._held_torque(begin, count)
         out = np.empty((count, len(OUTPUTS)))
         run(self._machine, held, out, start=first / self._per_second)
         self._steps, self._values = first + count, out[-1]
 
-    def _held(self, begin: int, count: int) -> FloatArray:
+    def _held_torque(self, begin: int, count: int) -> FloatArray:
         """Return the mean torque of each step from `begin` (ns) on, and keep the writes that come later."""
         held, last = np.full(count, self._torque), self._torque
         for k, (stamp, torque) in enumerate(self._writes):
@@ -137,7 +137,7 @@ class SimulatedDevice:
         self._torque = last
         return held
 
-    def _measured(self, channel: str, value: FloatArray) -> float:
+    def _measure(self, channel: str, value: FloatArray) -> float:
         return float(measure(self._rig, channel, value, self._rng) if self._noise else value)
 
 

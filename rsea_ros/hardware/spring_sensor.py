@@ -23,7 +23,7 @@ class Spring:
     def __str__(self) -> str:
         return f"stiffness of {self.stiffness:.4g} N·m/rad times measured deflection"
 
-    def felt(self, state: State) -> State:
+    def with_wrench(self, state: State) -> State:
         """Return a reading with the wrench of its deflection, unless it has a wrench or no deflection."""
         if state.wrench is not None or math.isnan(state.deflection):
             return state

@@ -35,7 +35,7 @@ def cycle(
     and holds up no other.
     """
     with ExitStack() as kept:
-        taken = [joint.taken(kept) for joint in joints]
+        taken = [joint.take(kept) for joint in joints]
         before = [joint.fault for joint in joints]
         for joint, is_taken, (torque, age) in zip(joints, taken, wanted, strict=True):
             if is_taken:

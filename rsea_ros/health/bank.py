@@ -35,7 +35,7 @@ class LookEvidence(NamedTuple):
     squares: FloatArray
     counts: FloatArray
 
-    def scaled(self, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def scale_sums(self, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return c (p,) and A (p, p) of all channels. scale: standard deviation of the innovations, (3,)."""
         weights = 1.0 / scale**2
         return weights @ self.score, np.tensordot(weights, self.information, 1)
@@ -46,12 +46,12 @@ class Bank:
 
     def __init__(self, rig: Rig, noise: Noise, hypotheses: Sequence[ChangeHypothesis], hold: float) -> None:
         self._steps = np.array([[h.step] for h in hypotheses])
-        rigs = (rig, *(h.changed(rig, h.step) for h in hypotheses))
+        rigs = (rig, *(h.change(rig, h.step) for h in hypotheses))
         self._observers = [BatchObserver(each, noise, hold=hold) for each in rigs]
 
     def evidence(self, look: Look) -> LookEvidence:
         """Return the evidence of a look."""
-        by_channel = [whitened(observer, look) for observer in self._observers]
+        by_channel = [whiten(observer, look) for observer in self._observers]
         p, n = len(self._steps), len(CHANNELS)
         evidence = LookEvidence(np.zeros((n, p)), np.zeros((n, p, p)), np.zeros(n), np.zeros(n))
         for channel in range(n):
@@ -65,7 +65,7 @@ class Bank:
         return evidence
 
 
-def whitened(observer: BatchObserver, look: Look) -> tuple[FloatArray, ...]:
+def whiten(observer: BatchObserver, look: Look) -> tuple[FloatArray, ...]:
     """Return the innovations of a look by channel over their standard deviations; nan where missing."""
     w = observer.innovations(look.t, look.kind, look.values)
     state, ft = look.counts & (look.kind == STATE), look.counts & (look.kind == FT)

@@ -16,7 +16,7 @@ import numpy as np
 
 from rsea_ros.health.bank import CHANNELS, Bank, LookEvidence
 from rsea_ros.health.cusum import Cusum, threshold
-from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, unexplained
+from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, unexplained_finding
 from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.health.look import FILTER_SETTLING, Look
 from rsea_ros.health.recursive_estimates import Estimates
@@ -99,7 +99,7 @@ class Changes:
     def take(self, look: Look, evidence: LookEvidence) -> None:
         """Process a look with motion."""
         self._looks.append(look)
-        score, information = evidence.scaled(self._scatter.scale)
+        score, information = evidence.scale_sums(self._scatter.scale)
         self.estimates.take(score, information, self._scatter.phi)
         loud = np.maximum(0.0, self._scatter.excess(evidence))
         one = np.ones(len(loud))
@@ -146,7 +146,7 @@ class Changes:
         best, code = causes[0], causes[0].hypothesis.code
         confidence = sum(c.probability for c in causes if c.hypothesis.code == code)
         if best.explained < EXPLAINED:
-            finding = unexplained(self._began, 1.0 - max(best.explained, 0.0))
+            finding = unexplained_finding(self._began, 1.0 - max(best.explained, 0.0))
             return self._later(finding if self._patience >= PATIENT else None)
         self.findings.pop(UNEXPLAINED, None)
         finding = self._finding(best, confidence)
@@ -181,7 +181,7 @@ class Changes:
             del self.findings[name]
         changed = _is_change(h, finding.size)
         self._before = replace(self._base, last=h.name) if changed else None
-        self._begin(_Base(h.changed(self._base.rig, cause.change), hypotheses, self._began - FILTER_SETTLING))
+        self._begin(_Base(h.change(self._base.rig, cause.change), hypotheses, self._began - FILTER_SETTLING))
         if not changed:
             self.findings.pop(h.name, None)
             return None

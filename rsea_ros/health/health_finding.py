@@ -26,7 +26,7 @@ class HealthFinding:
 UNEXPLAINED = "RSEA_UNEXPLAINED"
 
 
-def unexplained(since: float, share: float) -> HealthFinding:
+def unexplained_finding(since: float, share: float) -> HealthFinding:
     """Return the finding of a change without a name. share: of it that the best cause does not explain."""
     return HealthFinding(UNEXPLAINED, UNEXPLAINED, "", math.nan, (math.nan, math.nan), since, share)
 

@@ -53,7 +53,7 @@ class ChangeHypothesis:
         """Smallest change that is to be alarmed."""
         return self.inner + self.least
 
-    def changed(self, rig: Rig, change: float) -> Rig:
+    def change(self, rig: Rig, change: float) -> Rig:
         """Return the rig with the parameter changed, within its bounds."""
         value = min(max(self.value + change, self.low), self.high)
         return self.apply(rig, value / self.value if self.relative else value)
@@ -92,12 +92,12 @@ def _friction(rig: Rig) -> ChangeHypothesis:
     name = "rotor.reflected_damping"
     dry = _effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.0, 0.0, 0.0)
 
-    def scaled(rig: Rig, factor: float) -> Rig:
+    def scale(rig: Rig, factor: float) -> Rig:
         torque = next((e.parameters["torque"] for e in rig.effects if e.name == "coulomb_friction"), 0.0)
         return dry.apply(rig.with_values({name: factor * rig[name]}), factor * torque)
 
     return ChangeHypothesis(
-        "RSEA_FRICTION", FACTOR, "1", 1.0, EFFECT_DOUBT, 0.2, 0.2, 0.05, 20.0, scaled,
+        "RSEA_FRICTION", FACTOR, "1", 1.0, EFFECT_DOUBT, 0.2, 0.2, 0.05, 20.0, scale,
         relative=True,
     )  # fmt: skip
 

@@ -18,7 +18,7 @@ from rsea_ros.health.recursive_estimates import ChangeEstimate
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.health.sensors import Sensors
 from rsea_ros.health.settings import WatchSettings
-from rsea_ros.health.tuning import tuned
+from rsea_ros.health.tuning import tune
 from rsea_ros.model.observer.log import STATE
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
@@ -119,7 +119,7 @@ class Monitor:
         period = float(np.median(np.diff(t))) if len(t) > FEWEST else USUAL
         models = hypotheses_of(self._rig, period)
         single = (*(h for h in models if h.name not in (FACTOR, *GAINS)), *nuisances_of(self._rig))
-        rig, now = tuned(self._rig, self._noise, single, self._first, self._settings.hold)
+        rig, now = tune(self._rig, self._noise, single, self._first, self._settings.hold)
         known = {h.name: h for h in now}
         hypotheses = tuple(
             replace(h, value=known[h.name].value, common=known[h.name].common) if h.name in known else h

@@ -37,7 +37,7 @@ def scatter_of(looks: Sequence[LookEvidence]) -> Scatter:
     """Return the scatter of some looks; a change that lasts through them is not taken for scatter."""
     squares, counts = (np.sum([getattr(e, n) for e in looks], axis=0) for n in ("squares", "counts"))
     scale = np.clip(np.sqrt(squares / np.maximum(counts, 1.0)), *SCALES)
-    scores, informations = zip(*(e.scaled(scale) for e in looks), strict=True)
+    scores, informations = zip(*(e.scale_sums(scale) for e in looks), strict=True)
     c, a = np.array(scores), np.array([np.diag(i) for i in informations])
     mean = c.sum(axis=0) / np.maximum(a.sum(axis=0), 1e-300)
     squared = (c - a * mean) ** 2 / np.maximum(a, 1e-300)

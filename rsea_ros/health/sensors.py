@@ -111,11 +111,11 @@ class Sensors:
         for other in WITNESSES[name]:
             later = [span for span in self._spans.get(other, []) if span[0] >= since]
             moved = max((s[2] for s in later), default=0.0) - min((s[1] for s in later), default=0.0)
-            if moved > self._needed(name, other):
+            if moved > self._needed_motion(name, other):
                 return True
         return False
 
-    def _needed(self, name: str, other: str) -> float:
+    def _needed_motion(self, name: str, other: str) -> float:
         """Return the motion of another signal, in its unit, from which this one must have moved too."""
         beside = MOVED * self._noise.get(other, 0.0)
         if name == "motor_torque" or other == "position":

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.health.bank import whitened
+from rsea_ros.health.bank import whiten
 from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.health.look import Look
 from rsea_ros.model.observer.batch import BatchObserver
@@ -128,12 +128,12 @@ class Fitter:
 
     def _at(self, hypothesis: ChangeHypothesis, change: float) -> _Point:
         """Return a change, its innovations and their cost."""
-        w = self._innovations(hypothesis.changed(self._rig, change))
+        w = self._innovations(hypothesis.change(self._rig, change))
         return change, w, cost(w)
 
     def _innovations(self, rig: Rig) -> FloatArray:
         observer = BatchObserver(rig, self._noise, hold=self._hold)
-        by_look = (zip(whitened(observer, look), self._scale, strict=True) for look in self._looks)
+        by_look = (zip(whiten(observer, look), self._scale, strict=True) for look in self._looks)
         return np.concatenate([w / s for look in by_look for w, s in look])
 
 

@@ -29,7 +29,7 @@ ROUNDS = 2
 """Solutions of the linear problem, each about the one before."""
 
 
-def tuned(
+def tune(
     rig: Rig, noise: Noise, hypotheses: Sequence[ChangeHypothesis], looks: Sequence[Look], hold: float
 ) -> tuple[Rig, tuple[ChangeHypothesis, ...]]:
     """Return rig and hypotheses with the values that the looks have, within the doubts."""
@@ -44,7 +44,7 @@ def tuned(
         )
         rig = first
         for hypothesis, by in changes:
-            rig = hypothesis.changed(rig, by)
+            rig = hypothesis.change(rig, by)
     return rig, now
 
 
@@ -55,7 +55,7 @@ def _change(
     from scipy.optimize import lsq_linear  # takes 0.2 s that only this needs
 
     scatter = scatter_of(evidence)
-    both = [e.scaled(scatter.scale) for e in evidence]
+    both = [e.scale_sums(scatter.scale) for e in evidence]
     score, information = np.sum([c for c, _ in both], axis=0), np.sum([a for _, a in both], axis=0)
     doubt = np.array([max(h.doubt, _CERTAIN * h.least) for h in hypotheses])
     information, score = information * np.outer(doubt, doubt), score * doubt

@@ -77,7 +77,7 @@ def alternatives(solution: Solution, cases: Sequence[Case], pools: Pools) -> tup
     fitted = [(n, s) for n, s in fitted if s.cost < (1.0 - FALL) * solution.cost]
     best = min((s.cost for _, s in fitted), default=0.0)
     credible = sorted(((n, s) for n, s in fitted if s.cost <= NEAR * best), key=lambda item: item[1].cost)
-    return tuple(pools.fits.map(lambda law: _settled(law[0], law[1], cases, pools.run), credible))
+    return tuple(pools.fits.map(lambda law: _refit(law[0], law[1], cases, pools.run), credible))
 
 
 def _fit_with(solution: Solution, effect: Effect, run: Map) -> Solution | None:
@@ -95,7 +95,7 @@ def _clocks_at_zero(solution: Solution) -> FloatArray:
     return np.where(clocks, 0.0, solution.theta)
 
 
-def _settled(name: str, solution: Solution, cases: Sequence[Case], run: Map) -> ExtendedFit:
+def _refit(name: str, solution: Solution, cases: Sequence[Case], run: Map) -> ExtendedFit:
     """Return an alternative fitted again, every channel in units of its residual or its noise."""
     known = replace(solution.problem, cases=tuple(cases))
     ratios = misfit_ratios(replace(solution, problem=known))

@@ -17,7 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.identification.confidence import BLOCK, sample_blocks
+from rsea_ros.identification.confidence import sample_blocks
+from rsea_ros.identification.interval_settings import DEFAULT
 from rsea_ros.identification.lag_line import lag_line
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.remark import Remark
@@ -59,7 +60,7 @@ def required_clocks(solution: Solution, run: Map = serial) -> RequiredClocks:
     channels = sorted({n for case in problem.cases for n in problem.present(case)})
     free = {u.name for u in problem.unknowns}
     left = [u for u in (*clocks(channels, problem.rig), *clock_rates(channels)) if u.name not in free]
-    columns, blocks = clock_columns(problem, solution.theta, left, run), sample_blocks(problem, BLOCK)
+    columns, blocks = clock_columns(problem, solution.theta, left, run), sample_blocks(problem, DEFAULT.block)
     taken: list[int] = []
     for _ in left:
         rest = [i for i in range(len(left)) if i not in taken]

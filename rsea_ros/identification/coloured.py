@@ -3,8 +3,8 @@
 Sensor noise is stationary; its spectrum falls with frequency and is flat below what a block of a second
 resolves; whitened, it is nearly Gaussian; and it is independent of the command, of the motion, and of
 other sensors. A residual that passes all of these tests is noise, however large; one that fails in any point
-is a misfit. Limits were set between noise of first order with a memory of up to 0.25 s and mild effects,
-inside and outside the catalogue, of the second bench in test/independent.
+is a misfit. The limits (noise_settings.py) were set between noise of first order with a memory of up to
+0.25 s and mild effects, inside and outside the catalogue, of the second bench in test/independent.
 """
 
 from __future__ import annotations
@@ -13,25 +13,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.spectra import HANN, OVERLAP, SpectralShape, segment_spectra, shape_of
 from rsea_ros.identification.witnesses import witnesses
 from rsea_ros.signals import ComplexArray, FloatArray
 
-FEWEST = 1500
-"""Samples: of fewer, noise and misfit cannot be distinguished."""
-SHAPE = 5.0
-"""Standard deviations by which a band may lie off a falling spectrum; noise reaches 3.5 in 300 records."""
-UNSTEADY = 4.0
-"""Variance of the power over time, over that of stationary noise, which reaches 2.3."""
-SHARED = 0.2
-"""Share of the power in a band that may be coherent with a witness; chance reaches 0.17, effects 0.9."""
-SLOW = 6.0
-"""Power below 0.25 Hz over that from 0.3 to 1 Hz: blocks of a second must be independent. Noise reaches 3."""
-LASTING = 0.1
-"""Share of the power in a constant and a trend; noise reaches 0.03, a drift has most of it."""
-SPIKY = 1.0
-"""Excess kurtosis of the whitened residual; noise reaches 0.1, knocks have more than 10."""
 _LONG, _SHORT = 1024, 512
 _STEADY_BANDS = (0.4, 3.0, 10.0, 40.0)
 _SHARED_BANDS = (0.4, 4.0, 14.0, 50.0)
@@ -39,25 +26,33 @@ _SHARED_BANDS = (0.4, 4.0, 14.0, 50.0)
 _TOP = 0.96
 
 
-def is_noise(case: Case, outputs: Mapping[str, FloatArray], channel: str, ratio: float = 1.0) -> bool:
+def is_noise(
+    case: Case,
+    outputs: Mapping[str, FloatArray],
+    channel: str,
+    ratio: float = 1.0,
+    rule: NoiseSettings = DEFAULT,
+) -> bool:
     """Return whether the residual of a channel is noise of its sensor, coloured or not.
 
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
     False where the record is too short to decide.
     """
     left = residual_of(case, outputs, channel)
-    if len(left) < FEWEST or not np.any(left):
+    if len(left) < rule.fewest or not np.any(left):
         return False
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
-    if _lasting(left) > LASTING or _slow(left, rate) > SLOW:
+    if _lasting_share(left) > rule.lasting or _slow(left, rate) > rule.slow:
         return False
     spectra = segment_spectra(left, _LONG, 8)
     shape = shape_of(spectra)
-    if shape.off > SHAPE or _unsteady(spectra, shape, rate) > UNSTEADY or _kurtosis(shape, left) > SPIKY:
+    if shape.off > rule.shape or _unsteady(spectra, shape, rate) > rule.unsteady:
+        return False
+    if _kurtosis(shape, left) > rule.spiky:
         return False
     seen = segment_spectra(left, _SHORT, 16)
     others = (segment_spectra(w, _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
-    return all(_coherent_share(seen, other, rate) < SHARED for other in others)
+    return all(_coherent_share(seen, other, rate) < rule.shared for other in others)
 
 
 def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
@@ -65,7 +60,7 @@ def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> 
     return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
 
 
-def _lasting(values: FloatArray) -> float:
+def _lasting_share(values: FloatArray) -> float:
     """Return the share of the power in a constant and a trend."""
     late = np.linspace(-1.0, 1.0, len(values))
     line = np.polyval(np.polyfit(late, values, 1), late)
@@ -96,7 +91,7 @@ def _unsteady(spectra: ComplexArray, shape: SpectralShape, rate: float) -> float
 
 def _kurtosis(shape: SpectralShape, values: FloatArray) -> float:
     """Return the excess kurtosis of whitened values."""
-    white = shape.whitened(values)
+    white = shape.whiten(values)
     white = white - white.mean()
     return float(np.mean(white**4) / np.mean(white**2) ** 2) - 3.0
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.identification.determined import shares_from_data
+from rsea_ros.identification.interval_settings import DEFAULT, IntervalSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Map, Solution, central_jacobian, serial
@@ -24,10 +25,6 @@ from rsea_ros.model.rig_fields import FIELDS
 from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray, IntArray
 
-BLOCK = 1.0
-"""s. Residuals further apart than this are taken as independent."""
-_MOST_CORRECTED = 4.0
-"""Largest correction for the blocks that the fit has used up: n / (n - p) of n blocks and p unknowns."""
 _WEAK = 100.0
 """Of the prior's information: below it forward differences may take curvature for information."""
 _INVOLVED = 0.2
@@ -58,7 +55,9 @@ class Confidence:
         return result
 
 
-def confidence_of(solution: Solution, run: Map = serial) -> Confidence:
+def confidence_of(
+    solution: Solution, run: Map = serial, rule: IntervalSettings = DEFAULT
+) -> Confidence:
     """Return the doubt that is left after a fit."""
     doubt = np.array([u.reach for u in solution.problem.unknowns])
     prior = np.diag(1.0 / doubt**2)
@@ -67,7 +66,7 @@ def confidence_of(solution: Solution, run: Map = serial) -> Confidence:
         solution = replace(solution, jacobian=central_jacobian(solution.problem, solution.theta, run))
         information = solution.jacobian.T @ solution.jacobian
     inverse = inverse_of(information + prior)
-    spread = inverse @ np.hstack([_block_scores(solution).T, np.sqrt(prior)])
+    spread = inverse @ np.hstack([_block_scores(solution, rule).T, np.sqrt(prior)])
     covariance = spread @ spread.T  # no rounding makes a variance of this product negative
     least = np.diag(inverse) * max(_alike(case) for case in solution.problem.cases)
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
@@ -96,14 +95,14 @@ def _alike(case: Case) -> float:
     return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
 
 
-def _block_scores(solution: Solution) -> FloatArray:
+def _block_scores(solution: Solution, rule: IntervalSettings) -> FloatArray:
     """Return the score of each block, shape (blocks, unknowns): S'S is the scatter of their sum."""
-    blocks = sample_blocks(solution.problem, BLOCK)
+    blocks = sample_blocks(solution.problem, rule.block)
     scores = np.zeros((blocks.max() + 1, solution.jacobian.shape[1]))
     for column, derivative in zip(scores.T, solution.jacobian.T, strict=True):
         column[:] = np.bincount(blocks, derivative * solution.residual, minlength=len(scores))
     counted = len(np.unique(blocks))
-    free = max(counted - len(solution.theta), counted / _MOST_CORRECTED)
+    free = max(counted - len(solution.theta), counted / rule.most_corrected)
     result: FloatArray = scores * np.sqrt(counted / free)
     return result
 

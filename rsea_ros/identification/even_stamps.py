@@ -58,7 +58,7 @@ def even_out(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
         steady, sizes = _on_even_clocks(record)
         chosen = _prefer_even(record, steady, sizes.keys(), rig, solution) if sizes else set()
         scatter |= {n: max(sizes[n], scatter.get(n, 0.0)) for n in chosen}
-        result.append(_taking(record, steady, chosen))
+        result.append(_with_channels_of(record, steady, chosen))
     return Evened(tuple(result), scatter)
 
 
@@ -123,7 +123,7 @@ def _on_even_clocks(record: Record) -> tuple[Record, dict[str, float]]:
     return steady, {n: float(np.std(record[n].t - t)) for n, t in changed.items()}
 
 
-def _taking(record: Record, steady: Record, names: Collection[str]) -> Record:
+def _with_channels_of(record: Record, steady: Record, names: Collection[str]) -> Record:
     """Return the record with some channels as they are on even clocks."""
     return record.with_channels(**{n: steady[n] for n in names})
 
@@ -136,7 +136,7 @@ def _prefer_even(
     chosen, left = _sensors_preferred(record, steady, sensors, rig, solution)
     if "command" not in changed:
         return chosen
-    driven = _taking(record, steady, ["command"])
+    driven = _with_channels_of(record, steady, ["command"])
     others, even = _sensors_preferred(driven, steady, sensors, rig, solution)
     falls = [even[n] / max(left[n], _TINY) for n in left.keys() & even.keys() - {"motor_torque"}]
     return {"command", *others} if falls and min(falls) < _FALL and max(falls) < _NO_WORSE else chosen
@@ -149,7 +149,7 @@ def _sensors_preferred(
     stamped = _residual_rms(record, rig, solution)
     if not sensors:
         return set(), stamped
-    even = _residual_rms(_taking(record, steady, sensors), rig, solution)
+    even = _residual_rms(_with_channels_of(record, steady, sensors), rig, solution)
     chosen = {n for n in sensors & stamped.keys() & even.keys() if even[n] < _FALL * stamped[n]}
     return chosen, {**stamped, **{n: even[n] for n in chosen}}
 

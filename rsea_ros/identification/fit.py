@@ -119,4 +119,4 @@ def _stated_effects(rig: Rig, cases: Sequence[Case]) -> Iterator[tuple[Effect, M
     """Yield the effects that a rig states with their parameters; bounds suit the machine and hold these."""
     scale = scale_of(cases, rig) if rig.effects else Scale()
     for e in rig.effects:
-        yield effect_named(e.name).at(scale).reaching(e.parameters), e.parameters
+        yield effect_named(e.name).at(scale).widen(e.parameters), e.parameters

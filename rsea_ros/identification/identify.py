@@ -38,9 +38,9 @@ from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.start import start_from
 from rsea_ros.identification.statics import statics_of
 from rsea_ros.identification.workers import worker_pools
-from rsea_ros.model.extent import bounded
+from rsea_ros.model.extent import bound_values
 from rsea_ros.model.inverse import is_inverse
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.prediction_errors import fit_percent
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -54,10 +54,10 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     """
     report = progress or (lambda step, share: None)
     report("reading", 0.0)
-    records = [commanded(record, rig) for record in records]
+    records = [with_command(record, rig) for record in records]
     for record in records:
         check_usable(record)
-    records = [bounded(record) for record in records]
+    records = [bound_values(record) for record in records]
     check_excited(records)
     cases = tuple(case_from(record, rig) for record in records)
     report("frequency responses", 0.2)

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from rsea_ros.errors import RseaError
-from rsea_ros.model.inverse import FEWEST, smoothed
+from rsea_ros.model.inverse import FEWEST, smooth
 from rsea_ros.model.position_loop import loop_parameters
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record
@@ -57,9 +57,9 @@ def _regression(record: Record, rig: Rig) -> FloatArray:
         raise ValueError("too few samples")
     step = 1.0 / position.rate
     t = np.arange(position.t[0], position.t[-1], step)
-    q = smoothed(np.interp(t, position.t, position.y), step)
-    v = smoothed(np.gradient(q, step), step)
-    a = smoothed(np.gradient(v, step), step)
+    q = smooth(np.interp(t, position.t, position.y), step)
+    v = smooth(np.gradient(q, step), step)
+    a = smooth(np.gradient(v, step), step)
     sign = np.tanh(v / max(_SLOW * float(np.sqrt(np.mean(v**2))), 1e-300))
     terms = np.column_stack([a, v, sign, np.sin(q), np.cos(q), np.ones(len(q))])
     keep = terms if np.ptp(q) > _TURNS else terms[:, :5]
@@ -71,7 +71,7 @@ def _loop_torque(record: Record, rig: Rig, t: FloatArray, q: FloatArray, v: Floa
     """Return the torque that the loop makes along a motion, without its integral."""
     command = record["command"]
     held = command.y[np.clip(np.searchsorted(command.t, t, side="right") - 1, 0, len(command) - 1)]
-    target = smoothed(held, float(t[1] - t[0]))
+    target = smooth(held, float(t[1] - t[0]))
     _, position, _, velocity, *_ = loop_parameters(rig)
     if rig.loop == "pd":
         return position * (target - q) - velocity * v

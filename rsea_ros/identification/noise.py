@@ -14,44 +14,37 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.quantum import step_of
 from rsea_ros.identification.spectra import segment_spectra
 from rsea_ros.model.rig import Sensor
 from rsea_ros.signals import BoolArray, Channel, ComplexArray, FloatArray, IntArray, Record
 
 _TINY = 1e-300
-TOP_OF_BAND = (0.62, 0.98)
-"""Of the Nyquist frequency: where the noise is read off."""
-FLAT = 2.0
-"""Ratio of the powers of the two halves of the top of the band, up to which it counts as flat."""
 _LONGEST, _SEGMENTS = 512, 8
 _FEWEST = 64
-SLOWER = 0.9
-"""Of the command's rate: below it a channel is slower than the command."""
-FILTERED = 0.1
-"""Of the noise that a rig states: less at the top of the band is a filter's work, not a better sensor's."""
 _ROUNDING = 1e-9
 """Of a channel's standard deviation: less than this is rounding, not noise."""
 
 
-def noise_floor(record: Record, name: str, sensor: Sensor) -> float:
+def noise_floor(record: Record, name: str, sensor: Sensor, rule: NoiseSettings = DEFAULT) -> float:
     """Return the RMS of a channel's noise, in its unit: white noise with the level at the top of the band.
 
     sensor: as the rig states it; its statement counts where the record does not show the noise.
     """
     t, y = _finite(record[name])
-    least = least_noise(y, sensor)
+    least = least_noise(y, sensor, rule)
     stated = math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0))
     if len(y) < _FEWEST:
         return max(float(np.std(np.diff(y, 2))) / math.sqrt(6.0) if len(y) > 3 else 0.0, stated, least)
-    if stated > 0.0 and record[name].rate < SLOWER * record["command"].rate:
+    if stated > 0.0 and record[name].rate < rule.slower * record["command"].rate:
         return max(stated, least)
     unlike = _unlike(record["command"], t, y)
-    level = math.sqrt(float(np.median(unlike[_top(unlike)])))
-    return max(level, least) if _is_flat(unlike) else max(level, stated, least)
+    level = math.sqrt(float(np.median(unlike[_top(unlike, rule)])))
+    return max(level, least) if _is_flat(unlike, rule) else max(level, stated, least)
 
 
-def least_noise(values: FloatArray, sensor: Sensor) -> float:
+def least_noise(values: FloatArray, sensor: Sensor, rule: NoiseSettings = DEFAULT) -> float:
     """Return the least noise of a channel: no model has to fit better.
 
     Half the rig's quantum, or where the values come in steps larger than that, q / sqrt(12) of those; and a
@@ -59,18 +52,20 @@ def least_noise(values: FloatArray, sensor: Sensor) -> float:
     """
     step = step_of(values)
     coarse = step / math.sqrt(12.0) if step > sensor.quantum else 0.0
-    stated = max(0.5 * sensor.quantum, FILTERED * sensor.noise)
+    stated = max(0.5 * sensor.quantum, rule.filtered * sensor.noise)
     return max(stated, coarse, _ROUNDING * float(np.std(values)), _TINY)
 
 
-def top_of_band(values: FloatArray, seams: Sequence[int] | IntArray = ()) -> tuple[float, bool]:
+def top_of_band(
+    values: FloatArray, seams: Sequence[int] | IntArray = (), rule: NoiseSettings = DEFAULT
+) -> tuple[float, bool]:
     """Return the RMS of white noise as high as the top of the band of values, and whether that is flat.
 
     seams: samples before which values are missing. A jump there would pass for noise.
     """
     spectra = segment_spectra(values, _LONGEST, _SEGMENTS)
     power = np.mean(np.abs(spectra[_seamless(spectra, seams)]) ** 2, axis=0)
-    return math.sqrt(float(np.median(power[_top(power)]))), _is_flat(power)
+    return math.sqrt(float(np.median(power[_top(power, rule)]))), _is_flat(power, rule)
 
 
 def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray) -> BoolArray:
@@ -91,18 +86,18 @@ def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(power - shared, 0.0) / (1.0 - 1.8 / max(2.0, len(v))))
 
 
-def _is_flat(power: FloatArray) -> bool:
+def _is_flat(power: FloatArray, rule: NoiseSettings) -> bool:
     """Return whether both halves of the top of the band have about the same power; one line is not enough."""
-    top = power[_top(power)]
+    top = power[_top(power, rule)]
     if len(top) < 2:
         return False
     lower, upper = (float(np.median(half)) for half in np.array_split(top, 2))
-    return max(lower, upper) <= FLAT * max(min(lower, upper), _TINY)
+    return max(lower, upper) <= rule.flat * max(min(lower, upper), _TINY)
 
 
-def _top(lines: FloatArray) -> slice:
+def _top(lines: FloatArray, rule: NoiseSettings) -> slice:
     """Return where the top of the band lies: one line at least."""
-    first, last = math.ceil(TOP_OF_BAND[0] * len(lines)), math.floor(TOP_OF_BAND[1] * len(lines))
+    first, last = math.ceil(rule.top_from * len(lines)), math.floor(rule.top_to * len(lines))
     return slice(first, max(last, first + 1))
 
 

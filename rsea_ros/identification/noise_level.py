@@ -14,14 +14,11 @@ import numpy as np
 
 from rsea_ros.identification.coloured import is_noise, residual_of
 from rsea_ros.identification.noise import top_of_band
+from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray, IntArray
 
-ABOVE = 1.04
-"""RMS of a residual over the noise, above which it is asked whether all of it is noise."""
-SURE = 4.0
-"""Standard deviations of the white part, by which a residual must lie above it to be called coloured."""
 _WHITE_DOUBT = 1.5
 """Relative standard deviation of the RMS of white noise read off the top of the band, times sqrt(samples).
 
@@ -31,7 +28,9 @@ _BLOCK = 1.0
 """s. Coloured noise is independent from one such block to the next."""
 
 
-def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float = 1.0) -> Case:
+def reestimate_noise(
+    case: Case, outputs: Mapping[str, FloatArray], ratio: float = 1.0, rule: NoiseSettings = DEFAULT
+) -> Case:
     """Return a case with its noise from a fitted model's residual.
 
     outputs: simulated, by channel. ratio: of the gear, rotor over output, for ripple. Coloured noise is taken
@@ -42,13 +41,13 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     rms = {n: float(np.sqrt(np.mean(left[n][case.mask[n]] ** 2))) for n in channels}
     noise = dict(case.noise)
     for n in channels:
-        white, is_white = top_of_band(left[n], _seams(case, n))
+        white, is_white = top_of_band(left[n], _seams(case, n), rule)
         seen = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
         noise[n] = max(min(noise[n], seen), case.least.get(n, 0.0))
-    above = [n for n in channels if rms[n] > ABOVE * noise[n]]
-    if not above or not all(is_noise(case, outputs, n, ratio) for n in above):
+    above = [n for n in channels if rms[n] > rule.above * noise[n]]
+    if not above or not all(is_noise(case, outputs, n, ratio, rule) for n in above):
         return replace(case, noise=noise, coloured=frozenset())
-    coloured = frozenset(n for n in above if rms[n] > _surely_above(case, n) * noise[n])
+    coloured = frozenset(n for n in above if rms[n] > _surely_above(case, n, rule) * noise[n])
     for n in above:
         noise[n] = rms[n] * (1.0 + 2.0 * _doubt(case, left[n], n) if n in coloured else 1.0)
     return replace(case, noise=noise, coloured=coloured)
@@ -63,10 +62,10 @@ def _seams(case: Case, channel: str) -> IntArray:
     return np.searchsorted(case.t[channel], ends)
 
 
-def _surely_above(case: Case, channel: str) -> float:
-    """Return the RMS of a residual over its white part that chance does not reach, never below ABOVE."""
+def _surely_above(case: Case, channel: str, rule: NoiseSettings) -> float:
+    """Return the RMS of a residual over its white part that chance does not reach, `rule.above` at least."""
     samples = np.count_nonzero(case.mask[channel])
-    return max(ABOVE, 1.0 + SURE * _WHITE_DOUBT / float(np.sqrt(samples)))
+    return max(rule.above, 1.0 + rule.sure * _WHITE_DOUBT / float(np.sqrt(samples)))
 
 
 def _doubt(case: Case, left: FloatArray, channel: str) -> float:

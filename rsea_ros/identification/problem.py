@@ -11,12 +11,13 @@ import numpy as np
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
+from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive
-from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
+from rsea_ros.model.inverse import CUT_OFF, Motion, acting_torque, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.measured_motion import zero_unknown
 from rsea_ros.model.pace import SKIPPED_START
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
@@ -50,7 +51,7 @@ class Case:
         """Return the case with only samples that are also in `mask`."""
         return replace(self, mask={n: m & mask[n] for n, m in self.mask.items()})
 
-    def keeping(self, samples: Mapping[str, slice | BoolArray], drive: Drive) -> Case:
+    def keep(self, samples: Mapping[str, slice | BoolArray], drive: Drive) -> Case:
         """Return the case on another drive, with some samples of each channel."""
         return replace(
             self,
@@ -72,14 +73,20 @@ class Case:
         return drive.duration if isinstance(drive, Drive) else float(drive.t[-1] - drive.t[0])
 
 
-def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None = None) -> Case:
-    """Make a record ready. masked: samples by channel that are faulty and must not count.
+def case_from(
+    record: Record,
+    rig: Rig,
+    masked: Mapping[str, BoolArray] | None = None,
+    rule: NoiseSettings = DEFAULT,
+) -> Case:
+    """Make a record ready.
 
+    masked: samples by channel that are faulty and must not count. rule: of the noise that the record shows.
     Raises IdentificationError when no channel of the record is one that the rig has.
     """
     if is_inverse(rig):
-        return _inverse_case(record, rig)
-    record = commanded(record, rig)
+        return _inverse_case(record, rig, rule)
+    record = with_command(record, rig)
     channels = channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
     record = replace(record, channels={n: record[n] for n in (*beside, *channels)})
@@ -92,13 +99,13 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
         drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
-        noise=MappingProxyType({n: noise_floor(record, n, sensors[n]) for n in channels}),
+        noise=MappingProxyType({n: noise_floor(record, n, sensors[n], rule) for n in channels}),
         mask=MappingProxyType(
             {n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
         ),
         source=record.source,
         floating=floating,
-        least=MappingProxyType({n: least_noise(record[n].y, sensors[n]) for n in channels}),
+        least=MappingProxyType({n: least_noise(record[n].y, sensors[n], rule) for n in channels}),
     )
 
 
@@ -128,20 +135,20 @@ def channels_that_tell(record: Record, rig: Rig) -> list[str]:
     )
 
 
-def _inverse_case(record: Record, rig: Rig) -> Case:
+def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
     """Make a record of a drive without a spring ready: its torque against the one that its motion takes.
 
     Noise: the part that passes the filter of the white noise at the top of the torque's band, or
     where that is not flat of the stated noise, if that is more.
     """
-    motion, torque = motion_from(record), acted(record)
+    motion, torque = motion_from(record), acting_torque(record)
     for name, channel in (("position", record["position"]), ("the torque that acted", torque)):
         if channel.is_still:
             raise IdentificationError(
                 f"{record.source}: {name} holds one value, expected motion: "
                 "a rig without a spring is judged by what moves it"
             )
-    level, is_flat = top_of_band(torque.y)
+    level, is_flat = top_of_band(torque.y, rule=rule)
     stated = 0.0 if is_flat else rig.sensors.get("motor_torque", Sensor()).noise
     noise = max(level, stated) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
     return Case(

@@ -13,7 +13,7 @@ from rsea_ros.identification.problem import FEWEST
 from rsea_ros.identification.resample import AtRestError
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.equations import Mechanics
-from rsea_ros.model.position_loop import closed
+from rsea_ros.model.position_loop import close_loop
 from rsea_ros.model.propagator import encoder_row, read_row, state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray, Record
@@ -54,7 +54,7 @@ def model_responses(rig: Rig, frequencies: Mapping[str, FloatArray]) -> dict[str
         )[:, :, 0]
         response = np.einsum("j,kj->k", _output_row(rig, output, system.mechanics), solved)
         plant = np.einsum("j,kj->k", encoder_row(rig, system.mechanics), solved)
-        responses[output] = response if rig.loop is None else closed(rig, plant, response, s)
+        responses[output] = response if rig.loop is None else close_loop(rig, plant, response, s)
     return responses
 
 

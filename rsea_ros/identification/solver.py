@@ -118,7 +118,7 @@ def power(residual: FloatArray) -> float:
 def _read_later(problem: Problem, theta: FloatArray, delay: float) -> FloatArray:
     """Return the weighted residuals with every sensor read `delay` s later than it was."""
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
-    shifted = clocks.moved(delay, problem.channels)
+    shifted = clocks.move(delay, problem.channels)
     return problem.residual_of(simulate_cases(problem.cases, rig, shifted, ride=problem.ride))
 
 

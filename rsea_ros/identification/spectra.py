@@ -50,7 +50,7 @@ class SpectralShape:
         result: FloatArray = np.exp(np.interp(np.log(least), np.log(self.share), np.log(self.level)))
         return result
 
-    def whitened(self, values: FloatArray) -> FloatArray:
+    def whiten(self, values: FloatArray) -> FloatArray:
         """Return values divided by the shape's amplitude at every frequency."""
         spectrum = rfft(values)
         gain = 1.0 / np.sqrt(self.at(np.linspace(0.0, 1.0, len(spectrum))))
@@ -65,12 +65,12 @@ def shape_of(spectra: ComplexArray) -> SpectralShape:
     mean, count = np.mean(np.abs(spectra) ** 2, axis=0), np.diff(edges)
     measured = np.maximum(np.add.reduceat(mean[: edges[-1]], edges[:-1]) / count, 1e-300)
     freedom = 1.8 * count * len(spectra) / OVERLAP / np.where(count > 2, HANN, 1.0)
-    level = falling(measured, freedom)
+    level = fit_falling(measured, freedom)
     off = float(np.max(np.abs(np.log(measured / level)) * np.sqrt(freedom / 2.0)))
     return SpectralShape(np.sqrt(edges[:-1] * (edges[1:] - 1.0)) / (lines - 1.0), level, off)
 
 
-def falling(levels: FloatArray, weights: FloatArray) -> FloatArray:
+def fit_falling(levels: FloatArray, weights: FloatArray) -> FloatArray:
     """Return the sequence nearest to `levels` that never rises (pool adjacent violators), shape of levels."""
     pools: list[tuple[float, float, int]] = []
     for level, weight in zip(levels, weights, strict=True):

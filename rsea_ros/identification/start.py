@@ -29,7 +29,7 @@ _ITERATIONS = 15
 
 def start_from(responses: Sequence[FrequencyResponse], rig: Rig) -> Rig:
     """Return the rig with free values that bring its linear responses near the measured ones."""
-    unknowns, chosen = unknowns_of_rig(rig), [r for r in map(_chosen, responses) if len(r.frequency)]
+    unknowns, chosen = unknowns_of_rig(rig), [r for r in map(_choose_lines, responses) if len(r.frequency)]
     if not (unknowns and chosen):
         return rig
     begin = start_vector(unknowns)
@@ -42,7 +42,7 @@ def start_from(responses: Sequence[FrequencyResponse], rig: Rig) -> Rig:
     return apply(rig, unknowns, _least_squares(residual, begin))[0]
 
 
-def _chosen(response: FrequencyResponse) -> FrequencyResponse:
+def _choose_lines(response: FrequencyResponse) -> FrequencyResponse:
     """Return the lines that count, few enough to be quick."""
     good = np.flatnonzero(
         (response.coherence > _COHERENT) & np.isfinite(response.sd) & (response.frequency > 0.0)

@@ -34,7 +34,7 @@ class Clocks:
         late: FloatArray = self.offset.get(channel, 0.0) + 1e-6 * self.rate.get(channel, 0.0) * since
         return late
 
-    def moved(self, delay: float, channels: Iterable[str]) -> Clocks:
+    def move(self, delay: float, channels: Iterable[str]) -> Clocks:
         """Return the clocks with some channels read `delay` s later still."""
         return Clocks({**self.offset, **{n: self.offset.get(n, 0.0) + delay for n in channels}}, self.rate)
 
@@ -196,11 +196,11 @@ def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig
         {u.name.split(".")[1]: values[u.name] for u in unknowns if u.is_clock and u.is_rate == of_rate}
         for of_rate in (False, True)
     )
-    effects = tuple(_moved(e, values) for e in rig.effects)
+    effects = tuple(_move(e, values) for e in rig.effects)
     return rig.with_values(of_rig).with_effects(*effects), Clocks(offset, rate)
 
 
-def _moved(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:
+def _move(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:
     names = (u for u in values if u.startswith(f"{setting.name}."))
     moved = {**setting.parameters, **{n.split(".")[1]: values[n] for n in names}}
     return replace(setting, parameters=moved)

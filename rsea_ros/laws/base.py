@@ -18,8 +18,8 @@ from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.steady import with_even_clocks
-from rsea_ros.model.extent import bounded
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.extent import bound_values
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record
 
@@ -47,7 +47,7 @@ class Base:
 def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
     """Fit a rig to all blocks of records but the test blocks."""
     rig = rig.with_effects(*(e for e in rig.effects if not e.guess))
-    records = [bounded(commanded(r, rig)) for r in records]
+    records = [bound_values(with_command(r, rig)) for r in records]
     checked = [check(r, rig) for r in records]
     steady = with_even_clocks([c.record for c in checked], [c.masked for c in checked], rig)
     checked = [replace(c, record=r) for c, r in zip(checked, steady.records, strict=True)]

@@ -46,7 +46,7 @@ def body_of(law: Law) -> str:
     if sizes:
         lines.append(f"x[0] = mean_friction(s, {' + '.join(sizes)}, x[0], p[{index['creep_velocity']}])")
     total = " + ".join([*smooth, *(["-x[0]"] if sizes else [])])
-    lines += [f"torque = {total}", *_added(law, state)]
+    lines += [f"torque = {total}", *_addition_lines(law, state)]
     return "\n".join(f"    {line}" for line in lines)
 
 
@@ -60,7 +60,9 @@ def curve_body(law: Law) -> str:
               "w": " * w" if curve.over == "t" else " * tanh(w / 2e-3)"}[curve.factor]  # fmt: skip
     if law.place == "ft" and curve.factor == "T":
         factor = " * T"
-    return "\n".join(f"    {line}" for line in [*lines, f"torque = p[0] * value{factor}", *_added(law, 0)])
+    return "\n".join(
+        f"    {line}" for line in [*lines, f"torque = p[0] * value{factor}", *_addition_lines(law, 0)]
+    )
 
 
 def states_of(law: Law) -> int:
@@ -102,7 +104,7 @@ def _variables(law: Law) -> list[str]:
     return lines
 
 
-def _added(law: Law, state: int) -> list[str]:
+def _addition_lines(law: Law, state: int) -> list[str]:
     if law.place != "encoder":
         return [_ADDS[law.place]]
     rate = f"(torque - x[{state}]) / s[STEP] if x[{state + 1}] == 1.0 else 0.0"

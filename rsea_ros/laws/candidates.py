@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from rsea_ros.laws.columns import LawBench, ResidualRows
+from rsea_ros.laws.columns import CaseModel, ResidualRows
 from rsea_ros.laws.repeats import lines, modes, periods
 from rsea_ros.laws.terms import (
     COMMAND_TERMS,
@@ -96,9 +96,9 @@ def factor_of(variables: Variables, place: Place, over: str, factor: str) -> Flo
     return np.abs(values) if place == "gear" else values
 
 
-def spline_knots(benches: Sequence[LawBench], spline: Spline) -> FloatArray:
+def spline_knots(cases: Sequence[CaseModel], spline: Spline) -> FloatArray:
     """Return the knots of a spline over the range of its variable in all records."""
-    return knots_of(np.concatenate([b.variables.letters[spline.over] for b in benches]), spline.parts)
+    return knots_of(np.concatenate([c.variables.letters[spline.over] for c in cases]), spline.parts)
 
 
 def knots_of(x: FloatArray, parts: int) -> FloatArray:
@@ -117,9 +117,9 @@ def basis_of(x: FloatArray, knots: FloatArray) -> FloatArray:
     return np.ascontiguousarray(BSpline.design_matrix(inside, knots, _DEGREE, extrapolate=True).toarray().T)
 
 
-def terms_for(benches: Sequence[LawBench]) -> tuple[Term, ...]:
+def terms_for(cases: Sequence[CaseModel]) -> tuple[Term, ...]:
     """Return the terms that may act on a machine, the waves at the periods that the first record shows."""
-    bench = benches[0]
+    model = cases[0]
     made: list[Term] = [
         *GEAR_TERMS,
         *COMMAND_TERMS,
@@ -128,72 +128,72 @@ def terms_for(benches: Sequence[LawBench]) -> tuple[Term, ...]:
         *SENSOR_TERMS,
         *ENCODER_TERMS,
     ]
-    for cycles in wave_numbers(bench):
+    for cycles in wave_numbers(model):
         made += wave_terms(cycles)
-    if "ft" in bench.places:
-        made += [t for f in sensor_lines(bench) for t in hum_terms(f)]
-        made += mode_terms(sensor_modes(bench))
-    rigid = bench.injector is None
+    if "ft" in model.places:
+        made += [t for f in sensor_lines(model) for t in hum_terms(f)]
+        made += mode_terms(sensor_modes(model))
+    rigid = model.injector is None
     return tuple(
-        t for t in made if t.place in bench.places and not (rigid and "d" in (t.over, t.expression[:1]))
+        t for t in made if t.place in model.places and not (rigid and "d" in (t.over, t.expression[:1]))
     )
 
 
-def wave_numbers(bench: LawBench) -> list[float]:
+def wave_numbers(model: CaseModel) -> list[float]:
     """Return cycles per revolution of the rotor at which the missing torque repeats."""
-    variables, missing = bench.variables, bench.missing
-    at = (np.arange(len(variables.letters["t"])) + (0.5 if bench.injector else 0.0)) * variables.step
+    variables, missing = model.variables, model.missing
+    at = (np.arange(len(variables.letters["t"])) + (0.5 if model.injector else 0.0)) * variables.step
     theta = np.interp(missing.t, at, variables.letters["theta"])
     return periods(theta, missing.torque)
 
 
-def sensor_modes(bench: LawBench) -> list[float]:
+def sensor_modes(model: CaseModel) -> list[float]:
     """Return the frequencies of the highest broad peaks of the F/T sensor's residual, Hz."""
-    keep = bench.case.mask["ft"]
-    return modes(bench.case.t["ft"][keep], bench.residual["ft"][keep])
+    keep = model.case.mask["ft"]
+    return modes(model.case.t["ft"][keep], model.residual["ft"][keep])
 
 
-def sensor_lines(bench: LawBench) -> list[float]:
+def sensor_lines(model: CaseModel) -> list[float]:
     """Return the frequency of the sharpest line in the F/T signal that the mechanics do not explain, Hz."""
-    case = bench.case
+    case = model.case
     keep = case.mask["ft"]
     t = case.t["ft"][keep]
-    explained = np.interp(t - case.start, bench.missing.t, bench.missing.answers["ft"])
-    return lines(t, bench.residual["ft"][keep] - explained)
+    explained = np.interp(t - case.start, model.missing.t, model.missing.answers["ft"])
+    return lines(t, model.residual["ft"][keep] - explained)
 
 
-def candidates_of(benches: Sequence[LawBench]) -> list[tuple[TermCandidate, list[FloatArray]]]:
+def candidates_of(cases: Sequence[CaseModel]) -> list[tuple[TermCandidate, list[FloatArray]]]:
     """Return all candidates with their course along the steps of every case."""
-    return [*_of_terms(benches), *_of_splines(benches)]
+    return [*_of_terms(cases), *_of_splines(cases)]
 
 
-def _of_terms(benches: Sequence[LawBench]) -> Iterator[tuple[TermCandidate, list[FloatArray]]]:
-    for term in terms_for(benches):
-        for shape in benches[0].variables.shapes(term):
-            values = [b.variables.values(term, shape) for b in benches]
+def _of_terms(cases: Sequence[CaseModel]) -> Iterator[tuple[TermCandidate, list[FloatArray]]]:
+    for term in terms_for(cases):
+        for shape in cases[0].variables.shapes(term):
+            values = [c.variables.values(term, shape) for c in cases]
             if any(np.ptp(v) > 0.0 or v[0] != 0.0 for v in values):
                 yield TermCandidate(term.place, term.regressor, term, shape), values
 
 
-def _of_splines(benches: Sequence[LawBench]) -> Iterator[tuple[TermCandidate, list[FloatArray]]]:
+def _of_splines(cases: Sequence[CaseModel]) -> Iterator[tuple[TermCandidate, list[FloatArray]]]:
     for spline in SPLINES:
-        if spline.place not in benches[0].places or np.ptp(benches[0].variables.letters[spline.over]) == 0.0:
+        if spline.place not in cases[0].places or np.ptp(cases[0].variables.letters[spline.over]) == 0.0:
             continue
-        knots = spline_knots(benches, spline)
-        parts = [spline_parts(b.variables, spline, knots) for b in benches]
+        knots = spline_knots(cases, spline)
+        parts = [spline_parts(c.variables, spline, knots) for c in cases]
         for k in range(spline.parts):
             part = (spline.over, spline.factor, k)
             yield TermCandidate(spline.place, spline.regressor, part=part), [p[k] for p in parts]
 
 
 def columns_of(
-    rows: ResidualRows, benches: Sequence[LawBench], made: Sequence[tuple[TermCandidate, list[FloatArray]]]
+    rows: ResidualRows, cases: Sequence[CaseModel], made: Sequence[tuple[TermCandidate, list[FloatArray]]]
 ) -> list[FloatArray]:
     """Return the column of every candidate; the simulations run on two threads."""
 
     def column(item: tuple[TermCandidate, list[FloatArray]]) -> FloatArray:
         candidate, values = item
-        return rows.column([b.answers(v, candidate.place) for b, v in zip(benches, values, strict=True)])
+        return rows.column([c.answers(v, candidate.place) for c, v in zip(cases, values, strict=True)])
 
     with ThreadPoolExecutor(2) as pool:
         return list(pool.map(column, made))

@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.laws.base import Base
 from rsea_ros.laws.candidates import TermCandidate, candidates_of, columns_of
-from rsea_ros.laws.columns import LawBench, bench_of, rows_of
+from rsea_ros.laws.columns import CaseModel, case_model, rows_of
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
 from rsea_ros.laws.result import Tried
@@ -31,19 +31,19 @@ class Search:
     """A base model with all columns of laws and their sums of products."""
 
     base: Base
-    benches: tuple[LawBench, ...]
+    cases: tuple[CaseModel, ...]
     candidates: tuple[TermCandidate, ...]
     gram: Gram
 
 
-def searched(base: Base) -> Search:
+def make_search(base: Base) -> Search:
     """Return a base with the columns of all candidates."""
     problem, theta = base.problem, base.solution.theta
     rows = rows_of(problem, theta)
-    benches = tuple(bench_of(problem, theta, c, o) for c, o in zip(base.cases, base.outputs, strict=True))
-    made = candidates_of(benches)
-    gram = gram_of(rows, columns_of(rows, benches, made))
-    return Search(base, benches, tuple(c for c, _ in made), gram)
+    cases = tuple(case_model(problem, theta, c, o) for c, o in zip(base.cases, base.outputs, strict=True))
+    made = candidates_of(cases)
+    gram = gram_of(rows, columns_of(rows, cases, made))
+    return Search(base, cases, tuple(c for c, _ in made), gram)
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def surely_helps(
     gain = (before - after)[SELECTION] @ weight
     if not _is_sure(gain, _SURE, _WORSE):
         return False
-    held = [gram.tested(np.array(c, np.int64)) @ weight for c in ([*given], [*given, *columns])]
+    held = [gram.squares_left(np.array(c, np.int64)) @ weight for c in ([*given], [*given, *columns])]
     fall = (held[0] - held[1])[HELD_BACK]
     rms = 1.0 - float(np.sqrt(held[1][HELD_BACK].sum() / max(held[0][HELD_BACK].sum(), 1e-300)))
     return rms > MATTERS and _is_sure(fall, _SURE_ON_TEST, _WORSE_ON_TEST)

@@ -17,7 +17,7 @@ from rsea_ros.laws.injection import Injector
 from rsea_ros.laws.missing import MissingTorque, missing_torque
 from rsea_ros.laws.terms import PORTS, Place
 from rsea_ros.laws.variables import Variables, variables_along, variables_of
-from rsea_ros.model.inverse import Motion, smoothed
+from rsea_ros.model.inverse import Motion, smooth
 from rsea_ros.signals import FloatArray, IntArray
 
 GROUPS = 8
@@ -25,7 +25,7 @@ GROUPS = 8
 
 
 @dataclass(frozen=True)
-class LawBench:
+class CaseModel:
     """One case with its base model: missing torque, variables of a law, and the responses to a torque.
 
     residual: measured less simulated by channel, zero where masked.
@@ -58,7 +58,7 @@ class LawBench:
         """Return the response of each measured channel to values along the steps, acting at a place."""
         case = self.case
         if self.injector is None:
-            return {"motor_torque": -smoothed(values, self.variables.step)}
+            return {"motor_torque": -smooth(values, self.variables.step)}
         if place not in ("ft", "encoder"):
             return self.injector.answers(values, place)
         made = {n: np.zeros(len(t)) for n, t in case.t.items()}
@@ -72,9 +72,9 @@ class LawBench:
         return made
 
 
-def bench_of(
+def case_model(
     problem: Problem, theta: FloatArray, case: Case, outputs: Mapping[str, FloatArray], place: Place = "gear"
-) -> LawBench:
+) -> CaseModel:
     """Return a case with its base model at theta.
 
     outputs: simulated channels. place: of the missing torque.
@@ -85,7 +85,7 @@ def bench_of(
         t = case.drive.t - case.drive.t[0]
         torque = -residual["motor_torque"]
         missing = MissingTorque(t, torque, case.noise["motor_torque"], {})
-        return LawBench(case, residual, missing, variables_along(rig, case.drive), None)
+        return CaseModel(case, residual, missing, variables_along(rig, case.drive), None)
     since = {n: t - case.start for n, t in case.t.items()}
     sampled = {n: t + clocks.later(n, since[n]) + rig.clock(n, since[n]) for n, t in case.t.items()}
     injector = Injector(rig, case.drive, sampled)
@@ -93,7 +93,7 @@ def bench_of(
     period = float(np.median(np.diff(case.t[channel])))
     motion = missing_torque(case, residual, injector, period)
     missing = motion if place == "gear" else missing_torque(case, residual, injector, period, place)
-    return LawBench(case, residual, missing, variables_of(injector, motion), injector)
+    return CaseModel(case, residual, missing, variables_of(injector, motion), injector)
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.effects.catalogue import lent
+from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Claims, Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.unknowns import apply
-from rsea_ros.laws.columns import bench_of
+from rsea_ros.laws.columns import case_model
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import Law
 from rsea_ros.laws.measured_claims import claims_of
@@ -41,7 +41,7 @@ class Draft:
         return source_of(law, Claims("velocity", "neither", None), _NO_PROVENANCE)
 
 
-def finished(
+def finish_laws(
     drafts: Sequence[Draft], refined: Refined, cases: Sequence[Case], provenance: LawProvenance | None,
     gain: float, ci95: tuple[float, float],
 ) -> list[WrittenLaw]:  # fmt: skip
@@ -64,7 +64,7 @@ def finished(
         shown = shown_of(problem, refined, law, values)
         whole = len(law.parts) == len(draft.law.parts)
         effect = draft.effect if whole else effect_from(Draft.source(law), law.name)
-        with lent(effect):
+        with lend(effect):
             claims = claims_of(law, effect, rig, cases[0])
         written.append(
             WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=held_out_gain)), claims, shown)
@@ -80,19 +80,19 @@ def shown_of(problem: Problem, refined: Refined, law: Law, values: dict[str, flo
     names = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(f"{law.name}.")]
     rest = replace(problem, rig=rig.with_effects(*others), unknowns=tuple(problem.unknowns[i] for i in names))
     theta = refined.solution.theta[names]
-    bench = bench_of(rest, theta, rest.cases[0], rest.outputs(theta)[0], law.place)
-    over = law.curve.over if law.curve is not None else _most(law, bench.variables.letters)
-    letters, t = bench.variables.letters, bench.missing.t
-    offset = 0.5 * bench.variables.step if bench.injector else 0.0
-    at = bench.variables.step * np.arange(len(letters["t"])) + offset
+    model = case_model(rest, theta, rest.cases[0], rest.outputs(theta)[0], law.place)
+    over = law.curve.over if law.curve is not None else _most(law, model.variables.letters)
+    letters, t = model.variables.letters, model.missing.t
+    offset = 0.5 * model.variables.step if model.injector else 0.0
+    at = model.variables.step * np.arange(len(letters["t"])) + offset
     inside = np.linspace(0.02, 0.98, min(_POINTS, len(t))) * (len(t) - 1)
     k = np.unique(inside.astype(np.int64))
-    course = law.values(bench.variables) * (values.get("size", 1.0))
+    course = law.values(model.variables) * (values.get("size", 1.0))
     if law.parts and law.parts[0].term.memory:
         over, letters = LAW, {**letters, LAW: course}
     return FigurePoints(
-        t=t[k], x=np.interp(t[k], at, letters[over]), values=bench.missing.torque[k],
-        law=np.interp(t[k], at, course), over=over, sd=bench.missing.sd,
+        t=t[k], x=np.interp(t[k], at, letters[over]), values=model.missing.torque[k],
+        law=np.interp(t[k], at, course), over=over, sd=model.missing.sd,
     )  # fmt: skip
 
 

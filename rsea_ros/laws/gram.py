@@ -93,7 +93,7 @@ class Gram:
             out[at] = self.loss(columns, self.fit(columns, inside, ridge))[at]
         return out
 
-    def tested(self, columns: IntArray, ridge: float = _RIDGE) -> FloatArray:
+    def squares_left(self, columns: IntArray, ridge: float = _RIDGE) -> FloatArray:
         """Return the squares left by a fit on all but the test blocks, (groups, channels)."""
         return self.loss(columns, self.fit(columns, groups_of([s for f in FOLDS for s in f]), ridge))
 

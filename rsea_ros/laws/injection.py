@@ -28,7 +28,7 @@ _SHARE = 1e-3
 
 
 @compiled
-def _injected(s, p, x):  # type: ignore[no-untyped-def]
+def _inject(s, p, x):  # type: ignore[no-untyped-def]
     """Add p[1:], one value a step, at the port p[0]; 5 and 6: on the housing's and on the spring's end."""
     at = s[st.TIME] / s[st.STEP]
     if p[0] == 2.0:
@@ -119,7 +119,7 @@ def with_injection(machine: Machine, torque: FloatArray, port: Port, kind: float
     series = np.concatenate([[kind], torque, torque[-1:]])
     changed = Calls(
         first=first,
-        address=np.insert(calls.address, at, _injected.address),
+        address=np.insert(calls.address, at, _inject.address),
         p_at=np.insert(calls.p_at, at, len(calls.p)),
         x_at=np.insert(calls.x_at, at, 0),
         p=np.concatenate([calls.p, series]),

@@ -104,7 +104,7 @@ class Law:
             if values[c] != 0.0
         )
         regressors = dict.fromkeys(part.term.regressor for part in parts)
-        return replace(self, parts=parts, regressor=joined(list(regressors)))
+        return replace(self, parts=parts, regressor=join_names(list(regressors)))
 
     def values(self, variables: Variables) -> FloatArray:
         """Return the law along a record."""
@@ -116,6 +116,6 @@ class Law:
         return curve * factor_of(variables, self.place, self.curve.over, self.curve.factor)
 
 
-def joined(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str]) -> str:
     """Return names as people list them."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -23,12 +23,12 @@ def equation_of(law: Law) -> str:
         text = part.term.equation.format(a=s) if s else part.term.equation
         if s and s not in text:
             text += f" with {s}"
-        terms.append(_signed(c, text, minus=part.term.friction))
+        terms.append(_signed_text(c, text, minus=part.term.friction))
     tail = ", smooth below creep_velocity" if law.is_friction else ""
     return f"{left} = {' + '.join(terms).replace('+ -', '- ')}{tail}"
 
 
-def _signed(coefficient: str, text: str, *, minus: bool) -> str:
+def _signed_text(coefficient: str, text: str, *, minus: bool) -> str:
     bare = text.removeprefix("-")
     sign = "-" if minus or bare != text else ""
     return f"{sign}{coefficient}" if bare == "1" else f"{sign}{coefficient} · {bare}"

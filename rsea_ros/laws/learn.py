@@ -11,13 +11,13 @@ from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws.assembly import curve_of, law_of
 from rsea_ros.laws.base import Base, fitted_base, levels_of
-from rsea_ros.laws.choice import MATTERS, Choice, Search, chosen_models, searched, tried_of
+from rsea_ros.laws.choice import MATTERS, Choice, Search, chosen_models, make_search, tried_of
 from rsea_ros.laws.dependence import Dependence, dependences
 from rsea_ros.laws.effect_source import LawProvenance
-from rsea_ros.laws.file import Draft, finished
+from rsea_ros.laws.file import Draft, finish_laws
 from rsea_ros.laws.fitting import gain_on_tests, refined_laws, share_of
 from rsea_ros.laws.law import Law
-from rsea_ros.laws.refinement import acting, effect_from
+from rsea_ros.laws.refinement import effect_from, register
 from rsea_ros.laws.result import LawResult, WrittenLaw
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.progress import Progress
@@ -41,7 +41,7 @@ def learn(
         if is_at_floor(base.score(TEST)):
             return nothing_left(base, records)
         tell("looking for what is missing", 0.2)
-        search = searched(base)
+        search = make_search(base)
         tell("comparing laws", 0.6)
         depends = dependences(search.gram, search.candidates)
         models = chosen_models(search, depends)
@@ -67,7 +67,7 @@ def _result(
     base = search.base
     laws = _laws(search, choice)
     drafts = [Draft(law, effect_from(Draft.source(law), law.name)) for law in laws]
-    with acting([d.effect for d in drafts]):
+    with register([d.effect for d in drafts]):
         refined = refined_laws(base, drafts) if drafts else None
         if refined is None or gain_on_tests(base, refined)[0] < MATTERS:
             return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,
@@ -77,7 +77,7 @@ def _result(
         problem = replace(refined.solution.problem, cases=base.cases)
         after = levels_of(problem, problem.outputs(refined.solution.theta), base.cases)[0]
         share = share_of(before, after, noise)
-        written = finished(drafts, refined, base.cases, provenance, gain, ci95)
+        written = finish_laws(drafts, refined, base.cases, provenance, gain, ci95)
         rigs = [
             apply(s.problem.rig, s.problem.unknowns, s.theta)[0] for s in (base.solution, refined.solution)
         ]
@@ -99,5 +99,5 @@ def _with_files(rig: Rig, base: Rig, written: Sequence[WrittenLaw]) -> Rig:
 
 def _laws(search: Search, choice: Choice) -> list[Law]:
     if choice.curve is not None:
-        return [curve_of(search.gram, search.candidates, search.benches, choice.curve)]
-    return law_of(search.gram, search.candidates, search.benches, choice.taken)
+        return [curve_of(search.gram, search.candidates, search.cases, choice.curve)]
+    return law_of(search.gram, search.candidates, search.cases, choice.taken)

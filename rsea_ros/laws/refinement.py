@@ -14,7 +14,7 @@ from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.problem_variants import on_blocks
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.effects.catalogue import lent
+from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Effect
 from rsea_ros.files import write_new
 from rsea_ros.identification.confidence import confidence_of, interval
@@ -50,9 +50,9 @@ def effect_from(source: str, name: str) -> Effect:
 
 
 @contextmanager
-def acting(effects: Sequence[Effect]) -> Iterator[None]:
+def register(effects: Sequence[Effect]) -> Iterator[None]:
     """Have laws known to the simulation within the block."""
-    with lent(*effects):
+    with lend(*effects):
         yield
 
 

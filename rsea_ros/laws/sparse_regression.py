@@ -57,7 +57,7 @@ class Folded:
         return total
 
 
-def folded(gram: Gram, weight: FloatArray) -> Folded:
+def fold_sums(gram: Gram, weight: FloatArray) -> Folded:
     """Return the sums of each fold. weight: of each channel."""
     products, rights, squares = gram.by_set
     sets = [k for fold in FOLDS for k in fold]
@@ -90,7 +90,7 @@ def _path(
     models: list[SparseLaw] = []
     left = gram.held_out(np.array([*given], np.int64))
     for _ in range(most):
-        sums = folded(gram, gram.weights(left, SELECTION))
+        sums = fold_sums(gram, gram.weights(left, SELECTION))
         base = np.concatenate([gram.nominal, np.array([*given, *chosen], np.int64)])
         ranked = sorted(free, key=lambda k: sums.loss(np.append(base, k)))
         taken = next((k for k in ranked if _acts_right(gram, candidates, [*given, *chosen, k])), None)

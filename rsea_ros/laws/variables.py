@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rsea_ros.laws.injection import Injector
-from rsea_ros.laws.memory import remembered
+from rsea_ros.laws.memory import remember
 from rsea_ros.laws.missing import MissingTorque
 from rsea_ros.laws.terms import Term
 from rsea_ros.model.equations import train_ratio
@@ -37,7 +37,7 @@ class Variables:
         """Return a term along the record, for a coefficient of 1."""
         letters = dict(self.letters)
         if term.memory:
-            letters["m"] = remembered(term.memory, letters[term.remembers], self.step, shape, term.constant)
+            letters["m"] = remember(term.memory, letters[term.remembers], self.step, shape, term.constant)
         return term.values(letters, shape)
 
     def shapes(self, term: Term) -> tuple[float, ...]:

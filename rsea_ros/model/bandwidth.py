@@ -69,15 +69,15 @@ def _factor(inertia: FloatArray) -> FloatArray:
 
 def end_to_end(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
     """Return T_d / T_p of the rig with both ends clamped, exactly; Eq. (6) approximates it."""
-    return distal_per_proximal(_held(rig), sees)
+    return distal_per_proximal(_hold_ends(rig), sees)
 
 
 def end_over_end(rig: Rig) -> Fraction:
     """Return the same as a fraction, for who cannot wait for python-control."""
-    return distal_over_proximal(_held(rig))
+    return distal_over_proximal(_hold_ends(rig))
 
 
-def _held(rig: Rig) -> Rig:
+def _hold_ends(rig: Rig) -> Rig:
     return replace(rig, clamped=frozenset(END_NAMES))
 
 

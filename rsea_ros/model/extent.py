@@ -22,7 +22,7 @@ def check_extent(record: Record, start: float, stop: float) -> None:
 
     A clock that was set during the recording, or a pause of hours, would need millions of empty steps.
     """
-    covered = max(_covered(c.t) for c in record.channels.values())
+    covered = max(_covered_time(c.t) for c in record.channels.values())
     if stop - start <= LONGEST_PAUSE + (1.0 + MOST_EMPTY) * covered:
         return
     pauses = [(n, int(np.argmax(np.diff(c.t))), c.t) for n, c in record.channels.items() if len(c) > 1]
@@ -35,17 +35,17 @@ def check_extent(record: Record, start: float, stop: float) -> None:
     )
 
 
-def _covered(t: FloatArray) -> float:
+def _covered_time(t: FloatArray) -> float:
     """Return how long samples last with their median interval, s."""
     return len(t) * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
 
 
-def bounded(record: Record) -> Record:
+def bound_values(record: Record) -> Record:
     """Return the record with NaN for values beyond LARGEST, and zero for values below SMALLEST."""
-    return record.with_channels(**{n: _bounded(c) for n, c in record.channels.items()})
+    return record.with_channels(**{n: _bound_channel(c) for n, c in record.channels.items()})
 
 
-def _bounded(channel: Channel) -> Channel:
+def _bound_channel(channel: Channel) -> Channel:
     size = np.abs(channel.y)
     good = (size <= LARGEST) & ((size >= SMALLEST) | (size == 0.0))
     if good.all():

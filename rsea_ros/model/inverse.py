@@ -28,7 +28,7 @@ from rsea_ros.model.restarts import gaps
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
-from rsea_ros.model.structure import structured
+from rsea_ros.model.structure import with_structure
 from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
 
 CUT_OFF = 20.0
@@ -108,18 +108,18 @@ def motion_from(record: Record) -> Motion:
     q, torque = np.interp(t, position.t, position.y), _torque_at(record, t)
     v, a = np.zeros(len(t)), np.zeros(len(t))
     counts = np.zeros(len(t), bool)
-    for begin, end in _sampled(record, float(t[0]), float(t[-1])):
+    for begin, end in _sampled_spans(record, float(t[0]), float(t[-1])):
         part = slice(*np.searchsorted(t, [begin - 0.5 * step, end + 0.5 * step]))
         known = position.between(begin, end + 0.5 * step)
-        q[part] = smoothed(CubicSpline(known.t, known.y)(t[part]), step)
+        q[part] = smooth(CubicSpline(known.t, known.y)(t[part]), step)
         v[part] = np.gradient(q[part], step)
-        a[part], torque[part] = np.gradient(v[part], step), smoothed(torque[part], step)
+        a[part], torque[part] = np.gradient(v[part], step), smooth(torque[part], step)
         counts[part] = (t[part] >= t[part][0] + SKIPPED_START) & (t[part] <= t[part][-1] - SKIPPED_START)
     t, q, v, a, torque = (np.asarray(values[::finer], np.float64) for values in (t, q, v, a, torque))
     return Motion(t, q, v, a, torque, counts[::finer], commanded="motor_torque" not in record)
 
 
-def _sampled(record: Record, start: float, stop: float) -> list[tuple[float, float]]:
+def _sampled_spans(record: Record, start: float, stop: float) -> list[tuple[float, float]]:
     """Return begin and end (s) of the parts between gaps of the motion or its torque; short ones are gaps."""
     each = [Record({n: c}) for n, c in record.channels.items() if n in ("position", "motor_torque")]
     lost = sorted(gap for one in each for gap in gaps(one))
@@ -138,7 +138,7 @@ def _finite(record: Record) -> Record:
     return replace(record, channels=channels)
 
 
-def acted(record: Record) -> Channel:
+def acting_torque(record: Record) -> Channel:
     """Return the motor torque that acted: measured, or as commanded where it was not."""
     return record["motor_torque" if "motor_torque" in record else "command"]
 
@@ -164,7 +164,7 @@ def _torque_at(record: Record, t: FloatArray) -> FloatArray:
     return np.asarray(torque.y[np.minimum(shown, len(torque) - 1)].mean(axis=0), np.float64)
 
 
-def smoothed(values: FloatArray, period: float) -> FloatArray:
+def smooth(values: FloatArray, period: float) -> FloatArray:
     """Return values behind the Butterworth filter, run both ways. period: s, between samples."""
     from scipy.signal import butter, filtfilt
 
@@ -174,7 +174,7 @@ def smoothed(values: FloatArray, period: float) -> FloatArray:
 
 def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     """Return the motor torque that a motion takes, N m, filtered like the motion, shape of motion.t."""
-    rig_as_is = structured(rig)
+    rig_as_is = with_structure(rig)
     m = mechanics(rig_as_is, linear_gravity=False)
     if m.order != 1 or "housing_end" not in rig.clamped:
         raise IdentificationError(
@@ -190,7 +190,7 @@ def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
         for name, values in (("inertia", motion.a), ("damping", motion.v), ("stiffness", motion.q))
     )
     added = _effect_torques(*_parts(machine), motion.q, motion.v, motion.torque, load)
-    needed = (torque - smoothed(added, period)) / motor_gains(*_parts(machine), len(motion.t))
+    needed = (torque - smooth(added, period)) / motor_gains(*_parts(machine), len(motion.t))
     return _undone(machine, motion, needed, period) if motion.commanded else needed
 
 
@@ -204,7 +204,7 @@ def _as_moved(machine: Machine, motion: Motion, period: float) -> Motion:
     """Return a motion without the errors that effects of the encoder added."""
     if machine.calls.first[_SENSOR] == machine.calls.first[_SENSOR + 1]:
         return motion
-    error = smoothed(_sensor_errors(*_parts(machine), motion.q), period)
+    error = smooth(_sensor_errors(*_parts(machine), motion.q), period)
     v = np.gradient(error, period)
     return replace(motion, q=motion.q - error, v=motion.v - v, a=motion.a - np.gradient(v, period))
 
@@ -216,10 +216,10 @@ def _undone(machine: Machine, motion: Motion, torque: FloatArray, period: float)
     command = torque
     for _ in range(_UNDOINGS):
         command = command + torque - _made_of(*_parts(machine), command, motion.v)
-    return smoothed(command, period)
+    return smooth(command, period)
 
 
-def predicted(rig: Rig, motion: Motion) -> Mapping[str, FloatArray]:
+def predict_torque(rig: Rig, motion: Motion) -> Mapping[str, FloatArray]:
     """Return the one channel of an inverse comparison."""
     return {"motor_torque": inverse_torque(rig, motion)}
 

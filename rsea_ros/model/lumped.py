@@ -13,6 +13,6 @@ from dataclasses import replace
 from rsea_ros.model.rig import Rig
 
 
-def lumped(rig: Rig) -> Rig:
+def lumped_rig(rig: Rig) -> Rig:
     """Return the rig of the lumped model; every function of the model accepts it."""
     return replace(rig, name=f"{rig.name}, lumped", train="lumped", clamped=rig.clamped | {"housing_end"})

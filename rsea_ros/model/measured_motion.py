@@ -34,7 +34,7 @@ def initial_state(record: Record) -> tuple[float, float]:
     says nothing. The position at the start is the first one less what the first velocity brought until then.
     """
     (t, position), (_, velocity) = (_finite(record, n) for n in ("position", "velocity"))
-    if not (_moved(position) or _moved(velocity)):
+    if not (_has_moved(position) or _has_moved(velocity)):
         return 0.0, 0.0
     late = float(t[0] - record["command"].t[0])
     passed = late if "position" in record and 0.0 < late < LATE * float(t[1] - t[0]) else 0.0
@@ -94,6 +94,6 @@ def _cubics(t: FloatArray, y: FloatArray, slope: FloatArray, at: FloatArray) -> 
     return np.asarray(y[k] + (y[k + 1] - y[k]) * u**2 * (3.0 - 2.0 * u) + left + right)
 
 
-def _moved(y: FloatArray) -> bool:
+def _has_moved(y: FloatArray) -> bool:
     least = max(AT_REST * np.std(y), np.max(np.abs(np.diff(y))))
     return bool(y[0] != 0.0 and abs(y[0]) >= least)

@@ -23,7 +23,7 @@ def loop_parameters(rig: Rig) -> tuple[float, ...]:
     return firmware_loop.CASCADE, *gains, 0.0, *limits
 
 
-def commanded(record: Record, rig: Rig) -> Record:
+def with_command(record: Record, rig: Rig) -> Record:
     """Return the record with the signal that commands the rig as `command`: a position loop's targets, rad.
 
     Noise, blocks and responses then follow the targets. Raises ChannelError for a
@@ -45,7 +45,7 @@ def commanded(record: Record, rig: Rig) -> Record:
     return record.with_channels(command=record["reference"])
 
 
-def closed(rig: Rig, plant: ComplexArray, output: ComplexArray, s: ComplexArray) -> ComplexArray:
+def close_loop(rig: Rig, plant: ComplexArray, output: ComplexArray, s: ComplexArray) -> ComplexArray:
     """Return output / target with the loop closed, limits aside.
 
     plant: angle that the loop sees over motor torque; output: the output over motor torque; s: 2 pi i f, all

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.extent import bounded, check_command
+from rsea_ros.model.extent import bound_values, check_command
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
 from rsea_ros.model.pace import SKIPPED_START, check_pace
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig
@@ -75,7 +75,7 @@ def predict(rig: Rig | str, record: Record) -> Mapping[str, Comparison]:
     Raises IdentificationError for a record with nothing to compare. Nothing is fitted.
     """
     rig = load_rig(rig)
-    record = bounded(commanded(record, rig))
+    record = bound_values(with_command(record, rig))
     check_command(record)
     check_pace(record)
     record = replace(record, channels={n: c for n, c in record.channels.items() if len(c)})

@@ -38,7 +38,7 @@ from rsea_ros.model.pure_torque_filter import (
 from rsea_ros.model.pure_torque_noise import split
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_structure import check_two_torques
-from rsea_ros.model.structure import structured
+from rsea_ros.model.structure import with_structure
 
 Verdict = Literal["no torque", "pure", "beyond"]
 VERDICTS: tuple[Verdict, ...] = ("no torque", "pure", "beyond")
@@ -99,7 +99,7 @@ class PureTorque:
         """Raises RigError for a rig without a spring: there is one torque, not two."""
         check_two_torques(rig)
         s = settings or FlagSettings()
-        self._function = end_over_end(structured(rig))
+        self._function = end_over_end(with_structure(rig))
         self.edge = flat_band(self._function, s.tolerance_db, s.tolerance_deg)
         odds = (1.0 - s.limit) / s.limit
         corner = self.edge * odds**0.25

@@ -46,7 +46,7 @@ from rsea_ros.model.pure_torque_window import (
 )
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_structure import check_two_torques
-from rsea_ros.model.structure import structured
+from rsea_ros.model.structure import with_structure
 from rsea_ros.model.transfer import Fraction
 from rsea_ros.signals import FloatArray
 
@@ -98,7 +98,7 @@ class ErrorFlag:
         check_two_torques(rig)
         s = settings or ErrorSettings()
         self.settings = s
-        self.edge = edge_of(structured(rig), s.tolerance)
+        self.edge = edge_of(with_structure(rig), s.tolerance)
         self._state, self._ring = np.zeros(STATE), empty_ring()
         self._state[[TOLERANCE, WINDOW, HYSTERESIS, QUIET]] = s.tolerance, s.window, s.hysteresis, s.quiet
         self._state[[HEARD, SHARE, LAST]] = -math.inf, math.nan, -math.inf
@@ -143,7 +143,9 @@ def _possible(rig: Rig) -> Iterator[Rig]:
     ranges = {n: _range(rig, n) for n in ("spring.damping", ROTOR) if n in rig.quantities}
     for train in (rig.train, *rig.other_trains):
         turned = replace(rig, train=train)
-        rotors = {ROTOR: (*ranges[ROTOR], *_cancelling(turned, ranges[ROTOR]))} if ROTOR in ranges else {}
+        rotors = (
+            {ROTOR: (*ranges[ROTOR], *_cancelling_inertias(turned, ranges[ROTOR]))} if ROTOR in ranges else {}
+        )
         for values in product(*(ranges | rotors).values()):
             yield turned.with_values(dict(zip(ranges, values, strict=True)))
 
@@ -154,7 +156,7 @@ def _range(rig: Rig, name: str) -> tuple[float, float, float]:
     return rig[name] / wide, rig[name], rig[name] * wide
 
 
-def _cancelling(rig: Rig, j_m: tuple[float, ...]) -> list[float]:
+def _cancelling_inertias(rig: Rig, j_m: tuple[float, ...]) -> list[float]:
     """Return the J_m within a range at which J_sc + n J_r = 0, kg m^2, if any."""
     spin = inner_inertia(rig) - rig["chassis.inertia"]
     if not spin:

@@ -105,7 +105,7 @@ def update_flag(pair, limits, memory, t, torque, sigma):  # type: ignore[no-unty
     elif t - memory[HEARD] > limits[QUIET]:
         memory[VERDICT], memory[SINCE] = NOTHING, t
         return
-    wanted = _wanted(limits, memory[VERDICT], high - noise_high, low - noise_low, noise_high, noise_low)
+    wanted = _next_verdict(limits, memory[VERDICT], high - noise_high, low - noise_low, noise_high, noise_low)
     hold = limits[HOLD_OFF]
     if wanted == PURE:
         hold = max(limits[HOLD_ON], CALM) if memory[FALLS] >= FLUTTER else limits[HOLD_ON]
@@ -119,7 +119,7 @@ def update_flag(pair, limits, memory, t, torque, sigma):  # type: ignore[no-unty
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _wanted(limits, verdict, high, low, noise_high, noise_low):  # type: ignore[no-untyped-def]
+def _next_verdict(limits, verdict, high, low, noise_high, noise_low):  # type: ignore[no-untyped-def]
     """Return the verdict of the powers without their noise, or the present one when they are too small."""
     spread_high = 2.0 * noise_high**2 + 4.0 * noise_high * max(high, 0.0) / limits[VALUES]
     spread_low = 2.0 * noise_low**2 + 4.0 * noise_low * max(low, 0.0) / limits[VALUES]

@@ -20,7 +20,7 @@ def in_phase(rig: Rig, record: Record) -> Rig:
         effect = effect_named(setting.name)
         for phase in (p.name for p in effect.parameters if p.per_record):
             if effect.claims.channel in record:
-                rig = _having(rig, place, {phase: _phase(rig, place, phase, record)})
+                rig = _with_parameters(rig, place, {phase: _phase(rig, place, phase, record)})
     return rig
 
 
@@ -31,18 +31,18 @@ def _phase(rig: Rig, place: int, phase: str, record: Record) -> float:
     """
     effect = effect_named(rig.effects[place].name)
     channel, size = effect.claims.channel, effect.main
-    without = simulate(_having(rig, place, {size.name: size.null}), record)[channel]
+    without = simulate(_with_parameters(rig, place, {size.name: size.null}), record)[channel]
     residual = record[channel].y - without
     keep = np.isfinite(residual)
 
     def share(angle: float) -> float:
-        wave: FloatArray = simulate(_having(rig, place, {phase: angle}), record)[channel] - without
+        wave: FloatArray = simulate(_with_parameters(rig, place, {phase: angle}), record)[channel] - without
         return float(residual[keep] @ wave[keep])
 
     return math.atan2(share(0.5 * math.pi), share(0.0))
 
 
-def _having(rig: Rig, place: int, parameters: Mapping[str, float]) -> Rig:
+def _with_parameters(rig: Rig, place: int, parameters: Mapping[str, float]) -> Rig:
     """Return the rig with some parameters of one of its effects changed."""
     effects = list(rig.effects)
     effects[place] = replace(effects[place], parameters={**effects[place].parameters, **parameters})

@@ -47,7 +47,7 @@ def _lost_commands(record: Record) -> list[tuple[float, float]]:
     pauses = np.flatnonzero(np.diff(command.t) > max(SHORTEST, PERIODS / command.rate))
     if not len(pauses):
         return []
-    hold = _shown(command, torque)
+    hold = _shown_commands(command, torque)
     off = np.square(torque.y - command.y[hold])
     known, paused = np.isfinite(off), np.isin(hold, pauses)
     if not (known & ~paused).any():
@@ -58,7 +58,7 @@ def _lost_commands(record: Record) -> list[tuple[float, float]]:
     return [(float(command.t[k]), float(command.t[k + 1])) for k in lost]
 
 
-def _shown(command: Channel, torque: Channel) -> IntArray:
+def _shown_commands(command: Channel, torque: Channel) -> IntArray:
     """Return the number of the command that each motor torque shows: the one at its stamp, or before it."""
     edge = _AT_EDGE / command.rate
     ended, begun = (np.searchsorted(command.t, torque.t + side * edge) - 1 for side in (-1.0, 1.0))

@@ -26,7 +26,7 @@ from rsea_ros.model.rig_keys import (
 )
 from rsea_ros.model.rig_sensors import sensors_from
 from rsea_ros.units import plain
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 
 def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
@@ -56,7 +56,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         train=groups["gear"].get("train", "planetary"),
         other_trains=_other_trains(groups["gear"].get("or", [])),
         sensors=sensors_from(mapping(document.get("sensors", {}), "sensors")),
-        known=_known(
+        known=_known_names(
             document.get("known", []),
             [*quantities, *(f"{e.name}.{p}" for e in effects for p in e.parameters)],
         ),
@@ -99,24 +99,24 @@ def _quantity(name: str, item: Any) -> Quantity:
 
 def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
     if not isinstance(item, list) or len(item) != 2:
-        raise RigError(f"{name} = {shown(item)}, expected [low, high] in {plain(unit_name)}", name)
+        raise RigError(f"{name} = {quote(item)}, expected [low, high] in {plain(unit_name)}", name)
     low, high = (number(v, name, unit_name) for v in item)
     return low, high
 
 
 def _other_trains(items: Any) -> tuple[Any, ...]:
     if not isinstance(items, list):
-        raise RigError(f"gear.or = {shown(items)}, expected a list of trains", "gear.or")
+        raise RigError(f"gear.or = {quote(items)}, expected a list of trains", "gear.or")
     return tuple(items)
 
 
-def _known(items: Any, stated: Collection[str]) -> frozenset[str]:
+def _known_names(items: Any, stated: Collection[str]) -> frozenset[str]:
     if not isinstance(items, list):
         raise RigError(f"known = {items!r}, expected a list of field names", "known")
     for i, item in enumerate(items):
         if item not in stated:
             raise RigError(
-                f"known: {shown(item)}, expected a value that this rig states: {', '.join(stated)}",
+                f"known: {quote(item)}, expected a value that this rig states: {', '.join(stated)}",
                 f"known[{i}]",
             )
     return frozenset(items)
@@ -129,7 +129,7 @@ def _loop(item: Any) -> tuple[str | None, dict[str, Quantity]]:
     kind = text(item["kind"], "controller.kind")
     if kind not in LOOP_FIELDS:
         raise RigError(
-            f"controller.kind = {shown(kind)}, expected one of {', '.join(LOOP_FIELDS)}", "controller.kind"
+            f"controller.kind = {quote(kind)}, expected one of {', '.join(LOOP_FIELDS)}", "controller.kind"
         )
     only_keys(item, {"kind", *LOOP_FIELDS[kind], *LOOP_LIMITS}, "controller")
     names_of = (key for key in item if key != "kind")
@@ -140,7 +140,7 @@ def _hold(item: Any) -> Hold:
     for hold in HOLDS:
         if item == hold:
             return hold
-    raise RigError(f"hold = {shown(item)}, expected {', '.join(HOLDS)}", "hold")
+    raise RigError(f"hold = {quote(item)}, expected {', '.join(HOLDS)}", "hold")
 
 
 def _controller(item: Any) -> PositionLoop | None:

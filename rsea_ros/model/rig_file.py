@@ -16,7 +16,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.new_files import write_text
-from rsea_ros.wording import did_you_mean, shown
+from rsea_ros.wording import did_you_mean, quote
 
 
 def rig_path(name_or_path: str | Path) -> Path:
@@ -25,7 +25,7 @@ def rig_path(name_or_path: str | Path) -> Path:
     Raises RigError for a name that no rig has, and for text that cannot be a file name.
     """
     if not isinstance(name_or_path, (str, os.PathLike)) or "\0" in str(name_or_path):
-        raise RigError(f"rig {shown(name_or_path)}: expected the name of a rig, or of a YAML file")
+        raise RigError(f"rig {quote(name_or_path)}: expected the name of a rig, or of a YAML file")
     path = Path(name_or_path)
     if path.suffix in (".yaml", ".yml") or path.is_file():
         return path

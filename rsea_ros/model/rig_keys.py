@@ -135,18 +135,18 @@ def tables() -> str:
 def _loop_table(kind: str) -> str:
     """Return the table of a position loop whose targets command the bench."""
     keys = [(key, FIELDS[f"controller.{key}"]) for key in (*LOOP_FIELDS[kind], *LOOP_LIMITS)]
-    rows = [Key(key, *_expected(field), _LOOP_MEANINGS[key]) for key, field in keys]
+    rows = [Key(key, *_expectation(field), _LOOP_MEANINGS[key]) for key, field in keys]
     return table(f"controller, kind: {kind}", [LOOP_KIND, *rows])
 
 
 def _key(name: str, field: Field) -> Key:
-    expects, default = _expected(field)
+    expects, default = _expectation(field)
     if name.endswith("_end.inertia"):
         default = "required unless clamped"
     return Key(name.split(".")[1], expects, default, _MEANINGS[name])
 
 
-def _expected(field: Field) -> tuple[str, str]:
+def _expectation(field: Field) -> tuple[str, str]:
     """Return the expected value of a field, and its default."""
     bound = f", {'>=' if field.low_allowed else '>'} {field.low:g}" if math.isfinite(field.low) else ""
     expects = f"{plain(field.unit) or 1}{bound}"

@@ -22,13 +22,13 @@ from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.firmware_loop import STATES, control
 from rsea_ros.model.measured_motion import zero_unknown
-from rsea_ros.model.position_loop import commanded, loop_parameters
+from rsea_ros.model.position_loop import loop_parameters, with_command
 from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
-from rsea_ros.model.structure import structured
+from rsea_ros.model.structure import with_structure
 from rsea_ros.signals import Channel, FloatArray, Record
 
 _AFTER_DELAY = 1
@@ -70,7 +70,7 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
 def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
     """Return the drive of a rig from a record. Raises ChannelError where its commands are missing."""
     return drive_from(
-        commanded(record, rig),
+        with_command(record, rig),
         refine=refine,
         closed_loop=rig.loop is None and rig.controller is not None and "reference" in record,
         from_rest="position" in record and zero_unknown(record, rig, "position"),
@@ -92,11 +92,11 @@ def simulate_drives(rig: Rig, drives: Sequence[Drive], *, ride: bool = False) ->
         kind = (drive.step, drive.drift_time, len(drive.reference) > 0 or rig.loop is not None)
         if kind not in machines:
             machines[kind] = build(rig, kind[0], kind[1], in_loop=kind[2])
-        results.append(_driven(machines[kind], rig, drive, ride))
+        results.append(_drive_outputs(machines[kind], rig, drive, ride))
     return results
 
 
-def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, FloatArray]:
+def _drive_outputs(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, FloatArray]:
     """Return the channels of a drive at their sampling instants, from its own beginning."""
     ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
     channels = [n for n in drive.at if rig.measures(n)]
@@ -171,7 +171,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
 def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> Machine:
     """Make a rig ready for steps of `step` s. duration: time in which drifts reach their full size, s."""
     settings = [(effect_named(e.name), e.parameters) for e in rig.effects]
-    rig = structured(rig)
+    rig = with_structure(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
     linear = propagator(rig, step, {r for e, _ in active for r in e.reads})
@@ -226,7 +226,7 @@ def _calls(
     return calls, max(1, sum(x_sizes))
 
 
-def _sensed(rig: Rig) -> list[str]:
+def _logged_channels(rig: Rig) -> list[str]:
     """Return the channels that a bench logs: of a position loop and a spring's encoder only listed ones."""
     listed = [n for n in OUTPUTS if n in rig.sensors]
     if rig.loop is not None and listed:
@@ -238,7 +238,7 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     """Return the record that a bench would have logged: measurements stamped at the end of each hold."""
     period = float(command.t[-1] - command.t[0]) / (len(command) - 1)
     stamps, blank = command.t + period, np.zeros(len(command))
-    names = _sensed(rig)
+    names = _logged_channels(rig)
     asked = Record(
         {
             "command" if rig.loop is None else "reference": command,

@@ -6,7 +6,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.rig import Rig
 
 
-def structured(rig: Rig) -> Rig:
+def with_structure(rig: Rig) -> Rig:
     """Return the rig with the changes of structure by its effects (a compliant gear or base).
 
     Raises ParameterError for wrong parameters, and for an effect that this rig cannot have.

@@ -56,9 +56,9 @@ def distal_per_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> TransferF
 
 def distal_over_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> Fraction:
     """Return the same as a fraction."""
-    distal, _ = _expanded(rig, outputs.distal(rig, sees), "gear")
-    proximal, _ = _expanded(rig, outputs.proximal(rig), "gear")
-    return _reduced(distal, proximal)
+    distal, _ = _expand(rig, outputs.distal(rig, sees), "gear")
+    proximal, _ = _expand(rig, outputs.proximal(rig), "gear")
+    return _reduce(distal, proximal)
 
 
 def position_per_motor(rig: Rig) -> TransferFunction:
@@ -68,7 +68,7 @@ def position_per_motor(rig: Rig) -> TransferFunction:
 
 def transfer(rig: Rig, output: Output, port: str = "gear") -> TransferFunction:
     """Return any output over the torque at any of equations.PORTS."""
-    return _transfer_function(_reduced(*_expanded(rig, output, port)))
+    return _transfer_function(_reduce(*_expand(rig, output, port)))
 
 
 def state_space(rig: Rig, output: Output, port: str = "gear") -> StateSpace:
@@ -88,7 +88,7 @@ def read(system: propagator.StateSpace, output: Output, port: str = "gear") -> t
     return c, float(output.d[p] + placed[2] @ system.b[n:, p])
 
 
-def _expanded(rig: Rig, output: Output, port: str) -> tuple[FloatArray, FloatArray]:
+def _expand(rig: Rig, output: Output, port: str) -> tuple[FloatArray, FloatArray]:
     """Return numerator and denominator, lowest power first."""
     m, p = mechanics(rig), PORTS.index(port)
     z = [
@@ -125,7 +125,7 @@ def _sum(terms: Iterable[FloatArray]) -> FloatArray:
     return total
 
 
-def _reduced(numerator: FloatArray, denominator: FloatArray) -> Fraction:
+def _reduce(numerator: FloatArray, denominator: FloatArray) -> Fraction:
     """Return the fraction without common powers of s (a rig free to turn as a whole has them)."""
     common = min(int(np.argmax(p != 0.0)) for p in (numerator, denominator) if p.any())
     return Fraction(numerator[common:][::-1], denominator[common:][::-1])

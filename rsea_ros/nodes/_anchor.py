@@ -45,7 +45,7 @@ class Anchor:
         """How far the anchor has been moved since it was made, ns."""
         return self.offset - self._first
 
-    def arrived(self, received: int, earliest: int) -> int:
+    def arrival(self, received: int, earliest: int) -> int:
         """Return when a message came that the system clock says was received at an instant, ns.
 
         earliest: when messages were taken the time before. The system clock may have been set since.

@@ -75,7 +75,7 @@ class Cycle:
         self._over.clear()
         self._over.wait(2.0 / self._rate)
 
-    def running(self) -> bool:
+    def is_running(self) -> bool:
         """Return whether it still runs. Raises the error of `work`."""
         if self.error is not None:
             raise self.error

@@ -118,7 +118,7 @@ def _check_applicable(values: Values, rig: Rig) -> None:
             )
 
 
-def _simulated(values: Values) -> Device:
+def _simulated_device(values: Values) -> Device:
     from rsea_ros.hardware.simulated import SimulatedDevice  # and a compiler, which no real bench needs
 
     return SimulatedDevice(load_rig(values["rig"]), values["rate"], seed=values["seed"])
@@ -173,6 +173,6 @@ def latency_of(values: Values) -> float:
 
 DYNAMIXEL = "dynamixel_netft"
 DEVICES: Mapping[str, Callable[[Values], Device]] = {
-    "simulated": _simulated,
+    "simulated": _simulated_device,
     DYNAMIXEL: dynamixel_netft,
 }

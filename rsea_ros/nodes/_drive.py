@@ -38,7 +38,7 @@ class DriverCycle:
         self.lock = threading.Lock()
         self._deaf = 0
 
-    def wanted(self, stamp: int, by: int) -> tuple[float, float | None]:
+    def wanted_torque(self, stamp: int, by: int) -> tuple[float, float | None]:
         """Return the torque (N m) that is in force from this cycle on (its stamp rounded), and its age (s).
 
         stamp: the cycle's, ns since the epoch. A delayed cycle takes the command due by now.
@@ -91,5 +91,5 @@ def step(drives: Sequence[DriverCycle], stamp: int, buses: Sequence[Shared] = ()
         for drive in drives:
             kept.enter_context(drive.lock)
         by = drives[0].anchor.follow()
-        wanted = [drive.wanted(stamp + by, by) for drive in drives]
+        wanted = [drive.wanted_torque(stamp + by, by) for drive in drives]
         return cycle([drive.guarded for drive in drives], wanted, buses)

@@ -58,7 +58,7 @@ class HealthInputs:
             if abs(newest - self._newest) > SECOND:
                 self._waiting.clear()
             self._newest = newest
-        self._waiting += measured + [row for row in map(self._placed, commands) if row is not None]
+        self._waiting += measured + [row for row in map(self._place, commands) if row is not None]
         self._waiting.sort()
         return self._ready()
 
@@ -77,7 +77,7 @@ class HealthInputs:
         """Return the stamp of an instant, ns since 1970."""
         return (self.epoch or 0) + round(t * SECOND)
 
-    def _placed(self, row: tuple[int, int, float, float]) -> tuple[int, int, float, float] | None:
+    def _place(self, row: tuple[int, int, float, float]) -> tuple[int, int, float, float] | None:
         """Return a command at the instant from which it counts; None for one that is not a number."""
         stamp, kind, torque, _ = row
         if not math.isfinite(torque):

@@ -13,7 +13,7 @@ from rsea_ros.hardware.device import Device, State
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import DeviceFault
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._bench import Bench
+from rsea_ros.nodes._bench_topics import BenchTopics
 from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._devices import limits_of, spring_of
 from rsea_ros.nodes._drive import DriverCycle
@@ -28,7 +28,7 @@ class DrivenJoint:
     """values: parameters of this joint.
 
     part: its name among others, the namespace of its topics and services.
-    jobs: threads of services. drive, bench: present while the device is open.
+    jobs: threads of services. drive, topics: present while the device is open.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class DrivenJoint:
         self._node, self._jobs, self.part, self._values = node, jobs, part, values
         self.guarded = GuardedDevice(device, limits_of(values), values["rate"], spring_of(values))
         self.drive: DriverCycle | None = None
-        self.bench: Bench | None = None
+        self.topics: BenchTopics | None = None
         self._cycle: Cycle | None = None
         self._ended = ""
         self._reported: tuple[DeviceFault | None, int] = (None, 0)
@@ -54,11 +54,11 @@ class DrivenJoint:
         self.guarded.open(unprotected=values["allow_no_dead_host_protection"])
         self._ended = ""
         self._health.hardware = _hardware(values, self.guarded.device.health())
-        self.bench = Bench(
+        self.topics = BenchTopics(
             self._node, values, strict=True, every_record=values["ft_all"], part=self.part,
             deflects=self.guarded.measures_deflection(),
         )  # fmt: skip
-        self.drive = DriverCycle(self.guarded, self.bench, anchor, values["rate"])
+        self.drive = DriverCycle(self.guarded, self.topics, anchor, values["rate"])
 
     def runs_in(self, cycle: Cycle) -> None:
         """Note the cycle, whose times are reported with this joint's health."""
@@ -72,14 +72,14 @@ class DrivenJoint:
 
     def close(self) -> None:
         """Take the topics away; the device is closed already, or not open."""
-        if self.bench is not None:
-            self.bench.close()
-        self._cycle = self.bench = self.drive = None
+        if self.topics is not None:
+            self.topics.close()
+        self._cycle = self.topics = self.drive = None
 
     def publish(self, state: State) -> None:
         """Publish a reading."""
-        assert self.bench is not None and self.drive is not None
-        self.bench.publish(state, self.drive.anchor.shift)
+        assert self.topics is not None and self.drive is not None
+        self.topics.publish(state, self.drive.anchor.shift)
 
     def follow(self) -> None:
         """Log and publish changes: a fault, commands that were cut."""
@@ -87,19 +87,19 @@ class DrivenJoint:
         before, self._reported = self._reported, now
         if fault is not None and fault != before[0]:
             text = f"fault {fault}; torque zero until clear_fault or reboot"
-            self._node.get_logger().error(self.named(text))
+            self._node.get_logger().error(self.with_name(text))
             self._health.publish()
         if limited > before[1]:
             limits = self.guarded.guard.limits
             text = f"{limited} commands limited to {limits.torque:g} N·m and {limits.slew:g} N·m/s so far"
-            self._node.get_logger().warning(self.named(text), throttle_duration_sec=1.0)
+            self._node.get_logger().warning(self.with_name(text), throttle_duration_sec=1.0)
 
     def fail(self, error: Exception) -> None:
         """Log and keep the error that ended it."""
         self._ended = " ".join(str(error).split())
-        self._node.get_logger().error(self.named(self._ended))
+        self._node.get_logger().error(self.with_name(self._ended))
 
-    def named(self, text: str) -> str:
+    def with_name(self, text: str) -> str:
         """Return a line of the log with the name of the joint if there are several."""
         return f"{self.part}: {text}" if self.part else text
 
@@ -140,12 +140,12 @@ class DrivenJoint:
 
     def report(self) -> NodeHealth:
         """Return its health."""
-        if self._cycle is None or self.bench is None:
+        if self._cycle is None or self.topics is None:
             return NodeHealth(ERROR if self._ended else OK, self._ended or "not configured", {})
         self._cycle.rest()
         fault, cycles = self.guarded.fault, self.guarded.cycles
         lost = {words: cycles[name] for name, words in LOST.items()} if fault is None else {}
-        report = self.bench.report(self._cycle, lost)
+        report = self.topics.report(self._cycle, lost)
         values = {
             "active": self.guarded.enabled,
             "fault": fault or "none",

@@ -25,8 +25,8 @@ def joint_table(table: Sequence[NodeParameter], given: Mapping[str, Any]) -> lis
     if JOINTS not in table:
         return []
     return [
-        replace(p, name=f"{joint}.{p.name}", default=p.checked(given.get(p.name, p.default)))
-        for joint in joint_names(JOINTS.checked(given.get(JOINTS.name, JOINTS.default)))
+        replace(p, name=f"{joint}.{p.name}", default=p.check(given.get(p.name, p.default)))
+        for joint in joint_names(JOINTS.check(given.get(JOINTS.name, JOINTS.default)))
         for p in table
         if not p.whole
     ]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from msg_adapters import BagWriter
-from rsea_ros.new_files import unused
+from rsea_ros.new_files import unused_path
 from rsea_ros.nodes._cycle import SECOND
 
 
@@ -89,7 +89,7 @@ class Keeper:
         if held >= self._most:
             self.trouble = f"no bag kept: {self._folder} holds {held}, expected less than {self._most} (bags)"
             return
-        path = unused(self._folder / f"{time.strftime('%Y%m%d-%H%M%S')}-{code}")
+        path = unused_path(self._folder / f"{time.strftime('%Y%m%d-%H%M%S')}-{code}")
         self._writing = self._pool.submit(_write, path, self._ring.messages(), since)
 
 

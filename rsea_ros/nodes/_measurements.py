@@ -97,7 +97,7 @@ class Measurements:
         """Queue all desired torques that have arrived."""
         now = anchor.now()
         for stamp, (torque,), received in self._desired.take(MOST):
-            self.desired.add(stamp, torque, anchor.arrived(received, self._heard))
+            self.desired.add(stamp, torque, anchor.arrival(received, self._heard))
         self._heard = now
 
     def _refuse(self) -> None:

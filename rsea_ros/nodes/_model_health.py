@@ -59,14 +59,15 @@ class ModelHealth:
             )
         tests = self._observer.consistency()
         self.contradictions = self._contradictions(tests)
-        stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in self._inputs.frozen]
-        if self._inputs.unmoved and not stopped:
+        sensors = self._inputs.stopped
+        stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in sensors.frozen]
+        if sensors.unmoved and not stopped:
             stopped = [UNMOVED]
         doubts = (_inconsistency(name, test) for name, test in tests.items() if test.broken)
         troubles = [*stopped, *self.contradictions, *self._silence(), *doubts]
         summary = "; ".join(troubles) or self._error.verdict
         return NodeHealth(
-            WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)}
+            WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_test_values(tests)}
         )
 
     def _contradictions(self, tests: Mapping[str, Consistency]) -> list[str]:
@@ -144,7 +145,7 @@ def _inconsistency(name: str, test: Consistency) -> str:
     )
 
 
-def _tested(tests: Mapping[str, Consistency]) -> dict[str, object]:
+def _test_values(tests: Mapping[str, Consistency]) -> dict[str, object]:
     values: dict[str, object] = {}
     for name, test in tests.items():
         values |= {f"{name}.innovation": f"{test.ratio:.3f}", f"{name}.innovation_limit": f"{test.limit:.3f}"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 from operator import itemgetter
 from statistics import median
 
@@ -14,46 +15,46 @@ from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.observer import Observer, TorqueEstimate
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._frozen import Frozen
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
+from rsea_ros.nodes._stopped_sensors import StoppedSensors
 
 PERIODS = 64
-MOVED, LEAST = 12.0, 0.1
-"""Standard deviations of ft, and N m, by which it must move while joint_states stand still, to tell that they
-have stopped: more than noise does in a second, less than what matters."""
-
 _STATE, _FT = range(2)
+
+
+@dataclass(frozen=True)
+class InputSettings:
+    """How the topics are read: parameters of the node, by their names.
+
+    ft_timeout: s. axis: of the wrench, with its sign. joint: name that the joint must have; empty for any.
+    """
+
+    ft_timeout: float
+    axis: str
+    reliable: bool
+    joint: str = ""
 
 
 class ModelInputs:
     """Feeds the observer. Stamps are ns; the observer's seconds count from the first one."""
 
     def __init__(
-        self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool, *,
-        joint: str = "", ft_noise: float = 0.0, steps: bool = False, stiffness: float = 0.0,
-    ) -> None:  # fmt: skip
-        """ft_noise: standard deviation, N m. joint: name that the joint must have.
-
-        steps: whether ft may repeat a value at rest, as that of an encoder: its quantum exceeds its noise.
-        stiffness: of the spring, N m/rad.
-        """
-        self._observer = observer
-        self._sign, along = sign_and_index(axis)
-        self._timeout = round(ft_timeout * SECOND)
+        self, node: Node, observer: Observer, stopped: StoppedSensors, settings: InputSettings
+    ) -> None:
+        self._observer, self.stopped = observer, stopped
+        self._sign, along = sign_and_index(settings.axis)
+        self._timeout = round(settings.ft_timeout * SECOND)
         self._epoch: int | None = None
         self._state_stamp = self._ft_stamp = self._estimate_stamp = 0
         self._periods: deque[float] = deque(maxlen=PERIODS)
         self.refused = self.unstamped = 0
-        least = max(MOVED * ft_noise, LEAST)
-        self._still, self._idle = Frozen(least), Frozen(least)
-        self._numb, self._stiffness = Frozen(least if steps else 0.0), stiffness
-        deep = RECORD_RELIABLE if reliable else None
+        deep = RECORD_RELIABLE if settings.reliable else None
         self._commands, self._states, self.ft = (
             Mailbox(
                 node,
                 topic,
-                MessageFields(kind, tuple(fields), "" if topic == "ft" else joint),
+                MessageFields(kind, tuple(fields), "" if topic == "ft" else settings.joint),
                 deep or usual,
                 self._refuse,
             )
@@ -72,8 +73,8 @@ class ModelInputs:
         samples += [(t, self._sign * y, math.nan, _FT) for t, (y,), _ in self.ft.take()]
         samples.sort(key=itemgetter(0, 3))
         for stamp, a, b, kind in samples:
-            estimate = self._measured(stamp, a, b, kind)
-            if estimate is not None and (kind == _FT or self.ft_silent or self._numb.frozen):
+            estimate = self._measure(stamp, a, b, kind)
+            if estimate is not None and (kind == _FT or self.ft_silent or self.stopped.ft_frozen):
                 self._note_period(stamp)
                 yield stamp, estimate
 
@@ -98,31 +99,17 @@ class ModelInputs:
         """Median time between estimates, s; nan before there are enough."""
         return median(self._periods) if len(self._periods) == PERIODS else math.nan
 
-    @property
-    def frozen(self) -> list[str]:
-        """Topics that repeat a value where it should change."""
-        topics = (("joint_states", self._still), ("ft", self._numb))
-        return [topic for topic, sensor in topics if sensor.frozen]
-
-    @property
-    def unmoved(self) -> bool:
-        """Whether joint_states repeat a value while commands move: they have stopped, or the drive is off."""
-        return self._idle.frozen
-
-    def _measured(self, stamp: int, a: float, b: float, kind: int) -> TorqueEstimate | None:
+    def _measure(self, stamp: int, a: float, b: float, kind: int) -> TorqueEstimate | None:
         """Give a sample to the observer, unless its sensor has stopped."""
         if kind == _FT:
             self._ft_stamp = stamp
-            self._still.beside(a)
-            if self._numb.take(stamp, (a,)):
+            if self.stopped.take_ft(stamp, a):
                 return None
             return self._observer.ft(self.seconds(stamp), a)
         if not self._ft_stamp or stamp < self._ft_stamp - SECOND:
             self._ft_stamp = stamp
         self._state_stamp = stamp
-        self._idle.take(stamp, (a, b))
-        self._numb.beside(self._stiffness * a)
-        if self._still.take(stamp, (a, b)):
+        if self.stopped.take_state(stamp, a, b):
             return None
         return self._observer.state(self.seconds(stamp), a, b)
 
@@ -139,7 +126,7 @@ class ModelInputs:
         if not math.isfinite(torque):
             self._refuse()
         elif stamp:
-            self._idle.beside(torque)
+            self.stopped.take_command(torque)
             self._observer.command(self.seconds(stamp), torque)
 
     def _refuse(self) -> None:

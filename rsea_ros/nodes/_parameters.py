@@ -37,7 +37,7 @@ class NodeParameter:
     choices: Sequence[str] = ()
     whole: bool = False
 
-    def expected(self) -> str:
+    def requirement(self) -> str:
         """Return the requirement on a value, in words."""
         if self.choices:
             return f"one of {', '.join(self.choices)}"
@@ -46,14 +46,14 @@ class NodeParameter:
         bounds = "" if self.low is None else f" from {self.low:g} to {self.high:g}"
         return f"{kind}{bounds}{f' {plain(self.unit)}' if self.unit else ''}"
 
-    def checked(self, value: Any) -> Value:
+    def check(self, value: Any) -> Value:
         """Return a value that fits, in the type of the default. Raises ParameterError for any other."""
         if isinstance(self.default, float) and type(value) is int:
             value = float(value)
         if isinstance(self.default, list):
             value = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
         if type(value) is not type(self.default) or not self._fits(value):
-            raise ParameterError(f"parameter {self.name} = {value!r}, expected {self.expected()}")
+            raise ParameterError(f"parameter {self.name} = {value!r}, expected {self.requirement()}")
         result: Value = value
         return result
 
@@ -90,7 +90,7 @@ def declare(
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
     table = [*table, *more(given)]
     _refuse_unknown(given, table)
-    values = {p.name: p.checked(given.get(p.name, p.default)) for p in table}
+    values = {p.name: p.check(given.get(p.name, p.default)) for p in table}
     for parameter in table:
         if parameter.name in given:
             node.undeclare_parameter(parameter.name)
@@ -112,14 +112,14 @@ def _descriptor(parameter: NodeParameter) -> Any:
     low, high, bounds = parameter.low, parameter.high, None
     if low is not None and high is not None:
         bounds = (int(low), int(high)) if isinstance(parameter.default, int) else (float(low), float(high))
-    return parameter_descriptor(_described(parameter), f"expected {parameter.expected()}", bounds)
+    return parameter_descriptor(_describe(parameter), f"expected {parameter.requirement()}", bounds)
 
 
-def _described(parameter: NodeParameter) -> str:
+def _describe(parameter: NodeParameter) -> str:
     return f"{parameter.description}, {plain(parameter.unit)}" if parameter.unit else parameter.description
 
 
 def usage(name: str, table: Sequence[NodeParameter]) -> str:
     """Return the help text of a node."""
-    rows = [f"  {p.name:<11} {p.description}; {p.expected()} (default {p.default!r})" for p in table]
+    rows = [f"  {p.name:<11} {p.description}; {p.requirement()} (default {p.default!r})" for p in table]
     return "\n".join([f"usage: ros2 run rsea_ros {name} --ros-args -p NAME:=VALUE …", "", *rows, ""])

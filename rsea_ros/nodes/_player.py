@@ -66,7 +66,7 @@ class Player:
     def over(self) -> bool:
         """Return whether everything is published. Raises the error of the thread."""
         if self.started:
-            self.cycle.running()
+            self.cycle.is_running()
         soft = self._stopped_at + round(SOFT * self.rate) if self.stopped else len(self.command)
         return self.next >= min(soft, len(self.command)) or (self.stopped and not self.started)
 

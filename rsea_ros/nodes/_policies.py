@@ -114,7 +114,7 @@ def interfaces(name: str, **parameters: object) -> Interfaces:
         node = kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
         program = make(node, declare(node, table))
         try:
-            return _asked(node, name)
+            return _ask(node, name)
         finally:
             program.close()
             node.destroy_node()
@@ -135,7 +135,7 @@ def document(profiles: Profiles) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{XML.tostring(policy, encoding="unicode")}\n'
 
 
-def _asked(node: Any, name: str) -> Interfaces:
+def _ask(node: Any, name: str) -> Interfaces:
     def names(ask: Callable[[str, str], Iterable[tuple[str, Any]]]) -> set[str]:
         return {topic for topic, _ in ask(name, f"/{NAMESPACE}")}
 

@@ -34,7 +34,7 @@ TICK = 0.1
 class Program(Protocol):
     """The work of a node beside its callbacks."""
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Return whether the work is done; raises the error of a thread."""
 
     def conclude(self) -> None:
@@ -136,7 +136,7 @@ def _work(node: Node, program: Program, stop: _Stop) -> bool:
         done = False
         while not (stop.asked or done):
             ready = anything_to_do(node, executor, TICK)
-            done = program.finished()
+            done = program.is_finished()
             if ready and not done:
                 executor.spin_once(timeout_sec=0.0)
         stop.interrupt()

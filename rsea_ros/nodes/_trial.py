@@ -82,7 +82,7 @@ class LiveRun:
         self._ears, self._player = ears, player
         self._over_at, self._why = 0.0, ""
         self._rest = max(_TAIL, SHORTEST + _TAIL - len(player.command) / player.rate)
-        ears.begin(self._failed)
+        ears.begin(self._fail)
 
     def stop(self, why: str) -> None:
         """Go softly to zero; the run counts for nothing. why: the first reason stays."""
@@ -119,7 +119,7 @@ class LiveRun:
         check_followed(record)
         return record
 
-    def _failed(self, why: str) -> None:
+    def _fail(self, why: str) -> None:
         """Stop when a node of the bench reports a failure."""
         if self._player.started:
             self.stop(why)

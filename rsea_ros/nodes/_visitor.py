@@ -20,7 +20,7 @@ POLL = 0.05
 
 
 @contextmanager
-def visiting(name: str) -> Iterator[Node]:
+def visit(name: str) -> Iterator[Node]:
     """Yield a node that logs nowhere and offers no services; leave the graph afterwards."""
     os.environ.setdefault(*LOCAL)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)

@@ -40,7 +40,7 @@ class Waiter:
         if self.thread.is_alive():
             self.thread.join()
 
-    def running(self) -> bool:
+    def is_running(self) -> bool:
         """Return whether it still runs. Raises the error of `work`."""
         if self.error is not None:
             raise self.error

@@ -54,7 +54,7 @@ class WatchCommand:
             self._see_to_the_limits()
             self.why_not = self._reason()
         if self._cycle is not None:
-            self._cycle.running()
+            self._cycle.is_running()
             if not self.commander.active:
                 self._cycle.stop()
                 self._cycle = None

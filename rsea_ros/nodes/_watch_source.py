@@ -88,7 +88,7 @@ class WatchSource:
         rates = {topic: round(count / span) for topic, count in self._counts.items() if count}
         self._counts = dict.fromkeys(self._boxes, 0)
         self._health = {name: each for name, each in self._health.items() if now - each[0] < GONE}
-        shown = [_shown(now - heard, each) for _, (heard, each) in sorted(self._health.items())]
+        shown = [_status_json(now - heard, each) for _, (heard, each) in sorted(self._health.items())]
         return {"bench": self.bench, "health": shown, "rates": rates}
 
     def _of(self, topic: str) -> Sequence[tuple[int, Sequence[float]]]:
@@ -120,7 +120,7 @@ def _put(rows: Rows, t: float, **values: float) -> None:
         rows.setdefault(name, []).append((t, value))
 
 
-def _shown(age: float, status: Mapping[str, Any]) -> Mapping[str, Any]:
+def _status_json(age: float, status: Mapping[str, Any]) -> Mapping[str, Any]:
     if age < SILENT:
         return status
     return {**status, "level": STALE, "message": f"silent for {age:.0f} s; before: {status['message']}"}

@@ -75,12 +75,12 @@ class ControllerNode:
             arrived = list(self._inputs.take())
             for k, (stamp, reading) in enumerate(arrived):
                 if not self._fault:
-                    self._measured(stamp, reading, len(arrived) if k == len(arrived) - 1 else 0)
+                    self._measure(stamp, reading, len(arrived) if k == len(arrived) - 1 else 0)
             if time.monotonic_ns() - self._watched > WATCH * SECOND:
                 self._watched = time.monotonic_ns()
                 self._watch()
 
-    def _measured(self, stamp: int, reading: Measurement, together: int) -> None:
+    def _measure(self, stamp: int, reading: Measurement, together: int) -> None:
         """Command for a measurement, one for each period of the grid that they lie on.
 
         together: how many came at once, for the newest of them; 0 for the others, which it replaces.
@@ -166,13 +166,13 @@ class ControllerNode:
         response.success, response.message = True, "clear_fault: done"
         return response
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Run until stopped; report a new fault."""
         before, self._told_fault = self._told_fault, self._fault
         if self._told_fault not in ("", before):
             self._node.get_logger().error(f"{self._told_fault}; torque zero until clear_fault")
             self._health.publish()
-        return not self._waiter.running()
+        return not self._waiter.is_running()
 
     def conclude(self) -> None:
         """Leave nothing to do: `close` commands the zeros."""

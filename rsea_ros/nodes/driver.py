@@ -20,7 +20,7 @@ from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
 from rsea_ros.nodes._alarm import SignalListener
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._bench import NAMES, SPRING_FRAME
+from rsea_ros.nodes._bench_topics import NAMES, SPRING_FRAME
 from rsea_ros.nodes._buses import devices_of
 from rsea_ros.nodes._combined import Combined
 from rsea_ros.nodes._cycle import Cycle
@@ -111,7 +111,7 @@ class DriverNode(ManagedEntity):
             for joint in self.joints:
                 joint.enable()
         except RseaError as error:
-            self._node.get_logger().error(joint.named(f"not activated: {error}"))
+            self._node.get_logger().error(joint.with_name(f"not activated: {error}"))
             self._disable([each for each in self.joints if each.guarded.enabled])
             return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS
@@ -128,7 +128,7 @@ class DriverNode(ManagedEntity):
 
     on_shutdown = on_error = on_cleanup
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Report faults; return to unconfigured when the cycle has ended with an exception.
 
         The executor's next work begins between two cycles.
@@ -193,7 +193,7 @@ class DriverNode(ManagedEntity):
             try:
                 joint.guarded.disable()
             except RseaError as error:
-                self._node.get_logger().error(joint.named(f"while deactivating: {error}"))
+                self._node.get_logger().error(joint.with_name(f"while deactivating: {error}"))
 
     def _halt(self) -> None:
         """End the torque with the next cycle, since the process is to end."""

@@ -42,7 +42,7 @@ class ExciteNode:
     """Plays one excitation, or the file of one, and ends."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
-        command, rate = planned(values)
+        command, rate = plan(values)
         check_limits(command, values["limit"], rate)
         self._node, self._wanted = node, values["subscribers"]
         self._player = Player(
@@ -51,7 +51,7 @@ class ExciteNode:
         self._health = Health(node, self._report)
         node.create_timer(1.0, self._tell, clock=STEADY)
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Return whether the whole excitation is out."""
         return self._player.over()
 
@@ -85,7 +85,7 @@ class ExciteNode:
         return NodeHealth(level, "running" if p.started else "waiting for a measurement", values)
 
 
-def planned(values: dict[str, Any]) -> tuple[FloatArray, float]:
+def plan(values: dict[str, Any]) -> tuple[FloatArray, float]:
     """Return the command, N m, and its rate, Hz: of `file` where one is given, else of the parameters."""
     if values["file"]:
         return read_run(values["file"])

@@ -19,12 +19,12 @@ from msg_adapters.overlay_bag import write_overlay
 from msg_adapters.ros import JointState, Trigger
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.experiment.campaign import Budget, Campaign, CampaignOutcome, Round
-from rsea_ros.experiment.opinion import diagnosed
+from rsea_ros.experiment.opinion import diagnose_together
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_limits import limits_from
 from rsea_ros.experiment.weighed_causes import USUAL, causes_from
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.new_files import Destination, unused
+from rsea_ros.new_files import Destination, unused_path
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._player import Player
@@ -32,7 +32,7 @@ from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._trial import Ears, LiveRun
 from rsea_ros.report.campaign.files import write_campaign
-from rsea_ros.report.campaign.words import end_sentence, known
+from rsea_ros.report.campaign.words import end_sentence, known_causes
 from rsea_ros.report.diagnosis.files import write_diagnosis
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.experiment.words import shape_words
@@ -63,7 +63,7 @@ class ExperimentNode:
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node, self._values = node, values
-        self._out = unused(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
+        self._out = unused_path(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
         self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
         self._ears = Ears(node, values["axis"])
         self._trial: LiveRun | None = None
@@ -72,7 +72,7 @@ class ExperimentNode:
         self._answer: bool | None = None
         self._cancelled = ""
         self._changed = threading.Condition()
-        self._campaign = self._made(values)
+        self._campaign = self._make(values)
         self._runs = 0
         for name, answer in (
             ("approve", self._approve),
@@ -85,7 +85,7 @@ class ExperimentNode:
         self._pool = ThreadPoolExecutor(1, "experiment")
         self._work: Future[CampaignOutcome] = self._pool.submit(self._go)
 
-    def _made(self, values: dict[str, Any]) -> Campaign:
+    def _make(self, values: dict[str, Any]) -> Campaign:
         asked = DesignRequest(limits_from(values["limits"]), values["rate"], longest=values["longest"])
         budget = Budget(values["seconds"], values["energy"])
         causes = causes_from(values["causes"])
@@ -101,7 +101,7 @@ class ExperimentNode:
     def _hear(self, round_: Round) -> None:
         self._round = round_
         log = self._node.get_logger()
-        log.info(known(round_.weighing))
+        log.info(known_causes(round_.weighing))
         assert round_.proposal is not None
         log.info(
             f"proposed: {shape_words(round_.proposal)}; {round_.proposal.decided:.0%} expected to be decided"
@@ -143,12 +143,12 @@ class ExperimentNode:
         )
 
     def _approve(self, request: Any, response: Any) -> Any:
-        return self._answered(True, response)
+        return self._take_answer(True, response)
 
     def _decline(self, request: Any, response: Any) -> Any:
-        return self._answered(False, response)
+        return self._take_answer(False, response)
 
-    def _answered(self, answer: bool, response: Any) -> Any:
+    def _take_answer(self, answer: bool, response: Any) -> Any:
         with self._changed:
             waits = self._proposal is not None and self._answer is None
             if waits:
@@ -171,7 +171,7 @@ class ExperimentNode:
         )
         return response
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Return whether the loop has ended."""
         return self._work.done()
 
@@ -185,13 +185,13 @@ class ExperimentNode:
         report = write_campaign(outcome, self._campaign, self._out)
         self._health.publish()
         if outcome.seconds:
-            log.info(f"diagnosis of all runs: {self._diagnosed(outcome)}")
+            log.info(f"diagnosis of all runs: {self._diagnose(outcome)}")
         log.info(f"report: {report}")
 
-    def _diagnosed(self, outcome: CampaignOutcome) -> str:
+    def _diagnose(self, outcome: CampaignOutcome) -> str:
         """Write the diagnosis of all runs together and return its sentence; a person may interrupt it."""
         try:
-            verdict = diagnosed(outcome.records, self._campaign.rig, self._campaign.causes)
+            verdict = diagnose_together(outcome.records, self._campaign.rig, self._campaign.causes)
             write_diagnosis(
                 verdict, outcome.records[-1], Destination(self._out / "diagnosis", fresh=True), write_overlay
             )

@@ -143,7 +143,7 @@ class HealthNode:
             values |= {"bag": self._keeper.last, "diagnose": self._command(self._keeper.last)}
         return values
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Run until stopped."""
         return False
 

@@ -20,7 +20,7 @@ from msg_adapters.topic_map import ROLES, TYPES, TopicMap
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.new_files import check_free, unused
+from rsea_ros.new_files import check_free, unused_path
 from rsea_ros.nodes._diagnosing import Diagnosing
 from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
@@ -67,7 +67,7 @@ class IdentifyNode:
         self._contents = Contents()
         self._commanded, self._asked, self._done = 0.0, False, False
         self._service = node.create_service(Trigger, "~/finish", self._on_finish)
-        self._out = unused(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
+        self._out = unused_path(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
         check_free(self._out / name for name in IDENTIFICATION)
         self._diagnosing = Diagnosing(self._rig, self._out / "diagnosis")
         self._answering = 0
@@ -93,7 +93,7 @@ class IdentifyNode:
 
     def _on_finish(self, request: Any, response: Any) -> Any:
         self._asked = True
-        response.success, response.message = True, f"identifying from {self._gathered()}"
+        response.success, response.message = True, f"identifying from {self._progress_text()}"
         return response
 
     async def _on_diagnose(self, request: Any, response: Any) -> Any:
@@ -110,7 +110,7 @@ class IdentifyNode:
         self._health.publish()
         return response
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Return whether the commands are over and every diagnosis has been answered."""
         waited = self._commanded > 0.0 and time.monotonic() - self._commanded > self._values["quiet"]
         over = waited and not self._node.count_publishers(self._topics.topic("torque_command"))
@@ -126,7 +126,7 @@ class IdentifyNode:
         if not self._done:
             return
         log = self._node.get_logger()
-        log.info(f"identifying from {self._gathered()}")
+        log.info(f"identifying from {self._progress_text()}")
         record = held_against(self._record(), self._rig, self._values["axis"], masks=False)
         result = identify([record], self._rig, self._progress)
         report = write_results(result, self._out)
@@ -152,7 +152,7 @@ class IdentifyNode:
         """Leave nothing behind."""
         self._diagnosing.close()
 
-    def _gathered(self) -> str:
+    def _progress_text(self) -> str:
         lost = sum(tap.lost for tap in self._taps.values())
         return (
             ", ".join(f"{tap.count} {role}" for role, tap in self._taps.items() if tap.count)
@@ -162,7 +162,7 @@ class IdentifyNode:
     def _tell(self) -> None:
         log = self._node.get_logger()
         if self._commanded:
-            log.info(self._gathered())
+            log.info(self._progress_text())
         else:
             log.info("waiting for torque_command", throttle_duration_sec=10.0)
 

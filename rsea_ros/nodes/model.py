@@ -15,19 +15,19 @@ from msg_adapters.topic_map import TYPES
 from rsea_ros.model.observer import Observer
 from rsea_ros.model.pure_torque import FlagSettings, PureTorque
 from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings
-from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._flags import Flags
 from rsea_ros.nodes._health import Health, NodeHealth
 from rsea_ros.nodes._model_health import ModelHealth
-from rsea_ros.nodes._model_inputs import ModelInputs
+from rsea_ros.nodes._model_inputs import InputSettings, ModelInputs
 from rsea_ros.nodes._model_noise import noise_from
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._realtime import REALTIME, keep_time
 from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._stopped_sensors import stopped_sensors
 from rsea_ros.nodes._waiter import Waiter
 
 TABLE = (
@@ -81,10 +81,9 @@ class ModelNode:
         template = serialize_message(efforts_message(0, dict.fromkeys(NAMES, 0.0)))
         self._writer = RawWriter(template, TYPES["joint_states"], "effort")
         self._flags = Flags(node)
-        self._inputs = ModelInputs(
-            node, observer, values["ft_timeout"], values["axis"], values["reliable"], joint=values["joint"],
-            ft_noise=noise.ft, steps=_steps(rig), stiffness=rig["spring.stiffness"],
-        )  # fmt: skip
+        read = InputSettings(**{n: values[n] for n in ("ft_timeout", "axis", "reliable", "joint")})
+        self._stopped = stopped_sensors(rig, noise.ft)
+        self._inputs = ModelInputs(node, observer, self._stopped, read)
         self._assess = ModelHealth(rig, noise, observer, self._flag, self._error, self._inputs)
         self._lock = threading.Lock()
         self._health = Health(node, self._report, values["rig"])
@@ -106,15 +105,15 @@ class ModelNode:
     @property
     def _doubted(self) -> bool:
         """Whether a sensor has stopped or is wrong: nobody knows the torque then."""
-        return bool(self._inputs.frozen or self._inputs.unmoved or self._assess.contradictions)
+        return bool(self._stopped.frozen or self._stopped.unmoved or self._assess.contradictions)
 
     def _report(self) -> NodeHealth:
         with self._lock:
             return self._assess.report()
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Run until stopped."""
-        return not self._waiter.running()
+        return not self._waiter.is_running()
 
     def conclude(self) -> None:
         """Leave nothing to do."""
@@ -123,12 +122,6 @@ class ModelNode:
         """Leave nothing behind: the flag of a node that is gone is down, and its subscribers know."""
         self._waiter.stop()
         self._flags.lower()
-
-
-def _steps(rig: Rig) -> bool:
-    """Return whether the quantum of ft is larger than what its noise changes at each sample."""
-    ft = rig.sensors.get("ft")
-    return ft is not None and ft.quantum > 2.0 * ft.noise
 
 
 def main() -> int:

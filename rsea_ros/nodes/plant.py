@@ -10,7 +10,7 @@ from rclpy.node import Node
 
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._bench import NAMES, SPRING_FRAME, Bench
+from rsea_ros.nodes._bench_topics import NAMES, SPRING_FRAME, BenchTopics
 from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import Health
 from rsea_ros.nodes._parameters import NodeParameter
@@ -48,9 +48,9 @@ class PlantNode:
             duration=values["duration"],
             clock=lambda: self._now,
         )
-        self._bench = Bench(node, values, deflects="deflection" in rig.sensors)
+        self._topics = BenchTopics(node, values, deflects="deflection" in rig.sensors)
         self._cycle = Cycle(values["rate"], self._step, catch_up=True)
-        self._health = Health(node, lambda: self._bench.report(self._cycle), f"simulated {values['rig']}")
+        self._health = Health(node, lambda: self._topics.report(self._cycle), f"simulated {values['rig']}")
         self._log.info(f"rig {rig.name} at {values['rate']:g} Hz")
         self._cycle.start()
 
@@ -59,12 +59,12 @@ class PlantNode:
             self._now = stamp
             self._device.open()
         self._let_commands_in(self._cycle.anchor.now() - stamp)
-        self._bench.poll(self._cycle.anchor)
-        for instant, torque in self._bench.commands.take(stamp):
+        self._topics.poll(self._cycle.anchor)
+        for instant, torque in self._topics.commands.take(stamp):
             self._now = instant
             self._device.write(torque)
         self._now = stamp
-        self._bench.publish(self._device.read())
+        self._topics.publish(self._device.read())
 
     def _let_commands_in(self, behind: int) -> None:
         """Pause once after a stall (ns): commands sent meanwhile are still on their way."""
@@ -72,9 +72,9 @@ class PlantNode:
             time.sleep(PAUSE)
         self._behind = behind
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Run until stopped."""
-        return not self._cycle.running()
+        return not self._cycle.is_running()
 
     def conclude(self) -> None:
         """Leave nothing to do."""
@@ -83,7 +83,7 @@ class PlantNode:
         """Stop the simulation, at zero torque; warn if a bag of it would have wrong stamps."""
         self._cycle.stop()
         self._device.close()
-        if mistimed := self._bench.commands.late + self._bench.commands.unstamped:
+        if mistimed := self._topics.commands.late + self._topics.commands.unstamped:
             self._log.warning(f"{mistimed} commands did not act at their stamps, as a bag says they did")
         if gaps := self._cycle.left_out:
             self._log.warning(f"{gaps} samples were left out while this machine stood still")

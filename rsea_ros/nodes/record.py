@@ -13,7 +13,7 @@ from rclpy.node import Node
 from msg_adapters import BagWriter
 from msg_adapters.ros import message_type
 from msg_adapters.topic_map import JOINT_STATE, WRENCH
-from rsea_ros.new_files import unused
+from rsea_ros.new_files import unused_path
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
@@ -55,7 +55,7 @@ class RecordNode:
         self._node = node
         self._duration: float = values["duration"]
         self._quiet: float = values["quiet"]
-        path = values["out"] or unused(Path("runs") / time.strftime("%Y%m%d-%H%M%S"))
+        path = values["out"] or unused_path(Path("runs") / time.strftime("%Y%m%d-%H%M%S"))
         self._bag = BagWriter(path, values["storage"], interval=values["sync"]).__enter__()
         self._taps = {name: self._tap(name, kind) for name, kind in TOPICS.items()}
         self._begin = self._commanded = 0.0
@@ -75,7 +75,7 @@ class RecordNode:
             self._begin = self._begin or now
         self._bag.write(self._taps[name].topic, kind, received, raw)
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Return whether the duration is over, or the commands have ceased."""
         self._bag.keep_up()
         now = time.monotonic()
@@ -93,15 +93,15 @@ class RecordNode:
     def _counts(self) -> dict[str, int]:
         return {name: tap.count for name, tap in self._taps.items() if tap.count}
 
-    def _lost(self) -> int:
+    def _lost_count(self) -> int:
         return sum(tap.lost for tap in self._taps.values())
 
     def _tell(self) -> None:
         counts = ", ".join(f"{count} {name}" for name, count in self._counts().items())
-        self._node.get_logger().info(f"{counts or 'nothing yet'}; {self._lost()} lost")
+        self._node.get_logger().info(f"{counts or 'nothing yet'}; {self._lost_count()} lost")
 
     def _report(self) -> NodeHealth:
-        lost = self._lost()
+        lost = self._lost_count()
         summary = f"{lost} messages lost" if lost else "recording"
         return NodeHealth(WARN if lost else OK, summary, {**self._counts(), "lost_messages": lost})
 

@@ -74,7 +74,7 @@ class ReplayNode:
                 self._node.get_logger().warning(f"{topic} is left out: {error}")
         return publishers
 
-    def _awaited(self) -> bool:
+    def _awaits_subscribers(self) -> bool:
         """Return whether subscribers are still missing."""
         return any(
             publisher.get_subscription_count() < self._wanted
@@ -83,7 +83,7 @@ class ReplayNode:
         )
 
     def _run(self) -> None:
-        while self._awaited():
+        while self._awaits_subscribers():
             if self._stop.wait(0.05):
                 return
         begin, first, ticked = time.monotonic_ns() + DISCOVERY_TIME, self._rows[0][2], 0
@@ -101,7 +101,7 @@ class ReplayNode:
             publisher.wait_for_all_acked(HEARTBEAT)
         self._done.set()
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Return whether all messages are published and have arrived."""
         return self._done.is_set()
 

@@ -52,11 +52,11 @@ class WatchNode:
         for address in self._server.addresses:  # not to the log: it has the token
             sys.stderr.write(f"open {address}\n")
 
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Run until stopped."""
         if self._command is not None:
             self._command.look()
-        return not self._server.running()
+        return not self._server.is_running()
 
     def conclude(self) -> None:
         """Leave nothing to do."""

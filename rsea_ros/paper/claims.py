@@ -90,10 +90,10 @@ def table_2(name: str) -> float:
 
 def claims() -> tuple[PaperClaim, ...]:
     """Return every printed number that others determine, those from the paper's numbers alone first."""
-    return (*_recomputed(), *_from_the_springs(), *_from_the_parts())
+    return (*_recompute(), *_from_the_springs(), *_from_the_parts())
 
 
-def _recomputed() -> Iterator[PaperClaim]:
+def _recompute() -> Iterator[PaperClaim]:
     c_2 = formulas.EQ_10[2]
     yield PaperClaim(
         "Eq. (10)", "K_s/J_eff, numerator", "1560.436", c_2, "1/s^2", "K_s/J_eff of the denominator"

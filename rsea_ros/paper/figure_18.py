@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from rsea_ros.model import outputs
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
@@ -27,14 +27,14 @@ def readings(rig: Rig) -> dict[str, Rig]:
     return {
         "unlumped": rig,
         "lumped, loads moving": replace(rig, train="lumped"),
-        "lumped, motor grounded": lumped(rig),
+        "lumped, motor grounded": lumped_rig(rig),
     }
 
 
 def resonance_hz(rig: Rig, low: float = 3.0) -> float:
     """Return where the torque at the spring end is largest above low, Hz."""
     hz = _HZ[low <= _HZ]
-    return _sharpened(
+    return _sharpen(
         hz, int(np.argmax(_decibel(rig, hz))), lambda f: -float(_decibel(rig, np.array([f]))[0])
     )
 
@@ -45,7 +45,7 @@ def largest_gap(rig: Rig, other: Rig) -> tuple[float, float]:
     def gap(hz: FloatArray) -> FloatArray:
         return np.abs(_decibel(rig, hz) - _decibel(other, hz))
 
-    f = _sharpened(_HZ, int(np.argmax(gap(_HZ))), lambda f: -float(gap(np.array([f]))[0]))
+    f = _sharpen(_HZ, int(np.argmax(gap(_HZ))), lambda f: -float(gap(np.array([f]))[0]))
     return f, float(gap(np.array([f]))[0])
 
 
@@ -54,7 +54,7 @@ def _decibel(rig: Rig, hz: FloatArray) -> FloatArray:
     return np.asarray(20.0 * np.log10(np.abs(response)))
 
 
-def _sharpened(hz: FloatArray, at: int, cost: Callable[[float], float]) -> float:
+def _sharpen(hz: FloatArray, at: int, cost: Callable[[float], float]) -> float:
     """Return the minimum of a cost over log frequency, between the neighbours of a grid point."""
     low, high = (math.log(hz[k]) for k in (max(at - 1, 0), min(at + 1, len(hz) - 1)))
     best = minimize_scalar(lambda x: cost(math.exp(x)), bounds=(low, high), method="bounded")

@@ -15,7 +15,7 @@ import numpy as np
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.paper.rival_models import Rival, compare
@@ -36,9 +36,9 @@ Bag = Callable[[str, Record], Record]
 
 @dataclass(frozen=True)
 class MovingOutput:
-    """bench: the true rig. rivals: unlumped and lumped, fitted. responses: measured, F/T per command."""
+    """true_rig: of the bench. rivals: unlumped and lumped, fitted. responses: measured, F/T per command."""
 
-    bench: Rig
+    true_rig: Rig
     rivals: tuple[Rival, ...]
     responses: Mapping[str, FrequencyResponse]
 
@@ -50,35 +50,35 @@ def moving_output(
 
     channels: used by the fit beside the command; the paper had the F/T sensor alone.
     """
-    bench = drawn(rig, seed)
+    true_rig = draw(rig, seed)
     values = excitation(
         "white_noise", ExcitationSettings(rate=RATE, duration=duration, amplitude=NOISE, seed=seed)
     )
     command = Channel(np.arange(len(values)) / RATE, values)
     ends = ["spring_end", *(["housing_end"] if "proximal_spring.stiffness" in rig.quantities else [])]
-    records = {end: bag(f"{rig.name}_{end}", _record(bench, end, command, seed)) for end in ends}
+    records = {end: bag(f"{rig.name}_{end}", _record(true_rig, end, command, seed)) for end in ends}
     middle = 0.5 * duration
     train = _only(records["spring_end"].between(0.0, middle), channels)
     holdout = [(end, record.between(middle, duration + 1.0)) for end, record in records.items()]
-    rivals = compare({"unlumped": rig, "lumped": loosened(lumped(rig))}, train, holdout)
-    return MovingOutput(bench, rivals, {end: estimate_response(r, "ft") for end, r in records.items()})
+    rivals = compare({"unlumped": rig, "lumped": loosen(lumped_rig(rig))}, train, holdout)
+    return MovingOutput(true_rig, rivals, {end: estimate_response(r, "ft") for end, r in records.items()})
 
 
-def drawn(rig: Rig, seed: int) -> Rig:
+def draw(rig: Rig, seed: int) -> Rig:
     """Return the rig with its free values drawn from half their spread, log-normal."""
     rng = np.random.default_rng(seed)
     factors = {n: float(np.exp(_PART * rig.spread(n) * rng.standard_normal())) for n in rig.free()}
     return rig.with_values({n: rig[n] * factor for n, factor in factors.items()})
 
 
-def loosened(rig: Rig) -> Rig:
+def loosen(rig: Rig) -> Rig:
     """Return the rig with priors on its free values that hold nothing back."""
     wide = {n: replace(rig.quantities[n], spread=_LOOSE) for n in rig.free()}
     return replace(rig, quantities={**rig.quantities, **wide})
 
 
-def _record(bench: Rig, end: str, command: Channel, seed: int) -> Record:
-    return synthesize(replace(bench, ft_end=end), command, seed=seed + len(end))
+def _record(true_rig: Rig, end: str, command: Channel, seed: int) -> Record:
+    return synthesize(replace(true_rig, ft_end=end), command, seed=seed + len(end))
 
 
 def _only(record: Record, channels: tuple[str, ...]) -> Record:

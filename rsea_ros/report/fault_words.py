@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rsea_ros.fault_kinds import MASKED
 from rsea_ros.report import words
 from rsea_ros.signals import Fault
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 
 def fault(*alike: Fault) -> str:
@@ -17,7 +17,7 @@ def fault(*alike: Fault) -> str:
     alike: the same fault of several channels or records.
     """
     f, channels = alike[0], list(dict.fromkeys(f.channel for f in alike))
-    names = listed([words.channel(channel) for channel in channels])
+    names = list_names([words.channel(channel) for channel in channels])
     if f.kind == "missing_topic":
         return f"{names} {'are' if len(channels) > 1 else 'is'} missing"
     detail = f" ({f.detail})" if f.detail else ""
@@ -49,7 +49,9 @@ def _by_channel(items: Sequence[Fault]) -> str:
     kinds: dict[str, list[str]] = {}
     for f in items:
         kinds.setdefault(f.channel, []).append(_kind(f))
-    return "; ".join(f"{listed(k)} in {words.channel(n)}" if n else listed(k) for n, k in kinds.items())
+    return "; ".join(
+        f"{list_names(k)} in {words.channel(n)}" if n else list_names(k) for n, k in kinds.items()
+    )
 
 
 def _size(f: Fault) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from rsea_ros.identification.remark import Code, Remark
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.report import words
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _TORQUE_BY_MOTOR_CONSTANT = (
     "No F/T sensor takes part in this fit, so every torque is known only through the motor constant: "
@@ -38,8 +38,9 @@ def remark_sentences(remarks: Iterable[Remark]) -> tuple[str, ...]:
 
 def coloured_noise(channels: Iterable[str]) -> str:
     """Return the residuals that were taken for coloured noise of sensors, and why."""
+    names = list_names([words.channel(n) for n in channels])
     return (
-        f"The noise of the {listed([words.channel(n) for n in channels])} is coloured: its level was taken "
+        f"The noise of the {names} is coloured: its level was taken "
         "from the residual, which is steady, falls with frequency, and agrees with neither command nor "
         "motion nor another sensor."
     )
@@ -47,7 +48,7 @@ def coloured_noise(channels: Iterable[str]) -> str:
 
 def _even_clocks(remark: Remark) -> str:
     scatter = zip(remark.names, remark.values, strict=True)
-    sizes = listed([f"{n} by {1e3 * s:.2g} ms RMS" for n, s in scatter])
+    sizes = list_names([f"{n} by {1e3 * s:.2g} ms RMS" for n, s in scatter])
     return (
         f"Stamps scatter about an even clock: {sizes}. The values agree with the even clock, "
         "so the fit uses it."
@@ -78,13 +79,13 @@ def _not_identifiable(remark: Remark) -> str:
 def _only_ratios(remark: Remark) -> str:
     is_loop = any(name.startswith("controller.") for name in remark.names)
     return (
-        f"Only ratios of {listed(remark.names)} are identifiable from these data: a common factor is taken "
-        f"from the rig. {_FIXES_LOOP if is_loop else _FIXES}"
+        f"Only ratios of {list_names(remark.names)} are identifiable from these data: a common factor is "
+        f"taken from the rig. {_FIXES_LOOP if is_loop else _FIXES}"
     )
 
 
 def _only_together(remark: Remark) -> str:
-    return f"{listed(remark.names)} are identifiable from these data only together, not each. {_MEASURE}"
+    return f"{list_names(remark.names)} are identifiable from these data only together, not each. {_MEASURE}"
 
 
 def _play_undetermined(remark: Remark) -> str:
@@ -96,7 +97,7 @@ def _play_undetermined(remark: Remark) -> str:
 
 
 def _also_in_model(remark: Remark) -> str:
-    effects = listed([words.effect(n) for n in remark.names])
+    effects = list_names([words.effect(n) for n in remark.names])
     return (
         f"The extended model also has {effects}: it predicts better with it, but the data speak for another "
         "law than that."

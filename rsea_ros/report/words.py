@@ -77,7 +77,7 @@ def minus(text: str) -> str:
     return text.replace("-", "−")
 
 
-def signed(value: float, digits: int) -> str:
+def signed_text(value: float, digits: int) -> str:
     """Return a value with its sign and a number of decimal places."""
     return minus(f"{value:+.{digits}f}")
 
@@ -102,11 +102,11 @@ def number(value: float, digits: int = 3) -> str:
 
 def quantity(value: float, of: str, digits: int = 3) -> str:
     """Return a value with its unit, small ones with a prefix: 6.1e-6 rad as `6.10 µrad`."""
-    factor, prefixed = scaled(value, of)
+    factor, prefixed = unit_factor(value, of)
     return f"{number(value * factor, digits)} {prefixed}".strip()
 
 
-def scaled(value: float, of: str) -> tuple[float, str]:
+def unit_factor(value: float, of: str) -> tuple[float, str]:
     """Return the factor that makes a value readable, and its unit then: 6.1e-6 rad gives 1e6, `µrad`."""
     simple = of and " " not in of.split("/")[0] and of != "1"
     if not simple or value == 0.0 or not math.isfinite(value) or abs(value) >= 0.1:
@@ -117,7 +117,7 @@ def scaled(value: float, of: str) -> tuple[float, str]:
 
 def span(low: float, high: float, of: str) -> str:
     """Return a range with its unit, both ends to two digits of its width: `0 to 0.041 N·m`."""
-    factor, prefixed = scaled(max(abs(low), abs(high)), of)
+    factor, prefixed = unit_factor(max(abs(low), abs(high)), of)
     low, high = low * factor, high * factor
     width = high - low
     if not (math.isfinite(width) and width > 0.0):

@@ -10,7 +10,7 @@ LABEL = 12
 """Columns of the label that a row begins with."""
 
 
-def wrapped(text: str, width: int = WIDTH, indent: int = 0) -> str:
+def wrap(text: str, width: int = WIDTH, indent: int = 0) -> str:
     """Return text in lines of at most `width` columns, all but the first indented.
 
     A word that is longer, such as a path, stays whole.
@@ -23,7 +23,7 @@ def wrapped(text: str, width: int = WIDTH, indent: int = 0) -> str:
 
 def row(label: str, text: str, width: int = WIDTH) -> str:
     """Return a label and its text, which continues below itself."""
-    return wrapped(f"{label:<{LABEL}}{text}", width, LABEL)
+    return wrap(f"{label:<{LABEL}}{text}", width, LABEL)
 
 
 def command_row(label: str, text: str, command: str, width: int = WIDTH) -> str:

@@ -12,7 +12,7 @@ from rsea_ros.signals import FloatArray
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Interval
 from rsea_ros.trends.settings import DAY, TrendSettings
-from rsea_ros.trends.significance import adjusted
+from rsea_ros.trends.significance import adjust
 
 _LESS_BEFORE = 3.0
 """Log likelihood ratio, odds of 20, from which a joint is said to have been without it before."""
@@ -45,8 +45,8 @@ def appearances(every: Sequence[Naming], joints: int, settings: TrendSettings) -
     """
     usual = _usual(every, joints, settings)
     scans = [_scan(n, usual[n.kind, n.about], settings) for n in every]
-    q = adjusted(np.array([s.p for s in scans]))
-    sure = [_appeared(s, float(rate), settings) for s, rate in zip(scans, q, strict=True)]
+    q = adjust(np.array([s.p for s in scans]))
+    sure = [_appearance(s, float(rate), settings) for s, rate in zip(scans, q, strict=True)]
     return tuple(a for a in sure if a is not None)
 
 
@@ -109,7 +109,7 @@ def _likelihood(k: FloatArray | float, n: FloatArray | float, p: FloatArray | fl
     return value
 
 
-def _appeared(scan: Scan, q: float, settings: TrendSettings) -> Appearance | None:
+def _appearance(scan: Scan, q: float, settings: TrendSettings) -> Appearance | None:
     if q > settings.false_discovery or not len(scan.t):
         return None
     n, t = scan.naming, scan.t

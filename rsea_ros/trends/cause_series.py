@@ -69,14 +69,14 @@ def _kind(fault: Any) -> str:
 
 
 def _causes(joint: str, rows: np.ndarray, time_s: FloatArray, causes: npt.NDArray[Any]) -> Iterator[Naming]:
-    stated = [[_stated(c) for c in (causes[i] if causes[i] is not None else ())] for i in rows]
+    stated = [[_stated_cause(c) for c in (causes[i] if causes[i] is not None else ())] for i in rows]
     of_row = [{c["name"]: c for c in row if _counts(c)} for row in stated]
     for name in sorted(set().union(*of_row)):
         of_recording = [row.get(name) for row in of_row]
         yield _cause(joint, str(name), rows, time_s[rows], of_recording)
 
 
-def _stated(cause: Any) -> Mapping[str, Any]:
+def _stated_cause(cause: Any) -> Mapping[str, Any]:
     """Return a cause of which perhaps only the name is known."""
     if isinstance(cause, Mapping):
         return cause

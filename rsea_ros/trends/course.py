@@ -60,7 +60,7 @@ class Course:
         values: FloatArray = self.base.y - r.x[:, 1 : self.at] @ r.coefficients[1 : self.at]
         return values
 
-    def fitted(self) -> FloatArray:
+    def fit_values(self) -> FloatArray:
         """Return the course without temperature and without the level, shape (n,)."""
         r = self.regression()
         course: FloatArray = r.x[:, self.at :] @ r.coefficients[self.at :]
@@ -79,12 +79,12 @@ def course_of(days: Days, day_variance: float, prior: tuple[float, float]) -> Co
     return Course(days, base, day_variance, prior[0])
 
 
-def refined(course: Course, fewest: int) -> Course:
+def refine(course: Course, fewest: int) -> Course:
     """Return the course with each term at its best day, beside the others at theirs."""
     for i, old in enumerate(course.terms):
         gain = scan(course.regression(without=i), course.t, old.kind) ** 2
         alike = [k.index for j, k in enumerate(course.terms) if j != i and k.kind == old.kind]
-        best = _allowed(gain, alike, fewest)
+        best = _allowed_gains(gain, alike, fewest)
         terms = list(course.terms)
         terms[i] = replace(old, index=int(np.argmax(best)))
         course = replace(course, terms=tuple(terms))
@@ -104,12 +104,12 @@ def cost(course: Course, price: float) -> float:
     return course.regression().loss + price * (len(course.terms) + 0.6 * course.slope)
 
 
-def improved(course: Course, price: float, fewest: int) -> Course:
+def improve(course: Course, price: float, fewest: int) -> Course:
     """Return the cheapest course by leaving out, or turning into the other kind, one term after the other."""
-    course = refined(course, fewest)
+    course = refine(course, fewest)
     best = cost(course, price)
     while True:
-        others = [refined(c, fewest) for c in _neighbours(course)]
+        others = [refine(c, fewest) for c in _neighbours(course)]
         costs = [cost(c, price) for c in others]
         if not costs or min(costs) >= best - 1e-9:
             return course
@@ -129,7 +129,7 @@ def _neighbours(course: Course) -> Iterator[Course]:
             yield replace(course, terms=(*course.terms[:i], other, *course.terms[i + 1 :]))
 
 
-def _allowed(gain: FloatArray, taken: Sequence[int], fewest: int) -> FloatArray:
+def _allowed_gains(gain: FloatArray, taken: Sequence[int], fewest: int) -> FloatArray:
     """Return the gains, none within `fewest` days of an end or of another term of the kind."""
     allowed: FloatArray = gain.copy()
     allowed[:fewest] = -1.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.trends.course import Course, StepOrRamp, cost, course_of, improved
+from rsea_ros.trends.course import Course, StepOrRamp, cost, course_of, improve
 from rsea_ros.trends.day_effect import DayEffect, day_effect
 from rsea_ros.trends.days import Days
 from rsea_ros.trends.regression import Kind, scan
@@ -30,14 +30,14 @@ class Tested:
     p: float
 
 
-def tested(days: Days, effect: DayEffect, prior: tuple[float, float], settings: TrendSettings) -> Tested:
+def change_test(days: Days, effect: DayEffect, prior: tuple[float, float], settings: TrendSettings) -> Tested:
     """Return how surely a series is more than noise."""
     course = course_of(days, effect.variance, prior)
     _, z = _best(course, settings.fewest_beside)
     return Tested(course, effect, prior, z, scan_p(z, _share(days, settings), effect.freedom))
 
 
-def described(test: Tested, settings: TrendSettings) -> Course:
+def describe(test: Tested, settings: TrendSettings) -> Course:
     """Return the course of a series that is more than noise: the cheapest of several descriptions.
 
     Each piece costs the gain that noise alone reaches in one of 1/false_discovery series.
@@ -47,9 +47,9 @@ def described(test: Tested, settings: TrendSettings) -> Course:
     price = scan_threshold(rate, _share(days, settings), test.effect.freedom) ** 2
     best = min(_candidates(test.course, price, settings), key=lambda c: cost(c, price))
     days = _at_level(best)
-    effect = day_effect(days, settings, best.fitted())
+    effect = day_effect(days, settings, best.fit_values())
     anew = replace(course_of(days, effect.variance, test.prior), slope=best.slope, terms=best.terms)
-    return _completed(anew, price, settings)
+    return _complete(anew, price, settings)
 
 
 def _at_level(course: Course) -> Days:
@@ -57,7 +57,7 @@ def _at_level(course: Course) -> Days:
     days = course.days
     if days.warmth is None:
         return days
-    level = course.regression().coefficients[0] + course.fitted()
+    level = course.regression().coefficients[0] + course.fit_values()
     return replace(days, warmth=days.warmth * np.maximum(level, 0.0))
 
 
@@ -66,25 +66,25 @@ def _candidates(course: Course, price: float, settings: TrendSettings) -> Iterat
     r, few = course.regression(), settings.fewest_beside
     warm = r.x[:, 1:] @ r.coefficients[1:]
     levels = breaks(course.t, r.y - warm, r.w, "level", price, few)
-    yield improved(replace(course, terms=_terms(levels, ("step",))), price, few)
+    yield improve(replace(course, terms=_terms(levels, ("step",))), price, few)
     lines = breaks(course.t, r.y - warm, r.w, "line", 1.3 * price, few + 1)
-    yield improved(replace(course, slope=True, terms=_terms(lines, _KINDS)), price, few)
-    yield _completed(course, price, settings)
+    yield improve(replace(course, slope=True, terms=_terms(lines, _KINDS)), price, few)
+    yield _complete(course, price, settings)
 
 
 def _terms(places: Sequence[int], kinds: tuple[Kind, ...]) -> tuple[StepOrRamp, ...]:
     return tuple(StepOrRamp(kind, i) for i in places[: _MOST_TERMS // len(kinds)] for kind in kinds)
 
 
-def _completed(course: Course, price: float, settings: TrendSettings) -> Course:
+def _complete(course: Course, price: float, settings: TrendSettings) -> Course:
     """Return the course with further terms as long as one is worth its price."""
     few = settings.fewest_beside
-    course = improved(course, price, few)
+    course = improve(course, price, few)
     while len(course.terms) < _MOST_TERMS:
         term, z = _best(course, few)
         if z**2 < price:
             break
-        longer = improved(replace(course, terms=(*course.terms, term)), price, few)
+        longer = improve(replace(course, terms=(*course.terms, term)), price, few)
         if cost(longer, price) >= cost(course, price):
             break
         course = longer

@@ -35,8 +35,8 @@ class Days:
 
 def day_means(series: Series, settings: TrendSettings) -> Days:
     """Return the weighted means of the days that determine the parameter, lone outliers left out."""
-    s = series.kept(series.identifiable)
-    s = s.kept(~outlying(s.value, s.sd, settings.outlier_days))
+    s = series.keep(series.identifiable)
+    s = s.keep(~outliers(s.value, s.sd, settings.outlier_days))
     scale = _scale(s.value)
     day = np.floor(s.time_s / DAY)
     starts = np.flatnonzero(np.diff(day, prepend=-np.inf))
@@ -45,20 +45,20 @@ def day_means(series: Series, settings: TrendSettings) -> Days:
     total = np.add.reduceat(weight, starts) if len(starts) else weight
     warmth, mean = _warmth(s.temperature)
 
-    def averaged(values: FloatArray) -> FloatArray:
+    def average(values: FloatArray) -> FloatArray:
         return np.add.reduceat(weight * values, starts) / total if len(starts) else values
 
     return Days(
-        averaged(s.time_s) / DAY,
-        averaged(y),
+        average(s.time_s) / DAY,
+        average(y),
         1.0 / total,
-        None if warmth is None else averaged(warmth),
+        None if warmth is None else average(warmth),
         mean,
         scale,
     )
 
 
-def outlying(value: FloatArray, sd: FloatArray, most: float) -> BoolArray:
+def outliers(value: FloatArray, sd: FloatArray, most: float) -> BoolArray:
     """Return which recordings lie farther than `most` standard deviations from their neighbours' median."""
     if len(value) < _NEIGHBOURS:
         return np.zeros(len(value), bool)

@@ -9,14 +9,14 @@ import numpy as np
 
 from rsea_ros.trends.appearing import appearances
 from rsea_ros.trends.cause_series import namings, size_series, temperatures
-from rsea_ros.trends.course_search import Tested, described, tested
+from rsea_ros.trends.course_search import Tested, change_test, describe
 from rsea_ros.trends.day_effect import DayEffect, day_effect
 from rsea_ros.trends.days import Days, day_means
 from rsea_ros.trends.outliers import outliers
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.series import RECORDINGS, Series, Table, all_series, check_columns
 from rsea_ros.trends.settings import DEFAULT, TrendSettings
-from rsea_ros.trends.significance import adjusted
+from rsea_ros.trends.significance import adjust
 from rsea_ros.trends.temperature_slope import fleet_prior
 from rsea_ros.trends.trend import trend_of
 
@@ -64,12 +64,12 @@ def _trends(
     for series in all_of:
         days = day_means(series, settings)
         if len(days.t) < settings.fewest_days:
-            out[series.joint, series.parameter] = _undetermined(series, len(days.t), settings)
+            out[series.joint, series.parameter] = _undetermined_trend(series, len(days.t), settings)
             continue
         ready.append(_Prepared(series, days, day_effect(days, settings)))
     priors = {name: fleet_prior([r.effect for r in group]) for name, group in _by_parameter(ready).items()}
-    tests = [tested(r.days, r.effect, priors[r.series.parameter], settings) for r in ready]
-    rates = adjusted(np.array([t.p for t in tests]))
+    tests = [change_test(r.days, r.effect, priors[r.series.parameter], settings) for r in ready]
+    rates = adjust(np.array([t.p for t in tests]))
     for r, test, q in zip(ready, tests, rates, strict=True):
         out[r.series.joint, r.series.parameter] = _trend(r.series, test, float(q), settings)
     warm = {n: p for n, p in priors.items() if any(r.days.warmth is not None for r in _of(ready, n))}
@@ -77,11 +77,11 @@ def _trends(
 
 
 def _trend(series: Series, test: Tested, q: float, settings: TrendSettings) -> Trend:
-    course = described(test, settings) if q <= settings.false_discovery else test.course
+    course = describe(test, settings) if q <= settings.false_discovery else test.course
     return trend_of(series, test, course, q, settings)
 
 
-def _undetermined(series: Series, days: int, settings: TrendSettings) -> Trend:
+def _undetermined_trend(series: Series, days: int, settings: TrendSettings) -> Trend:
     many = len(series.identifiable)
     determined = f"{int(np.sum(series.identifiable))} of {many} recordings determine it, on {days} days"
     reason = f"{determined}; {settings.fewest_days} days are needed"

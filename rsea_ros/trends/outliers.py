@@ -9,7 +9,7 @@ import numpy as np
 from rsea_ros.normal import Z95
 from rsea_ros.trends.result import Outlier, Trend
 from rsea_ros.trends.settings import TrendSettings
-from rsea_ros.trends.significance import adjusted, two_sided_p
+from rsea_ros.trends.significance import adjust, two_sided_p
 
 _TO_SD = 1.4826
 
@@ -23,10 +23,10 @@ def outliers(trends: Iterable[Trend], settings: TrendSettings) -> tuple[Outlier,
     for trend in trends:
         if trend.now is not None:
             groups.setdefault((trend.series.parameter, trend.series.unit), []).append(trend)
-    scored = [s for group in groups.values() if len(group) >= settings.fewest_joints for s in _scored(group)]
+    scored = [s for group in groups.values() if len(group) >= settings.fewest_joints for s in _score(group)]
     if not scored:
         return ()
-    q = adjusted(np.array([two_sided_p(score, len_ - 1.0) for _, _, score, len_ in scored]))
+    q = adjust(np.array([two_sided_p(score, len_ - 1.0) for _, _, score, len_ in scored]))
     return tuple(
         Outlier(t.series.joint, t.series.parameter, t.series.unit, t.now, median, score, float(rate))
         for (t, median, score, _), rate in zip(scored, q, strict=True)
@@ -34,7 +34,7 @@ def outliers(trends: Iterable[Trend], settings: TrendSettings) -> tuple[Outlier,
     )
 
 
-def _scored(group: list[Trend]) -> list[tuple[Trend, float, float, int]]:
+def _score(group: list[Trend]) -> list[tuple[Trend, float, float, int]]:
     levels = np.array([t.now.value for t in group if t.now is not None])
     half = np.array([t.now.high - t.now.low for t in group if t.now is not None]) / (2.0 * Z95)
     median = float(np.median(levels))

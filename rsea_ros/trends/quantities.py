@@ -35,21 +35,21 @@ class Dated:
         return Interval(best.value, best.value - float(below), best.value + float(above))
 
 
-def dated(course: Course, doubt: float) -> Dated:
+def date_course(course: Course, doubt: float) -> Dated:
     """Return a course with the ranges of its dates. doubt: fall of twice the log likelihood."""
     ranges = tuple(date_range(course, i, doubt) for i in range(len(course.terms)))
     moved = tuple(
-        (_moved(course, i, first), _moved(course, i, last)) for i, (first, last) in enumerate(ranges)
+        (_move(course, i, first), _move(course, i, last)) for i, (first, last) in enumerate(ranges)
     )
     return Dated(course, ranges, moved)
 
 
-def _moved(course: Course, i: int, index: int) -> Course:
+def _move(course: Course, i: int, index: int) -> Course:
     terms: Sequence[StepOrRamp] = course.terms
     return replace(course, terms=(*terms[:i], replace(terms[i], index=index), *terms[i + 1 :]))
 
 
-def combined(r: Regression, row: FloatArray) -> Interval:
+def combine(r: Regression, row: FloatArray) -> Interval:
     """Return a linear combination of the coefficients with its interval."""
     variance = float(row @ r.covariance @ row)
     value, half = float(row @ r.coefficients), Z95 * float(np.sqrt(max(0.0, variance)))
@@ -58,7 +58,7 @@ def combined(r: Regression, row: FloatArray) -> Interval:
 
 def level_at(t: float) -> Quantity:
     """Return the quantity that is the level at a time, at the mean temperature. t: days from the first on."""
-    return lambda course: combined(course.regression(), level_row(course, t))
+    return lambda course: combine(course.regression(), level_row(course, t))
 
 
 def level_row(course: Course, t: float) -> FloatArray:
@@ -79,7 +79,7 @@ def slope_row(course: Course, last: int) -> FloatArray:
 
 def slope_after(last: int) -> Quantity:
     """Return the quantity that is the slope, per day, after the ramps up to a place; -1: before all."""
-    return lambda course: combined(course.regression(), slope_row(course, last))
+    return lambda course: combine(course.regression(), slope_row(course, last))
 
 
 def step_size(i: int) -> Quantity:
@@ -88,7 +88,7 @@ def step_size(i: int) -> Quantity:
     def size(course: Course) -> Interval:
         row = np.zeros(course.at + course.slope + len(course.terms))
         row[course.at + course.slope + i] = 1.0
-        return combined(course.regression(), row)
+        return combine(course.regression(), row)
 
     return size
 

@@ -43,7 +43,7 @@ def two_sided_p(z: float, freedom: float = np.inf) -> float:
     return float(2.0 * t.sf(abs(z), freedom))
 
 
-def adjusted(p: FloatArray) -> FloatArray:
+def adjust(p: FloatArray) -> FloatArray:
     """Return for each p value the false discovery rate at which it counts (Benjamini and Hochberg 1995).
 
     p: shape (n,). Findings of one joint depend on each other, positively, under which the rate still holds

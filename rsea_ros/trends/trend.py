@@ -12,8 +12,8 @@ from rsea_ros.trends.course import Course
 from rsea_ros.trends.course_search import Tested
 from rsea_ros.trends.quantities import (
     Dated,
-    combined,
-    dated,
+    combine,
+    date_course,
     is_sure,
     last_slope,
     level_at,
@@ -35,7 +35,7 @@ _POINTS = 24
 
 def trend_of(series: Series, test: Tested, course: Course, q: float, settings: TrendSettings) -> Trend:
     """Return the trend of a course. course: the one without a change for a series that is noise."""
-    scale, whole = course.days.scale, dated(course, settings.date_doubt)
+    scale, whole = course.days.scale, date_course(course, settings.date_doubt)
     detectable = scale * _detectable(course, test.effect.freedom, settings)
     first, now = (whole.interval(level_at(float(t))).times(scale) for t in (course.t[0], course.t[-1]))
     level = abs(now.value)
@@ -68,7 +68,7 @@ def _per_kelvin(course: Course) -> Interval | None:
     r = course.regression()
     row = np.zeros(r.x.shape[1])
     row[1] = 1.0
-    return Interval(*(v + course.warm for v in combined(r, row)))
+    return Interval(*(v + course.warm for v in combine(r, row)))
 
 
 def _detectable(course: Course, freedom: int, settings: TrendSettings) -> float:
@@ -108,7 +108,7 @@ def _curve(course: Course) -> ParameterCourse:
     t, r = course.t, course.regression()
     edges = [v for k in course.terms for v in (t[k.index] - 1e-6, t[k.index])]
     grid = np.unique(np.concatenate([np.linspace(t[0], t[-1], _POINTS), edges]))
-    values = np.array([combined(r, level_row(course, float(at))) for at in grid]) * course.days.scale
+    values = np.array([combine(r, level_row(course, float(at))) for at in grid]) * course.days.scale
     return ParameterCourse((course.days.t[0] + grid) * DAY, values[:, 0], values[:, 1], values[:, 2])
 
 

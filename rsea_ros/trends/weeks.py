@@ -78,7 +78,7 @@ def steps_over(first_s: float, last_s: float) -> Steps:
     return Steps((monday + _WEEK * length * np.arange(count + 1)) * DAY)
 
 
-def binned(trend: Trend, steps: Steps) -> Binned:
+def bin_days(trend: Trend, steps: Steps) -> Binned:
     """Return a trend's days at the mean temperature, averaged by step with their weights."""
     s, n = trend.series, len(steps)
     identifiable, recorded = steps.count(s.time_s[s.identifiable]), steps.count(s.time_s)

@@ -47,7 +47,7 @@ class Wish:
         return (self.kind, self.frequency if self.kind != "constant" else 0.0)
 
 
-def checked(wish: Wish, bounds: Bounds) -> Wish:
+def check_wish(wish: Wish, bounds: Bounds) -> Wish:
     """Return a wish that may be commanded. Raises ParameterError for any other."""
     if wish.kind not in KINDS:
         raise ParameterError(f"kind {wish.kind!r}, expected one of {', '.join(KINDS)}")
@@ -94,9 +94,9 @@ class Commander:
         """
         if self.bounds is None:
             raise ParameterError("the limits of the bench are not known yet")
-        wish = checked(wish, self.bounds)
+        wish = check_wish(wish, self.bounds)
         with self._lock:
-            if self._held(now) and self.holder != who:
+            if self._holds(now) and self.holder != who:
                 return False
             if not self._active:
                 self._active, self._last, self._running, self._envelope = True, now, wish, 0.0
@@ -116,7 +116,7 @@ class Commander:
             if not self._active or self.bounds is None:
                 return None
             step, self._last = max(0.0, now - self._last), now
-            if self.holder is not None and not self._held(now):
+            if self.holder is not None and not self._holds(now):
                 self._let_go()
             self._move(step, now)
             if self.holder is None and self._envelope == 0.0 and now - self._zero_since > CLOSING:
@@ -125,7 +125,7 @@ class Commander:
             value = self._envelope * _shape(self._running, now - self._began)
             return min(max(value, -self.bounds.torque), self.bounds.torque)
 
-    def _held(self, now: float) -> bool:
+    def _holds(self, now: float) -> bool:
         return self.holder is not None and now - self._heard <= PATIENCE
 
     def _let_go(self) -> None:
@@ -155,13 +155,17 @@ def _shape(wish: Wish, t: float) -> float:
     if wish.kind == "sine":
         return math.sin(2.0 * math.pi * wish.frequency * t)
     rounds, rest = divmod(t, 2.0 * SWEEP)
-    turn = _swept(wish.frequency, SWEEP)
+    turn = _chirp_phase(wish.frequency, SWEEP)
     back = rest > SWEEP
-    phase = 2.0 * turn - _swept(wish.frequency, 2.0 * SWEEP - rest) if back else _swept(wish.frequency, rest)
+    phase = (
+        2.0 * turn - _chirp_phase(wish.frequency, 2.0 * SWEEP - rest)
+        if back
+        else _chirp_phase(wish.frequency, rest)
+    )
     return math.sin(2.0 * rounds * turn + phase)
 
 
-def _swept(highest: float, t: float) -> float:
+def _chirp_phase(highest: float, t: float) -> float:
     """Return the phase, rad, of a chirp that has risen for t s."""
     rate = math.log(highest / LOWEST) / SWEEP
     return 2.0 * math.pi * LOWEST / rate * math.expm1(rate * t)

@@ -129,9 +129,9 @@ class Socket(TokenHandler, WebSocketHandler):
         except WebSocketClosedError:
             return
         self.waiting += 1
-        sending.add_done_callback(self._sent)
+        sending.add_done_callback(self._send)
 
-    def _sent(self, sending: asyncio.Future[Any]) -> None:
+    def _send(self, sending: asyncio.Future[Any]) -> None:
         self.waiting -= 1
         if not sending.cancelled():
             sending.exception()

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.new_files import unused
+from rsea_ros.new_files import unused_path
 from rsea_ros.processes import start, stop
 
 VERBS = ("identify", "diagnose")
@@ -73,7 +73,7 @@ class Runs:
         """Start a recording. Raises ParameterError while one runs."""
         if any(r.process is not None for r in self._recordings.values()):
             raise ParameterError("a recording runs already")
-        bag = unused(self._folder / time.strftime("%Y%m%d-%H%M%S"))
+        bag = unused_path(self._folder / time.strftime("%Y%m%d-%H%M%S"))
         words = ["-m", "rsea_ros.nodes.record", "--ros-args", *self._record_options, "-p", f"out:={bag}"]
         process, log = _python(words)
         self._recordings[bag.name] = Recording(bag, process, log, time.monotonic())
@@ -93,7 +93,7 @@ class Runs:
             raise ParameterError(f"{verb!r}, expected one of {', '.join(VERBS)}")
         if any(job.state == "running" for r in self._recordings.values() for job in r.jobs.values()):
             raise ParameterError("another recording is being evaluated, expected one at a time")
-        folder = unused(each.bag.with_name(f"{each.bag.name}-{verb}"))
+        folder = unused_path(each.bag.with_name(f"{each.bag.name}-{verb}"))
         words = ["-m", "rsea_ros", verb, str(each.bag), "--out", str(folder), *self._verb_options]
         each.jobs[verb] = Evaluation(verb, folder, *_python(words))
 
@@ -108,7 +108,7 @@ class Runs:
             _see_to(each)
             for job in each.jobs.values():
                 job.look()
-        return [_shown(name, each) for name, each in reversed(self._recordings.items())]
+        return [_run_json(name, each) for name, each in reversed(self._recordings.items())]
 
     def close(self) -> None:
         """Complete the present recording, and end evaluations."""
@@ -129,7 +129,7 @@ def _see_to(recording: Recording) -> None:
         recording.log.close()
 
 
-def _shown(name: str, r: Recording) -> Mapping[str, Any]:
+def _run_json(name: str, r: Recording) -> Mapping[str, Any]:
     jobs = {verb: {"state": job.state, "words": job.words} for verb, job in r.jobs.items()}
     return {"name": name, "running": r.process is not None, "seconds": round(r.seconds, 1), "words": r.words,
             "jobs": jobs}  # fmt: skip

@@ -48,7 +48,7 @@ class Server:
     ) -> None:
         self._source, self._runs = source, runs
         self.desk = Desk(commander, runs)
-        self._socket = _listening(host, port)
+        self._socket = _listen(host, port)
         self.port: int = self._socket.getsockname()[1]
         self.access = Access(f"rsea_watch_{self.port}")  # a cookie belongs to a host, not to a port
         self.addresses: Sequence[str] = addresses(host, self.port, self.access.token)
@@ -71,7 +71,7 @@ class Server:
         self._socket.close()
         self._runs.close()
 
-    def running(self) -> bool:
+    def is_running(self) -> bool:
         """Return whether it serves. Raises the error that ended it."""
         if self.error is not None:
             raise self.error
@@ -109,7 +109,7 @@ class Server:
         self.desk.send(frame(self._source.take(), self._source.flag), state)
 
 
-def _listening(host: str, port: int) -> socket.socket:
+def _listen(host: str, port: int) -> socket.socket:
     """Return a socket that listens. Raises RseaError where it cannot."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:

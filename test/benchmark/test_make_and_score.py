@@ -36,7 +36,7 @@ def truth_of(folder):
     return json.loads((folder / "set.truth.json").read_text())["records"]
 
 
-def answered(folder, answers, name="mine.jsonl"):
+def answer_once(folder, answers, name="mine.jsonl"):
     file = folder / name
     file.write_text("".join(json.dumps(a) + "\n" for a in answers))
     return file
@@ -54,7 +54,7 @@ def scores(folder, *files, capsys):
     return json.loads(capsys.readouterr().out)["entries"]
 
 
-def refused(capsys, *words):
+def assert_refused(capsys, *words):
     assert main(["benchmark", *map(str, words)]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and error.startswith("rsea benchmark: ")
@@ -62,7 +62,7 @@ def refused(capsys, *words):
 
 
 def test_the_truth_as_answer_scores_full_marks(made, capsys):
-    table = scores(made, answered(made, perfect(made)), capsys=capsys)
+    table = scores(made, answer_once(made, perfect(made)), capsys=capsys)
     assert table["mine"]["named_right"] == [1.0, 1.0, 1.0]
     assert table["mine"]["false_names"] == [0.0, 0.0, 0.0]
     assert table["mine"]["brier"][0] == 0.0 and table["mine"]["rank"][0] == 1.0
@@ -105,7 +105,7 @@ def test_a_seed_gives_the_same_records_and_another_seed_others(made, tmp_path):
 
 def test_a_secret_seed_that_could_be_guessed_is_refused(tmp_path, capsys):
     (tmp_path / "seed").write_text("12345\n")
-    error = refused(capsys, "make", tmp_path / "set", "--seed-file", tmp_path / "seed")
+    error = assert_refused(capsys, "make", tmp_path / "set", "--seed-file", tmp_path / "seed")
     assert "5 characters, expected at least 16" in error and not (tmp_path / "set").exists()
 
 
@@ -114,7 +114,7 @@ def test_a_tampered_truth_is_refused(folder, capsys):
     truth = json.loads(file.read_text())
     truth["records"]["r0002"]["causes"] = {"backlash": {"gap": 1e-3}}
     file.write_text(json.dumps(truth))
-    error = refused(capsys, "score", folder / "set", answered(folder, perfect(folder)))
+    error = assert_refused(capsys, "score", folder / "set", answer_once(folder, perfect(folder)))
     assert "records.r0002 has the hash" in error and "not the truth that was committed to" in error
 
 
@@ -135,12 +135,14 @@ def test_a_tampered_truth_is_refused(folder, capsys):
 )
 def test_a_bad_file_of_answers_gives_one_line(folder, line, expected, capsys):
     (folder / "bad.jsonl").write_text(line)
-    assert expected in refused(capsys, "score", folder / "set", folder / "bad.jsonl")
+    assert expected in assert_refused(capsys, "score", folder / "set", folder / "bad.jsonl")
 
 
 def test_a_missing_truth_is_named(folder, capsys):
     (folder / "set.truth.json").unlink()
-    error = refused(capsys, "score", folder / "set", answered(folder, [{"record": "r0001", "causes": []}]))
+    error = assert_refused(
+        capsys, "score", folder / "set", answer_once(folder, [{"record": "r0001", "causes": []}])
+    )
     assert "set.truth.json: No such file" in error
 
 
@@ -157,18 +159,19 @@ def test_a_missing_truth_is_named(folder, capsys):
 def test_a_manifest_of_another_kind_is_refused(folder, key, value, expected, capsys):
     file = folder / "set" / "manifest.json"
     file.write_text(json.dumps({**json.loads(file.read_text()), key: value}))
-    assert expected in refused(capsys, "run", folder / "set", "--out", folder / "answers.jsonl")
+    assert expected in assert_refused(capsys, "run", folder / "set", "--out", folder / "answers.jsonl")
 
 
 def test_a_table_with_other_columns_is_refused(folder, capsys):
     (folder / "set" / "r0001.csv").write_text("t,ft\n0,1\n")
-    error = refused(capsys, "run", folder / "set", "--out", folder / "answers.jsonl")
+    error = assert_refused(capsys, "run", folder / "set", "--out", folder / "answers.jsonl")
     assert "r0001.csv: columns 't,ft', expected t_command,command" in error
 
 
 def test_a_late_or_missing_answer_names_nothing(made, capsys):
     late = [{**a, "seconds": 120.5} for a in perfect(made)]
-    table = scores(made, answered(made, late, "late.jsonl"), answered(made, late[:1], "one"), capsys=capsys)
+    answers = answer_once(made, late, "late.jsonl"), answer_once(made, late[:1], "one")
+    table = scores(made, *answers, capsys=capsys)
     assert table["late"] == table["one"] == table["no names"]
 
 
@@ -200,19 +203,19 @@ def test_without_the_repository_make_says_so(tmp_path, monkeypatch, capsys):
     from rsea_ros.cli import _benchmark_make
 
     monkeypatch.setattr(_benchmark_make, "GENERATOR", tmp_path / "none.py")
-    assert "make needs a clone of the repository" in refused(capsys, "make", tmp_path / "set")
+    assert "make needs a clone of the repository" in assert_refused(capsys, "make", tmp_path / "set")
 
 
 def test_a_data_set_is_never_replaced(folder, capsys):
     before = (folder / "set" / "manifest.json").read_text()
-    assert "exists already" in refused(capsys, "make", folder / "set", "--records", "1")
+    assert "exists already" in assert_refused(capsys, "make", folder / "set", "--records", "1")
     assert (folder / "set" / "manifest.json").read_text() == before
 
 
 @pytest.mark.parametrize("name", ["mine.jsonl", "random.jsonl"])
 def test_two_rows_of_one_name_are_refused(folder, name, capsys):
-    files = [answered(folder, perfect(folder)), answered(folder, perfect(folder), name)]
-    assert f"a second row {name[:-6]!r}" in refused(capsys, "score", folder / "set", *files)
+    files = [answer_once(folder, perfect(folder)), answer_once(folder, perfect(folder), name)]
+    assert f"a second row {name[:-6]!r}" in assert_refused(capsys, "score", folder / "set", *files)
 
 
 def test_an_answer_is_written_as_it_is_read(made):
@@ -224,13 +227,13 @@ def test_an_answer_is_written_as_it_is_read(made):
 def test_a_stopped_run_goes_on_where_it_stopped(made, tmp_path, monkeypatch):
     asked = []
 
-    def stopping(record, rig):
+    def stop_run(record, rig):
         asked.append(record.source)
         if len(asked) == 3:
             raise KeyboardInterrupt
         return Answer({"backlash": 0.5})
 
-    monkeypatch.setitem(entry.ENTRIES, "diagnose", stopping)
+    monkeypatch.setitem(entry.ENTRIES, "diagnose", stop_run)
     words = ["benchmark", "run", str(made / "set"), "--out", str(tmp_path / "a.jsonl")]
     assert main(words) == 130 and not (tmp_path / "a.jsonl").exists()
     with (tmp_path / "a.jsonl.partial").open("a") as partial:

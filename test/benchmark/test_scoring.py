@@ -13,12 +13,12 @@ from rsea_ros.benchmark.truth import RecordTruth, truth_hash
 EFFECTS = ("a", "b", "c", "d")
 
 
-def hiding(*names, outside=""):
+def truth_of(*names, outside=""):
     return RecordTruth({n: {"size": 1.0} for n in names}, outside, dict.fromkeys(names, 2.0), "salt")
 
 
 def test_scores_by_hand():
-    truths = {"r0001": hiding("a", "b"), "r0002": hiding(outside="x"), "r0003": hiding("c")}
+    truths = {"r0001": truth_of("a", "b"), "r0002": truth_of(outside="x"), "r0003": truth_of("c")}
     answers = {
         "r0001": Answer({"a": 0.8, "c": 0.6, "b": 0.2}),
         "r0002": Answer({"d": 0.4}),
@@ -36,19 +36,19 @@ def test_scores_by_hand():
 
 
 def test_a_second_right_cause_is_no_rival_of_the_first():
-    scores = score({"r0001": Answer({"a": 0.9, "b": 0.8})}, {"r0001": hiding("a", "b")}, EFFECTS)
+    scores = score({"r0001": Answer({"a": 0.9, "b": 0.8})}, {"r0001": truth_of("a", "b")}, EFFECTS)
     assert scores.rank == (1.0, 1.0, 1.0)
 
 
 def test_names_in_a_record_that_hides_nothing_of_the_list_are_false():
-    scores = score({"r0001": Answer({"a": 0.5})}, {"r0001": hiding(outside="x")}, EFFECTS)
+    scores = score({"r0001": Answer({"a": 0.5})}, {"r0001": truth_of(outside="x")}, EFFECTS)
     assert scores.silent.value == 0.0 and scores.false_names.value == 1.0
     assert math.isnan(scores.named_right.value) and math.isnan(scores.rank.value)
 
 
 def test_the_interval_narrows_with_the_records():
     def width(count):
-        truths = {f"r{k}": hiding("a") for k in range(count)}
+        truths = {f"r{k}": truth_of("a") for k in range(count)}
         answers = {f"r{k}": Answer({"a": 1.0} if k % 2 else {}) for k in range(count)}
         interval = score(answers, truths, EFFECTS).named_right
         assert interval.low < interval.value == 0.5 < interval.high
@@ -58,8 +58,8 @@ def test_the_interval_narrows_with_the_records():
 
 
 def test_a_hash_depends_on_every_part_of_the_truth():
-    truth = hiding("a")
+    truth = truth_of("a")
     salted = RecordTruth(truth.causes, "", truth.times_noise, "pepper")
-    others = (hiding("b"), hiding("a", outside="x"), salted)
+    others = (truth_of("b"), truth_of("a", outside="x"), salted)
     hashes = [truth_hash("r0001", t) for t in (truth, *others)] + [truth_hash("r0002", truth)]
     assert len(set(hashes)) == 5

@@ -19,7 +19,7 @@ T = np.arange(len(U)) / 280.0
 RUN = synthesize(RIG, Channel(T, U))
 
 
-def turning(angle, **others):
+def turn_joint(angle, **others):
     rate = Channel(T, np.gradient(angle, T))
     return Record({"command": Channel(T, U), "position": Channel(T, angle), "velocity": rate, **others})
 
@@ -27,21 +27,21 @@ def turning(angle, **others):
 @pytest.mark.parametrize("with_velocity", [True, False])
 def test_a_wrapped_angle_is_named_with_what_unwraps_it(with_velocity):
     swing = 3.0 + 2.0 * np.sin(2.0 * T)
-    record = turning(swing).with_channels(position=Channel(T, (swing + np.pi) % (2.0 * np.pi) - np.pi))
+    record = turn_joint(swing).with_channels(position=Channel(T, (swing + np.pi) % (2.0 * np.pi) - np.pi))
     if not with_velocity:
         record = Record({n: record[n] for n in ("command", "position")})
-    (found,) = jump_findings(record)
+    (jumps,) = jump_findings(record)
     crossings = np.count_nonzero(np.diff(np.sign(np.sin(0.5 * (swing - np.pi)))))
-    assert (found.light, found.value) == ("red", crossings)
-    assert "a whole turn" in found.detail and "unwrap" in found.remedy
+    assert (jumps.light, jumps.value) == ("red", crossings)
+    assert "a whole turn" in jumps.detail and "unwrap" in jumps.remedy
 
 
 def test_an_encoder_that_counts_anew_is_named_with_the_time():
     position = RUN["position"]
     anew = Channel(position.t, np.where(position.t > 5.0, position.y + 0.3, position.y))
     findings = check_record(RUN.with_channels(position=anew), RIG)
-    (found,) = findings.of("angle_jumps")
-    assert "by 0.3" in found.detail and "at 5.00" in found.detail
+    (jumps,) = findings.of("angle_jumps")
+    assert "by 0.3" in jumps.detail and "at 5.00" in jumps.detail
     assert "angle_jumps" in {f.kind for f in findings.faults}
 
 
@@ -61,8 +61,8 @@ def test_a_motor_that_is_off_for_a_while_is_said(start):
     for name in ("position", "velocity", "ft"):
         t, noise = RUN[name].t, RIG.sensors[name].noise * rng.standard_normal(len(T))
         off[name] = Channel(t, np.where(t > start, noise, RUN[name].y))
-    (found,) = check_record(RUN.with_channels(**off), RIG).of("standstill")
-    assert found.value == pytest.approx(8.0 - start, abs=0.25)
+    (jumps,) = check_record(RUN.with_channels(**off), RIG).of("standstill")
+    assert jumps.value == pytest.approx(8.0 - start, abs=0.25)
     assert standstill_findings(RUN) == []
 
 

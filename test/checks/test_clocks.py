@@ -35,9 +35,9 @@ def test_offset_and_drift_are_recovered(seed):
     record = record_run(drawn_bench(np.random.default_rng(seed)), seed, duration=15.0)
     findings = check_record(late(record, 2e-4, 40e-6, "ft"), RIG)
     offset, drift = (clock(findings, kind, "ft") for kind in ("clock_offset", "clock_drift"))
-    for found, truth in ((offset, 200.0), (drift, 40.0)):
-        half = 0.5 * (found.high - found.low)
-        assert abs(found.value - truth) < 1.5 * half  # three sigma: five seeds, two numbers
+    for finding, truth in ((offset, 200.0), (drift, 40.0)):
+        half = 0.5 * (finding.high - finding.low)
+        assert abs(finding.value - truth) < 1.5 * half  # three sigma: five seeds, two numbers
     assert offset.high - offset.low < 150.0 and drift.high - drift.low < 10.0
     assert drift.light == "amber" and "clock_drift" in {f.kind for f in findings.faults}
     assert clock(findings, "clock_offset", "velocity").value == pytest.approx(0.0, abs=10.0)
@@ -88,7 +88,7 @@ def test_a_drift_that_turns_the_phases_is_a_fault_with_its_size(ppm):
     assert [f.detail.split(",")[0] for f in even.faults if f.kind == "clock_drift"] == ["taken out"]
 
 
-def drifting(effects, ppm):
+def check_drifting(effects, ppm):
     """Return the check of 30 s of a rig with effects that its model lacks, and an F/T clock that drifts."""
     rig = RIG
     for name, sizes in effects.items():
@@ -110,7 +110,7 @@ MISFITS = {
 @pytest.mark.parametrize("ppm", [200.0, -1000.0])
 def test_a_drift_beside_a_misfit_has_a_number_whose_interval_holds_it(misfit, ppm):
     """1000 ppm were "not determined", in green, on a sound bench too."""
-    drift = clock(drifting(MISFITS[misfit], ppm), "clock_drift", "ft")
+    drift = clock(check_drifting(MISFITS[misfit], ppm), "clock_drift", "ft")
     half = 0.5 * (drift.high - drift.low)
     assert abs(drift.value - ppm) < 1.5 * half  # three sigma: ten cases
     assert drift.light == "amber" or ppm == 200.0
@@ -118,6 +118,6 @@ def test_a_drift_beside_a_misfit_has_a_number_whose_interval_holds_it(misfit, pp
 
 @pytest.mark.parametrize("misfit", MISFITS)
 def test_no_misfit_is_taken_for_a_clock_that_drifts(misfit):
-    findings = drifting(MISFITS[misfit], 0.0)
+    findings = check_drifting(MISFITS[misfit], 0.0)
     assert not [f for f in findings.findings if f.kind == "clock_drift" and f.light != "green"]
     assert "clock_drift" not in {f.kind for f in findings.faults}

@@ -24,7 +24,7 @@ from rsea_ros.signals import Channel, Fault
 
 RIG = load_rig("paper_high_impedance")
 BENCH = drawn_bench(np.random.default_rng(2))
-QUIET = BENCH.having(ft_noise=0.0, velocity_noise=0.0, motor_noise=0.0)
+QUIET = BENCH.with_values(ft_noise=0.0, velocity_noise=0.0, motor_noise=0.0)
 N = 280 * 12
 COMMAND = chirp_noise(12.0, np.random.default_rng(3))
 IN_TURNS = (np.arange(N) // 600) % 2 == 0
@@ -35,7 +35,7 @@ def good():
     return record_run(BENCH, 4, duration=12.0)
 
 
-def having(channel, y):
+def with_channel(channel, y):
     return good().with_channels(**{channel: Channel(good()[channel].t, np.asarray(y, float))})
 
 
@@ -56,14 +56,14 @@ DEAD = {
 
 @pytest.mark.parametrize("name", DEAD)
 def test_a_dead_sensor_is_named(name):
-    assert kinds(having("ft", DEAD[name])) == {("dead_channel", "ft")}
+    assert kinds(with_channel("ft", DEAD[name])) == {("dead_channel", "ft")}
 
 
 @pytest.mark.parametrize(
     ("channel", "noise"), [("position", 1e-5), ("velocity", 2e-4), ("motor_torque", 0.05)]
 )
 def test_every_other_dead_channel_is_named_too(channel, noise):
-    assert ("dead_channel", channel) in kinds(having(channel, noise * RNG.normal(size=N)))
+    assert ("dead_channel", channel) in kinds(with_channel(channel, noise * RNG.normal(size=N)))
 
 
 def test_a_speed_that_is_the_rate_of_the_measured_position_is_alive():
@@ -83,7 +83,7 @@ def test_a_speed_that_is_the_rate_of_the_measured_position_is_alive():
 def test_a_sensor_that_freezes_for_long_is_named(share):
     y = good()["ft"].y.copy()
     y[N // 3 : N // 3 + int(share * N)] = y[N // 3]
-    assert ("frozen_samples", "ft") in kinds(having("ft", y))
+    assert ("frozen_samples", "ft") in kinds(with_channel("ft", y))
 
 
 @pytest.mark.parametrize("bench", [QUIET, hide(BENCH, "coulomb_friction", {"torque": 3.0})])

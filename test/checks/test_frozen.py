@@ -25,7 +25,7 @@ def run():
     return synthesize(RIG, Channel(np.arange(len(u)) / RATE, u))
 
 
-def frozen(record, names, start, stop=LENGTH + 1.0):
+def freeze(record, names, start, stop=LENGTH + 1.0):
     """Return the record with the values of some channels held between two times, s."""
     held = {}
     for name in names:
@@ -36,7 +36,7 @@ def frozen(record, names, start, stop=LENGTH + 1.0):
     return record.with_channels(**held)
 
 
-def named(record):
+def frozen_channels(record):
     return {f.channel for f in check(record, RIG).faults if f.kind == "frozen_samples"}
 
 
@@ -52,7 +52,7 @@ def named(record):
 )
 @pytest.mark.parametrize("span", [(1.0,), (4.0,), (4.0, 6.0), (10.5,)])
 def test_every_channel_of_a_driver_that_stops_is_named(names, span):
-    assert named(frozen(run(), names, *span)) == set(names)
+    assert frozen_channels(freeze(run(), names, *span)) == set(names)
 
 
 @pytest.mark.parametrize("stop", [4.3, 4.6, 7.0])
@@ -63,14 +63,14 @@ def test_sensors_with_noise_that_hold_at_once_are_frozen_whether_or_not_the_mach
     u = excitation(kind, ExcitationSettings(rate=RATE, duration=20.0, seed=1))
     record = synthesize(RIG, Channel(np.arange(len(u)) / RATE, u))
     names = ("position", "velocity", "ft", *others)
-    checked = check(frozen(record, names, 4.0, stop), RIG)
+    checked = check(freeze(record, names, 4.0, stop), RIG)
     for name in names:
         at = checked.record[name].t
         assert checked.masked[name][(at > 4.0 + 2 / RATE) & (at < stop)].all()
 
 
 def test_it_is_said_from_when_to_when_and_not_that_the_machine_is_another_or_a_sensor_noisy():
-    findings = check_record(frozen(run(), ("position", "velocity", "ft"), 4.0, 6.0), RIG).findings
+    findings = check_record(freeze(run(), ("position", "velocity", "ft"), 4.0, 6.0), RIG).findings
     assert {f.kind for f in findings if f.light != "green"} == {"frozen_samples"}
     assert all("from 4.007 s to 5.996 s" in f.detail for f in findings if f.kind == "frozen_samples")
 
@@ -81,7 +81,7 @@ def test_a_machine_that_sticks_while_the_command_goes_on_is_not_frozen(noise):
     rig = RIG.with_effects(EffectSetting("coulomb_friction", {"torque": 15.0}))
     t = np.arange(int(20.0 * RATE)) / RATE
     record = synthesize(rig, Channel(t, 20.0 * np.sin(2.0 * np.pi * 0.1 * t)), noise=noise)
-    assert named(record) == set()
+    assert frozen_channels(record) == set()
 
 
 def test_a_velocity_that_is_the_rate_of_the_position_is_steady():
@@ -91,5 +91,5 @@ def test_a_velocity_that_is_the_rate_of_the_position_is_steady():
     record = synthesize(rig, Channel(t, 10.0 * np.sign(np.sin(2.0 * np.pi * t / 4.0))), noise=False)
     noise = Channel(t, np.random.default_rng(5).standard_normal(len(t)))
     assert {f.channel for f in check(record.with_channels(ft=noise), rig).faults} == set()
-    stopped = record.with_channels(velocity=frozen(record, ("velocity",), 4.0)["velocity"], ft=noise)
+    stopped = record.with_channels(velocity=freeze(record, ("velocity",), 4.0)["velocity"], ft=noise)
     assert {f.channel for f in check(stopped, rig).faults} == {"velocity"}

@@ -22,18 +22,18 @@ def good():
     return record_run(drawn_bench(np.random.default_rng(2)), 4, duration=12.0)
 
 
-def scaled(record, **factors):
+def scale_channels(record, **factors):
     return record.with_channels(**{n: Channel(record[n].t, f * record[n].y) for n, f in factors.items()})
 
 
-def told(findings, *kinds):
+def red_findings(findings, *kinds):
     return {(f.kind, f.channel) for f in findings.findings if f.light == "red" and f.kind in kinds}
 
 
 @pytest.mark.parametrize("channel", ["command", "ft", "position", "velocity", "motor_torque"])
 def test_a_turned_channel_is_named(channel):
-    findings = check_record(scaled(good(), **{channel: -1.0}), RIG)
-    assert told(findings, "sign", "scale", "wrong_rig") == {("sign", channel)}
+    findings = check_record(scale_channels(good(), **{channel: -1.0}), RIG)
+    assert red_findings(findings, "sign", "scale", "wrong_rig") == {("sign", channel)}
 
 
 @pytest.mark.parametrize(
@@ -52,22 +52,22 @@ def test_a_turned_channel_is_named(channel):
     ],
 )
 def test_a_unit_is_named_with_its_factor(channel, factor, meaning):
-    findings = check_record(scaled(good(), **{channel: factor}), RIG)
-    assert told(findings, "sign", "scale", "wrong_rig") == {("scale", channel)}
-    (found,) = (f for f in findings.of("scale") if f.light == "red")
-    assert found.value == pytest.approx(factor, rel=0.01)
-    assert meaning in found.detail
+    findings = check_record(scale_channels(good(), **{channel: factor}), RIG)
+    assert red_findings(findings, "sign", "scale", "wrong_rig") == {("scale", channel)}
+    (result,) = (f for f in findings.of("scale") if f.light == "red")
+    assert result.value == pytest.approx(factor, rel=0.01)
+    assert meaning in result.detail
     assert ("scale", channel) in {(f.kind, f.channel) for f in findings.faults}
 
 
 def test_the_remedy_of_a_turned_sensor_is_the_option():
-    (found,) = check_record(scaled(good(), ft=-1.0), RIG, axis="-torque.z").of("sign")
-    assert found.remedy == "--axis torque.z"
+    (result,) = check_record(scale_channels(good(), ft=-1.0), RIG, axis="-torque.z").of("sign")
+    assert result.remedy == "--axis torque.z"
 
 
 def test_drive_values_on_the_motor_side_are_reported_together():
-    findings = check_record(scaled(good(), command=1 / 502, motor_torque=1 / 502), RIG)
-    assert told(findings, "scale") == {("scale", "command"), ("scale", "motor_torque")}
+    findings = check_record(scale_channels(good(), command=1 / 502, motor_torque=1 / 502), RIG)
+    assert red_findings(findings, "scale") == {("scale", "command"), ("scale", "motor_torque")}
 
 
 @pytest.mark.parametrize("effect", [None, *CATALOGUE])
@@ -83,15 +83,15 @@ def test_an_effect_is_not_taken_for_a_wrong_unit_or_rig(effect):
 def test_an_early_saturation_is_not_taken_for_a_wrong_unit():
     bench = hide(drawn_bench(np.random.default_rng(1)), "torque_saturation", {"limit": 15.0})
     findings = check_record(record_run(bench, 3, "white_noise", 10.0), RIG)
-    assert told(findings, "scale", "sign") == set()
+    assert red_findings(findings, "scale", "sign") == set()
 
 
 def test_a_wrong_inertia_is_not_taken_for_a_scale():
     rig = RIG.with_values({"rotor.reflected_inertia": 2.0 * RIG["rotor.reflected_inertia"]})
     findings = check_record(good(), rig)
     assert findings.light != "red"
-    (found,) = (f for f in findings.of("wrong_rig") if f.light != "green")
-    assert found.channel == "rotor.reflected_inertia"
+    (result,) = (f for f in findings.of("wrong_rig") if f.light != "green")
+    assert result.channel == "rotor.reflected_inertia"
 
 
 @pytest.mark.parametrize("name", ["prototype_knee", "cycloidal"])
@@ -106,9 +106,9 @@ def test_a_moving_average_is_named_with_its_length(samples):
     """It was reported as `177 times the noise`."""
     y = np.convolve(good()["ft"].y, np.ones(samples) / samples)[: len(good()["ft"])]
     findings = check_record(good().with_channels(ft=Channel(good()["ft"].t, y)), RIG)
-    (found,) = findings.of("smoothing")
-    assert found.value == pytest.approx(1e3 * samples / 280.0, rel=1e-3)
-    assert f"average of {samples} samples" in found.detail
+    (result,) = findings.of("smoothing")
+    assert result.value == pytest.approx(1e3 * samples / 280.0, rel=1e-3)
+    assert f"average of {samples} samples" in result.detail
     assert "smoothing" in {f.kind for f in findings.faults}
 
 
@@ -149,10 +149,10 @@ def test_a_lag_of_sensor_or_drive_is_not_taken_for_a_moving_average(effect, para
 
 def test_commands_and_sensors_may_each_have_another_unit():
     """Position and velocity `fit no unit`, the F/T torque `looks like kN m`."""
-    record = scaled(good(), command=1e3, position=57.29578, velocity=9.549297)
+    record = scale_channels(good(), command=1e3, position=57.29578, velocity=9.549297)
     record = record.with_channels(motor_torque=record["command"])
     findings = check_record(record, RIG)
-    assert told(findings, "sign", "scale", "wrong_rig") == {
+    assert red_findings(findings, "sign", "scale", "wrong_rig") == {
         ("scale", "command"), ("scale", "motor_torque"), ("scale", "position"), ("scale", "velocity")
     }  # fmt: skip
     remedies = " ".join(f.remedy for f in findings.of("scale"))
@@ -161,15 +161,15 @@ def test_commands_and_sensors_may_each_have_another_unit():
 
 @pytest.mark.parametrize("channel", ["command", "motor_torque"])
 def test_amperes_are_reported_with_the_measured_factor_not_that_of_a_unit_near_it(channel):
-    findings = check_record(scaled(good(), **{channel: 1 / 6.826}), RIG)
-    (found,) = (f for f in findings.of("scale") if f.light == "red")
-    assert found.channel == channel
-    assert found.value == pytest.approx(1 / 6.826, rel=0.1)
-    assert "no unit" in found.detail
-    assert float(found.remedy.split()[1].rstrip("`")) == pytest.approx(6.826, rel=0.1)
+    findings = check_record(scale_channels(good(), **{channel: 1 / 6.826}), RIG)
+    (result,) = (f for f in findings.of("scale") if f.light == "red")
+    assert result.channel == channel
+    assert result.value == pytest.approx(1 / 6.826, rel=0.1)
+    assert "no unit" in result.detail
+    assert float(result.remedy.split()[1].rstrip("`")) == pytest.approx(6.826, rel=0.1)
 
 
 def test_commands_in_the_place_of_the_ft_torque_are_not_the_rig_s_response():
     record = good()
     same = record.with_channels(ft=Channel(record["command"].t, record["command"].y))
-    assert told(check_record(same, RIG), "wrong_rig") == {("wrong_rig", "ft")}
+    assert red_findings(check_record(same, RIG), "wrong_rig") == {("wrong_rig", "ft")}

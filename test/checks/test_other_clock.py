@@ -25,7 +25,7 @@ def good():
     return record.with_channels(**{n: Channel(c.t + 10.0, c.y) for n, c in record.channels.items()})
 
 
-def moved(seconds, *names):
+def shift_stamps(seconds, *names):
     return good().with_channels(**{n: Channel(good()[n].t + seconds, good()[n].y) for n in names})
 
 
@@ -36,14 +36,14 @@ def off(findings):
 @pytest.mark.parametrize("seconds", [-0.5, 1.7])
 def test_commands_on_another_clock_are_not_taken_for_another_rig(seconds):
     """They were called a wrong rig; clocks were not mentioned."""
-    findings = check_record(moved(seconds, "command"), RIG)
+    findings = check_record(shift_stamps(seconds, "command"), RIG)
     assert off(findings) == {"command": pytest.approx(seconds, abs=0.005)}
     assert {f.kind for f in findings.findings if f.light == "red"} == {"clock_offset"}
     assert "clock_offset" in {f.kind for f in findings.faults}
 
 
 def test_a_sensor_on_another_clock_is_not_taken_for_dead_or_for_another_rig():
-    findings = check_record(moved(-1.8, "ft"), RIG)
+    findings = check_record(shift_stamps(-1.8, "ft"), RIG)
     assert off(findings) == {"ft": pytest.approx(-1.8, abs=0.01)}
     assert {f.kind for f in findings.findings if f.light == "red"} == {"clock_offset"}
 
@@ -56,7 +56,7 @@ def test_a_lag_is_not_read_from_a_sine_that_fits_many():
 
 def test_the_suggested_option_corrects_the_clock(tmp_path, capsys):
     bag = str(tmp_path / "bag.mcap")
-    write_record(moved(-0.5, "command"), bag)
+    write_record(shift_stamps(-0.5, "command"), bag)
     assert main(["check", bag, "--json", "--fail-on", "red"]) == 1
     (record,) = json.loads(capsys.readouterr().out)["records"]
     (clock,) = (f for f in record["findings"] if f["kind"] == "clock_offset" and f["light"] == "red")
@@ -73,7 +73,7 @@ def test_a_shift_of_nothing_is_refused_in_one_line(shift, tmp_path, capsys):
 
 
 @functools.cache
-def played(seconds):
+def simulate(seconds):
     command = 10.0 * np.random.default_rng(3).standard_normal(int(280 * seconds))
     return rsea.simulate(RIG, command, 280.0, seed=3)
 
@@ -91,17 +91,17 @@ def slow(record, hz, seconds, *names):
 @pytest.mark.parametrize("name", ["motor_torque", "ft"])
 def test_the_clock_of_a_slow_channel_is_a_number_too(name, hz, seconds):
     """At 1 Hz there were too few samples for a word; 0.73 s at 10 Hz was a dead channel."""
-    findings = check_record(slow(played(90.0), hz, seconds, name), RIG)
+    findings = check_record(slow(simulate(90.0), hz, seconds, name), RIG)
     assert off(findings) == {name: pytest.approx(seconds, abs=0.005)}
     assert not findings.of("dead_channel")
 
 
 @pytest.mark.parametrize("seconds", [-1.0, 0.0])
 def test_a_clock_that_few_samples_leave_open_is_said_to_be_open(seconds):
-    findings = check_record(slow(played(12.0), 1, seconds, "motor_torque"), RIG)
+    findings = check_record(slow(simulate(12.0), 1, seconds, "motor_torque"), RIG)
     (clock,) = (f for f in findings.of("clock_offset") if f.channel == "motor_torque")
     assert clock.value is None and "not determined: 12 samples at 1 Hz" in clock.detail
 
 
 def test_a_slow_channel_in_time_has_no_offset():
-    assert off(check_record(slow(played(90.0), 2.5, 0.0, "ft", "motor_torque"), RIG)) == {}
+    assert off(check_record(slow(simulate(90.0), 2.5, 0.0, "ft", "motor_torque"), RIG)) == {}

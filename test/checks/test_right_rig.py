@@ -22,7 +22,7 @@ def run_of(name, amplitude):
     return rsea.simulate(name, amplitude * np.random.default_rng(4).standard_normal(2800), RATE, seed=4)
 
 
-def asked(findings):
+def lights_of(findings):
     return {f.channel: f.light for f in findings.of("wrong_rig") if f.light != "green"}
 
 
@@ -31,15 +31,15 @@ def test_a_rig_without_a_spring_is_questioned_on_a_bench_with_one(rig):
     """This check was green."""
     record = record_run(drawn_bench(np.random.default_rng(2)), 4, duration=10.0)
     findings = check_record(record, load_rig(rig))
-    assert asked(findings) == {"spring_end.stiffness": "red"}
-    (found,) = (f for f in findings.of("wrong_rig") if f.light == "red")
-    assert found.value == pytest.approx(1530.0, rel=0.1)
-    assert found.remedy == RIGHT_RIG
+    assert lights_of(findings) == {"spring_end.stiffness": "red"}
+    (finding,) = (f for f in findings.of("wrong_rig") if f.light == "red")
+    assert finding.value == pytest.approx(1530.0, rel=0.1)
+    assert finding.remedy == RIGHT_RIG
 
 
 def test_a_rig_of_a_heavy_drive_is_questioned_on_a_light_pendulum():
     findings = check_record(run_of("pendulum", 1.0), load_rig("bare_drive"))
-    assert asked(findings)["spring_end.inertia"] == "red"
+    assert lights_of(findings)["spring_end.inertia"] == "red"
 
 
 def test_a_rig_without_gravity_is_questioned_on_a_pendulum_that_swings_far():
@@ -55,7 +55,7 @@ def test_a_rig_without_gravity_is_questioned_on_a_pendulum_that_swings_far():
 
 @pytest.mark.parametrize(("name", "amplitude"), [("bare_drive", 15.0), ("pendulum", 1.0)])
 def test_the_right_rig_is_not_questioned(name, amplitude):
-    assert asked(check_record(run_of(name, amplitude), load_rig(name))) == {}
+    assert lights_of(check_record(run_of(name, amplitude), load_rig(name))) == {}
 
 
 @pytest.mark.parametrize(("factor", "light"), [(0.144, {}), (0.02, {"motor_torque": "red"})])
@@ -65,7 +65,7 @@ def test_a_drive_within_the_coarse_spread_of_its_rig_is_not_questioned(factor, l
     values = {n: factor * rig[n] for n in ("rotor.reflected_inertia", "rotor.reflected_damping")}
     command = 50.0 * np.random.default_rng(4).standard_normal(2800)
     run = rsea.simulate(rig.with_values(values), command, RATE, seed=4)
-    assert asked(check_record(run, rig)) == light
+    assert lights_of(check_record(run, rig)) == light
 
 
 def test_a_value_that_identify_leaves_to_the_prior_is_undetermined():
@@ -74,8 +74,8 @@ def test_a_value_that_identify_leaves_to_the_prior_is_undetermined():
     run = replace(run, channels={n: run[n] for n in ("command", "ft")})
     fit = rsea.identify(run, "paper_high_impedance")
     left = {p.name for p in fit.result.parameters if p.determined == "no" and not p.name.startswith("clock")}
-    found = rsea.check(run, "paper_high_impedance").result.of("identifiability")
-    assert {f.channel for f in found if f.light == "amber"} == left
+    finding = rsea.check(run, "paper_high_impedance").result.of("identifiability")
+    assert {f.channel for f in finding if f.light == "amber"} == left
     assert {"rotor.reflected_inertia", "rotor.reflected_damping", "spring.damping"} <= left
 
 
@@ -83,7 +83,11 @@ def test_a_value_far_from_the_rigs_is_amber_with_both_numbers():
     """A spring 30 % off was green."""
     bench = load_rig("paper_high_impedance").with_values({"spring.stiffness": 1.3 * 1530.456})
     run = rsea.simulate(bench, 15.0 * np.random.default_rng(4).standard_normal(2800), RATE, seed=4)
-    (found,) = rsea.check(run, "paper_high_impedance").result.of("rig_value")
-    assert (found.light, found.channel, found.expected) == ("amber", "spring.stiffness", "1530, to 15 %")
-    assert found.low < 1.3 * 1530.456 < found.high
+    (finding,) = rsea.check(run, "paper_high_impedance").result.of("rig_value")
+    assert (finding.light, finding.channel, finding.expected) == (
+        "amber",
+        "spring.stiffness",
+        "1530, to 15 %",
+    )
+    assert finding.low < 1.3 * 1530.456 < finding.high
     assert rsea.check(run, bench).result.of("rig_value") == ()

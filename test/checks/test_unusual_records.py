@@ -22,7 +22,7 @@ RIG = load_rig("paper_high_impedance")
 T = np.arange(2000) / 280.0
 
 
-def checked(command, size=2000):
+def check_command(command, size=2000):
     noise = np.random.default_rng(0).normal(size=(2, len(T)))[:, :size]
     channels = {"ft": Channel(T[:size], noise[0]), "position": Channel(T[:size], noise[1])}
     with warnings.catch_warnings():
@@ -32,11 +32,11 @@ def checked(command, size=2000):
 
 @pytest.mark.parametrize("size", [0, 1, 2, 3, 10, 64, 80])
 def test_few_samples_are_checked_without_a_warning(size):
-    assert {f.kind for f in checked(np.sin(T[:size]), size).findings} >= {"topics", "missing_topic"}
+    assert {f.kind for f in check_command(np.sin(T[:size]), size).findings} >= {"topics", "missing_topic"}
 
 
 def test_a_channel_without_a_sample_is_missing():
-    missing = {f.channel for f in checked(np.sin(T), 0).findings if f.kind == "missing_topic"}
+    missing = {f.channel for f in check_command(np.sin(T), 0).findings if f.kind == "missing_topic"}
     assert missing == {"ft", "position", "velocity", "motor_torque"} & set(RIG.sensors)
 
 
@@ -51,7 +51,7 @@ COMMANDS = {
 @pytest.mark.parametrize("name", COMMANDS)
 def test_tiny_and_excessive_commands_are_rated(name):
     command, light = COMMANDS[name]
-    assert [f.light for f in checked(command).findings if f.kind == "excitation"] == [light]
+    assert [f.light for f in check_command(command).findings if f.kind == "excitation"] == [light]
 
 
 def test_a_sensor_of_too_few_samples_is_left_out_of_the_clocks():
@@ -139,9 +139,9 @@ def test_stamps_in_another_unit_than_seconds_are_a_red_rate(unit):
 def test_a_diagnosis_of_a_constant_command_says_that_it_could_see_nothing():
     """`Nothing is wrong with the simulation` of a bench that was never moved."""
     record = simulate(RIG, np.full(2800, 4.0), rate=280.0)
-    found = rsea.diagnose(record, RIG)
-    assert found.sentence.startswith("These data show nothing: the command never changes")
-    assert found.summary().startswith("These data show nothing")
+    dx = rsea.diagnose(record, RIG)
+    assert dx.sentence.startswith("These data show nothing: the command never changes")
+    assert dx.summary().startswith("These data show nothing")
 
 
 def test_statics_need_an_angle_that_grows_with_the_load():

@@ -32,7 +32,7 @@ def dead(record):
     return Channel(record["ft"].t, np.zeros(len(record["ft"])))
 
 
-def turned(record):
+def turn_ft(record):
     return Channel(record["ft"].t, -record["ft"].y)
 
 
@@ -46,7 +46,7 @@ def test_a_good_bag_is_green_and_says_its_rig(bag, capsys):
 
 
 def test_several_bags_as_json_and_a_status(bag, good, capsys):
-    assert main(["check", bag(), bag(ft=turned(good)), "--json", "--fail-on", "red"]) == 1
+    assert main(["check", bag(), bag(ft=turn_ft(good)), "--json", "--fail-on", "red"]) == 1
     said = json.loads(capsys.readouterr().out)
     assert (said["schema"], said["rig"], said["light"]) == (1, "paper_high_impedance", "red")
     assert [record["light"] for record in said["records"]] == ["green", "red"]
@@ -55,7 +55,7 @@ def test_several_bags_as_json_and_a_status(bag, good, capsys):
 
 
 def test_the_suggested_axis_corrects_the_bag(bag, good, capsys):
-    assert main(["check", bag(ft=turned(good)), "--axis=-torque.z", "--fail-on", "red"]) == 0
+    assert main(["check", bag(ft=turn_ft(good)), "--axis=-torque.z", "--fail-on", "red"]) == 0
 
 
 def test_for_a_dead_axis_the_one_that_follows_the_command_is_suggested(bag, capsys):

@@ -28,7 +28,7 @@ def rsea(*arguments: str | Path, before: Callable[[], None] | None = None):
     return subprocess.CompletedProcess(command, status, out.getvalue(), err.getvalue())
 
 
-def refused(done: subprocess.CompletedProcess[str], *words: str | Path) -> None:
+def assert_refused(done: subprocess.CompletedProcess[str], *words: str | Path) -> None:
     """Check that the outcome is status 2 and one line with everything that a person needs."""
     assert (done.returncode, done.stdout) == (2, ""), done.stderr
     assert done.stderr.count("\n") == 1, done.stderr
@@ -37,7 +37,7 @@ def refused(done: subprocess.CompletedProcess[str], *words: str | Path) -> None:
         assert str(word) in done.stderr, done.stderr
 
 
-def changed(record: Record, name: str, k: int, *, y: float | None = None, t: float | None = None) -> Record:
+def change(record: Record, name: str, k: int, *, y: float | None = None, t: float | None = None) -> Record:
     values, stamps = record[name].y.copy(), record[name].t.copy()
     values[k] = values[k] if y is None else y
     stamps[k] = stamps[k] if t is None else t

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from bad_input import changed, refused, rsea, without
+from bad_input import assert_refused, change, rsea, without
 from foreign import EPOCH, joint_state, write_foreign
 
 from msg_adapters import write_record
@@ -17,14 +17,14 @@ from rsea_ros.cli.main import main
 def test_a_missing_topic_is_refused_by_name(record, tmp_path, out):
     write_record(without(record, "command"), tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--out", out)
-    refused(done, tmp_path / "bag", "no message on /rsea/torque_command", "the bag holds /rsea/ft")
+    assert_refused(done, tmp_path / "bag", "no message on /rsea/torque_command", "the bag holds /rsea/ft")
 
 
 def test_a_topic_of_the_wrong_type_is_refused(record, tmp_path, out):
     write_record(without(record, "ft"), tmp_path / "bag")
     stated = ["--topic", "ft=/rsea/joint_states", "--topic", "joint_states=/rsea/nothing"]
     done = rsea("identify", tmp_path / "bag", "--out", out, *stated)
-    refused(
+    assert_refused(
         done, "/rsea/joint_states is sensor_msgs/msg/JointState, expected geometry_msgs/msg/WrenchStamped"
     )
 
@@ -32,12 +32,14 @@ def test_a_topic_of_the_wrong_type_is_refused(record, tmp_path, out):
 def test_an_empty_bag_is_refused(tmp_path, out):
     with BagWriter(tmp_path / "bag", "mcap"):
         pass
-    refused(rsea("identify", tmp_path / "bag", "--out", out), tmp_path / "bag", "holds no topic at all")
+    assert_refused(
+        rsea("identify", tmp_path / "bag", "--out", out), tmp_path / "bag", "holds no topic at all"
+    )
 
 
 def test_an_empty_file_is_refused(tmp_path, out):
     (tmp_path / "bag.mcap").touch()
-    refused(rsea("identify", tmp_path / "bag.mcap", "--out", out), tmp_path / "bag.mcap", "empty file")
+    assert_refused(rsea("identify", tmp_path / "bag.mcap", "--out", out), tmp_path / "bag.mcap", "empty file")
 
 
 def test_a_truncated_mcap_is_read_up_to_its_last_chunk(record, tmp_path):
@@ -52,21 +54,21 @@ def test_a_truncated_mcap_is_read_up_to_its_last_chunk(record, tmp_path):
 def test_a_truncated_mcap_without_a_chunk_is_refused(record, tmp_path, out):
     write_record(record, tmp_path / "whole.mcap")
     (tmp_path / "cut.mcap").write_bytes((tmp_path / "whole.mcap").read_bytes()[:60])
-    refused(rsea("identify", tmp_path / "cut.mcap", "--out", out), tmp_path / "cut.mcap", "cut off")
+    assert_refused(rsea("identify", tmp_path / "cut.mcap", "--out", out), tmp_path / "cut.mcap", "cut off")
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_command_that_is_not_finite_is_refused(record, tmp_path, out, value):
-    write_record(changed(record, "command", 7, y=value), tmp_path / "bag")
+    write_record(change(record, "command", 7, y=value), tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--out", out)
     words = f"/rsea/torque_command effort[7] is {value}", "expected a finite number"
-    refused(done, tmp_path / "bag", *words)
+    assert_refused(done, tmp_path / "bag", *words)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e31])
 def test_identify_masks_and_reports_a_measurement_that_is_no_number(record, tmp_path, value):
     """It refused what diagnose and predict mask."""
-    write_record(changed(record, "ft", 7, y=value), tmp_path / "bag")
+    write_record(change(record, "ft", 7, y=value), tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--out", tmp_path / "results")
     assert (done.returncode, done.stderr) == (0, "")
     faults = json.loads((tmp_path / "results" / "identification.json").read_text())["data"]["faults"]
@@ -78,7 +80,7 @@ def test_identify_masks_and_reports_a_measurement_that_is_no_number(record, tmp_
     [(9, 3.3 / 280, ["stray_stamps", "dropped_samples"]), (11, 13.5 / 280, ["out_of_order"])],
 )
 def test_a_stamp_that_goes_back_is_reported_and_the_rest_is_used(record, tmp_path, sample, stamp, kinds):
-    write_record(changed(record, "ft", sample, t=stamp), tmp_path / "bag")
+    write_record(change(record, "ft", sample, t=stamp), tmp_path / "bag")
     assert main(["identify", str(tmp_path / "bag"), "--out", str(tmp_path / "found")]) == 0
     faults = json.loads((tmp_path / "found" / "identification.json").read_text())["data"]["faults"]
     assert [(f["kind"], f["channel"], f["size"]) for f in faults] == [(kind, "ft", 1) for kind in kinds]
@@ -93,9 +95,9 @@ def test_a_bag_of_two_joints_needs_the_joint_to_be_named(tmp_path, out):
     ]
     bag = write_foreign(tmp_path / "bag", rows)
     done = rsea("identify", bag, "--out", out)
-    refused(done, bag, "/rsea/joint_states: 2 joints (hip, knee), expected one; name it with --joint")
-    refused(rsea("identify", bag, "--out", out, "--joint", "ankle"), bag, "no joint 'ankle'")
+    assert_refused(done, bag, "/rsea/joint_states: 2 joints (hip, knee), expected one; name it with --joint")
+    assert_refused(rsea("identify", bag, "--out", out, "--joint", "ankle"), bag, "no joint 'ankle'")
 
 
 def test_a_bag_that_does_not_exist_is_refused(tmp_path, out):
-    refused(rsea("identify", tmp_path / "nothing", "--out", out), tmp_path / "nothing", "no such bag")
+    assert_refused(rsea("identify", tmp_path / "nothing", "--out", out), tmp_path / "nothing", "no such bag")

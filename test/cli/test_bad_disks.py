@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from bad_input import ROOT, refused, rsea
+from bad_input import ROOT, assert_refused, rsea
 
 from msg_adapters import write_record
 
@@ -25,7 +25,7 @@ def test_a_disk_that_fills_up_under_the_results_leaves_none(record, tmp_path):
     write_record(record, tmp_path / "bag")
     assert rsea("identify", tmp_path / "bag", "--out", tmp_path / "roomy").returncode == 0  # compiles all
     done = rsea("identify", tmp_path / "bag", "--out", tmp_path / "results", before=small_files)
-    refused(done, tmp_path / "results" / "report.html", "File too large")
+    assert_refused(done, tmp_path / "results" / "report.html", "File too large")
     assert not (tmp_path / "results").exists()
 
 
@@ -33,14 +33,14 @@ def test_a_disk_that_fills_up_under_a_bag_leaves_none(tmp_path, tmp_path_factory
     roomy = tmp_path_factory.mktemp("roomy") / "bag"  # compiles all that runs with small files
     assert rsea("simulate", "paper_high_impedance", "--out", roomy).returncode == 0
     done = rsea("simulate", "paper_high_impedance", "--out", tmp_path / "bag", before=small_files)
-    refused(done, tmp_path / "bag", "File too large")
+    assert_refused(done, tmp_path / "bag", "File too large")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_full_disk_is_one_line(record, tmp_path):
     write_record(record, tmp_path / "bag")
     done = rsea("predict", "paper_high_impedance", tmp_path / "bag", "--out", "/dev/full/x.csv")
-    refused(done, "/dev/full")
+    assert_refused(done, "/dev/full")
 
 
 def as_nobody(*arguments: str | Path, once: tuple[str | Path, ...] = ()) -> subprocess.CompletedProcess[str]:
@@ -68,7 +68,7 @@ def test_a_file_without_read_permission_is_refused(record, tmp_path):
     reachable(tmp_path)
     before = ("identify", tmp_path / "open.mcap", "--out", tmp_path / "results")
     done = as_nobody("identify", tmp_path / "locked.mcap", once=before)
-    refused(done, tmp_path / "locked.mcap", "no permission to read it")
+    assert_refused(done, tmp_path / "locked.mcap", "no permission to read it")
 
 
 def test_a_folder_without_write_permission_is_refused(record, tmp_path):
@@ -77,4 +77,4 @@ def test_a_folder_without_write_permission_is_refused(record, tmp_path):
     reachable(tmp_path)
     bag = ("identify", tmp_path / "bag.mcap", "--out")
     done = as_nobody(*bag, tmp_path / "locked" / "results", once=(*bag, tmp_path / "open"))
-    refused(done, tmp_path / "locked" / "results", "Permission denied")
+    assert_refused(done, tmp_path / "locked" / "results", "Permission denied")

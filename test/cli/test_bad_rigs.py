@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from bad_input import ROOT, refused, rsea, without
+from bad_input import ROOT, assert_refused, rsea, without
 
 from msg_adapters import write_record
 
@@ -37,7 +37,7 @@ def test_a_senseless_rig_is_refused_in_one_line(record, tmp_path, out, old, new,
     write_record(record, tmp_path / "bag")
     assert old in RIG
     (tmp_path / "rig.yaml").write_text(RIG.replace(old, new, 1), encoding="utf-8")
-    refused(
+    assert_refused(
         rsea("identify", tmp_path / "bag", "--rig", tmp_path / "rig.yaml", "--out", out),
         tmp_path / "rig.yaml",
         *words,
@@ -47,13 +47,13 @@ def test_a_senseless_rig_is_refused_in_one_line(record, tmp_path, out, old, new,
 def test_a_rig_that_does_not_exist_is_refused(record, tmp_path, out):
     write_record(record, tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--rig", "papper", "--out", out)
-    refused(done, "rig 'papper' not found", "paper_high_impedance")
+    assert_refused(done, "rig 'papper' not found", "paper_high_impedance")
 
 
 def test_a_rig_that_the_data_contradict_is_refused(record, tmp_path, out):
     write_record(without(record, "position"), tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--rig", "bare_drive", "--out", out)
-    refused(done, tmp_path / "bag", "no position channel, expected one")
+    assert_refused(done, tmp_path / "bag", "no position channel, expected one")
 
 
 @pytest.mark.parametrize(
@@ -68,5 +68,5 @@ def test_a_rig_that_the_data_contradict_is_refused(record, tmp_path, out):
     ],
 )
 def test_a_senseless_simulation_is_refused(tmp_path, arguments, words):
-    refused(rsea("simulate", "paper_high_impedance", "--out", tmp_path / "bag", *arguments), *words)
+    assert_refused(rsea("simulate", "paper_high_impedance", "--out", tmp_path / "bag", *arguments), *words)
     assert list(tmp_path.iterdir()) == []

@@ -39,7 +39,7 @@ def _left_running(out):
     return [line for line in lines if b"rsea_ros.nodes" in line and str(out).encode() in line]
 
 
-def _played(tmp_path):
+def _play(tmp_path):
     """Play the demo until the plant does not stall, three times at most; return its directory and output."""
     for k in range(3):
         out = tmp_path / f"demo{k}"
@@ -52,18 +52,18 @@ def _played(tmp_path):
 
 
 def test_the_demo_finds_the_true_values_and_names_its_report(tmp_path):
-    out, printed = _played(tmp_path)
+    out, printed = _play(tmp_path)
     assert printed.splitlines()[-1] == f"report: {out / 'report.html'}"
     assert (out / "report.html").exists() and (out / "identification.json").exists()
     assert re.search(r"^1\d{4} messages recorded and replayed, 0 lost$", printed, re.MULTILINE)
-    true, found, start = (
+    true, fitted_value, start = (
         load_rig(r) for r in (out / "bench.yaml", out / "model.yaml", "paper_high_impedance")
     )
     for name in start.free():
-        low, high = found.quantities[name].ci95
+        low, high = fitted_value.quantities[name].ci95
         assert name in printed
         assert true[name] != start[name]
-        assert abs(found[name] - true[name]) < high - low
+        assert abs(fitted_value[name] - true[name]) < high - low
         assert high - low < 0.1 * true[name]
     assert not _left_running(out)
 
@@ -154,7 +154,7 @@ def test_a_run_that_was_disturbed_is_repeated_once(tmp_path, capsys, monkeypatch
     monkeypatch.setattr(demo, "source", lambda nodes, out, args: nullcontext("plant"))
     monkeypatch.setattr(demo, "measure", lambda nodes, path, *rest: played.append(path))
     monkeypatch.setattr(demo, "read_record", read)
-    assert demo.recorded(None, tmp_path, 20.0, SimpleNamespace(seed=1)) == tmp_path / bag == played[-1]
+    assert demo.record_bench(None, tmp_path, 20.0, SimpleNamespace(seed=1)) == tmp_path / bag == played[-1]
     told = " ".join(capsys.readouterr().out.split())
     assert told.count("this machine was too busy (") == lines
     assert told.count("once more") == min(lines, 1)

@@ -10,12 +10,12 @@ from rsea_ros.cli.main import main
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
+def directory(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def test_design_without_arguments_computes_the_papers_example(here, capsys):
+def test_design_without_arguments_computes_the_papers_example(directory, capsys):
     assert main(["design", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result["asked"]["bandwidth_eq_7_hz"] == pytest.approx(55.83, abs=5e-3)
@@ -23,12 +23,12 @@ def test_design_without_arguments_computes_the_papers_example(here, capsys):
     assert result["asked"]["deflection"] is None
     assert not result["asked"]["feasible"]
     assert result["least"]["feasible"]
-    page = (here / "out/design/report.html").read_text(encoding="utf-8")
+    page = (directory / "out/design/report.html").read_text(encoding="utf-8")
     for said in ("55.8 Hz by Eq. (7)", "130 N·m at 45°", "33°", "1728", "2759", "n = −160"):
         assert said in page
 
 
-def test_fail_on_makes_the_result_of_a_design_an_exit_status(here):
+def test_fail_on_makes_the_result_of_a_design_an_exit_status(directory):
     assert main(["design", "--fail-on", "unmet"]) == 1
     assert main(["design", "--fail-on", "unmet", "--stiffness", "4000"]) == 0
 
@@ -45,7 +45,7 @@ def test_fail_on_makes_the_result_of_a_design_an_exit_status(here):
         ),
     ],
 )
-def test_bad_input_is_one_line_and_status_2(here, capsys, arguments, message):
+def test_bad_input_is_one_line_and_status_2(directory, capsys, arguments, message):
     assert main(["design", *arguments]) == 2
     assert capsys.readouterr().err == f"rsea design: {message}\n"
-    assert not (here / "out").exists()
+    assert not (directory / "out").exists()

@@ -9,7 +9,7 @@ import pytest
 
 import rsea_ros as rsea
 from msg_adapters import write_record
-from rsea_ros.cli._shown import shown
+from rsea_ros.cli._shown import show_controls
 from rsea_ros.cli.main import FAULT, main
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import rig_path
@@ -23,21 +23,21 @@ def record():
     return rsea.simulate(RIG, 15.0 * np.random.default_rng(4).standard_normal(2000), 280.0, seed=4)
 
 
-def frozen(record):
+def freeze(record):
     y = record["ft"].y.copy()
     y[600:1200] = y[600]
     return record.with_channels(ft=Channel(record["ft"].t, y))
 
 
 def test_identify_reports_frozen_samples(record, tmp_path, capsys):
-    write_record(frozen(record), tmp_path / "bag.mcap")
+    write_record(freeze(record), tmp_path / "bag.mcap")
     main(["identify", str(tmp_path / "bag.mcap"), "--out", str(tmp_path / "out"), "--json"])
     faults = json.loads(capsys.readouterr().out)["data"]["faults"]
     assert [f["channel"] for f in faults if f["kind"] == "frozen_samples"] == ["ft"]
 
 
 def test_a_fit_in_python_opens_with_its_verdict_and_the_faults(record):
-    summary = rsea.identify(frozen(record), RIG).summary()
+    summary = rsea.identify(freeze(record), RIG).summary()
     assert summary.startswith("The model ")
     assert "frozen samples in F/T torque" in summary
 
@@ -75,7 +75,7 @@ def test_a_seed_below_zero_is_refused(tmp_path, capsys):
 
 def test_a_closed_stdout_is_no_error(monkeypatch):
     monkeypatch.setattr("sys.stdout", None)
-    with shown():
+    with show_controls():
         print("nobody hears this")  # noqa: T201
 
 
@@ -99,11 +99,11 @@ def test_a_symbolic_link_as_out_is_refused_before_any_work(exists, record, tmp_p
     assert not said.out
 
 
-def clipped(record):
+def clip(record):
     return record.with_channels(ft=Channel(record["ft"].t, np.clip(record["ft"].y, -4.0, 4.0)))
 
 
-@pytest.mark.parametrize(("damage", "kind"), [(frozen, "frozen_samples"), (clipped, "clipping")])
+@pytest.mark.parametrize(("damage", "kind"), [(freeze, "frozen_samples"), (clip, "clipping")])
 def test_identify_fits_no_sample_that_it_reports(damage, kind, record):
     fit = rsea.identify(damage(record), RIG)
     assert kind in {fault.kind for fault in fit.result.faults}

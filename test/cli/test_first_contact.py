@@ -80,8 +80,8 @@ def test_a_verbs_help_ends_with_an_example_that_its_parser_takes(name, capsys):
     verb = importlib.import_module(f"rsea_ros.cli.{cli.verbs()[name].stem}")
     assert left.value.code == 0 and shown.rstrip().endswith(verb.EXAMPLE)
     for command in verb.EXAMPLE.split("&&"):
-        program, own, *arguments = shlex.split(command)
-        assert (program, own) == ("rsea", name)
+        program, subcommand, *arguments = shlex.split(command)
+        assert (program, subcommand) == ("rsea", name)
         parser = argparse.ArgumentParser(exit_on_error=False)
         verb.add_arguments(parser)
         parser.parse_args(arguments) if name != "test" else None
@@ -145,8 +145,8 @@ def test_a_folder_of_results_that_is_a_symbolic_link_is_named_as_such(target, tm
 @pytest.mark.parametrize("kind", ["dropped_samples", "checksum_mismatch"])
 def test_a_long_kind_of_finding_is_apart_from_its_channel(kind):
     """`dropped samplesposition`."""
-    found = Findings("run", "bench", (Finding("amber", kind, "position", 1.0, "1"),))
-    assert f"{kind.replace('_', ' ')} position" in check_lines(found)[0].plain
+    findings = Findings("run", "bench", (Finding("amber", kind, "position", 1.0, "1"),))
+    assert f"{kind.replace('_', ' ')} position" in check_lines(findings)[0].plain
 
 
 def test_what_a_check_says_of_a_file_with_a_long_name_keeps_its_column():

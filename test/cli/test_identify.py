@@ -77,12 +77,12 @@ def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
 
 
 def test_the_model_runs_wherever_a_rig_runs(results):
-    found = json.loads((results / "identification.json").read_text(encoding="utf-8"))
+    document = json.loads((results / "identification.json").read_text(encoding="utf-8"))
     model = load_rig(results / "model.yaml")
     for name in load_rig(RIG).free():
-        assert model[name] == pytest.approx(found["parameters"][name]["value"], rel=1e-9)
+        assert model[name] == pytest.approx(document["parameters"][name]["value"], rel=1e-9)
         assert model.quantities[name].ci95 == pytest.approx(
-            tuple(found["parameters"][name]["ci95"]), rel=1e-9
+            tuple(document["parameters"][name]["ci95"]), rel=1e-9
         )
 
 

@@ -11,7 +11,7 @@ import pytest
 from rsea_ros import compiler
 from rsea_ros.cli import _lines
 from rsea_ros.cli.main import main
-from rsea_ros.report.wrapped_lines import command_row, row, wrapped
+from rsea_ros.report.wrapped_lines import command_row, row, wrap
 
 VERBS = [
     ["--help"], ["rigs"], ["maps"], ["effects"], ["effects", "backlash"], ["effects", "structural_resonance"],
@@ -43,7 +43,7 @@ def test_a_verb_prints_no_line_wider_than_the_terminal(folder, monkeypatch, caps
 
 def test_words_stay_whole_and_a_command_stays_on_one_line():
     path = "a/" * 60 + "b"
-    assert path in wrapped(f"report: {path}", 80)
+    assert path in wrap(f"report: {path}", 80)
     command = f"rsea law {path} --rig model.yaml"
     assert command_row("law", "of the rest:", command, 80).splitlines() == [
         "law         of the rest:",

@@ -46,7 +46,7 @@ def verb(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
     return run
 
 
-def raising(error: BaseException) -> Callable[[argparse.Namespace], int]:
+def raise_error(error: BaseException) -> Callable[[argparse.Namespace], int]:
     """Return a verb that raises the error."""
 
     def run(args: argparse.Namespace) -> int:
@@ -67,7 +67,7 @@ def raising(error: BaseException) -> Callable[[argparse.Namespace], int]:
     ],
 )
 def test_an_expected_error_is_one_line_and_a_status(verb, capsys, error, status, line):
-    assert verb(raising(error)) == status
+    assert verb(raise_error(error)) == status
     assert capsys.readouterr() == ("", line + "\n")
 
 
@@ -76,12 +76,12 @@ def test_an_expected_error_is_one_line_and_a_status(verb, capsys, error, status,
     [ZeroDivisionError, OverflowError, MemoryError, RecursionError, KeyError, AssertionError, LinAlgError],
 )
 def test_an_error_that_nobody_expected_is_one_line_too(verb, capsys, monkeypatch, error):
-    assert verb(raising(error("7 pears"))) == 2
+    assert verb(raise_error(error("7 pears"))) == 2
     printed, line = capsys.readouterr()
     assert (printed, line.count("\n")) == ("", 1)
     assert line.startswith(f"rsea fake: {cli.FAULT}: {error.__name__} in test_main.py:") and "7 pears" in line
     monkeypatch.setenv("RSEA_TRACEBACK", "1")
-    assert verb(raising(error("7 pears"))) == 2
+    assert verb(raise_error(error("7 pears"))) == 2
     assert "Traceback" in capsys.readouterr().err
 
 
@@ -163,7 +163,7 @@ HOSTILE = "ft\x1b]0;title\x07\x1b[2J\x9b1m\u202ecod\udce9\r"
 
 def test_control_characters_reach_no_terminal(verb, capsys):
     assert verb(lambda args: sys.stdout.write(HOSTILE + "\n") and 0) == 0
-    assert verb(raising(BagError(HOSTILE))) == 2
+    assert verb(raise_error(BagError(HOSTILE))) == 2
     told = capsys.readouterr()
     shown = "ft\\u001b]0;title\\u0007\\u001b[2J\\u009b1m\\u202ecod\\udce9"
     assert told == (f"{shown}\\u000d\n", f"rsea fake: {shown}\n")

@@ -29,13 +29,13 @@ class Disk:
         if name not in STEPS:
             return call
 
-        def counted(*arguments, **options):
+        def count(*arguments, **options):
             self.left -= 1
             if self.left == 0:
                 self._misfire(name)
             return call(*arguments, **options)
 
-        return counted
+        return count
 
 
 def full(name: str) -> None:

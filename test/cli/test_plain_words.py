@@ -73,7 +73,7 @@ def test_a_mistake_in_a_table_is_described_in_plain_words(name, content, said, t
 def test_a_mistake_in_metadata_is_described_in_plain_words(content, said, tmp_path):
     (tmp_path / metadata.NAME).write_bytes(content)
     contents = Contents()
-    metadata.known(tmp_path, contents)
+    metadata.metadata_of(tmp_path, contents)
     (fault,) = contents.faults
     _assert_plain(fault.detail, said)
 

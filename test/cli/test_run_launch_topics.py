@@ -75,7 +75,7 @@ def rsea(*words: str) -> list[str]:
     return [sys.executable, "-m", "rsea_ros", *words]
 
 
-def heard(topic: str, *running: subprocess.Popen[bytes]) -> dict[str, Any]:
+def first_message(topic: str, *running: subprocess.Popen[bytes]) -> dict[str, Any]:
     """Return the first message of a topic while some processes run."""
     while all(process.poll() is None for process in running):  # a plant compiles its simulation first
         echo = subprocess.run(
@@ -96,8 +96,8 @@ def test_a_launched_graph_hears_the_documented_controller_and_one_signal_ends_it
     )
     controller = subprocess.Popen(rsea("run", "my_controller.py"), cwd=tmp_path)
     try:
-        assert heard("joint_states", graph)["name"] == ["joint"]
-        assert abs(heard("torque_command", graph, controller)["effort"][0]) > 0.0
+        assert first_message("joint_states", graph)["name"] == ["joint"]
+        assert abs(first_message("torque_command", graph, controller)["effort"][0]) > 0.0
     finally:
         controller.kill()
         controller.wait()
@@ -112,7 +112,7 @@ def call(*words: str) -> subprocess.CompletedProcess[str]:
 @pytest.fixture
 def visitor():
     """A node beside /rsea/mute, whose lifecycle never answers, as that of a node that hangs."""
-    with _visitor.visiting("visitor") as node:
+    with _visitor.visit("visitor") as node:
         mute = LifecycleNode("mute", namespace="rsea")
         yield node
         mute.destroy_node()
@@ -127,7 +127,7 @@ def test_a_node_that_hangs_is_listed_as_such(visitor, monkeypatch):
 
 def test_a_named_node_is_listed_without_a_question_to_the_others(visitor, monkeypatch, capsys):
     asked = []
-    monkeypatch.setattr(_visitor, "visiting", lambda name: nullcontext(visitor))
+    monkeypatch.setattr(_visitor, "visit", lambda name: nullcontext(visitor))
     monkeypatch.setattr(_caller.Caller, "actions", lambda self, name: asked.append(name) or ("stop",))
     assert cli.main(["call", "visitor"]) == 0
     assert set(asked) == {"/rsea/visitor"} and "stop" in capsys.readouterr().out

@@ -15,7 +15,7 @@ from msg_adapters import TopicMap, write_record
 from rsea_ros.cli import diagnose, identify
 from rsea_ros.cli._runs import rig_choice
 from rsea_ros.cli._topics import topic_map
-from rsea_ros.cli.main import attached, main
+from rsea_ros.cli.main import attach_axis, main
 from rsea_ros.report.rig.words import command
 
 OPTIONS = [
@@ -27,19 +27,19 @@ OPTIONS = [
 ]
 
 
-def parsed(verb, words):
+def parse(verb, words):
     parser = argparse.ArgumentParser()
     verb.add_arguments(parser)
-    return parser.parse_args(attached(words))
+    return parser.parse_args(attach_axis(words))
 
 
 @pytest.mark.parametrize("options", OPTIONS)
 def test_a_suggested_command_reads_the_same_data(options):
     """After `identify --axis=-torque.z --window 5:20`, `diagnose BAG` was suggested: other data."""
-    given = parsed(identify, ["a b.mcap", *options])
+    given = parse(identify, ["a b.mcap", *options])
     words = shlex.split(command("diagnose", given.bags, "bench", rig_choice(given)))
     assert words[:2] == ["rsea", "diagnose"]
-    again = parsed(diagnose, words[2:])
+    again = parse(diagnose, words[2:])
     for name in ("bags", "rig", "namespace", "topic", "joint", "axis", "shift", "begin", "end", "window"):
         assert getattr(again, name) == getattr(given, name), name
     if " " not in given.namespace and not given.topic:
@@ -47,7 +47,7 @@ def test_a_suggested_command_reads_the_same_data(options):
 
 
 def test_no_option_is_written_that_was_not_given():
-    given = parsed(identify, ["run"])
+    given = parse(identify, ["run"])
     assert command("diagnose", ["run"], "bench", rig_choice(given)).split()[3:] == ["--rig", given.rig]
 
 

@@ -116,7 +116,7 @@ def prepare(record: Record, folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
         (fleet_files, "joint_page", "page"), (fleet_files, "fleet_page", "page"),
     ):  # fmt: skip
         monkeypatch.setattr(module, names, lambda *words, value=value, **named: value)
-    monkeypatch.setattr(paper, "_tests", lambda args, new, tell: write_record(record, new.staged("one.mcap")))
+    monkeypatch.setattr(paper, "_tests", lambda args, new, tell: write_record(record, new.stage("one.mcap")))
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -8,15 +8,15 @@ import pytest
 from rsea_ros.control.compensation import compensation
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.feedforward import inverse, inverse_poles
-from rsea_ros.control.following import following
+from rsea_ros.control.following import follow
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import load_range
 from rsea_ros.control.prediction import AHEAD, Prediction, prediction_response
-from rsea_ros.control.sampled import sampled
+from rsea_ros.control.sampled import sample_rig
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.trials import EFFECTS, Span, restlessness, sine, tracked
+from rsea_ros.control.trials import EFFECTS, Span, restlessness, sine, tracking_error
 from rsea_ros.control.uncertainty import BenchVariant
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
@@ -50,7 +50,7 @@ def test_a_sine_is_followed_with_half_and_twice_the_load(times):
 def test_a_late_path_costs_nothing_once_it_is_learned(load):
     """A sample and 2 ms: 8 to 10 % off, because the observer took the learned lead for a disturbance."""
     loads = load_range(RIG, FREE)
-    assert tracked(RIG, loads, BenchVariant(load, 1.1, 1.5, 1, 2e-3), DESIGN) < 0.03
+    assert tracking_error(RIG, loads, BenchVariant(load, 1.1, 1.5, 1, 2e-3), DESIGN) < 0.03
 
 
 @pytest.mark.parametrize("times", [1.0, 2.0])
@@ -90,13 +90,13 @@ def test_backlash_makes_no_limit_cycle():
 
 def test_small_sines_come_out_as_predicted():
     """No frequency is amplified beyond 1.5 dB: an extrapolator alone reached 18.7 dB at half the rate."""
-    found = following(RIG, RIG, DESIGN)
-    decibel = 20.0 * np.log10(np.abs(found.torque))
-    assert decibel.max() < 1.5 and np.abs(decibel[found.hz < 8.0]).max() < 0.1
-    assert found.bandwidth > 3.0 * 6.365
-    wanted = prediction_response(80.0, 1.0 / RATE, found.hz)
-    below = found.hz < 6.0
-    assert found.torque[below] == pytest.approx(wanted[below], rel=0.02)
+    response = follow(RIG, RIG, DESIGN)
+    decibel = 20.0 * np.log10(np.abs(response.torque))
+    assert decibel.max() < 1.5 and np.abs(decibel[response.hz < 8.0]).max() < 0.1
+    assert response.bandwidth > 3.0 * 6.365
+    wanted = prediction_response(80.0, 1.0 / RATE, response.hz)
+    below = response.hz < 6.0
+    assert response.torque[below] == pytest.approx(wanted[below], rel=0.02)
 
 
 def test_a_jump_is_not_extrapolated():
@@ -129,7 +129,7 @@ def test_a_parabola_is_predicted():
 @pytest.mark.parametrize("rate", [280.0, 1000.0])
 def test_the_inverse_leads_the_model_to_the_desired_torque(name, rate):
     """Slow torques are exact, also where a single sample cannot be inverted."""
-    f = inverse(sampled(load_rig(name), rate))
+    f = inverse(sample_rig(load_rig(name), rate))
     assert np.abs(inverse_poles(f)).max() < 1.0 + 1e-6
     x = np.zeros(len(f.plant.a))
     for k in range(400):

@@ -9,7 +9,7 @@ from rsea_ros.control.grid import Grid
 PERIOD = 1e9 / 280.0
 
 
-def placed(*periods):
+def place(*periods):
     """Return the periods that a grid counts between measurements at these instants (in periods)."""
     grid = Grid(PERIOD)
     return [grid.place(round((100.0 + at) * PERIOD)) for at in periods]
@@ -17,17 +17,17 @@ def placed(*periods):
 
 def test_one_late_cycle_and_one_in_time_are_two_periods():
     """Rounding counted 2 and 0 or 2 and 1, and divided by zero."""
-    assert placed(0.0, 1.6, 2.0, 3.0) == [1, 1, 1, 1]
-    assert placed(0.0, 1.4, 2.0, 3.0) == [1, 1, 1, 1]
+    assert place(0.0, 1.6, 2.0, 3.0) == [1, 1, 1, 1]
+    assert place(0.0, 1.4, 2.0, 3.0) == [1, 1, 1, 1]
 
 
 def test_a_lost_cycle_is_counted_once():
-    assert placed(0.0, 1.0, 3.0, 4.0) == [1, 1, 2, 1]
+    assert place(0.0, 1.0, 3.0, 4.0) == [1, 1, 2, 1]
 
 
 def test_two_measurements_of_one_period_are_one_step():
-    assert placed(0.0, 1.0, 1.1, 2.0) == [1, 1, 0, 1]
-    assert sum(placed(0.0, 1.9, 2.0, 3.0)) == 4
+    assert place(0.0, 1.0, 1.1, 2.0) == [1, 1, 0, 1]
+    assert sum(place(0.0, 1.9, 2.0, 3.0)) == 4
 
 
 @pytest.mark.parametrize("off", [-5e-4, 0.0, 5e-4])

@@ -61,12 +61,12 @@ def every(n, **offsets):
     return taken
 
 
-def scattered(n):
+def scatter(n):
     """Measurements late by half a Gaussian of 0.3 periods."""
     return np.minimum(0.3 * np.abs(np.random.default_rng(1).normal(size=n)), 0.9)
 
 
-def thinned(n):
+def thin(n):
     """A tenth of the measurements lost."""
     return np.where(np.random.default_rng(1).random(n) < 0.1, np.nan, 0.0)
 
@@ -75,8 +75,8 @@ KINDS = {
     "one 2.6 periods after the last, then one in time": (lambda n: every(n, _60=1.6), 0.0),
     "one lost, the next 0.6 late": (lambda n: every(n, _59=math.nan, _60=0.6), 0.0),
     "the same, and commands late": (lambda n: every(n, _59=math.nan, _60=0.6), 1.6),
-    "a tenth lost": (thinned, 0.0),
-    "jitter of 0.3 periods": (scattered, 0.0),
+    "a tenth lost": (thin, 0.0),
+    "jitter of 0.3 periods": (scatter, 0.0),
     "all commands three late": (np.zeros, 3.0),
 }
 

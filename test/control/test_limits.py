@@ -38,12 +38,12 @@ def test_control_feels_soft_where_it_is_slow_and_hardly_stiffer_than_the_spring_
 
 def test_the_reach_ends_at_the_torque_limit_of_the_motor():
     """|T_m| = A |J s^2 + (b_m + b_s) s + K| / |b_s s + K|."""
-    found = reach(RIG, 20.0, 44.2, 3.466)
-    s = 2j * math.pi * found.torque
+    reached = reach(RIG, 20.0, 44.2, 3.466)
+    s = 2j * math.pi * reached.torque
     assert 20.0 * abs((J * s * s + (B + B_S) * s + K) / (B_S * s + K)) == pytest.approx(44.2, rel=5e-3)
-    s = 2j * math.pi * found.speed
+    s = 2j * math.pi * reached.speed
     assert 20.0 * abs(s / (B_S * s + K)) == pytest.approx(3.466, rel=5e-3)
-    assert largest(RIG, found.torque, 44.2, 3.466) == pytest.approx(20.0, rel=5e-3)
+    assert largest(RIG, reached.torque, 44.2, 3.466) == pytest.approx(20.0, rel=5e-3)
 
 
 def test_the_simulated_actuator_stops_following_at_its_reach():

@@ -7,15 +7,15 @@ import pytest
 
 from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.harness import closed_loop
-from rsea_ros.control.human import measured
-from rsea_ros.control.impedance import moved
+from rsea_ros.control.human import measure_impedance
+from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
 from rsea_ros.control.loads import load_range
-from rsea_ros.control.loop import linked
+from rsea_ros.control.loop import link_response
 from rsea_ros.control.settings import ControllerSettings
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.trials import disturbed, lagging_corners
+from rsea_ros.control.trials import disturbed_rig, lagging_corners
 from rsea_ros.control.virtual import Virtual
 from rsea_ros.model.rig_file import load_rig
 
@@ -33,9 +33,9 @@ def test_parts_are_chosen_that_every_bench_of_the_set_stands():
 
 
 def test_the_output_is_as_soft_as_predicted_and_softer_than_without():
-    still = moved(RIG, RATE, HZ)
-    on_link = linked(LAW, SHARE.inertia, SHARE.damping, SHARE.corner, HZ)
-    felt = np.abs(measured(RIG, DESIGN, Virtual(0.0, 0.0), HZ, SHARE) / still.spring)
+    still = distal_responses(RIG, RATE, HZ)
+    on_link = link_response(LAW, SHARE.inertia, SHARE.damping, SHARE.corner, HZ)
+    felt = np.abs(measure_impedance(RIG, DESIGN, Virtual(0.0, 0.0), HZ, SHARE) / still.spring)
     assert felt == pytest.approx(still.ratio(LAW, on_link), rel=0.04)
     assert np.all(felt[:2] < 0.87 * still.ratio(LAW)[:2])
 
@@ -54,7 +54,7 @@ def test_a_free_load_is_followed_no_worse():
 def test_a_free_load_with_little_drag_and_all_of_the_lag_comes_to_rest(load):
     """In full, inertia and drag are gone for the load and the lag swings a pendulum up."""
     loads = load_range(RIG, FREE)
-    true = disturbed(loads, lagging_corners(load, every=True)[2])
+    true = disturbed_rig(loads, lagging_corners(load, every=True)[2])
     wanted = np.where(np.arange(1120) < 60, 2.0, 0.0)
     controller = TorqueController(RIG, RATE, GAINS, link=SHARE, settings=ControllerSettings(learn=False))
     ft = closed_loop(true, RATE, controller, wanted, noise=False, late=1).ft

@@ -10,7 +10,7 @@ from rsea_ros.control.law import FeedbackState, Gains, feedback, hold, law_of
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.loop import largest_pole, open_loop
 from rsea_ros.control.margins import margins
-from rsea_ros.control.sampled import FT, VELOCITY, responses, sampled
+from rsea_ros.control.sampled import FT, VELOCITY, responses, sample_rig
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import check, grid
 from rsea_ros.errors import ParameterError
@@ -24,7 +24,7 @@ LOCKED_RIG, FREE_RIG = load_rig("paper_high_impedance"), load_rig("paper_moving_
 
 
 @pytest.fixture(scope="module")
-def found():
+def margins_by_load():
     """Margins of GAINS with every load."""
     return check(LOCKED_RIG, load_range(LOCKED_RIG, FREE_RIG), RATE, GAINS)
 
@@ -32,7 +32,7 @@ def found():
 @pytest.mark.parametrize("rig", [LOCKED_RIG, FREE_RIG], ids=lambda rig: rig.name)
 def test_the_sampled_bench_responds_as_the_simulated_one(rig):
     """A pulse into both; gravity and effects are in neither."""
-    plant, model, x = Plant(rig, RATE, noise=False), sampled(rig, RATE), np.zeros(2)
+    plant, model, x = Plant(rig, RATE, noise=False), sample_rig(rig, RATE), np.zeros(2)
     x = np.zeros(len(model.a))
     for k in range(60):
         torque = 10.0 if k < 3 else 0.0
@@ -44,7 +44,7 @@ def test_the_sampled_bench_responds_as_the_simulated_one(rig):
 @pytest.mark.parametrize("hz", [1.0, 5.0, 17.5, 70.0])
 def test_the_controller_answers_a_sine_as_the_formula_says(hz):
     """The controller measures a bench driven by a sine and answers with -L times it."""
-    model, law = sampled(FREE_RIG, RATE), law_of(FREE_RIG, RATE, GAINS)
+    model, law = sample_rig(FREE_RIG, RATE), law_of(FREE_RIG, RATE, GAINS)
     at = np.array([hz])
     response = responses(model, at)
     turn = np.exp(2j * np.pi * hz / RATE * np.arange(4000))
@@ -71,10 +71,10 @@ def test_margins_are_those_of_python_control():
 
 
 @pytest.mark.parametrize("rig", [LOCKED_RIG, FREE_RIG], ids=lambda rig: rig.name)
-def test_the_bench_is_stable_below_the_gain_margin_and_unstable_above(rig, found):
+def test_the_bench_is_stable_below_the_gain_margin_and_unstable_above(rig, margins_by_load):
     """With more torque per current the loop is stable below the margin and unstable above it."""
     name = LOCKED if rig is LOCKED_RIG else "free x 1"
-    gain = 10.0 ** (found.margins[name].gain / 20.0)
+    gain = 10.0 ** (margins_by_load.margins[name].gain / 20.0)
     rms = {}
     for share in (0.95, 1.05):
         true = rig.with_effects(EffectSetting("torque_constant_error", {"gain": share * gain}))
@@ -84,9 +84,9 @@ def test_the_bench_is_stable_below_the_gain_margin_and_unstable_above(rig, found
     assert rms[0.95] < 2.0 and rms[1.05] > 5.0
 
 
-def test_poles_and_encirclements_agree(found):
-    plant, law = sampled(LOCKED_RIG, RATE), law_of(LOCKED_RIG, RATE, GAINS)
-    edge = 10.0 ** (found.margins[LOCKED].gain / 20.0)
+def test_poles_and_encirclements_agree(margins_by_load):
+    plant, law = sample_rig(LOCKED_RIG, RATE), law_of(LOCKED_RIG, RATE, GAINS)
+    edge = 10.0 ** (margins_by_load.margins[LOCKED].gain / 20.0)
     for share, stable in ((0.98, True), (1.02, False)):
         stronger = type(plant)(plant.a, plant.b * share * edge, plant.c, plant.period)
         assert (largest_pole(law, stronger) < 1.0) is stable

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.control.following import fall, following
+from rsea_ros.control.following import fall, follow
 from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.spread import NEAR, softness, spread
@@ -21,8 +21,8 @@ LOADS = load_range(RIG, FREE)
 
 def test_a_simulated_bench_of_the_set_lies_within_the_band():
     """The mode rings in the sensor and not in the torque, so it is taken out of what the sensor read."""
-    apart, near = spread(RIG, LOADS, DESIGN, (LOCKED,)), following(RIG, RIG, DESIGN, learn=False)
-    far = following(hard(LOADS), RIG, DESIGN, late=1, learn=False)
+    apart, near = spread(RIG, LOADS, DESIGN, (LOCKED,)), follow(RIG, RIG, DESIGN, learn=False)
+    far = follow(hard(LOADS), RIG, DESIGN, late=1, learn=False)
     mode = mode_of(Uncertainty().mode, Uncertainty().mode[2], far.hz)
     beyond = 20.0 * np.log10(np.abs(far.torque / mode / near.torque))
     low, high = (np.interp(far.hz, apart.hz, edge) for edge in apart.gain)

@@ -49,12 +49,12 @@ def links(spoil=lambda k, angle: angle, run=None, rig=RIG):
 @pytest.mark.parametrize("hz", [1.0, 5.0, 10.0, 20.0])
 def test_a_sound_encoder_counts_after_a_quarter_of_a_second_of_motion(hz):
     run = samples(hz=hz)
-    encoder, found = links(run=run)
+    encoder, angles = links(run=run)
     assert encoder.used and encoder.losses == 0 and encoder.trouble == ""
-    first = next(k for k, angle in enumerate(found) if math.isfinite(angle))
+    first = next(k for k, angle in enumerate(angles) if math.isfinite(angle))
     assert 0.25 * RATE <= first < 1.0 * RATE
     true = [s.position - s.deflection for s in run]
-    assert found[first:] == pytest.approx(true[first:], abs=1e-12)
+    assert angles[first:] == pytest.approx(true[first:], abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -70,8 +70,8 @@ def test_a_sound_encoder_counts_after_a_quarter_of_a_second_of_motion(hz):
     ids=["frozen", "wrong sign", "wrong scale", "missing", "of another motion", "jumping"],
 )
 def test_a_wrong_encoder_never_counts(spoil):
-    _, found = links(spoil)
-    assert not np.isfinite(found).any()
+    _, angles = links(spoil)
+    assert not np.isfinite(angles).any()
 
 
 @pytest.mark.parametrize(
@@ -85,43 +85,43 @@ def test_a_wrong_encoder_never_counts(spoil):
     ids=["frozen elsewhere", "wrong sign", "missing", "jump"],
 )
 def test_an_encoder_that_fails_is_dropped(spoil, within):
-    encoder, found = links(spoil)
-    assert np.isfinite(found[300:500]).all()
-    assert not np.isfinite(found[501 + within : 540]).any()
+    encoder, angles = links(spoil)
+    assert np.isfinite(angles[300:500]).all()
+    assert not np.isfinite(angles[501 + within : 540]).any()
     assert encoder.losses >= 1
 
 
 def test_an_encoder_that_stops_is_off_by_little_when_it_is_dropped():
     run = samples()
     stopped = run[500].deflection
-    _, found = links(lambda k, angle: stopped if k >= 500 else angle, run)
+    _, angles = links(lambda k, angle: stopped if k >= 500 else angle, run)
     true = np.array([s.position - s.deflection for s in run])
-    wrong = np.abs(np.array(found) - true)[500:]
+    wrong = np.abs(np.array(angles) - true)[500:]
     assert np.nanmax(wrong) < 0.6 * max(abs(s.deflection) for s in run)
-    assert not np.isfinite(found[560:]).any()
+    assert not np.isfinite(angles[560:]).any()
 
 
 def test_a_bench_at_rest_shows_nothing_about_its_encoder():
-    encoder, found = links(run=samples(torque=0.0))
-    assert not encoder.used and not np.isfinite(found).any()
+    encoder, angles = links(run=samples(torque=0.0))
+    assert not encoder.used and not np.isfinite(angles).any()
 
 
 def test_a_reading_lost_now_and_then_does_not_end_the_trust():
-    encoder, found = links(lambda k, angle: math.nan if k % 50 == 0 else angle)
-    assert encoder.used and encoder.losses == 0 and encoder.missing == math.ceil(len(found) / 50)
+    encoder, angles = links(lambda k, angle: math.nan if k % 50 == 0 else angle)
+    assert encoder.used and encoder.losses == 0 and encoder.missing == math.ceil(len(angles) / 50)
 
 
 def test_an_angle_of_the_sample_before_is_brought_to_its_instant():
     run = samples(hz=5.0)
     encoder = SpringEncoder(RIG, RATE)
-    found = [
+    angles = [
         encoder.link(SpringReading(old.deflection, new.ft, new.position, age=1.0))
         for old, new in pairwise(run)
     ]
     true = np.array([s.position - s.deflection for s in run[1:]])
     plain = np.array([new.position - old.deflection for old, new in pairwise(run)])
-    ready = np.isfinite(found)
-    off, before = (np.sqrt(np.mean((a - true)[ready] ** 2)) for a in (np.array(found), plain))
+    ready = np.isfinite(angles)
+    off, before = (np.sqrt(np.mean((a - true)[ready] ** 2)) for a in (np.array(angles), plain))
     assert encoder.losses == 0 and off < 0.5 * before
 
 

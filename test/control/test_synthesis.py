@@ -20,20 +20,20 @@ LOADS = load_range(RIG, FREE)
 
 
 @pytest.fixture(scope="module")
-def found():
+def designed():
     """The design for the paper's actuator at 280 Hz."""
     return design(RIG, LOADS, RATE)
 
 
-def test_the_demands_are_kept_with_every_load(found):
+def test_the_demands_are_kept_with_every_load(designed):
     """|S| <= 2 is 6 dB and 29 degrees; <= 3 over the set's corners; |Z| over the spring's at most 1.2."""
-    for margin in found.margins.values():
+    for margin in designed.margins.values():
         assert margin.sensitivity <= 2.02 and margin.phase >= 28.9 and margin.gain >= 5.95
         assert margin.delay >= 1.0
-    assert found.sensitivity <= 3.1 and found.impedance <= 1.21
+    assert designed.sensitivity <= 3.1 and designed.impedance <= 1.21
 
 
-def test_no_neighbour_that_keeps_the_demands_is_clearly_better(found):
+def test_no_neighbour_that_keeps_the_demands_is_clearly_better(designed):
     """Less friction or a softer feel costs one of the demands."""
 
     def worth(design):
@@ -43,16 +43,16 @@ def test_no_neighbour_that_keeps_the_demands_is_clearly_better(found):
 
     for name in ("k_p", "k_d", "k_i", "q_frequency", "k_w"):
         for factor in (0.93, 1.07):
-            gains = replace(found.gains, **{name: factor * getattr(found.gains, name)})
+            gains = replace(designed.gains, **{name: factor * getattr(designed.gains, name)})
             other = check(RIG, LOADS, RATE, gains)
-            short = other.sensitivity > 3.01 or other.impedance > 1.0 + found.impedance - 0.999
-            assert short or worth(other) > worth(found) - 0.05
+            short = other.sensitivity > 3.01 or other.impedance > 1.0 + designed.impedance - 0.999
+            assert short or worth(other) > worth(designed) - 0.05
 
 
-def test_the_whole_set_is_stable_and_its_worst_is_stated(found):
+def test_the_whole_set_is_stable_and_its_worst_is_stated(designed):
     """The set between its corners: loads, K_s, b_m, a sample, 2 ms, the mode."""
     few = {name: LOADS[name] for name in (LOCKED, "free x 0.5", "free x 10")}
-    swept = robustness(RIG, few, found, steps=3)
+    swept = robustness(RIG, few, designed, steps=3)
     assert swept.cases == 3 * 3 * 3 * 6 * 3 and swept.unstable == 0
     assert swept.sensitivity < 3.2 and swept.margins.delay > 1.0 and swept.margins.phase > 19.0
 
@@ -64,10 +64,10 @@ def test_gains_of_the_nominal_bench_alone_are_refused_for_the_set():
         check(RIG, LOADS, RATE, eager)
 
 
-def test_a_bench_that_lags_gets_gentler_gains(found):
+def test_a_bench_that_lags_gets_gentler_gains(designed):
     slow = RIG.with_effects(EffectSetting("current_loop_lag", {"time_constant": 2e-3}))
     gentle = design(slow, load_range(slow, FREE), RATE)
-    assert gentle.friction_left > 1.02 * found.friction_left
+    assert gentle.friction_left > 1.02 * designed.friction_left
 
 
 def test_loads_reach_from_locked_to_free():

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.control.human import measured
-from rsea_ros.control.impedance import moved
+from rsea_ros.control.human import measure_impedance
+from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import Gains
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.virtual import Virtual, felt, passive_to, stiffest
+from rsea_ros.control.virtual import Virtual, felt_impedance, passive_to, stiffest
 from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")
@@ -19,17 +19,17 @@ HZ = np.array([1.0, 5.0, 10.0, 20.0])
 
 def test_a_hand_feels_hardly_more_than_the_spring_and_what_the_formula_says():
     alone = Virtual(0.0, 0.0)
-    z = measured(RIG, DESIGN, alone, HZ)
-    assert np.abs(z) == pytest.approx(np.abs(felt(RIG, DESIGN, alone, HZ)), rel=0.03)
-    assert np.all(np.abs(z) / np.abs(moved(RIG, 280.0, HZ).spring) < 1.23)
+    z = measure_impedance(RIG, DESIGN, alone, HZ)
+    assert np.abs(z) == pytest.approx(np.abs(felt_impedance(RIG, DESIGN, alone, HZ)), rel=0.03)
+    assert np.all(np.abs(z) / np.abs(distal_responses(RIG, 280.0, HZ).spring) < 1.23)
     assert np.all(z.real > 0.0)
 
 
 def test_a_virtual_spring_is_felt_and_is_passive():
     spring = Virtual(200.0, 2.0)
-    z = measured(RIG, DESIGN, spring, HZ[:1])
-    assert z == pytest.approx(felt(RIG, DESIGN, spring, HZ[:1]), rel=0.05)
-    more = z[0] - felt(RIG, DESIGN, Virtual(0.0, 0.0), HZ[:1])[0]
+    z = measure_impedance(RIG, DESIGN, spring, HZ[:1])
+    assert z == pytest.approx(felt_impedance(RIG, DESIGN, spring, HZ[:1]), rel=0.05)
+    more = z[0] - felt_impedance(RIG, DESIGN, Virtual(0.0, 0.0), HZ[:1])[0]
     assert more.imag == pytest.approx(-200.0 / (2.0 * math.pi), rel=0.05)
     assert more.real == pytest.approx(2.0, abs=0.5)
 

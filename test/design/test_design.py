@@ -32,7 +32,7 @@ OTHERS = TRAIN + ", continuous_torque: {}, reflected_inertia: {}, reflected_damp
 VALUES = "ratio: {}, continuous_torque: {}, reflected_inertia: {}, reflected_damping: {}"
 
 
-def met(design):
+def checks_met(design):
     return [check.met for check in design.checks]
 
 
@@ -51,7 +51,7 @@ def test_the_example_also_yields_what_the_paper_leaves_out():
     assert math.degrees(ASKED.linear) == pytest.approx(33.0, abs=0.1)
     assert ASKED.band_exact == pytest.approx(19.87, abs=5e-3)
     assert math.isnan(ASKED.resonance)
-    assert met(ASKED) == [True, False, False, False, True]
+    assert checks_met(ASKED) == [True, False, False, False, True]
 
 
 def test_the_least_stiffness_meets_all_and_a_little_less_does_not():
@@ -105,12 +105,12 @@ def test_robust_is_stiffer_and_impossible_where_the_motor_is_too_weak():
 def test_the_amplitude_of_a_band_is_limited_by_motor_and_travel():
     """The motor's limit over T_d/T_m of the clamped rig; 5 degrees of a spring by Eq. (8)."""
     rig = load_rig("paper_high_impedance")
-    found = bands(rig, 44.2)
+    widths = bands(rig, 44.2)
     gain = abs(frequency_response(rig, outputs.distal(rig), np.array([10.0]))[0])
-    assert found.motor_limit[10.0] == pytest.approx(44.2 * gain)
-    assert found.spring_limit == pytest.approx(1530.456 / 2 * math.sin(math.radians(10.0)))
-    assert found.eq_7 == pytest.approx(53.20, abs=5e-3)
-    assert found.rows[1].hz[0] == pytest.approx(112.1, abs=0.05)
+    assert widths.motor_limit[10.0] == pytest.approx(44.2 * gain)
+    assert widths.spring_limit == pytest.approx(1530.456 / 2 * math.sin(math.radians(10.0)))
+    assert widths.eq_7 == pytest.approx(53.20, abs=5e-3)
+    assert widths.rows[1].hz[0] == pytest.approx(112.1, abs=0.05)
 
 
 def test_the_design_as_a_rig_has_its_band():

@@ -17,7 +17,7 @@ from rsea_ros.design import mujoco_model as mjcf_module
 from rsea_ros.design.mujoco_model import GRAVITY, mjcf
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import mechanics
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS
 
@@ -89,16 +89,16 @@ def test_the_xml_holds_the_rigs_equations_of_motion(rig):
         keep[k] = -row / row[k]
         keep = np.delete(keep, k, axis=1)
     ours = mechanics(rig)
-    found = [keep.T @ m @ keep for m in (mass, damping, stiffness)]
-    assert found[0].shape == ours.mass.shape
+    actual = [keep.T @ m @ keep for m in (mass, damping, stiffness)]
+    assert actual[0].shape == ours.mass.shape
     expected = characteristic(ours.mass, ours.damping, ours.stiffness)
-    np.testing.assert_allclose(characteristic(*found), expected, rtol=1e-6)
+    np.testing.assert_allclose(characteristic(*actual), expected, rtol=1e-6)
 
 
 def test_the_xml_has_the_inertias_of_the_knee():
     root = ElementTree.fromstring(mjcf(load_rig("prototype_knee")))
-    found = {body.get("name"): floats(body.find("inertial"), "diaginertia")[2] for body in root.iter("body")}
-    assert found == pytest.approx({"housing": 0.25, "rotor": 1.2 / 160**2, "chassis": 6.169e-4})
+    actual = {body.get("name"): floats(body.find("inertial"), "diaginertia")[2] for body in root.iter("body")}
+    assert actual == pytest.approx({"housing": 0.25, "rotor": 1.2 / 160**2, "chassis": 6.169e-4})
 
 
 @pytest.mark.parametrize("train", [t for t in TRAINS if t != "lumped"])
@@ -125,7 +125,7 @@ def test_a_rig_that_mujoco_cannot_represent_is_refused():
     with pytest.raises(RigError, match="a rigid spring cannot be exported"):
         mjcf(load_rig("bare_drive"))
     with pytest.raises(RigError, match="lumped train cannot be exported"):
-        mjcf(lumped(load_rig("paper_moving_output")))
+        mjcf(lumped_rig(load_rig("paper_moving_output")))
     light = replace(load_rig("paper_moving_output")).with_values({"chassis.inertia": 0.0})
     with pytest.raises(RigError, match="chassis has inertia 0 kg·m²"):
         mjcf(light)

@@ -83,10 +83,10 @@ class Script:
 def script(ratios, priors=None, **more):
     """A script from tables whose keys are causes with + between them; "" for none."""
 
-    def keyed(table):
+    def key_table(table):
         return {frozenset(filter(None, key.split("+"))): value for key, value in (table or {}).items()}
 
-    return Script(keyed(ratios), keyed(priors), **more)
+    return Script(key_table(ratios), key_table(priors), **more)
 
 
 def settings(max_causes=4, **forward):

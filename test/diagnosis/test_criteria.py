@@ -61,8 +61,8 @@ def model(*causes, size=1, parameters=None, prior_cost=0.0, at_bound=False, **ra
     ],
 )
 def test_a_model_is_preferred_when_it_is_surely_better_and_that_matters(now, before, extra, sure, matters):
-    found = preference(now, before, extra)
-    assert (found.sure, found.matters, found.better) == (sure, matters, sure and matters)
+    choice = preference(now, before, extra)
+    assert (choice.sure, choice.matters, choice.better) == (sure, matters, sure and matters)
 
 
 def test_each_parameter_must_bring_what_a_useless_one_gains():

@@ -40,10 +40,10 @@ def test_a_cause_that_the_others_make_redundant_goes(world, ratios, left, gone):
 
 
 def test_an_only_cause_is_not_taken_out(world):
-    it = world(script({"": 1.0, FRICTION: 1.0}))
-    selection = it.eliminate(FRICTION)
+    scripted_run = world(script({"": 1.0, FRICTION: 1.0}))
+    selection = scripted_run.eliminate(FRICTION)
     assert selection.last.causes == (FRICTION,)
-    assert it.fits.log == [], "and no fit is spent on it"
+    assert scripted_run.fits.log == [], "and no fit is spent on it"
 
 
 def test_redundant_causes_go_one_after_the_other(world):
@@ -56,28 +56,28 @@ def test_redundant_causes_go_one_after_the_other(world):
 
 
 def test_each_model_is_fitted_once(world):
-    it = world(script(NEEDED))
-    it.eliminate(FRICTION, GAP)
-    assert [added for added, _ in it.fits.log] == [(GAP,), (FRICTION,)]
+    scripted_run = world(script(NEEDED))
+    scripted_run.eliminate(FRICTION, GAP)
+    assert [added for added, _ in scripted_run.fits.log] == [(GAP,), (FRICTION,)]
 
 
 @pytest.mark.parametrize(("ratio", "quick"), [(1.0, False), (6.0, True)])
 def test_far_from_the_floor_fits_are_quick_and_in_units_of_what_is_left(world, ratio, quick):
-    it = world(script({"": 90.0, FRICTION: 40.0, GAP: 40.0, f"{FRICTION}+{GAP}": ratio}))
-    it.eliminate(FRICTION, GAP)
-    assert all(was is quick for _, was in it.fits.log)
-    for setup, _ in it.fits.setups:
-        assert setup.weights.ratio("ft") == ratio and setup.cases is it.fits.cases
+    scripted_run = world(script({"": 90.0, FRICTION: 40.0, GAP: 40.0, f"{FRICTION}+{GAP}": ratio}))
+    scripted_run.eliminate(FRICTION, GAP)
+    assert all(was is quick for _, was in scripted_run.fits.log)
+    for setup, _ in scripted_run.fits.setups:
+        assert setup.weights.ratio("ft") == ratio and setup.cases is scripted_run.fits.cases
 
 
 def test_a_cause_pays_for_its_own_parameters_alone(monkeypatch, world):
     """Friction gains a loss of 5.7 over 100 samples; its parameters cost 2 each, both models' more."""
     monkeypatch.setattr(scripted, "SAMPLES", 2.5)
-    it = world(script({f"{FRICTION}+{GAP}": 1.0, GAP: 1.03}))
-    both, without = it.fits.candidate(FRICTION, GAP), it.fits.candidate(GAP)
+    scripted_run = world(script({f"{FRICTION}+{GAP}": 1.0, GAP: 1.03}))
+    both, without = scripted_run.fits.candidate(FRICTION, GAP), scripted_run.fits.candidate(GAP)
     assert 2.0 * (both.parameters - without.parameters) < 5.7 < 2.0 * (both.parameters + without.parameters)
-    assert it.models.is_needed(both, without)
-    assert not it.models.is_needed(without, both)
+    assert scripted_run.models.is_needed(both, without)
+    assert not scripted_run.models.is_needed(without, both)
 
 
 SIMPLER = {"": 9.0, STRIBECK: 1.0, FRICTION: 1.0, "spring_hysteresis": 4.0}
@@ -93,24 +93,24 @@ SIMPLER = {"": 9.0, STRIBECK: 1.0, FRICTION: 1.0, "spring_hysteresis": 4.0}
     ],
 )  # fmt: skip
 def test_a_simpler_effect_that_does_as_well_takes_the_place(world, ratios, left, said):
-    it = world(script(ratios), FRICTION, "spring_hysteresis", LUGRE, GAP)
-    selection = it.eliminate(STRIBECK)
+    scripted_run = world(script(ratios), FRICTION, "spring_hysteresis", LUGRE, GAP)
+    selection = scripted_run.eliminate(STRIBECK)
     assert selection.last.causes == left
     assert reasons(selection) == said
-    assert LUGRE not in it.guesses, "what is larger is not tried"
+    assert LUGRE not in scripted_run.guesses, "what is larger is not tried"
 
 
 def test_a_rival_that_the_rig_cannot_have_is_passed_over(world):
-    it = world(script(SIMPLER), FRICTION, "spring_hysteresis")
-    it.impossible = {FRICTION}
-    assert it.eliminate(STRIBECK).last.causes == (STRIBECK,)
+    scripted_run = world(script(SIMPLER), FRICTION, "spring_hysteresis")
+    scripted_run.impossible = {FRICTION}
+    assert scripted_run.eliminate(STRIBECK).last.causes == (STRIBECK,)
 
 
 def test_a_rival_that_acts_already_is_not_tried(world):
     ratios = {"": 9.0, STRIBECK: 4.0, FRICTION: 4.0, f"{FRICTION}+{STRIBECK}": 1.0}
-    it = world(script(ratios), FRICTION)
-    it.eliminate(STRIBECK, FRICTION)
-    assert it.guesses == {}
+    scripted_run = world(script(ratios), FRICTION)
+    scripted_run.eliminate(STRIBECK, FRICTION)
+    assert scripted_run.guesses == {}
 
 
 @pytest.mark.parametrize(
@@ -123,8 +123,8 @@ def test_a_rival_that_acts_already_is_not_tried(world):
 )
 def test_a_likelier_effect_as_simple_takes_the_place_beside_another_cause(world, ratio, prior, left):
     ratios = {"": 9.0, DELAY: 4.0, LAG: 4.0, GAP: 4.0, f"{DELAY}+{GAP}": 1.0, f"{LAG}+{GAP}": ratio}
-    it = world(script(ratios, {f"{DELAY}+{GAP}": 4.0, f"{LAG}+{GAP}": prior}), LAG)
-    selection = it.eliminate(DELAY, GAP)
+    scripted_run = world(script(ratios, {f"{DELAY}+{GAP}": 4.0, f"{LAG}+{GAP}": prior}), LAG)
+    selection = scripted_run.eliminate(DELAY, GAP)
     assert set(selection.last.causes) == left
     replaced = LAG in left
     assert reasons(selection) == [(DELAY, "no_better_than_likelier", LAG)] * replaced
@@ -136,15 +136,15 @@ def test_a_likelier_effect_as_simple_takes_the_place_beside_another_cause(world,
 @pytest.mark.parametrize("both", [5.0, 9.0])
 def test_far_from_the_floor_priors_decide_nothing(world, both):
     ratios = {"": 90.0, DELAY: 40.0, LAG: 40.0, GAP: 40.0, f"{DELAY}+{GAP}": both, f"{LAG}+{GAP}": both}
-    it = world(script(ratios, {f"{DELAY}+{GAP}": 9.0}), LAG)
-    assert set(it.eliminate(DELAY, GAP).last.causes) == {DELAY, GAP}
-    assert it.guesses == {}
+    scripted_run = world(script(ratios, {f"{DELAY}+{GAP}": 9.0}), LAG)
+    assert set(scripted_run.eliminate(DELAY, GAP).last.causes) == {DELAY, GAP}
+    assert scripted_run.guesses == {}
 
 
 def test_a_single_cause_is_not_compared_with_its_equals_again(world):
-    it = world(script({"": 9.0, DELAY: 1.0, LAG: 1.0}, {DELAY: 9.0}), LAG)
-    assert it.eliminate(DELAY).last.causes == (DELAY,)
-    assert it.guesses == {}
+    scripted_run = world(script({"": 9.0, DELAY: 1.0, LAG: 1.0}, {DELAY: 9.0}), LAG)
+    assert scripted_run.eliminate(DELAY).last.causes == (DELAY,)
+    assert scripted_run.guesses == {}
 
 
 def test_a_replacement_is_followed_by_the_next(world):
@@ -160,9 +160,9 @@ def test_a_replacement_is_followed_by_the_next(world):
 def test_models_nest_from_the_most_useful_cause_on(world):
     ratios = {"": 9.0, FRICTION: 6.0, GAP: 5.0, DELAY: 7.0, f"{FRICTION}+{GAP}": 4.0}
     ratios |= {f"{FRICTION}+{DELAY}": 2.0, f"{GAP}+{DELAY}": 3.0, f"{FRICTION}+{GAP}+{DELAY}": 1.0}
-    it = world(script(ratios))
-    full = it.fits.candidate(GAP, FRICTION, DELAY)
-    nested = nested_sequence(Selection((it.fits.candidate(), full)), it.models)
+    scripted_run = world(script(ratios))
+    full = scripted_run.fits.candidate(GAP, FRICTION, DELAY)
+    nested = nested_sequence(Selection((scripted_run.fits.candidate(), full)), scripted_run.models)
     assert [m.causes for m in nested.models] == [
         (), (FRICTION,), (FRICTION, DELAY), (FRICTION, DELAY, GAP)
     ]  # fmt: skip
@@ -170,15 +170,17 @@ def test_models_nest_from_the_most_useful_cause_on(world):
 
 
 def test_without_a_cause_the_nominal_model_is_the_only_one(world):
-    it = world(script({"": 9.0}))
-    nested = nested_sequence(Selection((it.fits.candidate(),)), it.models)
+    scripted_run = world(script({"": 9.0}))
+    nested = nested_sequence(Selection((scripted_run.fits.candidate(),)), scripted_run.models)
     assert [m.causes for m in nested.models] == [()]
 
 
 def test_effects_that_the_rig_states_come_first_and_are_never_causes(world):
-    it = world(script({"": 9.0, FRICTION: 6.0, GAP: 5.0, f"{FRICTION}+{GAP}": 1.0}))
-    full = it.fits.candidate(FRICTION, GAP, stated=(BIAS, DELAY))
-    nested = nested_sequence(Selection((it.fits.candidate(stated=(BIAS, DELAY)), full)), it.models)
+    scripted_run = world(script({"": 9.0, FRICTION: 6.0, GAP: 5.0, f"{FRICTION}+{GAP}": 1.0}))
+    full = scripted_run.fits.candidate(FRICTION, GAP, stated=(BIAS, DELAY))
+    nested = nested_sequence(
+        Selection((scripted_run.fits.candidate(stated=(BIAS, DELAY)), full)), scripted_run.models
+    )
     assert [m.problem.acting for m in nested.models] == [
         (BIAS, DELAY), (BIAS, DELAY, GAP), (BIAS, DELAY, GAP, FRICTION)
     ]  # fmt: skip

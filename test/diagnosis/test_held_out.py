@@ -18,7 +18,7 @@ from rsea_ros.signals import Channel
 RIG = load_rig("paper_high_impedance")
 
 
-def checked(stiffer=1.0, seed=1):
+def checked_record(stiffer=1.0, seed=1):
     """Return a short record of the rig with its stiffness times a factor."""
     bench = RIG.with_values({"spring.stiffness": stiffer * RIG["spring.stiffness"]})
     u = excitation("chirp", ExcitationSettings(rate=280.0, duration=8.0))
@@ -26,11 +26,11 @@ def checked(stiffer=1.0, seed=1):
 
 
 def test_a_held_out_record_takes_the_place_of_the_test_blocks():
-    nominal = nominal_problem([checked()], RIG)
+    nominal = nominal_problem([checked_record()], RIG)
     theta = start_vector(nominal.unknowns)
     on_blocks = HeldOut(nominal.cases, RIG, None, DEFAULT).score(nominal, theta)
-    alike = HeldOut(nominal.cases, RIG, checked(seed=2), DEFAULT).score(nominal, theta)
-    stiffer = HeldOut(nominal.cases, RIG, checked(1.05, seed=2), DEFAULT).score(nominal, theta)
+    alike = HeldOut(nominal.cases, RIG, checked_record(seed=2), DEFAULT).score(nominal, theta)
+    stiffer = HeldOut(nominal.cases, RIG, checked_record(1.05, seed=2), DEFAULT).score(nominal, theta)
     assert on_blocks.ratio("position") == pytest.approx(1.0, abs=0.1)
     assert alike.ratio("position") == pytest.approx(1.0, abs=0.1)
     assert stiffer.ratio("position") > 5.0
@@ -38,7 +38,7 @@ def test_a_held_out_record_takes_the_place_of_the_test_blocks():
 
 
 def test_a_simulation_of_the_cases_is_reused_for_their_test_blocks():
-    nominal = nominal_problem([checked()], RIG)
+    nominal = nominal_problem([checked_record()], RIG)
     theta = start_vector(nominal.unknowns)
     held_out = HeldOut(nominal.cases, RIG, None, DEFAULT)
     again = held_out.score(nominal, theta, nominal.outputs(theta))

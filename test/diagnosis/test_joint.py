@@ -21,7 +21,7 @@ TRIED = ("coulomb_friction", "command_delay", "backlash", "stribeck_friction", "
 SETTINGS = DiagnosisSettings(max_causes=2, without=tuple(n for n in catalogue() if n not in TRIED))
 
 
-def logged(rig: Rig, high: float = 3.0) -> Record:
+def log_joint(rig: Rig, high: float = 3.0) -> Record:
     """Return 14 s of a joint whose inertia, damping and gravity are not those of its rig."""
     targets = excitation("chirp", replace(JOINT, duration=14.0, high=high))
     off = {"rotor.reflected_inertia": 0.026, "rotor.reflected_damping": 0.35, "spring_end.gravity": 0.6}
@@ -32,16 +32,16 @@ def logged(rig: Rig, high: float = 3.0) -> Record:
 def test_friction_and_a_delay_of_the_targets_are_named():
     rig = load_rig("pd_joint")
     true = rig.with_effect("coulomb_friction", torque=0.2).with_effect("command_delay", delay=0.015)
-    found = diagnose([logged(true)], rig, settings=SETTINGS)
-    assert {c.name for c in found.causes} == {"coulomb_friction", "command_delay"}
-    sizes = {c.name: next(iter(c.parameters.values())).value for c in found.causes}
+    diagnosis = diagnose([log_joint(true)], rig, settings=SETTINGS)
+    assert {c.name for c in diagnosis.causes} == {"coulomb_friction", "command_delay"}
+    sizes = {c.name: next(iter(c.parameters.values())).value for c in diagnosis.causes}
     assert sizes["coulomb_friction"] == pytest.approx(0.2, rel=0.03)
     assert sizes["command_delay"] == pytest.approx(0.015, abs=3e-4)
-    assert found.verdict == "explained"
-    assert any("cannot determine the play in the gear" in s for s in remark_sentences(found.remarks))
+    assert diagnosis.verdict == "explained"
+    assert any("cannot determine the play in the gear" in s for s in remark_sentences(diagnosis.remarks))
 
 
 def test_a_joint_with_other_values_has_no_cause():
     rig = load_rig("pd_joint")
-    found = diagnose([logged(rig)], rig, settings=SETTINGS)
-    assert (found.verdict, found.causes) == ("nothing_wrong", ())
+    diagnosis = diagnose([log_joint(rig)], rig, settings=SETTINGS)
+    assert (diagnosis.verdict, diagnosis.causes) == ("nothing_wrong", ())

@@ -27,7 +27,7 @@ def like(rig, amplitude=20.0):
     return case_from(synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=1), rig)
 
 
-def played(run, rig):
+def play_run(run, rig):
     """Return what excite would publish, with its defaults for options that the recommendation omits."""
     given = {k: v for k, v in _as_excited(run, rig).items() if k not in ("kind", "unit", "peak")}
     values = {p.name: p.default for p in TABLE}
@@ -37,7 +37,7 @@ def played(run, rig):
     )
 
 
-def moved(rig, command):
+def move_rig(rig, command):
     """The rig's response, every channel."""
     t = np.arange(len(command)) / RATE
     blank = {n: Channel(t, np.zeros(len(t))) for n in ("position", "velocity", "ft") if rig.measures(n)}
@@ -56,10 +56,10 @@ def test_no_run_exceeds_the_limits_of_rig_and_driver(name):
     """102 N m were asked for, half as much again as a present run at the driver's limit."""
     rig = load_rig("paper_high_impedance")
     run = allowed_run(rig, like(rig), *EVERY[name], 102.0)
-    command = played(run, rig)
+    command = play_run(run, rig)
     assert np.abs(command).max() <= DRIVER.torque
     assert np.abs(np.diff(command)).max() * RATE <= DRIVER.slew
-    peaks = moved(rig, command)
+    peaks = move_rig(rig, command)
     assert peaks["position"] <= DRIVER.deflection and peaks["ft"] <= DRIVER.ft
     assert peaks["velocity"] <= DRIVER.velocity
     assert run.peak > 15.0, "one limit is used, not a fear of it"
@@ -70,13 +70,13 @@ def test_a_free_end_travels_no_further_than_it_did():
     case = like(rig, 2.0)
     run = allowed_run(rig, case, *EVERY["steps 0.1-10 Hz"], 3.0)
     assert run.peak < 2.9
-    assert moved(rig, played(run, rig))["position"] <= 1.05 * np.abs(case.measured["position"]).max()
+    assert move_rig(rig, play_run(run, rig))["position"] <= 1.05 * np.abs(case.measured["position"]).max()
 
 
 def test_a_command_within_the_limits_is_played_as_requested():
     rig = load_rig("paper_high_impedance")
     run = allowed_run(rig, like(rig), *EVERY["multisine 0.1-5 Hz"], 20.0)
-    assert np.abs(played(run, rig)).max() == pytest.approx(20.0, rel=0.01)
+    assert np.abs(play_run(run, rig)).max() == pytest.approx(20.0, rel=0.01)
 
 
 def test_an_impossible_run_is_not_recommended():

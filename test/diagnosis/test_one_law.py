@@ -34,7 +34,9 @@ def test_a_mode_above_the_band_is_one_of_the_two_effects_that_make_one():
     assert parameters["frequency"] > 60.0
     bench = hide(drawn_bench(rng), "structural_resonance", parameters)
     record = record_command(bench, slow_sweep(20.0), rng)
-    found = diagnose([record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(without=WITHOUT))
-    (cause,) = found.causes
+    diagnosis = diagnose(
+        [record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(without=WITHOUT)
+    )
+    (cause,) = diagnosis.causes
     assert cause.status == "one_of"
-    assert {cause.name, *(a.name for a in found.alternatives)} == ALIKE
+    assert {cause.name, *(a.name for a in diagnosis.alternatives)} == ALIKE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from independent.puzzle import DELAY, RESONANCE, delayed, noisy_resonance
+from independent.puzzle import DELAY, RESONANCE, delayed_record, noisy_resonance
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
@@ -21,6 +21,6 @@ def test_a_resonance_is_found_in_the_noise_and_what_the_noise_hides_is_said():
 
 
 def test_a_delay_of_one_and_a_half_samples_is_no_resonance():
-    diagnosis = diagnose([delayed(3, 10.0)], load_rig("paper_moving_output"))
+    diagnosis = diagnose([delayed_record(3, 10.0)], load_rig("paper_moving_output"))
     assert [cause.name for cause in diagnosis.causes] == ["command_delay"]
     assert diagnosis.causes[0].parameters["delay"].value == pytest.approx(DELAY, rel=0.02)

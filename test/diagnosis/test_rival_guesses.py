@@ -20,11 +20,11 @@ STOP, CUBIC, BASE = "hard_stop", "nonlinear_spring", "base_compliance"
     [(STRIBECK, FRICTION, {"torque"}), (STOP, CUBIC, None)],  # N m for N m; 1/rad^2 for rad
 )
 def test_a_rival_begins_with_the_size_of_the_cause_where_that_is_one(world, cause, rival, typical):
-    it = world(script({"": 9.0, cause: 1.0, rival: 4.0}), rival)
-    model = it.fits.candidate(cause)
+    scripted = world(script({"": 9.0, cause: 1.0, rival: 4.0}), rival)
+    model = scripted.fits.candidate(cause)
     model.solution.theta[1:] = 0.75  # every parameter of the cause
-    it.models.with_rivals(model)
-    begun = it.guesses[rival]
+    scripted.models.with_rivals(model)
+    begun = scripted.guesses[rival]
     assert begun[0] == {"from": "residual"}
     if typical is None:
         assert len(begun) == 1
@@ -34,26 +34,28 @@ def test_a_rival_begins_with_the_size_of_the_cause_where_that_is_one(world, caus
 
 @pytest.mark.parametrize(("beside", "is_used"), [((), True), ((GAP,), False)])
 def test_a_rival_begins_where_its_trial_beside_the_same_causes_ended(world, beside, is_used):
-    it = world(script({"": 9.0, STRIBECK: 1.0, FRICTION: 4.0, GAP: 5.0, f"{FRICTION}+{GAP}": 4.0}), FRICTION)
-    tried = it.fits.candidate(*beside, FRICTION)
+    scripted = world(
+        script({"": 9.0, STRIBECK: 1.0, FRICTION: 4.0, GAP: 5.0, f"{FRICTION}+{GAP}": 4.0}), FRICTION
+    )
+    tried = scripted.fits.candidate(*beside, FRICTION)
     tried.solution.theta[1:] = 0.5
-    trial = trial_of(tried, FRICTION, it.fits.candidate(*beside), "explains_less")
-    it.models.with_rivals(it.fits.candidate(STRIBECK), [trial])
+    trial = trial_of(tried, FRICTION, scripted.fits.candidate(*beside), "explains_less")
+    scripted.models.with_rivals(scripted.fits.candidate(STRIBECK), [trial])
     reached = {p.name: 0.5 for p in effect_named(FRICTION).parameters}
-    assert it.guesses[FRICTION][0] == (reached if is_used else {"from": "residual"})
+    assert scripted.guesses[FRICTION][0] == (reached if is_used else {"from": "residual"})
 
 
 def test_a_rival_begins_where_the_latest_of_its_trials_ended(world):
     """The noise is estimated again after each step: the last trial has seen the least of other causes."""
-    it = world(script({"": 9.0, STRIBECK: 1.0, FRICTION: 4.0}), FRICTION)
+    scripted = world(script({"": 9.0, STRIBECK: 1.0, FRICTION: 4.0}), FRICTION)
     trials = []
     for size in (0.25, 0.5):
-        tried = it.fits.candidate(FRICTION)
+        tried = scripted.fits.candidate(FRICTION)
         tried.solution.theta[1:] = size
-        trials.append(trial_of(tried, FRICTION, it.fits.candidate(), "explains_less"))
-    it.models.with_rivals(it.fits.candidate(STRIBECK), trials)
-    assert set(it.guesses[FRICTION][0].values()) == {0.5}
-    assert len(it.guesses[FRICTION]) == 2, "beside it only the size of the cause"
+        trials.append(trial_of(tried, FRICTION, scripted.fits.candidate(), "explains_less"))
+    scripted.models.with_rivals(scripted.fits.candidate(STRIBECK), trials)
+    assert set(scripted.guesses[FRICTION][0].values()) == {0.5}
+    assert len(scripted.guesses[FRICTION]) == 2, "beside it only the size of the cause"
 
 
 @pytest.mark.parametrize(

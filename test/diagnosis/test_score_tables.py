@@ -45,13 +45,13 @@ def case(over_noise, names=("ft",)):
     return made, dict.fromkeys(names, measured + NOISE * np.nan_to_num(errors))
 
 
-def scored(*runs, channels=("ft", "position"), rule=SECONDS):
+def score_of(*runs, channels=("ft", "position"), rule=SECONDS):
     cases, outputs = zip(*runs, strict=True)
     return scores.score(SimpleNamespace(channels=channels), tuple(cases), list(outputs), rule)
 
 
 def test_residuals_count_over_the_noise_by_block_without_faulty_samples():
-    result = scored(case([1, np.nan, 3, 0, -1, 1]))
+    result = score_of(case([1, np.nan, 3, 0, -1, 1]))
     assert result.sums["ft"].tolist() == [1.0, 9.0, 2.0]
     assert result.counts["ft"].tolist() == [1.0, 2.0, 2.0]
     assert result.ratio("ft") == pytest.approx(np.sqrt(12.0 / 5.0))
@@ -59,21 +59,21 @@ def test_residuals_count_over_the_noise_by_block_without_faulty_samples():
 
 
 def test_a_short_record_has_shorter_blocks():
-    result = scored(case([1, 2, 3, 4]), rule=BlockSettings(longest=0.5, shortest=0.5))
+    result = score_of(case([1, 2, 3, 4]), rule=BlockSettings(longest=0.5, shortest=0.5))
     assert result.sums["ft"].tolist() == [1.0, 4.0, 9.0, 16.0]
 
 
 def test_a_block_without_a_sound_sample_is_none():
-    result = scored(case([1, 1, np.nan, np.nan, 2, 2]))
+    result = score_of(case([1, 1, np.nan, np.nan, 2, 2]))
     assert result.sums["ft"].tolist() == [2.0, 8.0]
 
 
 def test_one_sound_sample_is_enough_for_a_channel():
-    assert scored(case([np.nan, 3])).counts["ft"].tolist() == [1.0]
+    assert score_of(case([np.nan, 3])).counts["ft"].tolist() == [1.0]
 
 
 def test_records_follow_each_other_and_may_lack_a_channel():
-    result = scored(case([1, 1, 1, 1]), case([2, 2], names=("position",)))
+    result = score_of(case([1, 1, 1, 1]), case([2, 2], names=("position",)))
     assert result.sums["ft"].tolist() == [2.0, 2.0, 0.0]
     assert result.counts["ft"].tolist() == [2.0, 2.0, 0.0]
     assert result.sums["position"].tolist() == [0.0, 0.0, 8.0]
@@ -81,7 +81,7 @@ def test_records_follow_each_other_and_may_lack_a_channel():
 
 def test_a_channel_that_the_model_does_not_have_is_left_out():
     run, _ = case([1, 1], names=("ft", "position"))
-    assert list(scored((run, {"ft": run.measured["ft"]})).sums) == ["ft"]
+    assert list(score_of((run, {"ft": run.measured["ft"]})).sums) == ["ft"]
 
 
 def test_each_sample_is_in_training_validation_or_test():
@@ -111,13 +111,13 @@ def test_the_largest_missed_response_of_all_records_counts(monkeypatch, shares, 
         return next(left)
 
     monkeypatch.setattr(scores, "missed_response", coherence)
-    assert scored(*(case([1, 1], names) for _ in shares)).missed == missed
+    assert score_of(*(case([1, 1], names) for _ in shares)).missed == missed
 
 
 def test_a_model_without_the_measured_torque_misses_no_response(monkeypatch):
     monkeypatch.setattr(scores, "missed_response", lambda *_: 1.0)
     run, outputs = case([1, 1], names=("ft", "position"))
-    assert scored((run, {"position": outputs["position"]})).missed == 0.0
+    assert score_of((run, {"position": outputs["position"]})).missed == 0.0
 
 
 @pytest.mark.parametrize(

@@ -48,9 +48,11 @@ def test_a_guess_far_too_large_does_not_lose_the_effect(name, parameters, comman
     rng = np.random.default_rng(5)
     record = record_command(hide(drawn_bench(rng), name, parameters), command(rng), rng)
     others = tuple(other for other in catalogue() if other != name)
-    found = diagnose([record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(without=others))
-    assert [cause.name for cause in found.causes] == [name]
-    assert found.verdict == "explained"
+    diagnosis = diagnose(
+        [record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(without=others)
+    )
+    assert [cause.name for cause in diagnosis.causes] == [name]
+    assert diagnosis.verdict == "explained"
 
 
 @pytest.mark.parametrize(
@@ -66,6 +68,7 @@ def test_the_better_of_two_guesses_shows_after_a_fit(name, parameters, command):
     record = record_command(hide(drawn_bench(rng), name, parameters), command(rng), rng)
     tried = (name, *effect_named(name).claims.confusable_with, "command_delay")
     others = tuple(other for other in catalogue() if other not in tried)
-    found = diagnose([record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(without=others))
-    assert [cause.name for cause in found.causes] == [name]
-    assert found.verdict == "explained"
+    settings = DiagnosisSettings(without=others)
+    diagnosis = diagnose([record], load_rig("paper_high_impedance"), settings=settings)
+    assert [cause.name for cause in diagnosis.causes] == [name]
+    assert diagnosis.verdict == "explained"

@@ -34,7 +34,7 @@ SHOWN = ("torque_saturation", "coulomb_friction", "lugre_friction", "spring_hyst
 
 
 @functools.cache
-def screened(name: str, times: float):
+def screen_effect(name: str, times: float):
     """Return the screening of an effect on a machine with the torque scaled by a factor."""
     record, rig = record_with(RIG, effect_named(name), times, duration=5.0), similar(RIG, times)
     case = case_from(record, rig)
@@ -48,7 +48,7 @@ def screened(name: str, times: float):
 @pytest.mark.parametrize("times", [4.0**-5, 16.0])
 @pytest.mark.parametrize("name", SHOWN)
 def test_screening_is_the_same_on_a_similar_machine(name: str, times: float):
-    one, other = screened(name, 1.0), screened(name, times)
+    one, other = screen_effect(name, 1.0), screen_effect(name, times)
     assert other.cost == pytest.approx(one.cost, rel=1e-5)
     pairs = zip(one.problem.unknowns, one.theta, other.theta, strict=True)
     for unknown, a, b in pairs:

@@ -26,7 +26,7 @@ GAP = EffectSetting("backlash", {**effect_named("backlash").typical, "gap": 4e-3
 FEW = DiagnosisSettings(max_causes=1, without=tuple(set(catalogue()) - {"coulomb_friction", "backlash"}))
 
 
-def recorded(*effects):
+def record_bench(*effects):
     command = excitation("multisine", ExcitationSettings(rate=RATE, duration=DURATION, period=4.0))
     bench = RIG.with_effects(*effects)
     return synthesize(bench, Channel(np.arange(len(command)) / RATE, command), seed=3)
@@ -36,7 +36,7 @@ def test_a_known_effect_acts_and_is_no_cause():
     """It was reported as a cause without parameters, and the report raised StopIteration."""
     rig = RIG.with_effects(FRICTION)
     rig = replace(rig, known=rig.known | {f"coulomb_friction.{p}" for p in FRICTION.parameters})
-    diagnosis = diagnose([recorded(FRICTION, GAP)], rig, settings=FEW)
+    diagnosis = diagnose([record_bench(FRICTION, GAP)], rig, settings=FEW)
     assert [cause.name for cause in diagnosis.causes] == ["backlash"]
     assert diagnosis.causes[0].parameters["gap"].value == pytest.approx(4e-3, rel=0.05)
     assert diagnosis.causes[0].gain_holdout > 0.5
@@ -47,7 +47,7 @@ def test_a_known_effect_acts_and_is_no_cause():
 def test_a_stated_effect_is_fitted_with_the_rig_and_not_dropped():
     """It was silently removed from the rig and found again as a cause."""
     guess = replace(FRICTION, parameters={**FRICTION.parameters, "torque": 2.0})
-    diagnosis = diagnose([recorded(FRICTION)], RIG.with_effects(guess), settings=FEW)
+    diagnosis = diagnose([record_bench(FRICTION)], RIG.with_effects(guess), settings=FEW)
     assert (diagnosis.verdict, diagnosis.causes) == ("nothing_wrong", ())
     fitted = {p.name: p.value for p in diagnosis.baseline}
     assert fitted["coulomb_friction.torque"] == pytest.approx(3.0, rel=0.02)
@@ -55,13 +55,13 @@ def test_a_stated_effect_is_fitted_with_the_rig_and_not_dropped():
 
 def test_a_record_too_short_for_the_blocks_is_refused_by_the_function_itself():
     with pytest.raises(IdentificationError, match="4 s or more"):
-        diagnose([recorded().between(0.0, 3.0)], RIG, settings=FEW)
+        diagnose([record_bench().between(0.0, 3.0)], RIG, settings=FEW)
 
 
 def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
     """With the verdict `unexplained` it was neither a cause nor rejected."""
     monkeypatch.setattr(outcome, "naming_of", lambda *_: {})
-    diagnosis = diagnose([recorded(GAP)], RIG, settings=FEW)
+    diagnosis = diagnose([record_bench(GAP)], RIG, settings=FEW)
     assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())
     dropped = {r.name: r for r in diagnosis.rejected}["backlash"]
     assert dropped.reason == "leaves_too_much" and dropped.gain_holdout > 0.5

@@ -118,31 +118,36 @@ def test_coloured_noise_may_hide_a_cause(world):
 
 
 def test_each_step_begins_with_the_last_model_and_says_its_number(world):
-    it = world(script({**BOTH, f"{FRICTION}+{GAP}": 3.0}), ALONG)
-    it.select()
+    search = world(script({**BOTH, f"{FRICTION}+{GAP}": 3.0}), ALONG)
+    search.select()
     names = tuple(e.name for e in OTHERS)
-    assert it.runs == [(0, (), names), (1, (FRICTION,), names), (2, (FRICTION, GAP), names)]
+    assert search.runs == [(0, (), names), (1, (FRICTION,), names), (2, (FRICTION, GAP), names)]
 
 
 @pytest.mark.parametrize("most", [1, 2])
 def test_no_more_causes_are_accepted_than_max_causes(world, most):
     ratios = {**BOTH, f"{FRICTION}+{GAP}": 3.0, f"{FRICTION}+{GAP}+{DELAY}": 1.0}
-    it = world(script(ratios), {**ALONG, (FRICTION, GAP): (FRICTION, GAP, DELAY)})
-    assert causes(it.select(settings(max_causes=most))) == [(), (FRICTION,), (FRICTION, GAP)][: most + 1]
-    assert len(it.runs) == most, "no more is tried than may be accepted"
+    search = world(script(ratios), {**ALONG, (FRICTION, GAP): (FRICTION, GAP, DELAY)})
+    assert (
+        causes(search.select(settings(max_causes=most)))
+        == [(), (FRICTION,), (FRICTION, GAP)][: most + 1]
+    )
+    assert len(search.runs) == most, "no more is tried than may be accepted"
 
 
 @pytest.mark.parametrize(("replacements", "last"), [(0, (FRICTION,)), (1, (STRIBECK,)), (2, (LUGRE,))])
 def test_no_more_replacements_are_made_than_allowed(world, monkeypatch, replacements, last):
-    it = world(script({"": 90.0, FRICTION: 60.0, STRIBECK: 30.0, LUGRE: 10.0, LAG: 50.0}), {(): (FRICTION,)})
+    search = world(
+        script({"": 90.0, FRICTION: 60.0, STRIBECK: 30.0, LUGRE: 10.0, LAG: 50.0}), {(): (FRICTION,)}
+    )
     following = {(FRICTION,): (STRIBECK,), (STRIBECK,): (LUGRE,), (LUGRE,): (FRICTION,)}
 
-    def replaced(step):
+    def replace_step(step):
         name = following[step.present.causes]
-        return StepResult(it.fits.candidate(*name), [], (it.fits.candidate(FRICTION),))
+        return StepResult(search.fits.candidate(*name), [], (search.fits.candidate(FRICTION),))
 
-    monkeypatch.setattr(stepwise, "replacement_step", replaced)
-    selection = it.select(settings(max_causes=1, replacements=replacements))
+    monkeypatch.setattr(stepwise, "replacement_step", replace_step)
+    selection = search.select(settings(max_causes=1, replacements=replacements))
     assert selection.last.causes == last
 
 
@@ -161,25 +166,25 @@ def test_trials_and_equal_models_are_kept(world):
 
 
 def test_every_model_is_fitted_again_in_its_noise_and_all_are_scored_in_that_of_the_last(world):
-    it = world(script(BOTH), ALONG)
-    selection = it.select()
+    search = world(script(BOTH), ALONG)
+    selection = search.select()
     each = [(what, c) for c in ((), (FRICTION,), (FRICTION, GAP)) for what in ("noise", "refit")]
-    assert it.events == [*each, ("scored", ()), ("scored", (FRICTION,))]
+    assert search.events == [*each, ("scored", ()), ("scored", (FRICTION,))]
     assert [m.outputs for m in selection.models] == [[{"scored": True}]] * 2 + [[{}]]
 
 
 @pytest.mark.parametrize("start", [None, RIG])
 def test_the_first_fit_has_more_iterations_and_begins_at_the_given_values(world, start):
-    it = world(script({"": 1.0}))
-    it.select(start=start)
-    ((setup, theta),) = it.fits.setups
+    search = world(script({"": 1.0}))
+    search.select(start=start)
+    ((setup, theta),) = search.fits.setups
     assert setup.iterations == DEFAULT.fits.first_iterations
-    assert theta == (None if start is None else (it.nominal.unknowns, RIG))
+    assert theta == (None if start is None else (search.nominal.unknowns, RIG))
 
 
-def replacing(it, *present, effects=OTHERS):
+def replacement(search, *present, effects=OTHERS):
     """The causes of the model that a replacement leads to; None for none."""
-    step = Step(it.fits.candidate(*present), effects, 7, POOLS, None, DEFAULT)
+    step = Step(search.fits.candidate(*present), effects, 7, POOLS, None, DEFAULT)
     result = replacement_step(step)
     return None if result is NO_STEP else result.accepted.causes
 
@@ -194,20 +199,20 @@ def replacing(it, *present, effects=OTHERS):
     ],
 )
 def test_a_more_detailed_effect_replaces_a_cause_where_it_gains_enough(world, before, after, expected):
-    it = world(script({"": 40.0, FRICTION: before, STRIBECK: after, LAG: 9.0}), {(): (STRIBECK,)})
-    assert replacing(it, FRICTION) == expected
+    search = world(script({"": 40.0, FRICTION: before, STRIBECK: after, LAG: 9.0}), {(): (STRIBECK,)})
+    assert replacement(search, FRICTION) == expected
     tried = [(7, (), (STRIBECK, LUGRE))] if before >= 5.0 else []
-    assert it.runs == tried, "its look-alikes that say more than it does, and no others"
-    assert it.fits.log == [((), True)] * len(tried)
-    for setup, _ in it.fits.setups:
-        assert setup.weights.ratio("ft") == before and setup.cases == it.fits.cases
+    assert search.runs == tried, "its look-alikes that say more than it does, and no others"
+    assert search.fits.log == [((), True)] * len(tried)
+    for setup, _ in search.fits.setups:
+        assert setup.weights.ratio("ft") == before and setup.cases == search.fits.cases
 
 
 def test_a_place_is_offered_only_to_more_detailed_effects_that_are_not_in_the_model(world):
-    it = world(script({f"{STRIBECK}+{LUGRE}": 20.0, DELAY: 20.0}))
-    assert replacing(it, STRIBECK, LUGRE) is None
-    assert replacing(it, DELAY, effects=[effect_named(LAG)]) is None
-    assert it.runs == it.fits.log == []
+    search = world(script({f"{STRIBECK}+{LUGRE}": 20.0, DELAY: 20.0}))
+    assert replacement(search, STRIBECK, LUGRE) is None
+    assert replacement(search, DELAY, effects=[effect_named(LAG)]) is None
+    assert search.runs == search.fits.log == []
 
 
 @pytest.mark.parametrize("first", [None, (STRIBECK, GAP)])
@@ -216,8 +221,8 @@ def test_the_next_place_is_tried_where_one_brings_nothing(world, first):
     ratios = {"": 99.0, f"{DELAY}+{FRICTION}+{GAP}": 20.0, f"{DELAY}+{FRICTION}": 50.0, LAG: 9.0}
     ratios |= {f"{DELAY}+{GAP}": 50.0, f"{STRIBECK}+{GAP}": 19.0, f"{DELAY}+{FRICTION}+{STOP}": 9.0}
     steps = {(DELAY, GAP): first, (DELAY, FRICTION): (DELAY, FRICTION, STOP)}
-    it = world(script(ratios), steps)
-    assert replacing(it, DELAY, FRICTION, GAP) == (DELAY, FRICTION, STOP)
-    assert [(present, names) for _, present, names in it.runs] == [
+    search = world(script(ratios), steps)
+    assert replacement(search, DELAY, FRICTION, GAP) == (DELAY, FRICTION, STOP)
+    assert [(present, names) for _, present, names in search.runs] == [
         ((DELAY, GAP), (STRIBECK, LUGRE)), ((DELAY, FRICTION), (STOP,))
     ]  # fmt: skip

@@ -31,6 +31,6 @@ def test_both_causes_are_found_with_their_sizes(pair, severity, excitation, seed
         sizes[effect] = parameters[MAIN_PARAMETER[effect]]
     diagnosis = diagnose([record_run(bench, seed, excitation, duration)], load_rig("paper_high_impedance"))
     assert diagnosis.verdict == "explained"
-    found = {c.name: c.parameters[MAIN_PARAMETER[c.name]].value for c in diagnosis.causes}
-    assert found == pytest.approx(sizes, rel=0.1)
+    values = {c.name: c.parameters[MAIN_PARAMETER[c.name]].value for c in diagnosis.causes}
+    assert values == pytest.approx(sizes, rel=0.1)
     assert {r.name for r in diagnosis.rejected} >= set(gave_way)

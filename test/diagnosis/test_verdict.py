@@ -19,7 +19,7 @@ RATIOS = st.fixed_dictionaries({n: st.floats(0.3, 300.0) for n in ("ft", "positi
 NEAR = st.fixed_dictionaries({n: st.floats(0.9, 1.3) for n in ("ft", "position", "motor_torque")})
 
 
-def scored(ratios):
+def score_of(ratios):
     """Return the score of residuals with these ratios to the noise."""
     sums = {n: np.full(4, 100.0 * r**2) for n, r in ratios.items()}
     return Score(sums, {n: np.full(4, 100.0) for n in ratios})
@@ -27,14 +27,14 @@ def scored(ratios):
 
 @given(RATIOS | NEAR)
 def test_nothing_is_wrong_exactly_when_every_residual_is_noise(ratios):
-    score = scored(ratios)
+    score = score_of(ratios)
     at_noise = all(score.ratio(n) <= FLOOR for n in ratios)
     assert verdict_of([score]) == ("nothing_wrong" if at_noise else "unexplained")
 
 
 @given(RATIOS | NEAR)
 def test_the_sentence_speaks_of_a_channel_that_bears_the_verdict_out(ratios):
-    score = scored(ratios)
+    score = score_of(ratios)
     verdict = verdict_of([score])
     channel = main_channel(score, "ft") if verdict == "unexplained" else "ft"
     sentence = verdict_sentence(verdict, (), channel, score.ratio(channel), score.ratio(channel), ())

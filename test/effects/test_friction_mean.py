@@ -25,11 +25,11 @@ def test_a_gear_at_rest_takes_few_steps(monkeypatch):
     """On slow machines friction is 10^6 creep velocities strong; a step took 20 rounds."""
     rounds = []
 
-    def counted(*arguments):
+    def count(*arguments):
         rounds.append(arguments)
         return mean_tanh.py_func(*arguments)
 
-    monkeypatch.setitem(_implicit_mean.py_func.__globals__, "mean_tanh", counted)
+    monkeypatch.setitem(_implicit_mean.py_func.__globals__, "mean_tanh", count)
     for share in (-0.9, -0.3, 0.0, 0.1, 0.7):
         _implicit_mean.py_func(math.atanh(0.99 * share), 1e6 * share, 1e6)
     assert len(rounds) <= 5 * 9

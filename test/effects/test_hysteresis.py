@@ -8,7 +8,7 @@ import slow_equations
 from effect_bench import RIG, SIGNALS, command, record_of, rms, simulate
 from scipy.integrate import solve_ivp
 
-from rsea_ros.effects.spring_hysteresis import along, reached
+from rsea_ros.effects.spring_hysteresis import along, reach
 from rsea_ros.model.drive import drive_from
 
 TOLERANCE = {"ft": 6e-3, "position": 1.5e-6, "velocity": 8e-5}
@@ -36,7 +36,7 @@ def test_motion_in_one_direction_is_exact(gamma: float, z: float):
 
 def test_the_series_meets_the_exponential():
     for rate in (-1.0, 1.0):
-        below, above = (np.array(reached(rate, u)) for u in (0.00999999, 0.01000001))
+        below, above = (np.array(reach(rate, u)) for u in (0.00999999, 0.01000001))
         np.testing.assert_allclose(below, above, rtol=1e-5)
 
 

@@ -14,8 +14,8 @@ from similar_machine import record_with
 import rsea_ros.effects as effects
 from rsea_ros.cli.main import main
 from rsea_ros.control.compensation import compensation
-from rsea_ros.control.lags import lagging
-from rsea_ros.control.sampled import responses, sampled
+from rsea_ros.control.lags import lag_responses
+from rsea_ros.control.sampled import responses, sample_rig
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming.cause_facts import undetermined_play
 from rsea_ros.diagnosis.problem_variants import with_common_clock_in_delay
@@ -178,8 +178,8 @@ def test_a_joint_reports_play_of_another_name_that_its_data_do_not_show():
 def test_a_delay_of_another_name_is_treated_as_a_delay():
     rig = RIG.with_effects(EffectSetting("late_bus", {"delay": 4e-3}))
     assert without_delay(rig) == (RIG.with_effects(), 4e-3)
-    hz, plant = np.array([10.0]), sampled(RIG, 280.0)
-    response, path = lagging(rig, plant, hz)
+    hz, plant = np.array([10.0]), sample_rig(RIG, 280.0)
+    response, path = lag_responses(rig, plant, hz)
     assert path[0] == pytest.approx(np.exp(-2j * math.pi * 10.0 * 4e-3))
     np.testing.assert_array_equal(response, responses(plant, hz))
     case = case_from(record_with(RIG, effect_named("late_bus"), 1.0, duration=5.0), rig)

@@ -58,9 +58,9 @@ def test_angles_that_do_not_depend_on_the_machine_keep_their_bounds():
 def test_bounds_include_what_a_rig_states():
     friction = effect_named("coulomb_friction").at(Scale(4.0**-3))
     assert friction.main.high < 1.0
-    assert friction.reaching({"torque": 3.0}).main.high == 3.0
+    assert friction.widen({"torque": 3.0}).main.high == 3.0
     limit = effect_named("torque_saturation")
-    assert limit.reaching(limit.null) == limit
+    assert limit.widen(limit.null) == limit
 
 
 def test_no_machine_is_larger_than_what_a_person_may_state():

@@ -19,18 +19,18 @@ TOLERANCE = {"ft": 6e-3, "position": 1.5e-6, "velocity": 8e-5}
 MASS, DAMPING, HEAVY = 0.5, 0.4, 6.0
 
 
-def settling(t, p):
+def settled_part(t, p):
     """Return the part of a drift that is reached at t."""
     return math.expm1(-t / p["time_constant"]) / math.expm1(-DURATION / p["time_constant"])
 
 
 def settling_sensor(t, x, u, p):
     w, a, torque = motion(x, u)
-    return [w, a], torque + p["drift"] * settling(t, p)
+    return [w, a], torque + p["drift"] * settled_part(t, p)
 
 
 def warming_motor(t, x, u, p):
-    w, a, torque = motion(x, (1 + p["relative_change"] * settling(t, p)) * u)
+    w, a, torque = motion(x, (1 + p["relative_change"] * settled_part(t, p)) * u)
     return [w, a], torque
 
 
@@ -78,14 +78,14 @@ VARIANTS = {
 def test_simulation_obeys_the_whole_equation(name: str, monkeypatch: pytest.MonkeyPatch):
     states, law, p = VARIANTS[name]
     monkeypatch.setitem(slow_equations.LAWS, name, (states, law))
-    rig, commanded = (swinging() if name == "gravity_error" else RIG), command(280.0, DURATION)
+    rig, commanded = (pendulum_rig() if name == "gravity_error" else RIG), command(280.0, DURATION)
     simulated = simulate(drive_from(record_of(commanded)), name, p, rig)
     true = slow_equations.solve(name, p, commanded.y, commanded.t[1])
     for signal in SIGNALS:
         assert rms(simulated[signal] - true[signal]) < TOLERANCE[signal], signal
 
 
-def swinging():
+def pendulum_rig():
     """Return the bench with its spring's end free, a pendulum on it."""
     values = {"spring_end.inertia": MASS, "spring_end.damping": DAMPING, "spring_end.gravity": HEAVY}
     return replace(RIG.with_values(values), clamped=frozenset({"housing_end"}))
@@ -93,8 +93,8 @@ def swinging():
 
 def test_an_unknown_payload_vanishes_and_is_refused_where_nothing_is_free():
     driven = drive(duration=1.0)
-    for signal, values in simulate(driven, rig=swinging()).items():
-        with_none = simulate(driven, "gravity_error", {"torque": 0.0}, swinging())[signal]
+    for signal, values in simulate(driven, rig=pendulum_rig()).items():
+        with_none = simulate(driven, "gravity_error", {"torque": 0.0}, pendulum_rig())[signal]
         np.testing.assert_array_equal(with_none, values)
     with pytest.raises(ParameterError, match="both ends clamped, expected a free one"):
         simulate(driven, "gravity_error", {"torque": 1.0})

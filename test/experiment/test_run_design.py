@@ -15,9 +15,9 @@ from rsea_ros.experiment.hypothesis import motion, run_case
 from rsea_ros.experiment.joint_weighing import cases_of
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_design import propose
-from rsea_ros.experiment.run_limits import RunLimits, of_command, of_response, used
+from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
 from rsea_ros.experiment.run_shape import Shape, at_rest_around, command_of
-from rsea_ros.experiment.separation import Refit, refitted
+from rsea_ros.experiment.separation import Refit, refit
 from rsea_ros.experiment.stored_models import hypotheses_from, model_of
 from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.identification.solver import power, solve
@@ -64,8 +64,8 @@ def test_limits_hold_on_every_bench_drawn_from_what_is_known(friction_or_play):
     pair, run = friction_or_play
     rng = np.random.default_rng(2)
     for true in [rig for h in pair for rig in h.draws(60, rng)]:
-        found = of_response(run.command, motion(true, run.command, run.rate))
-        assert used(found | of_command(run.command, run.rate), LIMITS) <= 1.0
+        peaks = of_response(run.command, motion(true, run.command, run.rate))
+        assert largest_share(peaks | of_command(run.command, run.rate), LIMITS) <= 1.0
     assert run.peaks.at_level["velocity"] >= run.peaks.expected["velocity"]
 
 
@@ -106,8 +106,8 @@ def test_the_bound_leaves_room_where_a_run_separates():
     room = bound(delay, lag, LIMITS, 10.0, NOISE)
     assert not room.is_hopeless
     command = command_of(Shape("multisine", LIMITS.torque), 1.0, 280.0)
-    found = refitted(delay, lag, run_case(command, 280.0, NOISE))
-    assert isinstance(found, Refit) and found.data <= found.total <= room.most
+    peaks = refit(delay, lag, run_case(command, 280.0, NOISE))
+    assert isinstance(peaks, Refit) and peaks.data <= peaks.total <= room.most
 
 
 def test_a_joint_that_positions_command_is_refused():

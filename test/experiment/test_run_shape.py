@@ -5,7 +5,7 @@ import pytest
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.run_file import read_run, run_text
-from rsea_ros.experiment.run_limits import RunLimits, limits_from, of_command, used
+from rsea_ros.experiment.run_limits import RunLimits, largest_share, limits_from, of_command
 from rsea_ros.experiment.run_shape import KINDS, LEAD, Shape, command_of
 
 RATE = 280.0
@@ -65,5 +65,5 @@ def test_senseless_limits_are_refused(text, message):
 
 
 def test_the_largest_share_counts():
-    assert used({"torque": 5.0, "velocity": 3.0}, RunLimits(torque=10.0, velocity=2.0)) == 1.5
-    assert used({"torque": 5.0, "travel": np.nan}, RunLimits(torque=10.0, travel=1.0)) == np.inf
+    assert largest_share({"torque": 5.0, "velocity": 3.0}, RunLimits(torque=10.0, velocity=2.0)) == 1.5
+    assert largest_share({"torque": 5.0, "travel": np.nan}, RunLimits(torque=10.0, travel=1.0)) == np.inf

@@ -14,7 +14,7 @@ from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.sdf import export_sdf
 from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.model.equations import mechanics
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig_file import load_rig
 
 S = 2j * np.pi * np.array([0.3, 2.0, 11.0, 70.0])
@@ -37,17 +37,17 @@ def matrices(text):
     """Return mass, damping and stiffness of the small motions over the joints that mimic no other."""
     links, joints = tree(text)
     free = [j.get("name") for j in joints if j.find("axis/mimic") is None]
-    absolute, own = {"world": np.zeros(len(free))}, {}
+    absolute, local = {"world": np.zeros(len(free))}, {}
     mass, damping, stiffness = (np.zeros((len(free), len(free))) for _ in range(3))
     for joint in joints:
         name, mimic = joint.get("name"), joint.find("axis/mimic")
         sign = float(joint.find("axis/xyz").text.split()[0])
         if mimic is None:
-            own[name] = np.eye(len(free))[free.index(name)]
+            local[name] = np.eye(len(free))[free.index(name)]
         else:
-            own[name] = float(mimic.find("multiplier").text) * own[mimic.get("joint")]
-        absolute[joint.find("child").text] = absolute[joint.find("parent").text] + sign * own[name]
-        outer = np.outer(own[name], own[name])
+            local[name] = float(mimic.find("multiplier").text) * local[mimic.get("joint")]
+        absolute[joint.find("child").text] = absolute[joint.find("parent").text] + sign * local[name]
+        outer = np.outer(local[name], local[name])
         damping += float(joint.findtext("axis/dynamics/damping", "0")) * outer
         stiffness += float(joint.findtext("axis/dynamics/spring_stiffness", "0")) * outer
     for name, (inertia, weight) in links.items():
@@ -77,10 +77,10 @@ def test_the_joints_hold_the_rigs_equations_of_motion(name, changes):
     rig = load_rig(name)
     rig = rig.with_values({key: value for key, value in changes.items() if key in rig.quantities or value})
     ours = mechanics(rig)
-    found = matrices(export_sdf(rig).content)
-    assert found[0].shape == ours.mass.shape
+    exported = matrices(export_sdf(rig).content)
+    assert exported[0].shape == ours.mass.shape
     expected = characteristic(ours.mass, ours.damping, ours.stiffness)
-    np.testing.assert_allclose(characteristic(*found), expected, rtol=1e-9)
+    np.testing.assert_allclose(characteristic(*exported), expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -123,4 +123,4 @@ def test_a_linear_rig_is_refused(export):
 
 def test_a_lumped_rig_is_no_mechanism():
     with pytest.raises(RigError, match="the lumped train cannot be exported"):
-        export_urdf(lumped(load_rig("paper_moving_output")))
+        export_urdf(lumped_rig(load_rig("paper_moving_output")))

@@ -99,12 +99,12 @@ def test_a_long_excitation_is_played_in_pieces(monkeypatch):
 
     rig, given, played, sizes = load_rig("paper_moving_output"), command(0.25), rollout.rollout, []
 
-    def counted(model, data, state, control, **more):
+    def count(model, data, state, control, **more):
         sizes.append(control.shape[1])
         return played(model, data, state, control, **more)
 
     whole = play_mujoco(export_mjcf(rig).content, rig, given)
-    monkeypatch.setattr(rollout, "rollout", counted)
+    monkeypatch.setattr(rollout, "rollout", count)
     monkeypatch.setattr(mujoco_play, "PIECE", 20)
     pieces = play_mujoco(export_mjcf(rig).content, rig, given)
     hold = round(1.0 / RATE / STEP)
@@ -186,8 +186,8 @@ def test_an_fmu_plays_our_simulation_and_accepts_other_parameters(tmp_path):
             start_values=values, output=["ft", "position", "velocity"],
         )  # fmt: skip
         theirs = {name: result[name] for name in ("ft", "position", "velocity")}
-        found = differences(expected, ours(expected, given, RATE), theirs)
-        assert max(one.times_noise for one in found) < 0.5
+        differing = differences(expected, ours(expected, given, RATE), theirs)
+        assert max(one.times_noise for one in differing) < 0.5
 
 
 def test_drifts_of_an_fmu_come_to_their_size_over_its_duration():

@@ -20,11 +20,11 @@ from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.plan import is_anything_new
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
-from rsea_ros.fleet.store import TaskOutcome, locked, open_store
+from rsea_ros.fleet.store import TaskOutcome, hold_lock, open_store
 from rsea_ros.fleet.task import Changed, Task
 
 
-def played(store, folder, joints=(KNEE,), executor=None, work=stub_work, limits=None):
+def run_engine(store, folder, joints=(KNEE,), executor=None, work=stub_work, limits=None):
     held = bags_of([str(folder)], joints)
     return Engine(store, executor or Serial(), work, lambda step, share: None, limits).run(held)
 
@@ -53,44 +53,44 @@ class Unlucky(Serial):
 
 
 def test_a_second_run_finds_nothing_new(store, folder):
-    assert played(store, folder).outcomes == {"done": 5}
+    assert run_engine(store, folder).outcomes == {"done": 5}
     assert not is_anything_new(store, bags_of([str(folder)], [KNEE]))
-    again = played(store, folder, work=lambda task: pytest.fail("worked on a known recording"))
+    again = run_engine(store, folder, work=lambda task: pytest.fail("worked on a known recording"))
     assert (again.rows, again.before) == (0, 5)
     assert count(store) == 5
 
 
 def test_a_bag_that_moved_is_known_by_its_content(store, folder, tmp_path):
-    played(store, folder)
+    run_engine(store, folder)
     moved = folder.rename(tmp_path / "elsewhere")
     assert is_anything_new(store, bags_of([str(moved)], [KNEE]))
-    summary = played(store, moved)
+    summary = run_engine(store, moved)
     assert (summary.rows, summary.before) == (0, 5)
 
 
 def test_a_copy_in_the_same_run_counts_once(store, folder):
     (folder / "copy.mcap").write_bytes((folder / "run0.mcap").read_bytes())
-    summary = played(store, folder)
+    summary = run_engine(store, folder)
     assert (summary.rows, summary.before) == (5, 1)
 
 
 def test_other_settings_and_another_joint_are_new(store, folder):
-    played(store, folder)
-    assert played(store, folder, [KNEE, HIP]).outcomes == {"done": 5}
-    assert played(store, folder, [replace(KNEE, diagnose="always")]).outcomes == {"done": 5}
+    run_engine(store, folder)
+    assert run_engine(store, folder, [KNEE, HIP]).outcomes == {"done": 5}
+    assert run_engine(store, folder, [replace(KNEE, diagnose="always")]).outcomes == {"done": 5}
     assert count(store) == 15
     assert answer(store, "SELECT count(*) FROM recordings")[1] == [(10,)], "the newest analysis of each"
 
 
 def test_a_lost_worker_is_replaced_and_a_recording_that_kills_workers_is_quarantined(store, folder):
     losses = {"run1.mcap": 2, "run3.mcap": 1000}
-    summary = played(store, folder, executor=Unlucky(losses), limits=EngineLimits(back_off=0.001))
+    summary = run_engine(store, folder, executor=Unlucky(losses), limits=EngineLimits(back_off=0.001))
     assert summary.outcomes == {"done": 4, "quarantined": 1}
     ((joint, bag, why),) = summary.quarantined
     assert joint == "knee" and bag.endswith("run3.mcap") and f"all {ATTEMPTS} times" in why
-    assert played(store, folder).rows == 0, "poison is not tried again by itself"
+    assert run_engine(store, folder).rows == 0, "poison is not tried again by itself"
     store.take_out({"quarantined"})
-    assert played(store, folder).outcomes == {"done": 1}
+    assert run_engine(store, folder).outcomes == {"done": 1}
     assert (count(store), count(store, "quarantined")) == (5, 0)
 
 
@@ -100,7 +100,7 @@ def test_an_error_of_the_cluster_is_a_row_and_not_the_end(store, folder):
             raise TypeError("cannot pickle it")
         return stub_work(task)
 
-    assert played(store, folder, work=work).outcomes == {"done": 4, "quarantined": 1}
+    assert run_engine(store, folder, work=work).outcomes == {"done": 4, "quarantined": 1}
     assert answer(store, "SELECT reason FROM recordings WHERE outcome = 'quarantined'")[1] == [
         ("TypeError: cannot pickle it",)
     ]
@@ -124,9 +124,9 @@ def test_a_bag_that_is_being_written_is_left_for_the_next_run(store, folder):
             raise Changed(task.bag.url)
         return stub_work(task)
 
-    summary = played(store, folder, work=work)
+    summary = run_engine(store, folder, work=work)
     assert (summary.rows, len(summary.changed)) == (4, 1)
-    assert played(store, folder).outcomes == {"done": 1}
+    assert run_engine(store, folder).outcomes == {"done": 1}
     assert count(store) == 5
 
 
@@ -143,24 +143,24 @@ def test_a_full_disk_ends_the_run_and_loses_no_row(store, folder, monkeypatch):
 
     monkeypatch.setattr(type(store), "put", full)
     with pytest.raises(OSError, match="No space left"):
-        played(store, folder)
+        run_engine(store, folder)
     monkeypatch.undo()
     assert count(store) == 2
-    assert played(store, folder).outcomes == {"done": 3}
+    assert run_engine(store, folder).outcomes == {"done": 3}
     assert count(store) == 5
 
 
 def test_many_rows_become_one_file_and_stay_all_there(store, folder, monkeypatch):
     monkeypatch.setattr("rsea_ros.fleet.store.LOOSE", 2)
-    played(store, folder)
+    run_engine(store, folder)
     files = list(store.rows.rglob("*.parquet"))
     assert [file.parent.name for file in files] == ["month=2026-03"]
-    assert count(store) == 5 and played(store, folder).before == 5
+    assert count(store) == 5 and run_engine(store, folder).before == 5
 
 
 def test_a_compaction_killed_half_way_leaves_no_row_twice(store, folder, monkeypatch):
     monkeypatch.setattr("rsea_ros.fleet.compaction._remove", lambda folder, names: None)
-    played(store, folder)
+    run_engine(store, folder)
     monkeypatch.undo()
     assert len(list(store.rows.rglob("*.parquet"))) == 6
     assert count(store) == 5, "who reads counts them once"
@@ -176,10 +176,10 @@ def test_a_row_made_again_outlives_a_compaction_that_named_its_file(store, folde
         poison = {"outcome": "quarantined"} if task.bag.url.endswith("run2.mcap") else {}
         return TaskOutcome(stub_work(task).row | poison)
 
-    played(store, folder, work=work)
+    run_engine(store, folder, work=work)
     store.take_out({"quarantined"})
     monkeypatch.setattr(type(store), "compact", lambda self: None)  # killed before it
-    played(store, folder)
+    run_engine(store, folder)
     store.finish()
     assert count(store) == 5
 
@@ -188,22 +188,22 @@ def test_two_runs_take_turns(store):
     """Another process holds the lock: a run that does not wait names it, one that waits begins after it."""
     code = f"""
 import time
-from rsea_ros.fleet.store import TaskOutcome, locked, open_store
-with locked(open_store({str(store.path)!r}), None):
+from rsea_ros.fleet.store import TaskOutcome, hold_lock, open_store
+with hold_lock(open_store({str(store.path)!r}), None):
     print("held", flush=True)
     time.sleep(30)
 """
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout is not None and other.stdout.readline() == "held\n"
-        with pytest.raises(FleetError, match=f"process {other.pid} on "), locked(store, None):
+        with pytest.raises(FleetError, match=f"process {other.pid} on "), hold_lock(store, None):
             pass
         begin, heard = time.monotonic(), []
 
-        def waiting(holder: str) -> None:
+        def wait(holder: str) -> None:
             heard.append(holder)
             os.kill(other.pid, 9)
 
-        with locked(store, waiting):
+        with hold_lock(store, wait):
             assert heard and time.monotonic() - begin < 10.0
 
 
@@ -220,6 +220,6 @@ def test_a_folder_that_is_no_store_is_refused(tmp_path, folder):
 def test_jobs_that_wait_to_be_tried_again_do_not_hold_the_others_up(store, folder):
     """While one job waits to be retried, the others are done."""
     begin = time.monotonic()
-    summary = played(store, folder, executor=Unlucky({"run0.mcap": 1}), limits=EngineLimits(back_off=0.3))
+    summary = run_engine(store, folder, executor=Unlucky({"run0.mcap": 1}), limits=EngineLimits(back_off=0.3))
     assert summary.outcomes == {"done": 5} and time.monotonic() - begin < 5.0
     assert Job(stub_work, None).attempt == 0

@@ -15,7 +15,7 @@ from rsea_ros.cli.main import main
 from rsea_ros.fleet.joints import load_joints
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.read_recording import read_run
-from rsea_ros.fleet.sources import bags_of, fingerprint, relisted
+from rsea_ros.fleet.sources import bags_of, fingerprint, relist
 from rsea_ros.fleet.store import open_store
 
 ROOT = Path(__file__).parents[2]
@@ -77,7 +77,7 @@ def test_a_group_in_a_folder_is_one_recording_with_all_its_arrays(missions, tmp_
     before = fingerprint(bag)
     with open(f"{bag.url}/00_state_joint_torque/0", "ab") as file:
         file.write(b"more")
-    assert relisted(bag) != bag and relisted(bag).size == bag.size + 4
+    assert relist(bag) != bag and relist(bag).size == bag.size + 4
     assert fingerprint(bag) != before
 
 

@@ -10,7 +10,7 @@ import pytest
 from fleet_stubs import HIP, KNEE
 
 from rsea_ros.fleet.fleet_error import FleetError
-from rsea_ros.fleet.sources import bags_of, fingerprint, local_copy, relisted
+from rsea_ros.fleet.sources import bags_of, fingerprint, local_copy, relist
 
 
 def urls(sources, joints=(KNEE,)):
@@ -34,8 +34,8 @@ def test_a_folder_with_metadata_is_one_bag_and_other_files_are_each(folder):
         (bag / name).write_bytes(b"x" * 10)
     (folder / "notes.txt").write_text("no bag")
     (folder / ".hidden.mcap").write_text("half written")
-    found = urls([folder])
-    assert found == [*(str(folder / f"run{n}.mcap") for n in range(5)), str(bag)]
+    listed_sources = urls([folder])
+    assert listed_sources == [*(str(folder / f"run{n}.mcap") for n in range(5)), str(bag)]
     assert dict(bags_of([str(folder)], [KNEE])).keys() and bags_of([str(bag)], [KNEE])[0][0].size == 30
 
 
@@ -48,8 +48,8 @@ def test_a_source_named_twice_counts_once(folder, tmp_path):
 
 def test_a_joint_is_in_the_bags_that_its_pattern_names(folder):
     first, rest = replace(KNEE, bags=("run0.mcap",)), replace(HIP, bags=("bags/run[1-9]*",))
-    found = bags_of([str(folder)], [first, rest])
-    held = {bag.url[-9:]: [joint.name for joint in joints] for bag, joints in found}
+    listed_sources = bags_of([str(folder)], [first, rest])
+    held = {bag.url[-9:]: [joint.name for joint in joints] for bag, joints in listed_sources}
     assert held["run0.mcap"] == ["knee"] and held["run3.mcap"] == ["hip"]
 
 
@@ -61,7 +61,7 @@ def test_an_object_store_is_read_like_a_folder(remote):
         assert sorted(os.listdir(path)) == ["metadata.yaml", "monday.mcap"]
         assert (path / "monday.mcap").read_bytes() == b"content"
     assert not path.exists()
-    assert relisted(tuesday) == tuesday
+    assert relist(tuesday) == tuesday
 
 
 def test_a_fingerprint_is_that_of_the_content(folder, remote):
@@ -76,7 +76,7 @@ def test_a_file_that_has_changed_is_listed_as_another(folder):
     (bag, _), *_ = bags_of([str(folder)], [KNEE])
     with open(bag.url, "ab") as file:
         file.write(b"more")
-    assert relisted(bag) != bag
+    assert relist(bag) != bag
 
 
 @pytest.mark.parametrize("source", ["nowhere", "nowhere/*.mcap", "@nowhere", "no-such-protocol://x"])

@@ -52,11 +52,11 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def serial(lab: Path) -> Path:
-    assert main([*running(lab), "--out", str(lab / "serial"), "--serial"]) == 0
+    assert main([*run_node_process(lab), "--out", str(lab / "serial"), "--serial"]) == 0
     return lab / "serial"
 
 
-def running(lab: Path) -> list[str]:
+def run_node_process(lab: Path) -> list[str]:
     return ["fleet", "run", str(lab), "--map", str(lab / "joints.yaml")]
 
 
@@ -87,7 +87,7 @@ def test_a_bad_recording_is_a_row_with_its_reason(serial):
 
 def test_rows_of_dask_workers_are_those_of_this_process(lab, serial, capsys):
     out = lab / "dask"
-    arguments = [*running(lab), "--out", str(out)]
+    arguments = [*run_node_process(lab), "--out", str(out)]
     command = [sys.executable, "-m", "rsea_ros", *arguments, "--workers", "1"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     assert "2 done, 2 refused" in done.stdout and "dashboard: http://127.0.0.1:" in done.stderr
@@ -149,5 +149,5 @@ def test_a_date_stands_in_the_path(path, pattern, date):
 
 @pytest.mark.parametrize("option", [["--workers", "0"], ["--memory", "-1"], ["--serial", "--scheduler", "x"]])
 def test_senseless_options_are_refused(lab, option, capsys):
-    assert main([*running(lab), "--out", str(lab / "no"), *option]) == 2
+    assert main([*run_node_process(lab), "--out", str(lab / "no"), *option]) == 2
     assert option[0] in capsys.readouterr().err and not (lab / "no").exists()

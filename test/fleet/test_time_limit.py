@@ -18,7 +18,7 @@ from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
 from rsea_ros.fleet.store import TaskOutcome
 from rsea_ros.fleet.task import Task, work
-from rsea_ros.fleet.time_limit import TIME_LIMIT, OutOfTime, limited
+from rsea_ros.fleet.time_limit import TIME_LIMIT, OutOfTime, limit_time
 
 MAP = "joints:\n  knee: {rig: paper_high_impedance}\n"
 
@@ -32,9 +32,9 @@ def endless(*_: object) -> dict[str, str]:
             continue
 
 
-def ended() -> bool:
+def has_ended() -> bool:
     try:
-        with limited(0.05):
+        with limit_time(0.05):
             endless()
     except OutOfTime:
         return True
@@ -42,13 +42,13 @@ def ended() -> bool:
 
 
 def test_a_block_that_never_ends_is_ended_in_any_thread():
-    assert ended()
+    assert has_ended()
     with ThreadPoolExecutor(1) as pool:
-        assert pool.submit(ended).result(10.0)
+        assert pool.submit(has_ended).result(10.0)
 
 
 def test_a_block_in_time_hears_nothing_of_its_limit():
-    with limited(0.02):
+    with limit_time(0.02):
         pass
     until = time.monotonic() + 0.05
     while time.monotonic() < until:
@@ -60,12 +60,12 @@ def test_a_worker_whose_call_never_returns_ends_itself(monkeypatch):
     monkeypatch.setattr(time_limit, "GRACE", 0.02)
     monkeypatch.setattr(os, "_exit", ends.append)
 
-    def stuck() -> None:
-        with pytest.raises(OutOfTime), limited(0.02):
+    def hang() -> None:
+        with pytest.raises(OutOfTime), limit_time(0.02):
             time.sleep(0.3)  # one call: the exception waits for its end
 
     with ThreadPoolExecutor(1) as pool:
-        pool.submit(stuck).result(10.0)
+        pool.submit(hang).result(10.0)
     assert ends == [70]
 
 

@@ -1,4 +1,4 @@
-"""A bench on a wire in a process of its own, and the driver's loop without ROS in this one."""
+"""A simulated bench in a process of its own, and the driver's loop without ROS in this one."""
 
 from __future__ import annotations
 

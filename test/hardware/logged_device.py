@@ -50,7 +50,7 @@ class Device:
         return lambda: self._did(name)
 
 
-def guarded(device):
+def guard(device):
     """Return a guarded device, open and enabled, with nothing in its log; 4 N m a cycle of soft start."""
     made = GuardedDevice(device, Limits(64.0, slew=1e9, soft_start=256.0), 64.0)
     made.open()

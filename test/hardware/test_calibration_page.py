@@ -24,7 +24,7 @@ LAUGHS = b"<!DOCTYPE l [<!ENTITY a0 'ha'>%s]><l>&a9;</l>" % b"".join(
 
 
 @contextlib.contextmanager
-def served(*parts, pause=0.0):
+def serve(*parts, pause=0.0):
     """Serve one connection: parts of bytes with pauses between them; yield port and the request."""
     requests = []
     with socket.create_server(("127.0.0.1", 0)) as listener:
@@ -48,17 +48,17 @@ def whole(body, head=HEAD):
 
 
 def test_a_sensor_that_answers_gives_its_calibration():
-    with served(whole(GOOD)) as (port, requests):
+    with serve(whole(GOOD)) as (port, requests):
         read = calibration.fetch("127.0.0.1", port)
     assert (read.force, read.torque, read.rate) == (1e-6, 1e-6, 7000.0)
     assert requests[0].startswith(b"GET /netftapi2.xml HTTP/1.1\r\nHost: 127.0.0.1:")
 
 
 def test_a_page_in_pieces_and_without_a_length_is_read():
-    with served([HEAD + b"\r\n", GOOD[:50], GOOD[50:]], pause=0.01) as (port, _):
+    with serve([HEAD + b"\r\n", GOOD[:50], GOOD[50:]], pause=0.01) as (port, _):
         assert calibration.fetch("127.0.0.1", port).force == 1e-6
     chunks = [b"%x\r\n%s\r\n" % (len(part), part) for part in (GOOD[:50], GOOD[50:])]
-    with served([HEAD + b"Transfer-Encoding: chunked\r\n\r\n", *chunks, b"0\r\n\r\n"]) as (port, _):
+    with serve([HEAD + b"Transfer-Encoding: chunked\r\n\r\n", *chunks, b"0\r\n\r\n"]) as (port, _):
         assert calibration.fetch("127.0.0.1", port).force == 1e-6
 
 
@@ -92,7 +92,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_a_page_without_a_calibration_is_one_line(case):
     parts, message = REFUSED[case]
-    with served(parts) as (port, _), pytest.raises(DeviceError, match=message) as caught:
+    with serve(parts) as (port, _), pytest.raises(DeviceError, match=message) as caught:
         calibration.fetch("127.0.0.1", port)
     assert f"http://127.0.0.1:{port}/netftapi2.xml" in str(caught.value)
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
@@ -109,7 +109,7 @@ DRIPPING = {
 @pytest.mark.parametrize("case", DRIPPING)
 def test_a_page_that_drips_ends_in_time(case):
     head, drop = DRIPPING[case]
-    with served(head, [drop] * 60, pause=0.02) as (port, _):
+    with serve(head, [drop] * 60, pause=0.02) as (port, _):
         started = time.monotonic()
         with pytest.raises(DeviceError, match=r"no whole answer within 0.2 s"):
             calibration.fetch("127.0.0.1", port, timeout=0.2)
@@ -119,7 +119,7 @@ def test_a_page_that_drips_ends_in_time(case):
 def test_an_endless_page_is_abandoned_at_the_size_limit(monkeypatch):
     monkeypatch.setattr(web_page, "LARGEST", 1000)
     with (
-        served([HEAD + b"\r\n"], itertools.repeat(b" " * 500)) as (port, _),
+        serve([HEAD + b"\r\n"], itertools.repeat(b" " * 500)) as (port, _),
         pytest.raises(DeviceError, match="more than 1000 bytes"),
     ):
         calibration.fetch("127.0.0.1", port)

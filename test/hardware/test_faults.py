@@ -26,7 +26,7 @@ def torques(bench, since):
     return [(goal, on) for _, goal, on in bench.log(since)["torque"]]
 
 
-def acting(bench, since):
+def acting_writes(bench, since):
     """How many writes since then were of a torque that acts."""
     return sum(goal != 0 and on for goal, on in torques(bench, since))
 
@@ -40,7 +40,7 @@ def test_a_fault_is_latched_within_its_cycles_and_cleared_by_the_service(loop, n
     assert loop.cycles(5, 10.0) == [0.0] * 5
     if name != "port vanished":
         assert torques(loop.bench, since)[-1][0] == 0
-        assert acting(loop.bench, since) <= WITHIN + 1
+        assert acting_writes(loop.bench, since) <= WITHIN + 1
     loop.bench.ask(right, **back)
     loop.cycles(2, 10.0)
     assert loop.guarded.fault.cause == cause, "it is latched"

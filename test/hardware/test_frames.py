@@ -6,7 +6,7 @@ import random
 import pytest
 
 from rsea_ros.hardware.dynamixel.frame_stream import StatusFrameParser
-from rsea_ros.hardware.dynamixel.frames import crc16, frame, stuffed, unstuffed
+from rsea_ros.hardware.dynamixel.frames import crc16, frame, stuff, unstuff
 from rsea_ros.hardware.dynamixel.handler import PacketHandler
 from rsea_ros.hardware.peer import protocol2
 
@@ -39,15 +39,15 @@ def short_payloads():
 
 def test_stuffing_is_undone_for_every_short_payload_and_holds_no_header():
     for payload in short_payloads():
-        packed = stuffed(payload)
-        assert unstuffed(packed) == payload
+        packed = stuff(payload)
+        assert unstuff(packed) == payload
         assert packed == protocol2.escape(payload) and protocol2.unescape(packed) == payload
         assert b"\xff\xff\xfd\x00" not in packed
 
 
 def test_impossible_stuffing_is_refused_by_both_codecs():
     for payload in short_payloads():
-        assert (unstuffed(payload) is None) == (protocol2.unescape(payload) is None)
+        assert (unstuff(payload) is None) == (protocol2.unescape(payload) is None)
 
 
 def test_the_sdks_methods_invert_each_other_where_its_own_lose_a_byte():

@@ -11,7 +11,7 @@ from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import DeviceFault, Limits
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring
-from test.hardware.logged_device import LOST, Device, guarded
+from test.hardware.logged_device import LOST, Device, guard
 
 WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 7.0)
 
@@ -23,7 +23,7 @@ def device():
 
 @pytest.fixture
 def joint(device):
-    return guarded(device)
+    return guard(device)
 
 
 def test_nothing_is_enabled_counted_or_read_before_it_is_asked_for(device):

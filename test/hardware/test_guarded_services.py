@@ -10,7 +10,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import DeviceFault, Limits
-from test.hardware.logged_device import LOST, Device, guarded
+from test.hardware.logged_device import LOST, Device, guard
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def device():
 
 @pytest.fixture
 def joint(device):
-    return guarded(device)
+    return guard(device)
 
 
 def test_enabling_needs_no_fault_and_begins_softly(joint, device):
@@ -63,11 +63,11 @@ def test_a_device_that_another_thread_uses_is_left_alone(joint, device):
 
 def test_a_cycle_does_not_wait_for_another_user_of_the_device(joint):
     with ExitStack() as first:
-        assert joint.taken(first) is True
+        assert joint.take(first) is True
         with ExitStack() as second:
-            assert joint.taken(second) is False
+            assert joint.take(second) is False
     with ExitStack() as third:
-        assert joint.taken(third) is True, "it was let go"
+        assert joint.take(third) is True, "it was let go"
 
 
 def test_the_sensor_is_tared_only_without_torque_and_none_is_made_meanwhile(joint, device):

@@ -23,7 +23,7 @@ class Line:
     def __init__(self, *replies):
         self.replies, self.waiting = [list(r) for r in replies], []
         self.port_name, self.is_using, self.turns = "line", False, Turns()
-        self.latency = self.return_delay = self.left = 0.0
+        self.latency = self.return_delay = self.time_left = 0.0
         self.baudrate = 1_000_000
 
     def clearPort(self):

@@ -23,35 +23,37 @@ def guard(**limits):
 
 def test_torque_is_cut_at_its_limit_either_way_and_counted():
     limited = guard(slew=1e6)
-    assert [limited.allowed(w, 0.0) for w in (500.0, -500.0, 20.0)] == [68.0, -68.0, 20.0]
+    assert [limited.allowed_torque(w, 0.0) for w in (500.0, -500.0, 20.0)] == [68.0, -68.0, 20.0]
     assert limited.limited == 2
 
 
 def test_the_slew_limit_is_per_second_whatever_the_rate():
     limited = guard(slew=300.0)
-    assert [limited.allowed(10.0, 0.0) for _ in range(5)] == [3.0, 6.0, 9.0, 10.0, 10.0]
+    assert [limited.allowed_torque(10.0, 0.0) for _ in range(5)] == [3.0, 6.0, 9.0, 10.0, 10.0]
     assert limited.limited == 3
 
 
 def test_without_a_command_there_is_no_torque():
-    assert guard().allowed(10.0, None) == 0.0
+    assert guard().allowed_torque(10.0, None) == 0.0
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_commands_that_cease_end_in_a_ramp_and_a_fault(sign):
     late = guard(slew=1e6, command_timeout=0.05, ramp=0.04)
-    assert late.allowed(sign * 40.0, 0.05) == sign * 40.0
-    assert [late.allowed(sign * 40.0, 0.06) for _ in range(5)] == [sign * t for t in (30, 20, 10, 0, 0)]
+    assert late.allowed_torque(sign * 40.0, 0.05) == sign * 40.0
+    assert [late.allowed_torque(sign * 40.0, 0.06) for _ in range(5)] == [
+        sign * t for t in (30, 20, 10, 0, 0)
+    ]
     assert str(late.fault) == "command_timeout: 60 ms, limit 50 ms"
-    assert late.allowed(sign * 40.0, 0.0) == 0.0, "it is latched"
+    assert late.allowed_torque(sign * 40.0, 0.0) == 0.0, "it is latched"
     late.clear()
-    assert late.allowed(sign * 40.0, 0.0) == sign * 40.0
+    assert late.allowed_torque(sign * 40.0, 0.0) == sign * 40.0
 
 
 def test_zero_commands_that_cease_are_no_fault():
     quiet = guard()
-    quiet.allowed(0.0, 0.0)
-    quiet.allowed(0.0, 9.0)
+    quiet.allowed_torque(0.0, 0.0)
+    quiet.allowed_torque(0.0, 9.0)
     assert quiet.fault is None
 
 
@@ -68,10 +70,10 @@ def test_zero_commands_that_cease_are_no_fault():
 )
 def test_a_reading_beyond_a_limit_names_cause_value_and_limit(reading, told):
     seen = guard(current=12.0, voltage=20.0)
-    seen.allowed(30.0, 0.0)
+    seen.allowed_torque(30.0, 0.0)
     seen.look(State(0, **({"position": 0.0, "velocity": 0.0, "motor_torque": 0.0} | reading)))
     assert str(seen.fault) == told
-    assert seen.allowed(30.0, 0.0) == 0.0
+    assert seen.allowed_torque(30.0, 0.0) == 0.0
 
 
 def test_a_quantity_that_is_not_measured_trips_nothing():
@@ -138,20 +140,20 @@ def test_any_other_error_is_a_fault_at_once(error):
 def test_the_first_command_does_not_act_in_full_after_start_fault_and_pause():
     soft = guard(slew=1e6, soft_start=300.0)
     begin = [3.0, 6.0, 9.0, 10.0]
-    assert [soft.allowed(10.0, 0.0) for _ in range(4)] == begin
+    assert [soft.allowed_torque(10.0, 0.0) for _ in range(4)] == begin
     soft.trip(DeviceFault("any"))
-    assert soft.allowed(10.0, 0.0) == 0.0
+    assert soft.allowed_torque(10.0, 0.0) == 0.0
     soft.clear()
-    assert [soft.allowed(10.0, 0.0) for _ in range(4)] == begin
-    soft.allowed(0.0, 0.0)
-    soft.allowed(0.0, 9.0)
-    assert [soft.allowed(10.0, 0.0) for _ in range(4)] == begin
+    assert [soft.allowed_torque(10.0, 0.0) for _ in range(4)] == begin
+    soft.allowed_torque(0.0, 0.0)
+    soft.allowed_torque(0.0, 9.0)
+    assert [soft.allowed_torque(10.0, 0.0) for _ in range(4)] == begin
 
 
 def test_a_motor_that_does_not_make_its_torque_for_long_enough_is_a_fault():
     watched = guard(slew=1e6, effort=6.0, effort_time=0.05)
     for k in range(6):
-        watched.allowed(10.0, 0.0)
+        watched.allowed_torque(10.0, 0.0)
         assert watched.fault is None, k
         watched.look(State(0, 0.0, 0.0, 3.0))
     assert str(watched.fault) == "effort: 7 N·m, limit 6 N·m between commanded and measured torque"
@@ -160,7 +162,7 @@ def test_a_motor_that_does_not_make_its_torque_for_long_enough_is_a_fault():
 def test_a_changing_torque_that_is_measured_late_is_no_fault():
     watched, torques = guard(slew=1e6, effort=6.0, effort_time=0.05), [0.0, 0.0]
     for k in range(100):
-        torques.append(watched.allowed(60.0 * (-1) ** k, 0.0))
+        torques.append(watched.allowed_torque(60.0 * (-1) ** k, 0.0))
         watched.look(State(0, 0.0, 0.0, torques[-2]))
     assert watched.fault is None
 
@@ -191,60 +193,60 @@ def test_limits_hold_for_every_rig(limits, reading, told):
 ])  # fmt: skip
 def test_an_ft_limit_needs_a_torque_that_is_measured(readings, fault):
     """A device whose wrench ceased went on without the limit, and nobody was told."""
-    it = Guard(Limits(68.0, ft=60.0), 0.01)
+    limiter = Guard(Limits(68.0, ft=60.0), 0.01)
     for reading in readings:
-        it.look(reading)
-    assert (it.fault and str(it.fault)) == fault
-    it.clear()
-    it.look(readings[-1])
-    assert (it.fault and str(it.fault)) == fault, "clear_fault changes nothing of it"
-    it.clear()
-    it.look(FELT)
-    assert it.fault is None
+        limiter.look(reading)
+    assert (limiter.fault and str(limiter.fault)) == fault
+    limiter.clear()
+    limiter.look(readings[-1])
+    assert (limiter.fault and str(limiter.fault)) == fault, "clear_fault changes nothing of it"
+    limiter.clear()
+    limiter.look(FELT)
+    assert limiter.fault is None
 
 
 @pytest.mark.parametrize("name", ["temperature", "current", "voltage"])
 def test_a_limited_quantity_must_go_on_being_measured(name):
     good = {"temperature": 30.0, "current": 1.0, "voltage": 24.0}
-    it = Guard(Limits(68.0, temperature=70.0, current=12.0, voltage=20.0), 0.01)
-    read = lambda **values: it.look(State(0, 0.0, 0.0, 0.0, **(good | values)))  # noqa: E731
+    limiter = Guard(Limits(68.0, temperature=70.0, current=12.0, voltage=20.0), 0.01)
+    read = lambda **values: limiter.look(State(0, 0.0, 0.0, 0.0, **(good | values)))  # noqa: E731
     for _ in range(3):
         read()
         for _ in range(100):
             read(**{name: math.nan})
-    assert it.fault is None
+    assert limiter.fault is None
     read(**{name: math.nan})
-    assert str(it.fault) == f"{name}: no {name} measured for 1 s, expected one for {name}_limit"
-    it.clear()
+    assert str(limiter.fault) == f"{name}: no {name} measured for 1 s, expected one for {name}_limit"
+    limiter.clear()
     read(**{name: math.nan})
-    assert it.fault.cause == name, "clear_fault changes nothing of it"
-    it.clear()
+    assert limiter.fault.cause == name, "clear_fault changes nothing of it"
+    limiter.clear()
     read()
-    assert it.fault is None
+    assert limiter.fault is None
 
 
 def test_without_an_ft_limit_no_torque_need_be_measured():
-    it = Guard(Limits(68.0), 0.01)
+    limiter = Guard(Limits(68.0), 0.01)
     for _ in range(150):
-        it.look(UNFELT)
-    assert it.fault is None
+        limiter.look(UNFELT)
+    assert limiter.fault is None
 
 
 def test_the_ramp_after_the_last_command_takes_its_time_not_cycles():
     """Seed 2 of bench/driver.py random: cycles of 60 ms on a busy machine made 340 ms of a ramp of 20 ms."""
     guard = Guard(Limits(68.0, command_timeout=0.05, ramp=0.02), 1.0 / 280.0)
     for _ in range(3):
-        guard.allowed(10.0, 0.0)
-    assert guard.allowed(10.0, 0.06) == pytest.approx(5.0)
+        guard.allowed_torque(10.0, 0.0)
+    assert guard.allowed_torque(10.0, 0.06) == pytest.approx(5.0)
     assert guard.fault.cause == "command_timeout"
-    assert guard.allowed(10.0, 0.12) == 0.0
+    assert guard.allowed_torque(10.0, 0.12) == 0.0
 
 
 def test_the_ramp_goes_on_when_commands_come_again():
     guard = Guard(Limits(68.0, command_timeout=0.05, ramp=0.02), 1.0 / 280.0)
     for _ in range(3):
-        guard.allowed(10.0, 0.0)
-    torques = [guard.allowed(10.0, 0.06), *(guard.allowed(10.0, 0.0) for _ in range(6))]
+        guard.allowed_torque(10.0, 0.0)
+    torques = [guard.allowed_torque(10.0, 0.06), *(guard.allowed_torque(10.0, 0.0) for _ in range(6))]
     assert torques[-1] == 0.0 and torques == sorted(torques, reverse=True)
 
 

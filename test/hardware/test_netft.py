@@ -89,8 +89,8 @@ def test_random_and_mutated_datagrams_give_no_record_that_was_not_sent():
         flipped[rng.randrange(2)] ^= 1 << rng.randrange(8)  # a step of at least 65536
         flipped[0] |= 0x40
         for damaged in (noise, cut, whole + whole[:4], bytes(flipped)):
-            found = decode(damaged)
-            assert found is None or not sequence.accept(found), damaged.hex()
+            decoded = decode(damaged)
+            assert decoded is None or not sequence.accept(decoded), damaged.hex()
     assert sequence.counts["received"] == 20_000 and sequence.counts["lost"] == 0
 
 
@@ -204,8 +204,8 @@ def test_a_new_stream_after_which_only_the_sensors_own_counter_has_moved_on_is_f
 def test_a_tare_collects_while_the_cycle_reads(streamed):
     """Tare and cycle took from one queue, and the second of them raised IndexError."""
     receiver, sensor, client = streamed
-    found = []
-    thread = threading.Thread(target=lambda: found.extend(receiver.collect(0.2)))
+    decoded = []
+    thread = threading.Thread(target=lambda: decoded.extend(receiver.collect(0.2)))
     thread.start()
     sent = taken = 0
     while thread.is_alive():
@@ -216,4 +216,4 @@ def test_a_tare_collects_while_the_cycle_reads(streamed):
             _until_heard(receiver, sent)
     _until_heard(receiver, sent)
     taken += len(receiver.take())
-    assert taken == sent and len(found) > 1
+    assert taken == sent and len(decoded) > 1

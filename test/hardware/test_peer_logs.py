@@ -1,4 +1,4 @@
-"""What a bench on a wire keeps of what it saw: the newest, and nothing where nobody can ask for it."""
+"""What a simulated bench keeps of what it saw: the newest, and nothing where nobody can ask for it."""
 
 import argparse
 

@@ -25,7 +25,7 @@ def wire():
         os.close(near)
 
 
-def received(port, size):
+def receive_all(port, size):
     """Everything until so many bytes have come."""
     data, deadline = b"", time.monotonic() + 10.0
     while len(data) < size and time.monotonic() < deadline:
@@ -40,20 +40,20 @@ def test_a_reply_is_read_whole(wire, size):
     for fill in range(3):
         reply = bytes((k + fill) % 251 for k in range(size))
         os.write(near, reply)
-        assert received(port, size) == reply
+        assert receive_all(port, size) == reply
 
 
 def test_a_reply_in_pieces_is_read_whole(wire):
     port, near = wire
     for piece in (b"ab", b"cde", b"f"):
         os.write(near, piece)
-        assert received(port, len(piece)) == piece
+        assert receive_all(port, len(piece)) == piece
 
 
 def test_without_a_reply_nothing_is_returned_after_the_time_out(wire):
     port, _ = wire
     port.setPacketTimeoutMillis(2.0)
-    assert port.receive() == b"" and port.isPacketTimeout() and port.left == 0.0
+    assert port.receive() == b"" and port.isPacketTimeout() and port.time_left == 0.0
 
 
 def test_bytes_that_came_before_are_discarded(wire):
@@ -62,7 +62,7 @@ def test_bytes_that_came_before_are_discarded(wire):
     time.sleep(0.05)
     port.clearPort()
     os.write(near, b"new")
-    assert received(port, 3) == b"new"
+    assert receive_all(port, 3) == b"new"
 
 
 def test_a_port_that_hangs_up_is_lost(wire):

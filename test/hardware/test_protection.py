@@ -40,23 +40,23 @@ def toy(monkeypatch):
         device.close()
 
 
-def guarded(device, spring=None, **limits):
+def guard(device, spring=None, **limits):
     return GuardedDevice(device, Limits(68.0, **limits), 280.0, spring)
 
 
 def test_a_device_without_protection_is_refused_unless_that_is_allowed(toy):
     device = toy()
     with pytest.raises(ParameterError, match="allow_no_dead_host_protection = true"):
-        guarded(device).open()
+        guard(device).open()
     assert not device.opened, "nothing stays open"
-    guarded(device).open(unprotected=True)
+    guard(device).open(unprotected=True)
     assert device.opened
 
 
 def test_a_supervised_toy_is_stopped_when_the_driver_hangs(toy):
     """It held its torque after a kill -9: the supervisor was private to the Dynamixel code."""
     device = toy(supervised="yes")
-    loop = guarded(device)
+    loop = guard(device)
     loop.open()
     assert str(device.protection) == "supervisor, 0.1 s"
     loop.enable()
@@ -72,7 +72,7 @@ def test_a_supervised_toy_is_stopped_when_the_driver_hangs(toy):
 
 def test_a_supervised_toy_that_is_still_driven_is_left_alone(toy):
     device = toy(supervised="yes", watchdog=1.0)
-    loop = guarded(device)
+    loop = guard(device)
     loop.open()
     loop.enable()
     begun = time.monotonic()
@@ -89,7 +89,7 @@ def test_a_supervised_toy_that_is_still_driven_is_left_alone(toy):
 def test_a_long_reboot_under_torque_is_not_taken_for_a_hang(toy):
     """Only the motor told the supervisor that its torque was off: one that was being set up was stopped."""
     device = toy(supervised="yes", boot="0.3")
-    loop = guarded(device)
+    loop = guard(device)
     loop.open()
     loop.enable()
     for _ in range(3):
@@ -108,7 +108,7 @@ def test_the_simulation_ends_with_its_process():
 
 def test_the_springs_deflection_is_a_wrench_where_no_sensor_measures_one(toy):
     device = toy()
-    loop = guarded(device, Spring(1500.0, place=5, sign=-1.0), deflection=0.05, ft=60.0)
+    loop = guard(device, Spring(1500.0, place=5, sign=-1.0), deflection=0.05, ft=60.0)
     loop.open(unprotected=True)
     loop.enable()
     states = [loop.cycle(10.0, 0.0) for _ in range(3)]
@@ -122,7 +122,7 @@ def test_the_springs_deflection_is_a_wrench_where_no_sensor_measures_one(toy):
 
 def test_a_deflection_that_is_not_measured_any_more_is_a_fault(toy):
     device = toy()
-    loop = guarded(device, Spring(1500.0), deflection=math.inf)
+    loop = guard(device, Spring(1500.0), deflection=math.inf)
     loop.open(unprotected=True)
     loop.cycle(0.0, None)
     device.deflection_known = False
@@ -133,7 +133,7 @@ def test_a_deflection_that_is_not_measured_any_more_is_a_fault(toy):
 def test_a_deflection_that_is_not_measured_stays_a_fault_until_it_is_again(toy):
     """The second reading without it was none: clear_fault was granted, and no limit held the spring."""
     device = toy()
-    loop = guarded(device, Spring(1500.0), deflection=math.inf, ft=60.0)
+    loop = guard(device, Spring(1500.0), deflection=math.inf, ft=60.0)
     loop.open(unprotected=True)
     loop.enable()
     loop.cycle(0.0, None)
@@ -150,7 +150,7 @@ def test_a_deflection_that_is_not_measured_stays_a_fault_until_it_is_again(toy):
 def test_a_supervisor_that_stands_still_is_lost_before_its_pipe_blocks_the_cycle(toy):
     """The beats filled the pipe, and the cycle waited under torque for a process that was stopped."""
     device = toy(supervised="yes", watchdog=1.0)
-    loop = guarded(device)
+    loop = guard(device)
     loop.open()
     child = device.protection._supervisor._end._process
     os.kill(child.pid, signal.SIGSTOP)

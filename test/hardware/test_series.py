@@ -93,8 +93,8 @@ def test_the_bench_has_every_model_with_the_same_units():
         for name, register in model.registers.items():
             item = table.optional(names.get(name, name))
             if item is not None:
-                there = (register.address, register.size, register.signed)
-                assert (item.address, item.size, item.signed) == there, f"{number} {name}"
+                address = (register.address, register.size, register.signed)
+                assert (item.address, item.size, item.signed) == address, f"{number} {name}"
 
 
 SMALL = Limits(2.0, deflection=math.inf, voltage=9.0, current=10.0)

@@ -45,7 +45,7 @@ def _run(device, clock, commands, offset):
     return states
 
 
-def _expected(rig, commands, offset):
+def _expectation(rig, commands, offset):
     """The same bench, simulated as one record with a step eight times finer."""
     t = np.arange(len(commands)) / RATE
     ends = Channel(t + 1.0 / RATE, np.zeros(len(t)))
@@ -58,7 +58,7 @@ def test_a_command_acts_from_its_instant_on(offset):
     rig = load_rig("paper_high_impedance")
     commands = np.random.default_rng(1).normal(0.0, 20.0, 600)
     states = _run(*_device(rig), commands, offset)
-    expected = _expected(rig, commands, offset)
+    expected = _expectation(rig, commands, offset)
     ft = np.array([s.wrench[5] for s in states])
     assert np.max(np.abs(ft - expected["ft"])) < 0.1 * rig.sensors["ft"].noise
     position = np.array([s.position for s in states])

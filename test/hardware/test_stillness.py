@@ -19,7 +19,7 @@ def records(values, start=0, every=MS):
     ]
 
 
-def calibrated(values):
+def calibrate(values):
     made = Stillness()
     made.calibrate(records(values))
     return made
@@ -36,11 +36,11 @@ def calibrated(values):
     ],
 )
 def test_the_limit_is_ten_times_the_longest_rest_of_its_values(rest, limit):
-    assert calibrated(rest).limit == limit
+    assert calibrate(rest).limit == limit
 
 
 def test_values_that_stop_are_a_fault_until_they_change():
-    sensor = calibrated([0, 1] * 50)
+    sensor = calibrate([0, 1] * 50)
     assert sensor.take(records([5, *[9] * 50], start=1000 * MS)) == ""
     assert not sensor.stopped
     told = sensor.take(records([9] * 10, start=1052 * MS))
@@ -53,5 +53,5 @@ def test_values_that_stop_are_a_fault_until_they_change():
 
 
 def test_a_sensor_without_noise_may_stand_still():
-    sensor = calibrated([7] * 100)
+    sensor = calibrate([7] * 100)
     assert sensor.take(records([7] * 5000)) == "" and sensor.reason(records([7] * 100)) == ""

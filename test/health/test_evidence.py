@@ -56,10 +56,10 @@ def test_estimates_find_a_small_change_and_hold_without_motion():
     bank, estimates = Bank(RIG, noise_of(RIG), HYPOTHESES, 0.05), Estimates(HYPOTHESES)
     phi = np.ones(len(HYPOTHESES))
     for look in looks_of(changed, 6.0):
-        estimates.take(*bank.evidence(look).scaled(np.ones(3)), phi)
-    (found,) = (e for e in estimates.estimates() if e.name == "spring.stiffness")
-    assert found.ci95[0] < changed["spring.stiffness"] < found.ci95[1] and not found.held
-    assert found.ci95[0] > RIG["spring.stiffness"]
+        estimates.take(*bank.evidence(look).scale_sums(np.ones(3)), phi)
+    (computed,) = (e for e in estimates.estimates() if e.name == "spring.stiffness")
+    assert computed.ci95[0] < changed["spring.stiffness"] < computed.ci95[1] and not computed.held
+    assert computed.ci95[0] > RIG["spring.stiffness"]
     before = estimates.estimates()
     estimates.hold()
     assert [(e.value, e.ci95) for e in estimates.estimates()] == [(e.value, e.ci95) for e in before]
@@ -68,7 +68,9 @@ def test_estimates_find_a_small_change_and_hold_without_motion():
 
 def test_the_score_of_a_right_model_is_as_large_as_its_information_says():
     bank = Bank(RIG, noise_of(RIG), HYPOTHESES, 0.05)
-    found = [bank.evidence(look).scaled(np.ones(3)) for seed in range(2) for look in looks_of(RIG, 6.0, seed)]
+    computed = [
+        bank.evidence(look).scale_sums(np.ones(3)) for seed in range(2) for look in looks_of(RIG, 6.0, seed)
+    ]
     i = NAMES.index("spring.stiffness")
-    z = np.array([c[i] / np.sqrt(a[i, i]) for c, a in found])
+    z = np.array([c[i] / np.sqrt(a[i, i]) for c, a in computed])
     assert np.mean(z**2) < 2.0 and abs(np.mean(z)) < 1.0

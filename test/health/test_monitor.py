@@ -14,7 +14,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record
 
 RATE, CLEAN, AFTER = 280.0, 8.0, 8.0
-BENCH = Bench().having(coulomb=3.0, b_m=8.0)
+BENCH = Bench().with_values(coulomb=3.0, b_m=8.0)
 SETTINGS = WatchSettings(learn=6, every=1.0, fitted=3)
 
 
@@ -35,10 +35,10 @@ def command(seconds, seed):
     return np.sum(waves, axis=0) * np.clip(t / 0.5, 0.0, 1.0)
 
 
-def watched(**fault):
+def watch_records(**fault):
     """Monitor and its findings after a clean record and one with a fault."""
     monitor, rng = Monitor(rig(), noise_of(rig()), SETTINGS), np.random.default_rng(1)
-    for bench, start, length in ((BENCH, 0.0, CLEAN), (BENCH.having(**fault), CLEAN, AFTER)):
+    for bench, start, length in ((BENCH, 0.0, CLEAN), (BENCH.with_values(**fault), CLEAN, AFTER)):
         run = record_command(bench, command(length, 2), rng)
         record = Record({n: Channel(c.t + start, c.y) for n, c in run.channels.items()})
         t, kind, values = events_of(record)
@@ -50,8 +50,8 @@ def watched(**fault):
 
 
 def test_a_healthy_joint_is_not_alarmed_and_its_parameters_are_right():
-    monitor, found = watched()
-    assert found == [] and not monitor.learning
+    monitor, events = watch_records()
+    assert events == [] and not monitor.learning
     values = {e.name: e for e in monitor.estimates()}
     low, high = values["spring.stiffness"].ci95
     assert low < BENCH.plant.k_s < high and high - low < 0.03 * BENCH.plant.k_s
@@ -71,7 +71,7 @@ def test_a_joint_in_a_position_loop_is_refused():
     ],
 )
 def test_a_change_is_named_and_sized(fault, code, size, tolerance):
-    _, (finding,) = watched(**fault)
+    _, (finding,) = watch_records(**fault)
     assert finding.code == code and finding.confidence > 0.95
     assert finding.size == pytest.approx(size, abs=tolerance)
     assert finding.ci95[0] < finding.size < finding.ci95[1]

@@ -18,7 +18,7 @@ T = np.arange(round(3.0 * RATE)) / RATE
 RECORD = synthesize(RIG, Channel(T, 8.0 * np.sin(9.0 * T)), seed=1)
 
 
-def found(**channels):
+def codes_of(**channels):
     """Codes and names that a record with other channels gives, taken in pieces."""
     sensors, record = Sensors(RIG), RECORD.with_channels(**channels)
     t, kind, values = events_of(record)
@@ -32,24 +32,24 @@ def with_values(name, change):
     return Channel(RECORD[name].t, change(y))
 
 
-def stopped(y):
+def freeze(y):
     y[400:] = y[400]
     return y
 
 
 def test_a_good_record_and_rest_have_no_findings():
     still = synthesize(RIG, Channel(T, np.zeros(len(T))), seed=1)
-    assert found() == [] and found(**still.channels) == []
+    assert codes_of() == [] and codes_of(**still.channels) == []
 
 
 @pytest.mark.parametrize("name", ["position", "ft", "motor_torque"])
 def test_a_sensor_that_stops_is_frozen(name):
-    assert found(**{name: with_values(name, stopped)}) == [("RSEA_SENSOR_FROZEN", name)]
+    assert codes_of(**{name: with_values(name, freeze)}) == [("RSEA_SENSOR_FROZEN", name)]
 
 
 def test_a_sensor_that_is_silent_is_missing():
     ft = RECORD["ft"]
-    assert found(ft=Channel(ft.t[:300], ft.y[:300])) == [("RSEA_SENSOR_MISSING", "ft")]
+    assert codes_of(ft=Channel(ft.t[:300], ft.y[:300])) == [("RSEA_SENSOR_MISSING", "ft")]
 
 
 def test_values_that_are_no_numbers_are_counted():
@@ -57,7 +57,7 @@ def test_values_that_are_no_numbers_are_counted():
         y[10:13] = np.nan
         return y
 
-    assert found(ft=with_values("ft", spoilt)) == [("RSEA_BAD_DATA", "3 no numbers")]
+    assert codes_of(ft=with_values("ft", spoilt)) == [("RSEA_BAD_DATA", "3 no numbers")]
 
 
 def test_after_a_clock_was_set_the_watch_restarts_and_reports_it():

@@ -20,7 +20,9 @@ def bench(name: str, seed: int) -> tuple[Rig, Rig]:
     return nominal, nominal.with_values({n: nominal[n] * np.exp(d) for n, d in off.items()})
 
 
-def recorded(true: Rig, seed: int, duration: float = 10.0, kind: str = "white_noise", **settings) -> Record:
+def record_bench(
+    true: Rig, seed: int, duration: float = 10.0, kind: str = "white_noise", **settings
+) -> Record:
     """Return what the sensors of a bench log."""
     u = excitation(
         kind, ExcitationSettings(rate=RATE, duration=duration, seed=seed, amplitude=15.0, **settings)

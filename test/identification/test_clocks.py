@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benches import bench, recorded
+from benches import bench, record_bench
 
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Sensor
@@ -32,7 +32,7 @@ def clocks(result):
 
 def test_correct_clocks_are_left_alone_and_their_cost_is_reported():
     nominal, true = bench("paper_high_impedance", 1)
-    result = identify([recorded(true, 1, 20.0)], nominal)
+    result = identify([record_bench(true, 1, 20.0)], nominal)
     assert clocks(result) == {}
     (note,) = result.clocks
     assert note.code == "clocks_taken_as_right"
@@ -52,7 +52,7 @@ def test_correct_clocks_are_left_alone_and_their_cost_is_reported():
 )
 def test_a_wrong_clock_is_fitted_with_its_size(offset, ppm, moved):
     nominal, true = bench("paper_high_impedance", 1)
-    result = identify([with_clock(recorded(true, 1, 20.0), "ft", offset, ppm)], nominal)
+    result = identify([with_clock(record_bench(true, 1, 20.0), "ft", offset, ppm)], nominal)
     assert set(clocks(result)) == moved
     for name, p in clocks(result).items():
         size = ppm if name.startswith("clock_rate") else offset
@@ -64,7 +64,7 @@ def test_a_wrong_clock_is_fitted_with_its_size(offset, ppm, moved):
 
 def test_a_clock_rate_is_part_of_the_rig():
     _, true = bench("paper_high_impedance", 1)
-    record = recorded(true, 1, 5.0)
+    record = record_bench(true, 1, 5.0)
     fast = replace(true, sensors={**true.sensors, "ft": Sensor(0.03, 0.0, clock_rate=200.0)})
     assert rig_from_document(rig_to_document(fast)).sensors["ft"].clock_rate == 200.0
     late = simulate(fast, record)["ft"]

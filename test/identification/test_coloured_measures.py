@@ -28,16 +28,16 @@ ALTERNATING = np.resize([1.0, -1.0], 10_000)
     ],
 )
 def test_the_share_of_a_constant_and_a_trend_is_measured(values, share):
-    assert coloured._lasting(values) == pytest.approx(share, abs=2e-3)
+    assert coloured._lasting_share(values) == pytest.approx(share, abs=2e-3)
 
 
-def toned(size, *tones, rate=RATE):
+def sines(size, *tones, rate=RATE):
     """Sines of given frequency (Hz) and amplitude."""
     t = np.arange(size) / rate
     return sum(a * np.sin(2.0 * math.pi * f * t + 0.3) for f, a in tones)
 
 
-def shaped(size, density, seed=0):
+def shape_noise(size, density, seed=0):
     """Noise of a power density that is a function of frequency (Hz)."""
     spectrum = np.fft.rfft(white(size, seed))
     frequency = np.linspace(0.0, 0.5 * RATE, len(spectrum))
@@ -57,7 +57,7 @@ def shaped(size, density, seed=0):
 )
 def test_slow_is_below_a_quarter_of_a_hertz(low, high, expected):
     """Power of 50 within a band and of 1 elsewhere, over 256 s."""
-    y = shaped(2**16, lambda f: np.where((f >= low) & (f < high), 50.0, 1.0))
+    y = shape_noise(2**16, lambda f: np.where((f >= low) & (f < high), 50.0, 1.0))
     assert coloured._slow(y, RATE) == pytest.approx(expected, rel=0.35)
 
 
@@ -96,7 +96,7 @@ def test_a_mean_is_not_slow():
 @pytest.mark.parametrize(("seconds", "known"), [(14, False), (33, True)])
 def test_a_record_without_two_slow_lines_leaves_slowness_open(seconds, known):
     """Segments of half its length: of 8 s one line lies below 0.25 Hz, of 16 s three."""
-    y = white(int(seconds * RATE)) + toned(int(seconds * RATE), (0.12, 9.0))
+    y = white(int(seconds * RATE)) + sines(int(seconds * RATE), (0.12, 9.0))
     assert (coloured._slow(y, RATE) > 0.0) is known
 
 
@@ -142,7 +142,7 @@ def test_power_of_stationary_noise_varies_as_it_should(memory):
 def test_noise_that_comes_late_in_one_band_is_unsteady(band, least):
     """The power of a band of n lines is off by its mean half of the time: n / 1.5 times what it may be."""
     size = 2**16
-    burst = shaped(size, lambda f: np.where((f >= band[0]) & (f < band[1]), 40.0, 0.0), seed=5)
+    burst = shape_noise(size, lambda f: np.where((f >= band[0]) & (f < band[1]), 40.0, 0.0), seed=5)
     burst[: size // 2] = 0.0
     lines = (band[1] - band[0]) * 1024 / RATE
     value = unsteady(white(size) + burst)
@@ -183,7 +183,7 @@ def test_coherence_is_corrected_for_chance():
 
 def test_the_worst_band_decides_what_is_shared():
     witness = white(2**16, seed=1)
-    low = shaped(2**16, lambda f: np.where(f < 4.0, 1.0, 0.0), seed=1)
+    low = shape_noise(2**16, lambda f: np.where(f < 4.0, 1.0, 0.0), seed=1)
     assert share(white(2**16) + 3.0 * low, witness) == pytest.approx(0.9, abs=0.03)
 
 

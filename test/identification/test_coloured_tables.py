@@ -18,7 +18,7 @@ def passes(y, **more):
     return is_noise(case(y, **more), {"ft": np.zeros(len(y))}, "ft")
 
 
-FINE = {"_lasting": 0.0, "_slow": 0.0, "off": 0.0, "_unsteady": 0.0, "_kurtosis": 0.0, "_shared": 0.0}
+FINE = {"_lasting_share": 0.0, "_slow": 0.0, "off": 0.0, "_unsteady": 0.0, "_kurtosis": 0.0, "_shared": 0.0}
 
 
 @pytest.fixture
@@ -42,8 +42,8 @@ def measured(monkeypatch):
     ("values", "noise"),
     [
         ({}, True),
-        ({"_lasting": 0.1}, True),
-        ({"_lasting": 0.11}, False),
+        ({"_lasting_share": 0.1}, True),
+        ({"_lasting_share": 0.11}, False),
         ({"_slow": 6.0}, True),
         ({"_slow": 6.1}, False),
         ({"off": 5.0}, True),

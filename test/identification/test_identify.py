@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from benches import bench, only, recorded
+from benches import bench, only, record_bench
 from scipy.stats import binom
 
 from rsea_ros.errors import IdentificationError
@@ -40,7 +40,7 @@ def test_intervals_contain_the_truth_as_often_as_they_say(name, kind, duration):
     errors: dict[str, list[float]] = {}
     for seed in SEEDS:
         nominal, true = bench(name, seed)
-        result = identify([recorded(true, seed, duration, kind)], nominal)
+        result = identify([record_bench(true, seed, duration, kind)], nominal)
         for parameter, error in standard_errors(result, true.values()).items():
             errors.setdefault(parameter, []).append(error)
     assert set(errors) == set(load_rig(name).free())
@@ -52,7 +52,7 @@ def test_intervals_contain_the_truth_as_often_as_they_say(name, kind, duration):
 
 def test_the_residual_is_the_noise_and_the_values_are_narrow():
     nominal, true = bench("paper_high_impedance", 1)
-    result = identify([recorded(true, 1, 20.0)], nominal)
+    result = identify([record_bench(true, 1, 20.0)], nominal)
     for channel, residual in result.residual_rms.items():
         assert 0.75 < residual / result.noise_rms[channel] < 1.1, channel
     assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=1e-4)
@@ -64,24 +64,24 @@ def test_the_residual_is_the_noise_and_the_values_are_narrow():
 def test_torque_alone_determines_only_ratios():
     """Facts, section 3: from T_d / T_m alone K_s / J_eff and b_eff / J_eff, and no absolute value."""
     nominal, true = bench("paper_high_impedance", 2)
-    result = identify([only(recorded(true, 2, 20.0), "ft")], nominal)
+    result = identify([only(record_bench(true, 2, 20.0), "ft")], nominal)
     told = {p.name: p.told_by_data for p in result.parameters}
     assert all(told[name] < 0.01 for name in nominal.free()), told
     (sentence,) = remark_sentences(result.remarks)
     assert sentence.startswith("Only ratios of ")
     assert all(name in sentence for name in nominal.free())
     assert "encoder" in sentence
-    found = result.rig
+    rig_found = result.rig
     for name in ("rotor.reflected_damping", "spring.stiffness"):
-        ratio = found[name] / (found["rotor.reflected_inertia"] + found["chassis.inertia"])
+        ratio = rig_found[name] / (rig_found["rotor.reflected_inertia"] + rig_found["chassis.inertia"])
         expected = true[name] / (true["rotor.reflected_inertia"] + true["chassis.inertia"])
         assert ratio == pytest.approx(expected, rel=0.01)
-    assert abs(found["spring.stiffness"] / true["spring.stiffness"] - 1.0) > 0.01
+    assert abs(rig_found["spring.stiffness"] / true["spring.stiffness"] - 1.0) > 0.01
 
 
 def test_with_the_encoder_all_values_are_determined():
     nominal, true = bench("paper_high_impedance", 2)
-    result = identify([only(recorded(true, 2, 20.0), "ft", "position")], nominal)
+    result = identify([only(record_bench(true, 2, 20.0), "ft", "position")], nominal)
     assert all(p.told_by_data > 0.99 for p in result.parameters if p.name in nominal.free())
     assert result.remarks == ()
     assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=1e-3)
@@ -89,7 +89,7 @@ def test_with_the_encoder_all_values_are_determined():
 
 def test_the_encoder_alone_does_not_separate_the_dampings():
     nominal, true = bench("paper_high_impedance", 3)
-    result = identify([only(recorded(true, 3, 10.0), "position")], nominal)
+    result = identify([only(record_bench(true, 3, 10.0), "position")], nominal)
     scale, sentence = remark_sentences(result.remarks)
     assert sentence.startswith("spring.damping")
     assert scale.startswith("No F/T sensor takes part in this fit, so every torque is known only")
@@ -101,7 +101,7 @@ def test_an_effect_that_the_rig_lists_is_fitted():
     nominal, true = bench("paper_high_impedance", 4)
     saturated = EffectSetting("torque_saturation", {"limit": 18.0})
     start = EffectSetting("torque_saturation", {"limit": 25.0})
-    record = recorded(true.with_effects(saturated), 4, 20.0)
+    record = record_bench(true.with_effects(saturated), 4, 20.0)
     result = identify([record], nominal.with_effects(start))
     limit = next(p for p in result.parameters if p.name == "torque_saturation.limit")
     assert limit.ci95[0] <= 18.0 <= limit.ci95[1]
@@ -112,7 +112,7 @@ def test_an_effect_that_the_rig_lists_is_fitted():
 def test_an_effect_that_never_shows_is_not_determined():
     nominal, true = bench("paper_high_impedance", 5)
     start = EffectSetting("torque_saturation", {"limit": 100.0})
-    result = identify([recorded(true, 5)], nominal.with_effects(start))
+    result = identify([record_bench(true, 5)], nominal.with_effects(start))
     limit = next(p for p in result.parameters if p.name == "torque_saturation.limit")
     assert limit.told_by_data < 0.01
     assert limit.ci95 == (0.5, 200.0)
@@ -124,7 +124,7 @@ def test_an_effect_that_never_shows_is_not_determined():
 
 def test_a_rig_that_the_record_contradicts_is_refused():
     _, true = bench("paper_high_impedance", 6)
-    record = recorded(true, 6)
+    record = record_bench(true, 6)
     with pytest.raises(IdentificationError, match="no position channel, expected one"):
         identify([only(record, "ft")], load_rig("bare_drive"))
     with pytest.raises(IdentificationError, match="no ft, deflection, position or velocity channel"):

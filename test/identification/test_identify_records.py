@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benches import RATE, bench, recorded
+from benches import RATE, bench, record_bench
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.even_stamps import even_clock
@@ -20,7 +20,7 @@ from rsea_ros.signals import Channel, Record
 PERIOD = 1.0 / RATE
 
 
-def sampled(true: Rig, record: Record, stamps: dict[str, np.ndarray], seed: int) -> Record:
+def resample(true: Rig, record: Record, stamps: dict[str, np.ndarray], seed: int) -> Record:
     """Return the record with some channels measured at other instants, and stamped with them."""
     rng = np.random.default_rng(seed)
     asked = record.with_channels(**{n: Channel(t, np.zeros(len(t))) for n, t in stamps.items()})
@@ -38,12 +38,12 @@ def agree(result, true: Rig, sigmas: float = 4.0) -> None:
 @pytest.fixture(scope="module")
 def case() -> tuple[Rig, Rig, Record]:
     nominal, true = bench("paper_high_impedance", 7)
-    return nominal, true, recorded(true, 7, 10.0)
+    return nominal, true, record_bench(true, 7, 10.0)
 
 
 def test_the_ft_sensor_stamped_half_a_sample_later_gives_the_same_parameters(case):
     nominal, true, record = case
-    later = sampled(true, record, {"ft": record["ft"].t + 0.5 * PERIOD}, 8)
+    later = resample(true, record, {"ft": record["ft"].t + 0.5 * PERIOD}, 8)
     on_grid, off_grid = identify([record], nominal), identify([later], nominal)
     for a, b in zip(on_grid.parameters, off_grid.parameters, strict=True):
         sd = np.hypot(a.ci95[1] - a.ci95[0], b.ci95[1] - b.ci95[0]) / (2.0 * 1.96)
@@ -54,7 +54,7 @@ def test_the_ft_sensor_stamped_half_a_sample_later_gives_the_same_parameters(cas
 def test_stamps_count_and_not_positions_in_the_record(case):
     """A sensor read half a sample later but stamped as if not is late: the residual shows it."""
     nominal, true, record = case
-    later = sampled(true, record, {"ft": record["ft"].t + 0.5 * PERIOD}, 8)
+    later = resample(true, record, {"ft": record["ft"].t + 0.5 * PERIOD}, 8)
     wrong = later.with_channels(ft=Channel(record["ft"].t, later["ft"].y))
     result = identify([wrong], nominal)
     assert result.residual_rms["ft"] > 2.0 * result.noise_rms["ft"]
@@ -67,7 +67,7 @@ def test_jittered_stamps_leave_no_bias(case, deviation):
     rng = np.random.default_rng(9)
     names = ("ft", "position", "velocity")
     stamps = {n: record[n].t + deviation * rng.standard_normal(len(record[n])) for n in names}
-    result = identify([sampled(true, record, stamps, 10)], nominal)
+    result = identify([resample(true, record, stamps, 10)], nominal)
     agree(result, true, sigmas=6.0)
     assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=2e-4)
 
@@ -86,12 +86,12 @@ def test_missing_samples_leave_no_bias(case):
 def test_sensors_of_other_rates_leave_no_bias(case):
     nominal, true, record = case
     stamps = {"ft": np.arange(0.003, 9.9, 1.0 / 1000.0), "position": np.arange(0.01, 9.9, 1.0 / 100.0)}
-    agree(identify([sampled(true, record, stamps, 12)], nominal), true)
+    agree(identify([resample(true, record, stamps, 12)], nominal), true)
 
 
 def test_several_bags_narrow_the_intervals(case):
     nominal, true, record = case
-    second = recorded(true, 13, 10.0)
+    second = record_bench(true, 13, 10.0)
     one, two = identify([record], nominal), identify([record, second], nominal)
     agree(two, true)
     widths = [[p.ci95[1] - p.ci95[0] for p in r.parameters if p.name in nominal.free()] for r in (one, two)]
@@ -214,7 +214,7 @@ def test_commands_that_did_act_at_scattered_stamps_stay(case):
     command = record["command"]
     late = Channel(command.t + rng.uniform(0.0, 6e-4, len(command)), command.y)
     stamps = {n: record[n].t for n in ("ft", "position", "velocity")}
-    result = identify([sampled(true, record.with_channels(command=late), stamps, 13)], nominal)
+    result = identify([resample(true, record.with_channels(command=late), stamps, 13)], nominal)
     assert result.remarks == ()
     agree(result, true)
 
@@ -223,7 +223,7 @@ def test_stamps_at_which_a_sensor_did_measure_stay_however_they_scatter(case):
     nominal, true, record = case
     rng = np.random.default_rng(10)
     stamps = {n: record[n].t + rng.uniform(0.0, 6e-4, len(record[n])) for n in ("ft", "position", "velocity")}
-    result = identify([sampled(true, record, stamps, 10)], nominal)
+    result = identify([resample(true, record, stamps, 10)], nominal)
     assert result.remarks == ()
     agree(result, true)
 

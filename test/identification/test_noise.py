@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from benches import bench, recorded
+from benches import bench, record_bench
 from scipy.signal import lfilter
 
 from rsea_ros.identification.coloured import is_noise
@@ -38,7 +38,7 @@ def with_coloured_noise(record, memory, channels=("ft", "position"), seed=0):
 @pytest.mark.parametrize("channels", [("ft",), ("position",), ("ft", "position")])
 def test_coloured_noise_of_a_clean_bench_is_noise(memory, channels):
     nominal, true = bench("paper_high_impedance", 3)
-    result = identify([with_coloured_noise(recorded(true, 3, 20.0), memory, channels)], nominal)
+    result = identify([with_coloured_noise(record_bench(true, 3, 20.0), memory, channels)], nominal)
     assert result.verdict == "adequate"
     for n in channels:
         assert 0.8 < result.times_noise[n] < 1.25
@@ -50,7 +50,7 @@ def test_coloured_noise_of_a_clean_bench_is_noise(memory, channels):
 def test_white_noise_of_a_short_record_is_not_called_coloured(duration):
     rig = load_rig("paper_high_impedance")
     for seed in range(15):
-        case = case_from(recorded(rig, seed, duration), rig)
+        case = case_from(record_bench(rig, seed, duration), rig)
         known = reestimate_noise(case, simulate_cases((case,), rig, Clocks({}, {}))[0])
         assert known.coloured == frozenset(), seed
 
@@ -58,14 +58,14 @@ def test_white_noise_of_a_short_record_is_not_called_coloured(duration):
 def test_a_broadband_misfit_is_not_taken_for_coloured_noise():
     nominal, true = bench("paper_high_impedance", 4)
     stiction = EffectSetting("coulomb_friction", {"torque": 1.0, "creep_velocity": 0.02})
-    result = identify([with_coloured_noise(recorded(true.with_effects(stiction), 4, 20.0), 0.9)], nominal)
+    result = identify([with_coloured_noise(record_bench(true.with_effects(stiction), 4, 20.0), 0.9)], nominal)
     assert result.verdict == "misfit"
     assert result.coloured == ()
 
 
 def test_a_coarse_encoder_has_the_noise_of_its_steps():
     nominal, true = bench("paper_high_impedance", 5)
-    record, step = recorded(true, 5, 20.0), 4e-4
+    record, step = record_bench(true, 5, 20.0), 4e-4
     q = record["position"]
     coarse = record.with_channels(position=Channel(q.t.copy(), np.round(q.y / step) * step))
     assert step_of(coarse["position"].y) == pytest.approx(step)
@@ -76,7 +76,7 @@ def test_a_coarse_encoder_has_the_noise_of_its_steps():
 
 def test_states_slower_than_the_commands_have_the_noise_of_their_sensors():
     nominal, true = bench("paper_high_impedance", 6)
-    record = recorded(true, 6, 20.0)
+    record = record_bench(true, 6, 20.0)
     full = identify([record], nominal)
     thin = np.searchsorted(record["position"].t, np.arange(0.02, 19.9, 0.01))
     slow = {

@@ -20,7 +20,7 @@ MOTION = SimpleNamespace(t=np.array([START, START + 16.0]))
 """As of a bare drive, whose torque is filtered before it is compared."""
 
 
-def alternating(amplitude, size=4096):
+def alternate(amplitude, size=4096):
     """A residual of exactly that RMS."""
     return np.resize([1.0, -1.0], size) * amplitude
 
@@ -39,9 +39,9 @@ class World:
     def __init__(self, monkeypatch):
         self.white, self.noises, self.asked = {}, set(), []
         monkeypatch.setattr(noise_level, "is_noise", self.is_noise)
-        monkeypatch.setattr(noise_level, "top_of_band", lambda left, seams: self.white[len(left)])
+        monkeypatch.setattr(noise_level, "top_of_band", lambda left, seams, rule: self.white[len(left)])
 
-    def is_noise(self, case, outputs, channel, ratio):
+    def is_noise(self, case, outputs, channel, ratio, rule):
         self.asked.append((channel, ratio))
         return channel in self.noises
 
@@ -73,7 +73,7 @@ def world(monkeypatch):
 def test_the_noise_follows_from_the_residual(world, before, white, flat, drive, passes, after, coloured):
     world.white = {4096: (white, flat)}
     world.noises = {"ft"} if passes else set()
-    known = world.known(case({"ft": before}, drive, ft=alternating(1.0)))
+    known = world.known(case({"ft": before}, drive, ft=alternate(1.0)))
     assert known.noise == pytest.approx({"ft": after})
     assert known.coloured == ({"ft"} if coloured else set())
 
@@ -81,14 +81,14 @@ def test_the_noise_follows_from_the_residual(world, before, white, flat, drive, 
 @pytest.mark.parametrize(("least", "after"), [({"ft": 3.0}, 3.0), ({"ft": 0.1}, 0.97), ({}, 0.97)])
 def test_the_noise_is_never_below_the_least(world, least, after):
     world.white = {4096: (0.97, True)}
-    known = world.known(case({"ft": 2.0}, least=least, ft=alternating(1.0)))
+    known = world.known(case({"ft": 2.0}, least=least, ft=alternate(1.0)))
     assert known.noise == pytest.approx({"ft": after}, rel=1e-12)
 
 
 @pytest.mark.parametrize(("rms", "asked"), [(1.04, []), (1.0401, ["ft"])])
 def test_a_residual_four_percent_above_is_tested_for_coloured_noise(world, rms, asked):
     world.white = {4096: (1.0, True)}
-    world.known(case({"ft": 1.0}, ft=alternating(rms)))
+    world.known(case({"ft": 1.0}, ft=alternate(rms)))
     assert [channel for channel, _ in world.asked] == asked
 
 
@@ -97,13 +97,13 @@ def test_a_residual_four_percent_above_is_tested_for_coloured_noise(world, rms, 
                                                      (256, 1.376, True)])  # fmt: skip
 def test_a_short_record_must_lie_farther_above_to_be_coloured(world, size, rms, coloured):
     world.white, world.noises = {size: (1.0, True)}, {"ft"}
-    known = world.known(case({"ft": 2.0}, ft=alternating(rms, size)))
+    known = world.known(case({"ft": 2.0}, ft=alternate(rms, size)))
     assert (known.coloured == {"ft"}) is coloured
 
 
 def test_a_misfit_of_one_channel_leaves_no_other_coloured(world):
     world.white, world.noises = {4096: (0.5, True), 2048: (0.5, True)}, {"ft"}
-    both = case({"ft": 9.0, "position": 9.0}, ft=alternating(1.0), position=alternating(1.0, 2048))
+    both = case({"ft": 9.0, "position": 9.0}, ft=alternate(1.0), position=alternate(1.0, 2048))
     known = world.known(both)
     assert known.noise == {"ft": 0.5, "position": 0.5} and known.coloured == set()
     world.noises = {"ft", "position"}
@@ -114,7 +114,7 @@ def test_a_misfit_of_one_channel_leaves_no_other_coloured(world):
 def test_a_channel_at_its_noise_is_not_tested(world):
     world.white, world.noises = {4096: (0.5, True), 2048: (1.0, True)}, {"ft"}
     known = world.known(
-        case({"ft": 9.0, "position": 1.0}, ft=alternating(1.0), position=alternating(1.0, 2048))
+        case({"ft": 9.0, "position": 1.0}, ft=alternate(1.0), position=alternate(1.0, 2048))
     )
     assert known.noise == {"ft": 1.0, "position": 1.0} and known.coloured == {"ft"}
     assert [channel for channel, _ in world.asked] == ["ft"]
@@ -123,17 +123,17 @@ def test_a_channel_at_its_noise_is_not_tested(world):
 @pytest.mark.parametrize(("more", "ratio"), [({}, 1.0), ({"ratio": 502.0}, 502.0)])
 def test_the_gear_ratio_reaches_the_search_for_ripple(world, more, ratio):
     world.white = {4096: (0.5, True)}
-    world.known(case({"ft": 9.0}, ft=alternating(1.0)), **more)
+    world.known(case({"ft": 9.0}, ft=alternate(1.0)), **more)
     assert world.asked == [("ft", ratio)]
 
 
 def test_only_valid_samples_of_simulated_channels_count(world):
     world.white = {4096: (0.5, False), 100: (0.5, True)}
-    y, keep = alternating(1.0), np.ones(4096, bool)
+    y, keep = alternate(1.0), np.ones(4096, bool)
     y[:1000], keep[:1000] = 50.0, False
     before = {"ft": 9.0, "position": 7.0, "velocity": 8.0}
     made = case(
-        before, ft=y, position=alternating(1.0, 100), velocity=alternating(1.0, 200),
+        before, ft=y, position=alternate(1.0, 100), velocity=alternate(1.0, 200),
         mask={"ft": keep, "position": np.zeros(100, bool)},
     )  # fmt: skip
     outputs = {"ft": np.zeros(4096), "position": np.zeros(100)}
@@ -145,7 +145,7 @@ SQRT3 = math.sqrt(3.0)
 
 def seconds(*amplitudes):
     """A residual whose RMS is given second by second."""
-    return np.concatenate([alternating(a, 256) for a in amplitudes])
+    return np.concatenate([alternate(a, 256) for a in amplitudes])
 
 
 @pytest.mark.parametrize(

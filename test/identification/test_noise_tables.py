@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from rsea_ros.identification import noise
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
+from rsea_ros.identification.noise_settings import DEFAULT
 from rsea_ros.identification.quantum import step_of
 from rsea_ros.model.rig import Sensor
 from rsea_ros.signals import Channel, Record
@@ -39,7 +40,7 @@ def white(size, rms=1.0, seed=0):
     return rms * np.random.default_rng(seed).normal(size=size)
 
 
-def alternating(size, amplitude=1.0):
+def alternate(size, amplitude=1.0):
     """Values of one size whose signs alternate: all of their power lies at the Nyquist frequency."""
     return amplitude * (-1.0) ** np.arange(size)
 
@@ -51,14 +52,14 @@ SECOND = 4.0 / math.sqrt(6.0)
 @pytest.mark.parametrize(
     ("y", "stated", "floor"),
     [
-        (alternating(2), sensor(), 1e-9),  # too few to say anything: rounding
-        (alternating(3), sensor(), 1e-9 * math.sqrt(8.0) / 3.0),
-        (alternating(3), sensor(0.25), 0.25),
-        (alternating(4), sensor(), SECOND),
-        (alternating(62), sensor(), SECOND),
-        (alternating(62), sensor(0.25), SECOND),
-        (alternating(62), sensor(2.0), 2.0),  # so few do not contradict the rig
-        (alternating(62), sensor(0.0, 12.0), 6.0),  # half a step of the rig's
+        (alternate(2), sensor(), 1e-9),  # too few to say anything: rounding
+        (alternate(3), sensor(), 1e-9 * math.sqrt(8.0) / 3.0),
+        (alternate(3), sensor(0.25), 0.25),
+        (alternate(4), sensor(), SECOND),
+        (alternate(62), sensor(), SECOND),
+        (alternate(62), sensor(0.25), SECOND),
+        (alternate(62), sensor(2.0), 2.0),  # so few do not contradict the rig
+        (alternate(62), sensor(0.0, 12.0), 6.0),  # half a step of the rig's
         (np.linspace(0.0, 9.0, 62), sensor(0.25), 0.25),  # a line has no noise
         (np.linspace(0.0, 9.0, 62) ** 2, sensor(0.25), 0.25),
     ],
@@ -69,7 +70,7 @@ def test_a_short_channel_has_the_noise_of_its_second_differences(y, stated, floo
 
 @pytest.mark.parametrize(("size", "short"), [(63, True), (64, False)])
 def test_from_64_samples_on_a_channel_has_a_spectrum(size, short):
-    floor = noise_floor(record(alternating(size)), "ft", sensor())
+    floor = noise_floor(record(alternate(size)), "ft", sensor())
     assert (abs(floor - SECOND) < 0.1) == short
 
 
@@ -138,7 +139,7 @@ def test_the_noise_is_read_off_the_top_of_the_band(levels, level, flat):
 def lines(count, **powers):
     """Powers of some lines, 1 where nothing is said: halves of the top of the band, and the rest."""
     power = np.full(count, powers.get("rest", 1.0))
-    top = noise._top(power)
+    top = noise._top(power, DEFAULT)
     half = (top.stop - top.start + 1) // 2
     power[top.start : top.start + half] = powers.get("lower", 1.0)
     power[top.start + half : top.stop] = powers.get("upper", 1.0)
@@ -149,7 +150,7 @@ def lines(count, **powers):
     ("count", "first", "last"), [(100, 62, 97), (257, 160, 250), (8, 5, 6), (5, 4, 4), (7, 5, 5)]
 )
 def test_the_top_of_the_band_is_62_to_98_percent_and_a_line_at_least(count, first, last):
-    assert list(range(count))[noise._top(np.ones(count))] == list(range(first, last + 1))
+    assert list(range(count))[noise._top(np.ones(count), DEFAULT)] == list(range(first, last + 1))
 
 
 @pytest.mark.parametrize(
@@ -169,7 +170,7 @@ def test_the_top_of_the_band_is_62_to_98_percent_and_a_line_at_least(count, firs
     ],
 )
 def test_flat_is_up_to_twice_the_power_in_one_half(power, flat):
-    assert noise._is_flat(power) is flat
+    assert noise._is_flat(power, DEFAULT) is flat
 
 
 LOG = lfilter([0.25, 0.5, 0.25], [1.0], white(2**14))

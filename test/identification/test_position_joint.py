@@ -83,9 +83,9 @@ def test_without_a_current_only_ratios_to_the_gains_are_determined(stiff):
 
 def test_the_checks_mention_targets_and_not_commands(stiff):
     record = run(stiff)
-    found = check_record(record, stiff)
-    assert found.light != "red"
-    assert {f.unit for f in found.of("excitation")} == {"rad"}
-    assert "command" not in {f.channel for f in found.findings}
+    findings = check_record(record, stiff)
+    assert findings.light != "red"
+    assert {f.unit for f in findings.of("excitation")} == {"rad"}
+    assert "command" not in {f.channel for f in findings.findings}
     without = replace(record, channels={"position": record["position"]})
     assert [f.channel for f in check_record(without, stiff).findings] == ["reference"]

@@ -16,7 +16,7 @@ from rsea_ros.signals import Channel, Record
 K_S, C, A1, A0 = 1530.456, 1560.436, 27.267, 1638.783
 
 
-def bench_of_eq_10(noise: float) -> Record:
+def record_of_eq_10(noise: float) -> Record:
     """Return the record of a bench that has Eq. (10) for its T_d / T_m: inertia and damping from a0 and a1,
     torque gain c / a0 = 0.952, all damping at the rotor, so that the sensor sees the spring alone."""
     rig = load_rig("paper_high_impedance")
@@ -33,7 +33,7 @@ def bench_of_eq_10(noise: float) -> Record:
 
 
 def test_a_record_gives_eq_10() -> None:
-    fit = fit_second_order(estimate_response(bench_of_eq_10(noise=0.0), "ft"), high=60.0)
+    fit = fit_second_order(estimate_response(record_of_eq_10(noise=0.0), "ft"), high=60.0)
     assert (fit.c, fit.a1, fit.a0) == pytest.approx((C, A1, A0), rel=2e-4)
     values = effective_values(K_S, fit.c, fit.a1, fit.a0)
     assert values.inertia == pytest.approx(0.95677, rel=2e-4)
@@ -41,7 +41,7 @@ def test_a_record_gives_eq_10() -> None:
 
 
 def test_a_noisy_record_gives_eq_10_within_its_interval() -> None:
-    fit = fit_second_order(estimate_response(bench_of_eq_10(noise=0.2), "ft"), high=60.0)
+    fit = fit_second_order(estimate_response(record_of_eq_10(noise=0.2), "ft"), high=60.0)
     sd = np.sqrt(np.diag(fit.covariance))
     assert np.all(np.abs(np.array([fit.c - C, fit.a1 - A1, fit.a0 - A0])) < 3.0 * sd)
     assert np.all(sd / np.array([C, A1, A0]) < 0.01)
@@ -58,6 +58,6 @@ def test_eq_10_has_its_reference_numbers() -> None:
 
 
 def test_a_band_without_lines_is_refused() -> None:
-    response = estimate_response(bench_of_eq_10(noise=0.0), "ft")
+    response = estimate_response(record_of_eq_10(noise=0.0), "ft")
     with pytest.raises(IdentificationError, match="0 lines from 200 to 300 Hz, expected at least 4"):
         fit_second_order(response, low=200.0, high=300.0)

@@ -41,14 +41,14 @@ def test_the_minimum_of_a_curve_is_found():
 
 def test_a_cliff_behind_the_minimum_is_avoided():
     """A step over the cliff is shortened; an unknown whose derivative would cross it is held for a while."""
-    found = solve(Decay(start=(1.0, 3.4), cliff=3.40001))
-    assert np.isfinite(found.cost) and found.theta[1] < 3.40001
+    solution = solve(Decay(start=(1.0, 3.4), cliff=3.40001))
+    assert np.isfinite(solution.cost) and solution.theta[1] < 3.40001
     assert solve(Decay(cliff=3.1)).theta == pytest.approx([2.0, 3.0], rel=1e-5)
 
 
 def test_a_start_beyond_the_cliff_is_returned_at_an_infinite_cost():
-    found = solve(Decay(start=(1.0, 5.0), cliff=4.0))
-    assert found.cost == np.inf and found.theta == pytest.approx([1.0, 5.0])
+    solution = solve(Decay(start=(1.0, 5.0), cliff=4.0))
+    assert solution.cost == np.inf and solution.theta == pytest.approx([1.0, 5.0])
 
 
 def test_derivatives_across_the_cliff_are_zero():

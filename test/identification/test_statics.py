@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from benches import bench, recorded
+from benches import bench, record_bench
 
 from rsea_ros.identification.statics import statics_of
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -30,39 +30,39 @@ def with_effect(name: str, **parameters: float) -> Rig:
 
 def test_a_plain_spring_has_its_stiffness():
     rig = load_rig("paper_high_impedance")
-    found = statics_of(ramps(rig), rig)
-    assert found is not None
-    assert found.torque == pytest.approx(PEAK, rel=1e-3)
-    assert found.stiffness == pytest.approx(rig["spring.stiffness"], rel=0.01)
-    assert found.travel == pytest.approx(2.0 * 0.9875 * PEAK / rig["spring.stiffness"], rel=0.01)
-    assert abs(found.lost_motion) < 0.01 * found.travel
-    assert found.limit is None
+    statics = statics_of(ramps(rig), rig)
+    assert statics is not None
+    assert statics.torque == pytest.approx(PEAK, rel=1e-3)
+    assert statics.stiffness == pytest.approx(rig["spring.stiffness"], rel=0.01)
+    assert statics.travel == pytest.approx(2.0 * 0.9875 * PEAK / rig["spring.stiffness"], rel=0.01)
+    assert abs(statics.lost_motion) < 0.01 * statics.travel
+    assert statics.limit is None
 
 
 def test_friction_is_lost_motion():
     rig = with_effect("coulomb_friction", torque=2.0)
-    found = statics_of(ramps(rig), rig)
-    assert found is not None
-    assert found.lost_motion == pytest.approx(2.0 * 2.0 / rig["spring.stiffness"], rel=0.1)
+    statics = statics_of(ramps(rig), rig)
+    assert statics is not None
+    assert statics.lost_motion == pytest.approx(2.0 * 2.0 / rig["spring.stiffness"], rel=0.1)
 
 
 def test_backlash_is_travel():
     rig = with_effect("backlash", gap=0.01)
     plain = statics_of(ramps(load_rig("paper_high_impedance")), rig)
-    found = statics_of(ramps(rig), rig)
-    assert found is not None and plain is not None
-    assert found.travel - plain.travel == pytest.approx(0.01, rel=0.02)
-    assert found.stiffness == pytest.approx(plain.stiffness, rel=0.02)
+    statics = statics_of(ramps(rig), rig)
+    assert statics is not None and plain is not None
+    assert statics.travel - plain.travel == pytest.approx(0.01, rel=0.02)
+    assert statics.stiffness == pytest.approx(plain.stiffness, rel=0.02)
 
 
 def test_saturation_is_its_limit():
     rig = with_effect("torque_saturation", limit=13.0)
-    found = statics_of(ramps(rig), rig)
-    assert found is not None and found.limit == pytest.approx(13.0, rel=0.01)
+    statics = statics_of(ramps(rig), rig)
+    assert statics is not None and statics.limit == pytest.approx(13.0, rel=0.01)
 
 
 def test_a_quick_run_and_a_free_output_give_no_statics():
     _, true = bench("paper_high_impedance", 1)
-    assert statics_of(recorded(true, 1), true) is None
+    assert statics_of(record_bench(true, 1), true) is None
     moving = load_rig("paper_moving_output")
     assert statics_of(ramps(moving), moving) is None

@@ -28,7 +28,7 @@ def drawn_bench(rng, setup="high_impedance"):
         "b_s": plant.b_s * rng.uniform(0.90, 1.10),
         "housing_free": float(setup == "moving_output"),
     }
-    return Bench().having(**values)
+    return Bench().with_values(**values)
 
 
 def record_run(bench, seed, excitation="chirp_noise", duration=60.0, solver=run_fixed):
@@ -44,10 +44,10 @@ def record_command(bench, command, rng, solver=run_fixed, rate=RATE):
     knock = _knocks(command.size, bench.outside, rng, rate)
     states, held = solver(_drive(command, bench.outside, period), knock, period, plant)
     starts = np.arange(command.size) * period
-    ends = _stamped(starts + period, bench.outside)
+    ends = _stamp(starts + period, bench.outside)
     measured = _measure(states, held, starts + period, plant, bench.outside, rng)
     channels = {name: Channel(ends.copy(), y) for name, y in measured.items()}
-    stamps = _stamped(starts, bench.outside)
+    stamps = _stamp(starts, bench.outside)
     return Record({"command": Channel(stamps, command.copy()), **channels}, "second bench")
 
 
@@ -96,10 +96,10 @@ def _measure(states, held, t, plant, outside, rng):
     current = states[:, CURRENT] if lagged else held
     n = t.size
     return {
-        "position": _rounded(angle, outside.position_quantum),
-        "velocity": _rounded(speed + outside.velocity_noise * rng.normal(size=n), outside.velocity_quantum),
-        "motor_torque": _rounded(current + outside.motor_noise * rng.normal(size=n), outside.motor_quantum),
-        "ft": _rounded(_force_torque(states, t, plant, outside, rng), outside.ft_quantum),
+        "position": _round(angle, outside.position_quantum),
+        "velocity": _round(speed + outside.velocity_noise * rng.normal(size=n), outside.velocity_quantum),
+        "motor_torque": _round(current + outside.motor_noise * rng.normal(size=n), outside.motor_quantum),
+        "ft": _round(_force_torque(states, t, plant, outside, rng), outside.ft_quantum),
     }
 
 
@@ -126,13 +126,13 @@ def _crosstalk(t, outside, rng):
     return outside.ft_crosstalk * noise / noise.std()
 
 
-def _rounded(y, quantum):
+def _round(y, quantum):
     return np.round(y / quantum) * quantum if quantum > 0.0 else y
 
 
-def _stamped(t, outside):
+def _stamp(t, outside):
     """Return stamps as a clock of 64-bit floating point seconds has them."""
-    return _rounded(t, outside.stamp_quantum)
+    return _round(t, outside.stamp_quantum)
 
 
 __all__ = ["Bench", "Outside", "Plant", "drawn_bench", "record_command", "record_run"]

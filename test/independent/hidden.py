@@ -114,7 +114,7 @@ def hide(bench, effect, parameters):
         values["encoder_on_chassis"] = 1.0  # the encoder reads the gear's output, behind its compliance
     if "resonance_omega" in values:
         values["resonance_omega"] *= 2.0 * np.pi
-    return bench.having(**values)
+    return bench.with_values(**values)
 
 
 def hide_beside_the_contract(bench, effect, factor=1.0):
@@ -126,11 +126,11 @@ def hide_beside_the_contract(bench, effect, factor=1.0):
         log = np.log(values.pop("current_overshoot"))
         values["current_omega"] = 1.0 / values.pop("current_time")
         values["current_zeta"] = -log / np.hypot(np.pi, log)
-    return bench.having(**values)
+    return bench.with_values(**values)
 
 
 def hide_off_catalogue(bench, effect, factor=1.0):
     """Return the bench with an effect outside the table; `factor` scales its size (the first value)."""
     values, _ = OFF_CATALOGUE[effect]
     size = next(iter(values))
-    return bench.having(**{**values, size: values[size] * factor})
+    return bench.with_values(**{**values, size: values[size] * factor})

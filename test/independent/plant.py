@@ -127,7 +127,7 @@ class Bench(NamedTuple):
     plant: Plant = Plant()
     outside: Outside = Outside()
 
-    def having(self, **values: float) -> Bench:
+    def with_values(self, **values: float) -> Bench:
         """Return the bench with other values, by the field names of Plant and Outside."""
         inner = {k: float(v) for k, v in values.items() if k in Plant._fields}
         outer = {k: float(v) for k, v in values.items() if k in Outside._fields}

@@ -16,7 +16,7 @@ def noisy_resonance(seed, duration=160.0):
     The coherence of ft with the command is about 1 below 19 Hz, a half at 20 Hz and at the resonance,
     and less than 0.3 elsewhere above.
     """
-    bench = drawn_bench(np.random.default_rng(seed), "moving_output").having(
+    bench = drawn_bench(np.random.default_rng(seed), "moving_output").with_values(
         resonance=RESONANCE["participation"],
         resonance_omega=2.0 * np.pi * RESONANCE["frequency"],
         resonance_zeta=RESONANCE["damping_ratio"],
@@ -27,7 +27,7 @@ def noisy_resonance(seed, duration=160.0):
     return record_run(bench, seed + 1, "white_noise", duration)
 
 
-def delayed(seed, duration=160.0):
+def delayed_record(seed, duration=160.0):
     """Record of a bench whose commands act one and a half samples late, with a good sensor."""
-    bench = drawn_bench(np.random.default_rng(seed), "moving_output").having(delay=DELAY)
+    bench = drawn_bench(np.random.default_rng(seed), "moving_output").with_values(delay=DELAY)
     return record_run(bench, seed + 1, "white_noise", duration)

@@ -32,7 +32,9 @@ def test_both_implementations_agree(effect):
     """Within 6 % of the effect's own change, or half of the sensor's noise, RMS, after 0.3 s."""
     parameters = drawn_parameters(effect, "medium", np.random.default_rng(3)) if effect else {}
     bench = hide(Bench(), effect, parameters) if effect else Bench()
-    hidden, plain = (record_run(b.having(**QUIET, hum_phase=0.0), 5, duration=12.0) for b in (bench, Bench()))
+    hidden, plain = (
+        record_run(b.with_values(**QUIET, hum_phase=0.0), 5, duration=12.0) for b in (bench, Bench())
+    )
     rig = load_rig("paper_high_impedance")
     if effect:
         setting = EffectSetting(effect, {**parameters, **OF_THE_MODEL.get(effect, {})})

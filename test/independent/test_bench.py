@@ -27,7 +27,7 @@ QUIET = dict.fromkeys(
 
 
 def _quiet(bench):
-    return record_run(bench.having(**QUIET), 3, duration=10.0)
+    return record_run(bench.with_values(**QUIET), 3, duration=10.0)
 
 
 @functools.cache
@@ -37,8 +37,10 @@ def _nominal():
 
 def _change(bench):
     """Return how far the bench's record is from a nominal one, in noise RMS, for the clearest channel."""
-    found, nominal = _quiet(bench), _nominal()
-    return max(np.sqrt(np.mean((found[k].y - nominal[k].y) ** 2)) / noise for k, noise in NOISE.items())
+    quiet_record, nominal = _quiet(bench), _nominal()
+    return max(
+        np.sqrt(np.mean((quiet_record[k].y - nominal[k].y) ** 2)) / noise for k, noise in NOISE.items()
+    )
 
 
 def test_a_seed_determines_the_record():
@@ -49,7 +51,7 @@ def test_a_seed_determines_the_record():
 
 
 def test_noise_is_the_sensors():
-    loud, quiet = (record_run(b, 5, duration=20.0) for b in (Bench(), Bench().having(**QUIET)))
+    loud, quiet = (record_run(b, 5, duration=20.0) for b in (Bench(), Bench().with_values(**QUIET)))
     for name, noise in NOISE.items():
         assert np.std(loud[name].y - quiet[name].y) == pytest.approx(noise, rel=0.05), name
 

@@ -46,7 +46,7 @@ def _energy(states, p):
 @pytest.mark.parametrize("effect", [None, *PASSIVE])
 def test_energy_only_falls_when_nothing_drives(effect, housing_free):
     bench = hide(Bench(), effect, PASSIVE[effect]) if effect else Bench()
-    plant = bench.having(housing_free=housing_free).plant
+    plant = bench.with_values(housing_free=housing_free).plant
     command = np.zeros(420)
     command[:140] = 25.0 * np.random.default_rng(1).normal(size=140) + 15.0
     states, _ = run_fixed(command, np.zeros(420), 1.0 / 280.0, plant)

@@ -35,7 +35,7 @@ def _command(n, seed=0):
 def test_fixed_steps_agree_with_an_adaptive_solver(effect):
     parameters, values = HIDDEN[effect]
     bench = hide(Bench(), effect, parameters) if parameters else Bench()
-    plant = bench.having(duration=0.2, **values).plant
+    plant = bench.with_values(duration=0.2, **values).plant
     command, calm = _command(56), np.zeros(56)
     fixed, held = run_fixed(command, calm, PERIOD, plant)
     adaptive, held_adaptive = run_adaptive(command, calm, PERIOD, plant, rtol=1e-7, atol=1e-10)
@@ -70,7 +70,7 @@ def test_without_effects_it_is_the_linear_system_of_the_paper():
 )
 def test_moving_output_has_the_papers_unlumped_response(frequency, decibels):
     """T_ft/T_m with the rotor as an inerter between housing and chassis."""
-    plant = Bench().having(housing_free=1.0).plant
+    plant = Bench().with_values(housing_free=1.0).plant
     response = _response(plant, 2j * np.pi * frequency)
     assert 20.0 * np.log10(abs(response)) == pytest.approx(decibels, abs=0.05)
 

@@ -22,7 +22,7 @@ def learnt(values: tuple[tuple[str, float], ...], seed: int = 3) -> LawResult:
     """Return the law learnt from a record of the second bench with hidden values."""
     from independent.bench import drawn_bench, record_run
 
-    bench = drawn_bench(np.random.default_rng(seed)).having(**dict(values))
+    bench = drawn_bench(np.random.default_rng(seed)).with_values(**dict(values))
     return learn([record_run(bench, seed, "chirp_noise", SECONDS)], load_rig("paper_high_impedance"))
 
 

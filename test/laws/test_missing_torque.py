@@ -8,7 +8,7 @@ from effect_bench import RIG, command
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.identification.unknowns import vector_of
-from rsea_ros.laws.columns import bench_of, rows_of
+from rsea_ros.laws.columns import case_model, rows_of
 from rsea_ros.laws.gram import SELECTION, gram_of
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
@@ -31,7 +31,7 @@ def test_a_hidden_torque_is_reconstructed_within_its_doubt():
     t = np.arange(2800) / 280.0
     problem, theta = problem_with(bump(t))
     case = problem.cases[0]
-    missing = bench_of(problem, theta, case, problem.outputs(theta)[0]).missing
+    missing = case_model(problem, theta, case, problem.outputs(theta)[0]).missing
     inside = (missing.t > 0.5) & (missing.t < 9.5)
     error = (missing.torque - np.interp(missing.t + 0.5 / 280.0, t, bump(t)))[inside]
     assert np.std(error) < 0.35

@@ -16,7 +16,7 @@ from rsea_ros.signals import Channel
 RIG = load_rig("paper_high_impedance")
 
 
-def coloured():
+def coloured_record():
     """Return a record of a bench without any effect whose F/T sensor has coloured noise (AR 0.9)."""
     record = record_run(drawn_bench(np.random.default_rng(2)), 4, duration=12.0)
     ft = record["ft"]
@@ -26,7 +26,7 @@ def coloured():
 
 def test_a_residual_that_a_diagnosis_takes_for_noise_needs_no_law():
     """The smaller of two estimates of the noise counted: 2.5 times the noise, where diagnose saw none."""
-    record = coloured()
+    record = coloured_record()
     result = learn([record], RIG)
     assert result.at_floor and result.laws == ()
     assert headline(result) == "No law is needed: the model is at the noise floor"

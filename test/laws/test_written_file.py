@@ -13,12 +13,12 @@ from effect_bench import command as chirp
 
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
-from rsea_ros.effects.catalogue import catalogue, effect_named, lent
+from rsea_ros.effects.catalogue import catalogue, effect_named, lend
 from rsea_ros.effects.effect import Claims
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import FittedTerm, Law, LearntCurve
 from rsea_ros.laws.measured_claims import claims_of
-from rsea_ros.laws.memory import remembered
+from rsea_ros.laws.memory import remember
 from rsea_ros.laws.refinement import effect_from
 from rsea_ros.laws.terms import COMMAND_TERMS, GEAR_TERMS, SENSOR_TERMS, SPRING_TERMS, Term, wave_terms
 from rsea_ros.model.rig import EffectSetting
@@ -49,7 +49,7 @@ def written(request):
     made = request.param
     text = source_of(made, NOTHING, WHERE)
     assert "Source: rsea law" in text
-    with lent(effect_from(text, made.name)) as _:
+    with lend(effect_from(text, made.name)) as _:
         record = synthesize(RIG, chirp(280.0, 10.0))
         case = nominal_problem([check(record, RIG)], RIG).cases[0]
         claims = claims_of(made, effect_named(made.name), RIG, case)
@@ -92,7 +92,7 @@ def test_a_learnt_curve_acts_as_its_points_say():
     )
     short = law("law_of_drag", ("quadratic_drag", 12.0, 0.0))
     effects = [effect_from(source_of(each, NOTHING, WHERE), each.name) for each in (made, short)]
-    with lent(*effects):
+    with lend(*effects):
         curve, drag = (
             simulate_drive(RIG.with_effects(EffectSetting(e.name, p)), drive(duration=3.0))
             for e, p in zip(effects, ({"size": 1.0}, {"quadratic_drag": 12.0}), strict=True)
@@ -106,9 +106,9 @@ def test_a_learnt_curve_acts_as_its_points_say():
 def test_a_memory_in_the_file_is_the_one_that_was_fitted(name: str):
     made = law("law_of_past", (name, 1.0, 5e-3))
     driven = drive(duration=2.0)
-    with lent(effect_from(source_of(made, NOTHING, WHERE), made.name)):
+    with lend(effect_from(source_of(made, NOTHING, WHERE), made.name)):
         setting = EffectSetting(made.name, made.parameters)
         acting = simulate_drive(RIG.with_effects(setting), driven)
-    late = remembered(term(name).memory, driven.command, driven.step, 5e-3)
+    late = remember(term(name).memory, driven.command, driven.step, 5e-3)
     expected = simulate_drive(RIG, replace(driven, command=late))
     np.testing.assert_allclose(acting["position"], expected["position"], atol=1e-9)

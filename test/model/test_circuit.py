@@ -13,7 +13,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs
 from rsea_ros.model.circuit import circuit, circuit_response
 from rsea_ros.model.equations import PORTS
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.netlist import Element, impedance, nodal_analysis
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
@@ -44,7 +44,7 @@ def test_nodal_analysis_is_the_equations_of_motion(rig):
 @pytest.mark.parametrize("name", RIG_NAMES)
 def test_the_circuit_of_every_shipped_rig_is_its_equations_of_motion(name):
     assert worst(load_rig(name)) < 1e-9
-    assert worst(lumped(load_rig(name))) < 1e-9
+    assert worst(lumped_rig(load_rig(name))) < 1e-9
 
 
 def test_impedances_are_those_of_table_1():

@@ -19,7 +19,7 @@ T = np.arange(2000) / 500.0
 WAVE = Channel(T, 3.0 * np.sin(2 * np.pi * 3.0 * T))
 
 
-def seen(rig):
+def sensor_values(rig):
     """Return what the sensors of a rig would see without noise."""
     blank = Channel(T + 2e-3, np.zeros(len(T)))
     return simulate(rig, Record({"command": WAVE, **dict.fromkeys(("ft", "deflection", "position"), blank)}))
@@ -27,28 +27,28 @@ def seen(rig):
 
 def test_the_deflection_is_torque_over_stiffness_without_damping():
     rig = load_rig("sea_two_encoders").with_values({"spring.damping": 0.0})
-    out = seen(rig)
+    out = sensor_values(rig)
     assert np.allclose(out["ft"], rig["spring.stiffness"] * out["deflection"], rtol=1e-9, atol=1e-12)
     assert np.allclose(out["deflection"], out["position"], atol=1e-15)  # both ends are clamped
 
 
 def test_behind_play_the_deflection_is_that_of_the_spring():
     rig = load_rig("sea_two_encoders").with_values({"spring.damping": 0.0, "chassis.inertia": 1e-3})
-    out = seen(rig.with_effect("backlash", gap=1e-3))
+    out = sensor_values(rig.with_effect("backlash", gap=1e-3))
     assert np.max(np.abs(out["deflection"] - out["position"])) == pytest.approx(5e-4, rel=1e-3)
     assert np.allclose(out["ft"], rig["spring.stiffness"] * out["deflection"], rtol=1e-6, atol=1e-9)
 
 
 def test_with_a_moving_end_the_deflection_is_not_the_position():
     rig = load_rig("two_moving_outputs")
-    out = seen(rig)
+    out = sensor_values(rig)
     assert np.std(out["deflection"] - out["position"]) > 0.5 * np.std(out["deflection"])
 
 
 def test_only_a_rig_that_lists_the_deflection_logs_it():
     assert "deflection" not in synthesize(load_rig("paper_high_impedance"), WAVE)
     record = synthesize(load_rig("sea_two_encoders"), WAVE, seed=1)
-    noise = record["deflection"].y - seen(load_rig("sea_two_encoders"))["deflection"]
+    noise = record["deflection"].y - sensor_values(load_rig("sea_two_encoders"))["deflection"]
     assert np.std(noise) == pytest.approx(2e-5, rel=0.1)
 
 

@@ -41,8 +41,8 @@ def test_a_gap_changes_no_result(seconds, names):
     fit = rsea.identify(record, "pendulum")
     assert fit.verdict == "adequate"
     assert "dropped_samples" in {fault.kind for fault in fit.result.faults}
-    for name, found in fit.parameters.items():
-        low, high = found.ci95
+    for name, estimate in fit.parameters.items():
+        low, high = estimate.ci95
         assert low < truth[name] < high
 
 

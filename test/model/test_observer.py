@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from bench.observer_truth import true_run
 from rsea_ros.errors import RigError
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.observer import Observer, noise_of, observe
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import EffectSetting, Sensor
@@ -59,7 +59,7 @@ def test_the_unlumped_observer_errs_as_it_says_and_the_lumped_one_much_more(name
     for error, sigma in ((estimates[:, 0] - truth.distal, estimates[:, 3]),
                          (estimates[:, 1] - truth.proximal, estimates[:, 4])):  # fmt: skip
         assert rms((error / sigma)[SETTLE:]) < 1.9
-    _, rival = observe(Observer(lumped(rig)), truth.record)
+    _, rival = observe(Observer(lumped_rig(rig)), truth.record)
     unlumped_error, lumped_error = (rms((e[:, 1] - truth.proximal)[SETTLE:]) for e in (estimates, rival))
     assert unlumped_error < 0.03 < 50.0 * unlumped_error < lumped_error
 

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from rsea_ros.errors import ChannelError, RigError
 from rsea_ros.identification.responses import model_response
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import PositionLoop, Quantity, Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig
@@ -38,7 +38,7 @@ def rigid_quantities(kind: str) -> dict[str, Quantity]:
     return {**rig.quantities, **{f"controller.{n}": Quantity(v) for n, v in gains.items()}}
 
 
-def moved(rig: Rig, targets=STEPPING, **options) -> dict[str, np.ndarray]:
+def move_rig(rig: Rig, targets=STEPPING, **options) -> dict[str, np.ndarray]:
     """Return what a rig does for targets, at the end of each hold."""
     blank = {n: Channel(T + 1 / RATE, np.zeros(len(T))) for n in ("position", "velocity", "motor_torque")}
     return simulate(rig, Record({"reference": Channel(T, targets), **blank}, source="joint"), **options)
@@ -75,7 +75,7 @@ def test_the_loop_is_that_of_its_equation(kind):
         return u
 
     integral = {"k_i": 40.0} if kind == "pd" else {"k_vi": 30.0, "velocity_limit": 1.5}
-    position = moved(joint(kind, **integral), refine=1)["position"]
+    position = move_rig(joint(kind, **integral), refine=1)["position"]
     assert np.max(np.abs(position - by_scipy(joint(kind), law))) < 1e-9
 
 
@@ -90,37 +90,39 @@ def test_a_cascade_without_integral_is_the_controller_of_a_logged_torque():
         source="a",
     )
     outside = simulate(drive, record, refine=5)["position"]
-    assert np.allclose(outside, moved(joint("cascade"), steady, refine=12)["position"], atol=1e-12)
+    assert np.allclose(outside, move_rig(joint("cascade"), steady, refine=12)["position"], atol=1e-12)
 
 
 def test_the_limits_of_the_loop_hold():
-    limited = moved(joint(torque_limit=4.0))
+    limited = move_rig(joint(torque_limit=4.0))
     assert np.max(np.abs(limited["motor_torque"])) == pytest.approx(4.0)
-    slewed = moved(joint(velocity_limit=0.5))
-    assert np.max(np.abs(slewed["velocity"])) < 0.65 < np.max(np.abs(moved(joint())["velocity"]))
+    slewed = move_rig(joint(velocity_limit=0.5))
+    assert np.max(np.abs(slewed["velocity"])) < 0.65 < np.max(np.abs(move_rig(joint())["velocity"]))
 
 
 def test_an_integral_takes_away_what_gravity_pulls_and_does_not_wind_up():
     hanging = joint().with_values({"spring_end.gravity": 3.0, "spring_end.gravity_angle": 0.5})
     still = np.full(len(T), 0.0)
-    sag = moved(hanging, still)["position"][-1]
+    sag = move_rig(hanging, still)["position"][-1]
     assert 60.0 * -sag == pytest.approx(3.0 * np.sin(0.5 + sag), rel=1e-3)
-    assert abs(moved(hanging.with_values({"controller.k_i": 300.0}), still)["position"][-1]) < 0.1 * abs(sag)
+    assert abs(move_rig(hanging.with_values({"controller.k_i": 300.0}), still)["position"][-1]) < 0.1 * abs(
+        sag
+    )
     weak = hanging.with_values({"controller.k_i": 300.0, "controller.torque_limit": 6.0})
-    assert np.max(moved(weak)["position"]) < 0.4
+    assert np.max(move_rig(weak)["position"]) < 0.4
 
 
 def test_the_firmware_holds_its_torque_between_its_samples():
-    torque = moved(joint(sample_time=0.05))["motor_torque"]
+    torque = move_rig(joint(sample_time=0.05))["motor_torque"]
     assert len(np.unique(np.round(torque, 12))) <= 2.0 / 0.05 + 1
     assert np.allclose(torque[1:10], torque[1])
 
 
 def test_a_delay_delays_the_target_not_the_torque_in_the_loop():
-    late = moved(joint().with_effect("command_delay", delay=0.04))["position"]
-    assert np.max(np.abs(late[8:] - moved(joint())["position"][:-8])) < 1e-9
-    shifted = moved(joint().with_effect("command_delay", delay=0.04), STEPPING + 1.0)["position"]
-    assert shifted[0] > moved(joint())["position"][0]  # before the first target a joint had that target
+    late = move_rig(joint().with_effect("command_delay", delay=0.04))["position"]
+    assert np.max(np.abs(late[8:] - move_rig(joint())["position"][:-8])) < 1e-9
+    shifted = move_rig(joint().with_effect("command_delay", delay=0.04), STEPPING + 1.0)["position"]
+    assert shifted[0] > move_rig(joint())["position"][0]  # before the first target a joint had that target
 
 
 def test_the_encoder_may_sit_behind_the_play():
@@ -131,7 +133,7 @@ def test_the_encoder_may_sit_behind_the_play():
     slow_swing = 0.4 * np.sin(2 * np.pi * T)
     lost = {
         rig.encoder_end: np.ptp(
-            moved(rig, slow_swing)["position"] - moved(rig.with_effects(), slow_swing)["position"]
+            move_rig(rig, slow_swing)["position"] - move_rig(rig.with_effects(), slow_swing)["position"]
         )
         for rig in (before, behind)
     }
@@ -142,7 +144,7 @@ def test_the_encoder_may_sit_behind_the_play():
 def test_the_linear_response_is_that_of_the_simulation(kind):
     rig = joint(kind)
     f = 4.0
-    position = moved(rig, 0.1 * np.sin(2 * np.pi * f * T))["position"]
+    position = move_rig(rig, 0.1 * np.sin(2 * np.pi * f * T))["position"]
     wave = np.exp(-2j * np.pi * f * (T + 1 / RATE))[200:]
     hold = np.exp(-1j * np.pi * f / RATE) * np.sinc(f / RATE)
     measured = 2j * np.mean(position[200:] * wave) / 0.1
@@ -178,7 +180,7 @@ def test_a_record_must_have_what_commands_its_rig():
     rig = load_rig("pd_joint")
     record = synthesize(rig, Channel(T, STEPPING))
     assert set(record.channels) == {"reference", *rig.sensors}
-    assert np.array_equal(commanded(record, rig)["command"].y, STEPPING)
+    assert np.array_equal(with_command(record, rig)["command"].y, STEPPING)
     with pytest.raises(ChannelError, match="expected a rig with controller"):
         simulate(load_rig("bare_drive"), record)
     torques = Record({"command": Channel(T, STEPPING), "position": record["position"]}, source="torques")

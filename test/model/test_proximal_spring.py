@@ -41,10 +41,10 @@ def test_the_sensor_on_the_housing_reads_the_torque_on_that_end():
     ft = synthesize(rig, command, noise=False)["ft"]
     late = ft.t > 35.0
     wave = np.exp(2j * np.pi * hz * ft.t[late])
-    found = np.linalg.lstsq(np.column_stack([wave.real, -wave.imag]), ft.y[late], rcond=None)[0] @ [1, 1j]
+    ratio = np.linalg.lstsq(np.column_stack([wave.real, -wave.imag]), ft.y[late], rcond=None)[0] @ [1, 1j]
     held = np.sinc(hz / rate) * np.exp(-1j * np.pi * hz / rate)
     expected = frequency_response(rig, outputs.end_torque(rig, "housing_end"), np.array([hz]))[0] * held
-    assert found == pytest.approx(expected, rel=2e-3)
+    assert ratio == pytest.approx(expected, rel=2e-3)
 
 
 def test_a_rig_file_keeps_the_proximal_spring(tmp_path):

@@ -45,7 +45,7 @@ def tones(seconds, *hz):
     return lines
 
 
-def said(flag, distal, proximal, sigma=0.007):
+def verdicts_of(flag, distal, proximal, sigma=0.007):
     """Verdicts and shares by sample."""
     rows = []
     for k, (d, p) in enumerate(zip(distal.tolist(), proximal.tolist(), strict=True)):
@@ -74,7 +74,7 @@ CASES = {
 def test_the_verdict_is_that_of_the_true_error(name):
     """Asked: right in 95 % of the time outside 20 % of the tolerance, at most one change a second."""
     distal, proximal = ends(PLATFORM, CASES[name])
-    verdicts, shares = said(ErrorFlag(PLATFORM), distal, proximal)
+    verdicts, shares = verdicts_of(ErrorFlag(PLATFORM), distal, proximal)
     true = true_share(distal, proximal, SETTINGS.window)
     settled = np.arange(len(true)) > RATE
     np.testing.assert_allclose(shares[settled], true[settled], rtol=1e-9)
@@ -87,7 +87,7 @@ def test_the_verdict_is_that_of_the_true_error(name):
 def test_torque_flat_to_100_hz_is_not_pure():
     """The measure by shares of the spectrum called it pure 65 % of the time, at 48 % of error."""
     distal, proximal = ends(PLATFORM, noise(6.0, 100.0))
-    verdicts, shares = said(ErrorFlag(PLATFORM), distal, proximal)
+    verdicts, shares = verdicts_of(ErrorFlag(PLATFORM), distal, proximal)
     assert np.median(shares[1000:]) == pytest.approx(0.48, abs=0.03)
     assert np.all(verdicts[500:] == BEYOND)
 
@@ -97,7 +97,7 @@ def test_torque_flat_to_100_hz_is_not_pure():
 def test_the_latency_is_at_most_the_window(rig, before, after):
     edge = ErrorFlag(rig).edge.hz
     first, second = (ends(rig, tones(2.0, round(2.0 * part * edge) / 2.0)) for part in (before, after))
-    verdicts, _ = said(
+    verdicts, _ = verdicts_of(
         ErrorFlag(rig), np.concatenate([first[0], second[0]]), np.concatenate([first[1], second[1]])
     )
     late = 2000 + round(SETTINGS.window * RATE) + 1
@@ -153,11 +153,11 @@ def test_a_rig_that_leaves_the_damping_out_has_an_edge():
 
 def test_without_torque_the_flag_says_so_and_restarts():
     flag, quiet = ErrorFlag(PLATFORM), np.random.default_rng(1).normal(0.0, 0.007, (4000, 2))
-    verdicts, shares = said(flag, quiet[:, 0], quiet[:, 1])
+    verdicts, shares = verdicts_of(flag, quiet[:, 0], quiet[:, 1])
     assert np.all(verdicts == NOTHING)
     assert np.isnan(shares).all()
     distal, proximal = ends(PLATFORM, tones(1.0, 20.0))
-    verdicts, _ = said(
+    verdicts, _ = verdicts_of(
         ErrorFlag(PLATFORM), np.concatenate([distal, 0.0 * distal]), np.concatenate([proximal, 0.0 * distal])
     )
     assert verdicts[900] == PURE
@@ -178,8 +178,8 @@ def test_a_torque_too_small_to_judge_keeps_the_verdict():
 def test_stamps_that_go_back_a_second_start_another_run():
     distal, proximal = ends(PLATFORM, tones(3.0, 70.0))
     flag = ErrorFlag(PLATFORM)
-    assert said(flag, distal, proximal)[0][-1] == BEYOND
-    again = said(flag, *ends(PLATFORM, tones(1.0, 20.0)))[0]
+    assert verdicts_of(flag, distal, proximal)[0][-1] == BEYOND
+    again = verdicts_of(flag, *ends(PLATFORM, tones(1.0, 20.0)))[0]
     assert again[0] in (NOTHING, PURE)
     assert np.all(again[50:] == PURE)
 
@@ -188,7 +188,7 @@ def test_stamps_that_go_back_a_second_start_another_run():
 def test_values_that_are_not_finite_are_left_out(bad):
     distal, proximal = ends(PLATFORM, tones(2.0, 20.0))
     distal[700:760] = bad
-    verdicts, shares = said(ErrorFlag(PLATFORM), distal, proximal)
+    verdicts, shares = verdicts_of(ErrorFlag(PLATFORM), distal, proximal)
     assert np.all(verdicts[200:] == PURE)
     assert np.isfinite(shares[200:]).all()
 
@@ -211,7 +211,7 @@ def test_a_long_run_sums_as_exactly_as_a_short_one():
     distal, proximal = ends(PLATFORM, tap := tones(20.0, 30.0))
     distal[:8000] *= 1e4
     proximal[:8000] *= 1e4
-    shares = said(ErrorFlag(PLATFORM), distal, proximal)[1]
+    shares = verdicts_of(ErrorFlag(PLATFORM), distal, proximal)[1]
     assert shares[-1] == pytest.approx(
         true_share(distal[-600:], proximal[-600:], SETTINGS.window)[-1], rel=1e-6
     )

@@ -15,7 +15,7 @@ from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 
 
-def humming(phase: float) -> Rig:
+def hum(phase: float) -> Rig:
     parameters = {"amplitude": 0.2, "frequency": 50.02, "phase": phase}
     return load_rig("paper_high_impedance").with_effects(EffectSetting("mains_interference", parameters))
 
@@ -23,9 +23,9 @@ def humming(phase: float) -> Rig:
 @pytest.mark.parametrize("phase", [-2.9, 0.4, 2.0])
 def test_the_mains_are_predicted_whenever_the_record_began(phase):
     command = 10.0 * np.random.default_rng(3).standard_normal(2800)
-    record = synthesize(humming(phase), Channel(np.arange(2800) / 280.0, command), seed=5)
-    found = in_phase(humming(1.0), record).effects[0].parameters
-    assert math.remainder(found["phase"] - phase, 2.0 * math.pi) == pytest.approx(0.0, abs=0.03)
-    assert found["amplitude"] == 0.2
+    record = synthesize(hum(phase), Channel(np.arange(2800) / 280.0, command), seed=5)
+    phased = in_phase(hum(1.0), record).effects[0].parameters
+    assert math.remainder(phased["phase"] - phase, 2.0 * math.pi) == pytest.approx(0.0, abs=0.03)
+    assert phased["amplitude"] == 0.2
     noise = load_rig("paper_high_impedance").sensors["ft"].noise
-    assert predict(humming(1.0), record)["ft"].rms_error == pytest.approx(noise, rel=0.05)
+    assert predict(hum(1.0), record)["ft"].rms_error == pytest.approx(noise, rel=0.05)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.model import bandwidth, outputs, spring
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper import formulas
@@ -25,7 +25,7 @@ FT = "spring_end"
 
 def gain_db(hz: float, *, as_lumped: bool = False) -> float:
     """Return |T_ft / T_m| of the moving-output test, dB."""
-    rig = lumped(MOVING) if as_lumped else MOVING
+    rig = lumped_rig(MOVING) if as_lumped else MOVING
     return float(20 * np.log10(abs(frequency_response(rig, outputs.end_torque(rig, FT), np.array([hz]))[0])))
 
 

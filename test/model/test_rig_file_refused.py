@@ -18,7 +18,7 @@ BASE = yaml.safe_load(rig_path("paper_high_impedance").read_text())
 MOVING = yaml.safe_load(rig_path("paper_moving_output").read_text())
 
 
-def changed(path, value, base=BASE):
+def change(path, value, base=BASE):
     """Return a shipped document with one entry changed; DELETE removes it."""
     document = copy.deepcopy(base)
     *folders, last = path
@@ -133,7 +133,7 @@ NONSENSE = [
 )
 def test_nonsense_is_refused_in_one_line_that_names_it(path, value, message, tmp_path):
     file = tmp_path / "bad.yaml"
-    file.write_text(yaml.safe_dump(changed(path, value)))
+    file.write_text(yaml.safe_dump(change(path, value)))
     with pytest.raises(RigError) as error:
         load_rig(file)
     text = str(error.value)
@@ -142,7 +142,7 @@ def test_nonsense_is_refused_in_one_line_that_names_it(path, value, message, tmp
 
 def test_a_known_field_must_be_stated(tmp_path):
     file = tmp_path / "bad.yaml"
-    file.write_text(yaml.safe_dump(changed(("known",), ["spring_end.inertia"], MOVING)))
+    file.write_text(yaml.safe_dump(change(("known",), ["spring_end.inertia"], MOVING)))
     with pytest.raises(
         RigError, match=r"known: 'spring_end.inertia', expected a value that this rig states: "
     ):

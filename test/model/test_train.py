@@ -11,7 +11,7 @@ from rolling import rotor_speed
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, flat_band, inner_inertia, resonance_peak, undamped_band
 from rsea_ros.model.equations import mechanics, rotor_inertia, train_ratio
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.rig_file import load_rig
@@ -98,4 +98,4 @@ def test_without_inner_inertia_the_band_has_no_edge():
 
 def test_a_lumped_rotor_counts_whole_at_the_chassis():
     assert spin_inertia("lumped", 160.0, 1.2) == 1.2
-    assert inner_inertia(lumped(KNEE)) == pytest.approx(1.2 + 6.169e-4)
+    assert inner_inertia(lumped_rig(KNEE)) == pytest.approx(1.2 + 6.169e-4)

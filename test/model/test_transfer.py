@@ -14,7 +14,7 @@ from rsea_ros.errors import RigError
 from rsea_ros.model import outputs, transfer
 from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import PORTS
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper import formulas
@@ -123,7 +123,7 @@ def test_both_ends_together_take_the_change_of_angular_momentum(name, train):
 
 
 def test_lumped_model_is_eqs_1_to_3():
-    rig = lumped(load_rig("paper_high_impedance"))
+    rig = lumped_rig(load_rig("paper_high_impedance"))
     for ours, printed in (
         (
             transfer.distal_per_motor(rig, "element"),
@@ -143,7 +143,7 @@ def test_lumped_model_is_eqs_1_to_3():
 
 def test_lumping_does_not_change_the_high_impedance_test():
     rig = load_rig("paper_high_impedance")
-    agree(transfer.distal_per_motor(lumped(rig))(S), transfer.distal_per_motor(rig)(S))
+    agree(transfer.distal_per_motor(lumped_rig(rig))(S), transfer.distal_per_motor(rig)(S))
 
 
 @pytest.mark.parametrize("name", WITH_SPRING)

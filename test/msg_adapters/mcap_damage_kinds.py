@@ -23,7 +23,7 @@ class Run:
         return [k for k, row in enumerate(self.bare.rows) if row[0] == "/rsea/ft"]
 
 
-def flipped(data: bytes, at: int) -> bytes:
+def flip(data: bytes, at: int) -> bytes:
     return data[:at] + bytes([data[at] ^ 0x40]) + data[at + 1 :]
 
 
@@ -43,12 +43,12 @@ def flipped_number(run):
     """One bit of one value: nothing but the checksum of the data can tell."""
     data = run.bare.file()
     one = run.bare.messages[run.wrenches[9]]
-    return flipped(data, data.index(one) + len(one) - 2)
+    return flip(data, data.index(one) + len(one) - 2)
 
 
 def flipped_in_chunk(run):
     parts = run.chunked.data()
-    parts[2] = flipped(parts[2], 200)
+    parts[2] = flip(parts[2], 200)
     return run.chunked.file(parts)
 
 
@@ -75,7 +75,7 @@ def chunk_in_a_chunk(run):
     return run.chunked.file([*parts[:1], chunk(parts[1]), *parts[2:]])
 
 
-def undeclared(run):
+def undeclare(run):
     strays = [message(99, 5, b"\x00\x01\x00\x00") for _ in range(4)]
     return run.bare.file([run.bare.declared, *run.bare.messages, *strays])
 
@@ -88,7 +88,7 @@ def attachment(run):
 def summary(run):
     data = run.bare.file()
     at = data.rindex(b"/rsea/ft")
-    return flipped(data, at)
+    return flip(data, at)
 
 
 def no_records(run):

@@ -18,7 +18,7 @@ def _without(topic):
     return [row for row in run_rows(4) if row[0] != topic]
 
 
-def _changed(index, message):
+def _change(index, message):
     rows = run_rows(4)
     rows[index] = (rows[index][0], rows[index][1], message)
     return rows
@@ -43,15 +43,15 @@ REFUSED = {
     ),
     "empty bag": ([], "no message on /rsea/torque_command; the bag holds no topic at all"),
     "NaN": (
-        _changed(3, COMMAND),
+        _change(3, COMMAND),
         r"/rsea/torque_command effort\[1\] is nan at 1763000000.127028217 s, expected a finite",
     ),
     "two joints": (
-        _changed(1, joint_state(EPOCH, ["hip", "knee"], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0])),
+        _change(1, joint_state(EPOCH, ["hip", "knee"], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0])),
         r"/rsea/joint_states: 3 joints \(joint, hip, knee\), expected one; name it with --joint",
     ),
     "joints without names": (
-        _changed(1, joint_state(EPOCH, [], [0.0, 1.0])),
+        _change(1, joint_state(EPOCH, [], [0.0, 1.0])),
         r"2 joints \(joint\), expected one",
     ),
     "empty command": (
@@ -88,7 +88,7 @@ def test_faults_are_returned_where_a_diagnosis_asks_for_them(tmp_path, case):
 
 @pytest.mark.parametrize("strict", [True, False])
 def test_a_measurement_that_is_nan_stays_for_the_checks_to_mask(tmp_path, strict):
-    record = read_record(write_foreign(tmp_path / "bag", _changed(4, STATE)), strict=strict)
+    record = read_record(write_foreign(tmp_path / "bag", _change(4, STATE)), strict=strict)
     assert np.isnan(record["velocity"].y).tolist() == [False, True, False, False]
 
 
@@ -176,7 +176,7 @@ def test_senseless_topic_options_are_refused():
     with pytest.raises(
         ParameterError, match="topic 'wrench=/ft': expected ROLE=TOPIC with ROLE one of torque_command"
     ):
-        TopicMap().renamed(["wrench=/ft"])
+        TopicMap().rename(["wrench=/ft"])
 
 
 def test_a_message_in_another_encoding_is_refused(tmp_path):

@@ -39,7 +39,7 @@ with BagWriter(sys.argv[1], sys.argv[2]) as bag:
 """
 
 
-def _chunked(path: Path, compression: CompressionMode) -> bytes:
+def _chunk(path: Path, compression: CompressionMode) -> bytes:
     """Return an MCAP file with many chunks: each run of rosbags' writer holds a chunk."""
     rows = run_rows(120)
     data = b""
@@ -66,7 +66,7 @@ def _messages_of_complete_chunks(data: bytes) -> int:
 
 @pytest.mark.parametrize("compression", [CompressionMode.NONE, CompressionMode.STORAGE])
 def test_every_complete_chunk_before_the_cut_comes_back(tmp_path, compression):
-    data = _chunked(tmp_path, compression)
+    data = _chunk(tmp_path, compression)
     rng = random.Random(20)
     cuts = [rng.randrange(1, len(data)) for _ in range(150)]
     recovered = []
@@ -89,7 +89,7 @@ def test_every_complete_chunk_before_the_cut_comes_back(tmp_path, compression):
 
 
 def test_a_cut_off_bag_is_a_record_up_to_the_cut(tmp_path):
-    data = _chunked(tmp_path, CompressionMode.NONE)
+    data = _chunk(tmp_path, CompressionMode.NONE)
     file = tmp_path / "cut.mcap"
     file.write_bytes(data[: len(data) // 2])
     record = read_record(file)

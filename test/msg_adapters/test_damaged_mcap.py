@@ -27,7 +27,7 @@ CASES = {
     "ended in the middle": (kinds.ended_in_the_middle, {"data_after_end": ("a.mcap", 4)}, 0),
     "unknown records": (kinds.unknown_records, {"unknown_records": ("a.mcap", 3)}, 3),
     "chunk in a chunk": (kinds.chunk_in_a_chunk, {"unknown_records": ("a.mcap", 1)}, 10),
-    "undeclared channel": (kinds.undeclared, {"damaged_messages": ("a.mcap", 4)}, 0),
+    "undeclared channel": (kinds.undeclare, {"damaged_messages": ("a.mcap", 4)}, 0),
     "attachment": (kinds.attachment, {"checksum_mismatch": ("a.mcap", None)}, 0),
     "summary": (kinds.summary, {"checksum_mismatch": ("a.mcap", None)}, 0),
     "no records": (kinds.no_records, {"damaged_records": ("a.mcap", None)}, 0),
@@ -89,7 +89,7 @@ def _is_chunk(data: bytearray, at: int) -> bool:
 
 
 def test_a_bag_without_a_sound_chunk_is_refused_in_one_line(tmp_path):
-    parts = [kinds.flipped(part, 200) for part in RUN.chunked.data()]
+    parts = [kinds.flip(part, 200) for part in RUN.chunked.data()]
     with pytest.raises(
         BagError, match=r"no message on /rsea/torque_command.*damaged MCAP.*checksum"
     ) as caught:

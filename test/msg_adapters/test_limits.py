@@ -184,8 +184,8 @@ def test_messages_that_all_differ_in_layout_are_sorted_once(monkeypatch):
     compared = []
     whole = cdr.np.zeros
     monkeypatch.setattr(cdr.np, "zeros", lambda n, *kind: compared.append(n) or whole(n, *kind))
-    found = list(cdr.blocks(raw, "sensor_msgs/msg/JointState", "here"))
-    assert sorted(int(row) for block in found for row in block.rows) == list(range(400))
+    blocks = list(cdr.blocks(raw, "sensor_msgs/msg/JointState", "here"))
+    assert sorted(int(row) for block in blocks for row in block.rows) == list(range(400))
     assert sum(compared) <= 400 * 32
 
 

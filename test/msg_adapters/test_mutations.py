@@ -25,7 +25,7 @@ KINDS = {
 }
 
 
-def mutated(data: bytes, rng: random.Random) -> bytes:
+def mutate(data: bytes, rng: random.Random) -> bytes:
     """Return data with a bit, a byte, a number, or a stretch changed, taken out, doubled, or cut off."""
     out, at = bytearray(data), rng.randrange(len(data))
     kind = rng.randrange(6)
@@ -62,7 +62,7 @@ def test_a_fault_anywhere_in_a_file_gives_a_record_or_one_line(tmp_path, kind):
     file = next(path for path in bag.iterdir() if path.suffix in (".mcap", ".db3"))
     data = file.read_bytes()
     for _ in range(MUTATIONS):
-        file.write_bytes(mutated(data, rng) or b"\0")
+        file.write_bytes(mutate(data, rng) or b"\0")
         _read_or_refuse(bag)
     shutil.rmtree(bag)
 
@@ -75,7 +75,7 @@ def test_a_fault_anywhere_in_a_chunk_whose_checksum_fits_gives_a_record_or_one_l
         file.messages = list(sound)
         for _ in range(3):
             at = rng.randrange(len(sound))
-            file.messages[at] = mutated(sound[at], rng)
+            file.messages[at] = mutate(sound[at], rng)
         (tmp_path / "a.mcap").write_bytes(file.file())
         _read_or_refuse(tmp_path / "a.mcap")
 
@@ -85,5 +85,5 @@ def test_a_fault_anywhere_in_the_metadata_gives_a_record_or_one_line(tmp_path):
     bag = write_foreign(tmp_path / "bag", run_rows(20))
     text = (bag / "metadata.yaml").read_bytes()
     for _ in range(MUTATIONS):
-        (bag / "metadata.yaml").write_bytes(mutated(text, rng))
+        (bag / "metadata.yaml").write_bytes(mutate(text, rng))
         _read_or_refuse(bag)

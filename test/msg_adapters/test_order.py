@@ -16,7 +16,7 @@ COUNT = 400
 PERIOD = 3_571_428
 
 
-def _jittered(rows, share, seed=5):
+def _jitter(rows, share, seed=5):
     """Return rows in the order in which they arrive after a delay of up to `share` periods, or spread so."""
     rng = np.random.default_rng(seed)
     delays = np.abs(rng.normal(0.0, share * PERIOD, len(rows)))
@@ -29,7 +29,7 @@ def _jittered(rows, share, seed=5):
 def test_jitter_of_arrival_changes_nothing(tmp_path, strict, share):
     rows = run_rows(COUNT)
     clean = read_record(write(tmp_path / "clean.mcap", McapFile(rows).file()), strict=strict)
-    got = read_record(write(tmp_path / "a.mcap", McapFile(_jittered(rows, share)).file()), strict=strict)
+    got = read_record(write(tmp_path / "a.mcap", McapFile(_jitter(rows, share)).file()), strict=strict)
     assert got.epoch_ns == clean.epoch_ns
     for name, channel in clean.channels.items():
         assert np.array_equal(got[name].t, channel.t) and np.array_equal(got[name].y, channel.y)
@@ -133,5 +133,5 @@ def test_a_channel_of_another_clock_is_left_out(tmp_path):
 
 def test_a_gap_is_reported_beside_disorder(tmp_path):
     rows = [row for k, row in enumerate(run_rows(COUNT)) if not (row[0] == "/rsea/ft" and 300 <= k < 360)]
-    got = read_record(write(tmp_path / "a.mcap", McapFile(_jittered(rows, 0.5)).file()))
+    got = read_record(write(tmp_path / "a.mcap", McapFile(_jitter(rows, 0.5)).file()))
     assert {(f.kind, f.size) for f in got.faults if f.channel == "ft"} >= {("dropped_samples", 20)}

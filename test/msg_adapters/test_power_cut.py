@@ -54,10 +54,10 @@ def test_a_recording_without_new_messages_is_flushed(tmp_path, monkeypatch):
 def test_a_disk_that_fails_under_a_recording_is_reported_and_the_rest_is_kept(tmp_path, monkeypatch):
     cut = PowerCut(monkeypatch, McapStorage)
 
-    def broken(storage):
+    def break_power(storage):
         raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr(McapStorage, "sync", broken)
+    monkeypatch.setattr(McapStorage, "sync", break_power)
     line = r"bag: cannot be written: Input/output error; .* is in .*bag.partial"
     with pytest.raises(BagError, match=line), BagWriter(tmp_path / "bag") as bag:
         for k in range(1, 9):

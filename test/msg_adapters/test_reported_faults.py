@@ -20,7 +20,7 @@ def status(at: int, node: str, **values):
     return ("/diagnostics", at, make(TYPE, header=header(at, "frame"), status=[one]))
 
 
-def _told(tmp_path, *statuses, strict=True):
+def _faults_of(tmp_path, *statuses, strict=True):
     bag = write_foreign(tmp_path / "bag", [*run_rows(60), *statuses])
     return {(fault.kind, fault.channel): fault for fault in read_record(bag, strict=strict).faults}
 
@@ -41,27 +41,30 @@ def _told(tmp_path, *statuses, strict=True):
 )
 def test_counts_that_grow_during_the_run_are_faults(tmp_path, key, kind, unit, strict):
     rising = [status(EPOCH + k * SECOND, "/rsea/node", **{key: 5 + k, "else": 3}) for k in range(4)]
-    (fault,) = _told(tmp_path, *rising, strict=strict).values()
+    (fault,) = _faults_of(tmp_path, *rising, strict=strict).values()
     assert (fault.kind, fault.channel, fault.size, fault.unit) == (kind, "/rsea/node", 3, unit)
 
 
 def test_counts_of_a_node_that_starts_during_the_run_begin_at_zero(tmp_path):
-    assert _told(tmp_path, status(EPOCH + 5 * SECOND, "/n", left_out=4))["commands_left_out", "/n"].size == 4
+    assert (
+        _faults_of(tmp_path, status(EPOCH + 5 * SECOND, "/n", left_out=4))["commands_left_out", "/n"].size
+        == 4
+    )
 
 
 def test_counts_of_a_node_that_restarts_begin_at_zero(tmp_path):
     counts = enumerate([10, 12, 0, 3])
     statuses = [status(EPOCH + k * SECOND, "/n", watchdog_trips=count) for k, count in counts]
-    assert _told(tmp_path, *statuses)["watchdog_trips", "/n"].size == 5
+    assert _faults_of(tmp_path, *statuses)["watchdog_trips", "/n"].size == 5
 
 
 def test_faults_before_the_run_are_not_reported(tmp_path):
     old = [status(EPOCH + k * SECOND, "/n", left_out=7, fault="none", missed_cycles=k) for k in range(3)]
-    assert _told(tmp_path, *old) == {}
+    assert _faults_of(tmp_path, *old) == {}
 
 
 def test_a_latched_fault_of_the_device_is_reported(tmp_path):
-    told = _told(tmp_path, status(EPOCH, "/rsea/driver", fault="torque 70 N m\x1b[31m, limit 68 N m"))
+    told = _faults_of(tmp_path, status(EPOCH, "/rsea/driver", fault="torque 70 N m\x1b[31m, limit 68 N m"))
     assert told["device_fault", "/rsea/driver"].detail == "torque 70 N m\ufffd[31m, limit 68 N m"
 
 

@@ -64,7 +64,7 @@ time.time_ns = lambda: true() + int.from_bytes(step.read_bytes(), "{order}", sig
 """
 
 
-def preloaded(folder, step):
+def preload(folder, step):
     """Return the environment of a process whose clock a file sets; {} where no compiler is there."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:

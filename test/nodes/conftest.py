@@ -24,7 +24,7 @@ class Process:
     """A node of the package, started with parameters."""
 
     def __init__(self, nodes, name, log, parameters, remaps):
-        words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={written(value)}")]
+        words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={as_argument(value)}")]
         words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
         self._log = log
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
@@ -41,7 +41,7 @@ class Process:
         """Its number."""
         return self._process.pid
 
-    def running(self):
+    def is_running(self):
         """Whether it has not ended."""
         return self._process.poll() is None
 
@@ -51,7 +51,7 @@ class Process:
 
     def stop(self, number=signal.SIGINT):
         """Send a signal and return the exit status."""
-        if self.running():
+        if self.is_running():
             self._process.send_signal(number)
         return self.wait()
 
@@ -61,12 +61,12 @@ class Process:
         self._process.wait()
 
 
-def written(value):
+def as_argument(value):
     """Return a value as a parameter on the command line."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list):
-        return f"[{', '.join(map(written, value))}]"
+        return f"[{', '.join(map(as_argument, value))}]"
     return f"'{value}'" if isinstance(value, (str, Path)) else str(value)
 
 

@@ -123,7 +123,7 @@ class World:
     def poll(self, anchor):
         """Pass the sent commands to the driver, as a bench does."""
         for stamp, torque, received in self.inbox:
-            self.commands.add(stamp, torque, anchor.arrived(received, self.polled))
+            self.commands.add(stamp, torque, anchor.arrival(received, self.polled))
         self.inbox, self.polled = [], anchor.now()
 
     def activate(self):

@@ -1,4 +1,4 @@
-"""A driver node on the bench on a wire, and a driver made of a script."""
+"""A driver node on a simulated bench, and a driver made of a script."""
 
 import os
 import subprocess
@@ -36,14 +36,14 @@ class Driven:
         """Command a torque until the condition holds; clear what a busy machine has latched."""
         begun, clear_now_and_then = time.monotonic(), every(1.5, self._clear_stall)
 
-        def pushed():
+        def push_commands():
             assert time.monotonic() < begun + WAIT, self.process.output[-5:]
             self._commands.publish(torque_command_message(0, torque))
             if not (result := condition()):
                 clear_now_and_then()
             return result
 
-        self._listener.until(pushed)
+        self._listener.until(push_commands)
 
     def _clear_stall(self):
         fault = newest_value(self._health, self.name, "fault")

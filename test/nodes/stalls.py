@@ -15,10 +15,10 @@ def every(seconds, act):
     """Return a function that may be called at any rate and acts once in `seconds`, first after them."""
     acted = time.monotonic()
 
-    def called():
+    def call():
         nonlocal acted
         if time.monotonic() - acted > seconds:
             acted = time.monotonic()
             act()
 
-    return called
+    return call

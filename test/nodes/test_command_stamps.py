@@ -39,7 +39,7 @@ def test_a_command_for_a_late_measurement_acts_in_the_next_cycle_all_the_same(pr
         queue.take(cycle + PERIOD // 2)
         acted.append(queue.torque)
         stamp = cycle + (700_000 if k % 10 == 9 else 300_000)
-        program._measured(stamp, Measurement(0.0, 0.0, 0.0), 1)
+        program._measure(stamp, Measurement(0.0, 0.0, 0.0), 1)
         at, torque = program.sent[-1]
         queue.add(at, torque, stamp)
     assert acted == [float(k) for k in range(60)]

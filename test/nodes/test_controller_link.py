@@ -86,15 +86,15 @@ def read(monkeypatch, run, deflections, together=1):
     post, encoder = Post(), SpringEncoder(bench(), RATE)
     monkeypatch.setattr(_measurements, "Mailbox", post)
     inputs = _measurements.Measurements(None, "torque.z", PERIOD, "joint", encoder=encoder)
-    found = []
+    link_states = []
     for k, s in enumerate(run):
         stamp = round(EPOCH + k * PERIOD)
         post["joint_states"].append((stamp, (s.position, s.velocity, 0.0)))
         post["ft"].append((stamp, (s.ft,)))
         post["deflection"] += [(round(stamp + off * PERIOD), (angle,)) for off, angle in deflections(k, s)]
         if (k + 1) % together == 0:
-            found += inputs.take()
-    return encoder, np.array([reading.link for _, reading in found])
+            link_states += inputs.take()
+    return encoder, np.array([reading.link for _, reading in link_states])
 
 
 def truth(run):

@@ -1,4 +1,4 @@
-"""Controller and driver together on the bench on a wire, with the defaults of config/nodes."""
+"""Controller and driver together on a simulated bench, with the defaults of config/nodes."""
 
 import signal
 import time
@@ -80,7 +80,7 @@ def test_the_controller_runs_on_the_drivers_measurements_and_reaches_the_torque(
     wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
     heard = len(wire.wrenches)
     wire.hold(10.0, lambda: len(wire.wrenches) > heard + 1500)
-    assert wire.controller.running() and wire.driver.running()
+    assert wire.controller.is_running() and wire.driver.is_running()
     wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
 
 
@@ -99,7 +99,7 @@ def test_the_controller_never_becomes_unstable(wire):
 def test_the_end_of_the_controller_is_the_end_of_the_torque(wire, listener):
     wire.controller.kill()
     listener.until(lambda: wire.bench.torque()[0] == 0)
-    assert wire.driver.running()
+    assert wire.driver.is_running()
 
 
 def test_the_hangup_of_a_terminal_ends_the_driver_at_zero(wire):

@@ -66,4 +66,4 @@ def test_what_the_work_raises_is_raised_to_whoever_asks():
     cycle.start()
     cycle.thread.join(30.0)
     with pytest.raises(ZeroDivisionError):
-        cycle.running()
+        cycle.is_running()

@@ -49,13 +49,13 @@ class Commanded(Driven):
         """Wait until the motor has all of its torque and no fault is latched."""
         self.torque = 10.0
 
-        def driving():
+        def drive():
             self._listener.until(lambda: True)
             if self.latched():
                 self.clear()
             return self.goal() == (self.counts(10.0), True) and not self.latched()
 
-        self._listener.until(driving)
+        self._listener.until(drive)
 
     def clear(self):
         """Clear the fault, by a reboot where that is necessary; return the answers."""
@@ -67,8 +67,8 @@ class Commanded(Driven):
 
     def children(self):
         """The processes that the driver has started."""
-        found = subprocess.run(["pgrep", "-P", str(self.process.pid)], capture_output=True, text=True)
-        return [int(pid) for pid in found.stdout.split()]
+        process_list = subprocess.run(["pgrep", "-P", str(self.process.pid)], capture_output=True, text=True)
+        return [int(pid) for pid in process_list.stdout.split()]
 
 
 @pytest.fixture(scope="module")

@@ -35,8 +35,8 @@ def test_a_spring_with_a_free_end_is_limited_by_what_ft_measures():
 
 def test_an_angle_that_counts_from_the_motors_zero_is_not_the_springs():
     """The limit of the deflection was that of the joint: one way twice as far, the other not at all."""
-    own = limits(device="dynamixel_netft", position_zero="motor", deflection_limit=0.05)
-    assert math.isinf(own.deflection) and own.ft == pytest.approx(0.05 * 1530.456)
+    own_limits = limits(device="dynamixel_netft", position_zero="motor", deflection_limit=0.05)
+    assert math.isinf(own_limits.deflection) and own_limits.ft == pytest.approx(0.05 * 1530.456)
     felt = limits(device="dynamixel_netft", position_zero="motor", encoder_id=5, ft_host="")
     assert felt.deflection == 0.0873
     with pytest.raises(ParameterError, match=r"deflection_limit = 0\.05 cannot be applied"):
@@ -45,8 +45,8 @@ def test_an_angle_that_counts_from_the_motors_zero_is_not_the_springs():
 
 def test_velocity_power_and_ft_are_limited_by_default_on_every_rig():
     for rig in ("paper_high_impedance", "paper_moving_output", "prototype_knee"):
-        found = limits(rig=rig)
-        assert math.isfinite(found.velocity + found.power + found.ft + found.effort)
+        bounds = limits(rig=rig)
+        assert math.isfinite(bounds.velocity + bounds.power + bounds.ft + bounds.effort)
 
 
 @pytest.mark.parametrize(
@@ -69,5 +69,5 @@ def test_zero_is_no_limit():
 
 
 def test_a_bare_drive_has_the_limits_that_apply_to_it():
-    found = limits(rig="bare_drive", deflection_limit=0.0, ft_limit=0.0, position_limit=0.5)
-    assert found.position == 0.5 and math.isinf(found.ft) and math.isfinite(found.velocity)
+    bounds = limits(rig="bare_drive", deflection_limit=0.0, ft_limit=0.0, position_limit=0.5)
+    assert bounds.position == 0.5 and math.isinf(bounds.ft) and math.isfinite(bounds.velocity)

@@ -143,11 +143,11 @@ def spied(listener, make_driver, monkeypatch):
     program, node = make_driver("spied", values | given)
     publisher = listener.node.create_publisher(JointState, "/spied/torque_command", COMMAND)
 
-    def pushed():
+    def push_commands():
         publisher.publish(torque_command_message(0, 5.0))
         return 5.0 in spy.written
 
-    listener.until(pushed)
+    listener.until(push_commands)
     return spy, program, node
 
 
@@ -178,9 +178,9 @@ def test_a_fault_of_the_device_zeroes_the_torque_until_it_is_cleared(spied, list
     assert told == "fault deviceerror: no answer from ID 1 within 5 ms"
     clear = listener.node.create_client(Trigger, "/spied/spied/clear_fault")
     listener.until(clear.service_is_ready)
-    assert not _called(clear, listener).success
+    assert not _call(clear, listener).success
     spy.fault = None
-    assert _called(clear, listener).success
+    assert _call(clear, listener).success
     assert program.joints[0].guarded.fault is None and spy.on
     assert node._state_machine.current_state[1] == "active"
 
@@ -190,7 +190,7 @@ def test_after_an_exception_the_device_is_closed_at_zero_torque_and_can_be_confi
     spy.fault = ZeroDivisionError("a mistake in the program")
     listener.until(lambda: not spy.opened)
     assert spy.written[-1] == 0.0
-    program.finished()
+    program.is_finished()
     assert node._state_machine.current_state[1] == "unconfigured"
     assert program.joints[0].report()[1] == "a mistake in the program"
     spy.fault = None
@@ -198,7 +198,7 @@ def test_after_an_exception_the_device_is_closed_at_zero_torque_and_can_be_confi
     assert node._state_machine.current_state[1] == "inactive" and spy.opened
 
 
-def _called(client, listener):
+def _call(client, listener):
     """The answer of a service."""
     future = client.call_async(Trigger.Request())
     listener.until(future.done)
@@ -221,7 +221,7 @@ def test_two_actuators_each_follow_only_their_own_commands(listener, monkeypatch
     def pushed():
         for name in spies:
             topic[name].publish(torque_command_message(0, 5.0, "left_knee"))
-        return spies["left"].written[-1:] == [5.0] and made[1][0].joints[0].bench.commands.refused > 3
+        return spies["left"].written[-1:] == [5.0] and made[1][0].joints[0].topics.commands.refused > 3
 
     listener.until(pushed)
     assert not any(spies["right"].written)

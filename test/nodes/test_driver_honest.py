@@ -17,7 +17,7 @@ from rsea_ros.nodes._alarm import SignalListener
 from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._publishers import Obeyed
 from rsea_ros.nodes._qos import COMMAND
-from test.nodes.clock_shim import in_python, preloaded, set_clock
+from test.nodes.clock_shim import in_python, preload, set_clock
 from test.nodes.stalls import is_stall
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,7 +31,7 @@ class Shimmed:
     def __init__(self, bench, listener, folder):
         self.bench, self.listener, self.off, self.step = bench, listener, 0, folder / "step"
         self.set_clock(0)
-        self.preloaded = preloaded(folder, self.step)
+        self.preloaded = preload(folder, self.step)
         program = DRIVER if self.preloaded else in_python() + DRIVER
         values = {**bench.parameters(), "baud": 4_000_000, "autostart": True, "joint": "left_knee"}
         words = [w for k, v in values.items() for w in ("-p", f"{k}:={str(v).lower() if v is True else v}")]
@@ -79,12 +79,12 @@ class Shimmed:
     def push(self, torque, condition, joint="left_knee"):
         """Command a torque until a condition holds."""
 
-        def pushed():
+        def push_commands():
             stamp = time.time_ns() + self.off
             self.commands.publish(torque_command_message(stamp, torque, joint))
             return condition()
 
-        self.listener.until(pushed)
+        self.listener.until(push_commands)
 
     def drive(self):
         """Command 10 N m until the motor has a torque; clear what a busy machine has latched."""

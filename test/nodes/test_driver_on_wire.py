@@ -1,4 +1,4 @@
-"""The driver node on the bench on a wire: what it publishes, its services, zero torque on every way out."""
+"""The driver node on a simulated bench: what it publishes, its services, zero torque on every way out."""
 
 import signal
 import subprocess
@@ -121,7 +121,7 @@ LISTENER = (
 )
 
 
-def _undisturbed(wire):
+def _is_undisturbed(wire):
     """Whether commands reach the motor and no fault is latched meanwhile."""
     cleared = len(wire.cleared)
     for torque in (20.0, 10.0, 20.0, 10.0):
@@ -141,7 +141,7 @@ def test_a_stopped_listener_holds_up_nobody(wire, listener):
         wire.drive()
         held.send_signal(signal.SIGSTOP)
         # A busy machine latches a fault now and then; a driver that waits for its listener does each time.
-        assert any(_undisturbed(wire) for _ in range(3)), wire.cleared
+        assert any(_is_undisturbed(wire) for _ in range(3)), wire.cleared
     finally:
         held.kill()
         held.wait()

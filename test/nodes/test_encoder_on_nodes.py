@@ -63,13 +63,13 @@ def loop(start, listener, rigs):
 def run(loop):
     """A sine in the middle of which the encoder dies: errors with and without it, and when that was."""
     for _ in range(4):
-        with_it, without, link = followed(loop)
+        with_it, without, link = follow_sine(loop)
         if "before" in link and with_it < 0.05 and np.diff(commands(loop, link["at"])[0]).max() < 1.5 / RATE:
             break  # else the machine stalled
     return with_it, without, link
 
 
-def followed(loop):
+def follow_sine(loop):
     """Follow the sine; return the median error with the encoder and without, and what was seen of it."""
     loop.encoder.alive, link = True, {}
     errors = loop.sine(AMPLITUDE, HZ, SECONDS, lambda t: follow(loop, t, link))

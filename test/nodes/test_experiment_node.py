@@ -12,7 +12,7 @@ from rsea_ros.experiment.run_shape import Shape, command_of
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.nodes._qos import COMMAND
-from rsea_ros.nodes.excite import planned
+from rsea_ros.nodes.excite import plan
 from rsea_ros.signals import Channel
 
 RIG = "paper_high_impedance"
@@ -59,12 +59,12 @@ def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(bench, start, l
     def says(text):
         return any(text in s.message for m in health for s in m.status if "experiment" in s.name)
 
-    listener.until(lambda: says("waits for ~/approve") or not node.running())
-    assert node.running() and not commands, node.output
+    listener.until(lambda: says("waits for ~/approve") or not node.is_running())
+    assert node.is_running() and not commands, node.output
     assert ask("approve").success
     listener.until(lambda: sum(m.effort[0] != 0.0 for m in commands) > 60)
     assert ask("cancel").success
-    listener.until(lambda: not node.running())
+    listener.until(lambda: not node.is_running())
     assert node.wait() == 0, node.output
     efforts = np.array([m.effort[0] for m in commands])
     ends = np.flatnonzero(efforts)[-1]
@@ -79,5 +79,5 @@ def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(bench, start, l
 def test_excite_plays_the_file_of_a_run(tmp_path):
     command = command_of(Shape("multisine", 4.0), 0.5, RATE)
     (tmp_path / "run.csv").write_text(run_text(command, RATE), encoding="utf-8")
-    played, rate = planned({"file": str(tmp_path / "run.csv")})
+    played, rate = plan({"file": str(tmp_path / "run.csv")})
     assert played == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)

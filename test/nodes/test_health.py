@@ -32,15 +32,15 @@ def heard(listener):
     return inputs, ring, state, command, ft
 
 
-def taken(inputs, listener, count):
+def take_all(inputs, listener, count):
     """Everything that is complete, once some messages have come."""
     rows = []
 
-    def come():
+    def has_come():
         rows.append(inputs.take())
         return sum(inputs.counts.values()) + inputs.refused >= count
 
-    listener.until(come)
+    listener.until(has_come)
     return tuple(np.concatenate(parts) for parts in zip(*rows, strict=True))
 
 
@@ -53,7 +53,7 @@ def test_events_are_sorted_strangers_are_refused_and_bags_can_be_read(heard, lis
         command.publish(joint_state_message(stamp, 0.0, 0.0, 1.0))
     state.publish(joint_state_message(EPOCH, 0.0, 0.0, 0.0, joint="elbow"))
     command.publish(joint_state_message(EPOCH, 0.0, 0.0, math.inf))
-    t, kind, values = taken(inputs, listener, 302)
+    t, kind, values = take_all(inputs, listener, 302)
     assert np.all(np.diff(t) >= 0.0) and len(t) > 3 * 60 and set(kind) == {0, 1, 2}
     assert np.isnan(values[kind == 0, 0]).sum() == 1 and inputs.refused == 2
     keeper = Keeper(ring, tmp_path / "kept", 1, 0.0)
@@ -90,11 +90,13 @@ def test_memory_is_bounded_in_time_and_size():
 
 def test_every_code_has_a_status_of_its_own(listener):
     nan = math.nan
-    found = [
+    node_statuses = [
         HealthFinding("RSEA_BACKLASH", "backlash.gap", "rad", 4e-3, (3.9e-3, 4.1e-3), 2.0, 0.99),
         HealthFinding("RSEA_SENSOR_FROZEN", "ft", "", nan, (nan, nan), 1.0, 1.0),
     ]
-    publisher = FindingsPublisher(listener.node, "knee", lambda: found, lambda t: EPOCH + round(t * 1e9))
+    publisher = FindingsPublisher(
+        listener.node, "knee", lambda: node_statuses, lambda t: EPOCH + round(t * 1e9)
+    )
     messages = []
     publisher._publisher.publish = messages.append
     publisher.publish()

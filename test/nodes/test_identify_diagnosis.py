@@ -37,7 +37,7 @@ def identify(bag, start, listener, tmp_path_factory):
     out = tmp_path_factory.mktemp("identify")
     node = start("identify", rig=RIG, out=out, reliable=True, stay=True, quiet=0.2)
     replay = start("replay", bag=bag, rate=10.0, subscribers=1)
-    listener.until(lambda: not replay.running())
+    listener.until(lambda: not replay.is_running())
     assert replay.wait() == 0, replay.output
     return node, out
 
@@ -62,7 +62,7 @@ def test_the_answer_is_the_verdict_and_other_calls_are_answered_meanwhile(identi
     heard = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
     first, second = ask("diagnose"), ask("diagnose")
     listener.until(second.done)
-    assert not first.done() and node.running()
+    assert not first.done() and node.is_running()
     assert not second.result().success and "a diagnosis is under way" in second.result().message
 
     listener.until(first.done)
@@ -88,7 +88,7 @@ def test_the_answer_is_the_verdict_and_other_calls_are_answered_meanwhile(identi
 
 def test_the_node_stays_until_it_is_told_to_finish(identify, ask, listener):
     node, out = identify
-    assert node.running()
+    assert node.is_running()
     listener.until(ask("finish").done)
     assert node.wait() == 0, node.output
     assert (out / "identification.json").exists()

@@ -94,7 +94,7 @@ def test_replay_keeps_stamps_and_gives_identify_everything(bag, start, listener,
     replay = start("replay", bag=bag, rate=10.0, subscribers=2)
     epoch = read_record(bag).epoch_ns
     expected = epoch + np.rint(read_record(bag)["position"].t * 1e9).astype(np.int64)
-    listener.until(lambda: not replay.running() and len(states) >= len(expected))
+    listener.until(lambda: not replay.is_running() and len(states) >= len(expected))
     listener.forget()
     assert replay.wait() == 0, replay.output
     rows = [row for row in iterate(bag) if row[0] in TOPICS]
@@ -106,10 +106,10 @@ def test_replay_keeps_stamps_and_gives_identify_everything(bag, start, listener,
     gathered = next(line for line in identify.output if "identifying from" in line)
     for topic in TOPICS:
         assert f"{sum(row[0] == topic for row in rows)} {topic.rpartition('/')[2]}" in gathered
-    found = load_rig(tmp_path / "model.yaml")
+    identified = load_rig(tmp_path / "model.yaml")
     for name in load_rig(RIG).free():
-        low, high = found.quantities[name].ci95
-        assert abs(found[name] - load_rig(RIG)[name]) < high - low
+        low, high = identified.quantities[name].ci95
+        assert abs(identified[name] - load_rig(RIG)[name]) < high - low
 
 
 def test_excite_interrupted_ends_with_zero_and_says_so(start, listener):

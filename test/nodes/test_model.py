@@ -64,8 +64,8 @@ class Heard:
 
     def status(self):
         """The newest status of the node."""
-        own = [s for m in self._health for s in m.status if s.name == "/rsea/model"]
-        return own[-1] if own else None
+        statuses = [s for m in self._health for s in m.status if s.name == "/rsea/model"]
+        return statuses[-1] if statuses else None
 
     def values(self):
         """Its values."""

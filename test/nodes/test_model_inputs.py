@@ -13,10 +13,12 @@ from msg_adapters.ros import (
 )
 from rsea_ros.model.observer import Observer, noise_of
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._model_inputs import ModelInputs
+from rsea_ros.nodes._model_inputs import InputSettings, ModelInputs
 from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._stopped_sensors import StoppedSensors
 
 RIG = load_rig("paper_high_impedance")
+READ = InputSettings(0.02, "torque.z", True)
 EPOCH, PERIOD = 1_700_000_000_000_000_000, 1e9 / 280.0
 
 
@@ -24,9 +26,8 @@ EPOCH, PERIOD = 1_700_000_000_000_000_000, 1e9 / 280.0
 def heard(listener):
     """Inputs on topics of this process, and publishers of them."""
     node = listener.node
-    inputs = ModelInputs(
-        node, Observer(RIG), 0.02, "torque.z", True, joint="joint", ft_noise=noise_of(RIG).ft
-    )
+    stopped = StoppedSensors(noise_of(RIG).ft)
+    inputs = ModelInputs(node, Observer(RIG), stopped, InputSettings(0.02, "torque.z", True, "joint"))
     state, ft = (
         node.create_publisher(kind, topic, COMMAND)
         for kind, topic in ((JointState, "joint_states"), (WrenchStamped, "ft"))
@@ -54,12 +55,12 @@ def test_frozen_joint_states_are_left_out_and_reported(heard, listener):
 
             listener.until(arrived)
         if k == 85:
-            assert inputs.frozen == []
-    assert inputs.frozen == ["joint_states"]
+            assert inputs.stopped.frozen == []
+    assert inputs.stopped.frozen == ["joint_states"]
     assert estimates[-1][1].distal == pytest.approx(torque, abs=0.5)
 
 
-def fed(listener, inputs, publishers, samples):
+def feed(listener, inputs, publishers, samples):
     """Publish samples of command, (position, effort) and torque, and have them taken."""
     for start in range(0, len(samples), 20):
         some, count = samples[start : start + 20], 0
@@ -69,12 +70,12 @@ def fed(listener, inputs, publishers, samples):
             publishers["joint_states"].publish(joint_state_message(stamp, state[0], 0.0, state[1]))
             publishers["ft"].publish(wrench_message(stamp, torque))
 
-        def arrived():
+        def has_arrived():
             nonlocal count
             count += sum(1 for _ in inputs.take())
-            return count >= len(some) or inputs.frozen  # noqa: B023  called at once
+            return count >= len(some) or inputs.stopped.frozen  # noqa: B023  called at once
 
-        listener.until(arrived)
+        listener.until(has_arrived)
 
 
 @pytest.fixture
@@ -84,7 +85,7 @@ def inputs_of(listener):
 
     def make(**more):
         node = listener.node
-        inputs = ModelInputs(node, Observer(RIG), 0.02, "torque.z", True, ft_noise=0.03, **more)
+        inputs = ModelInputs(node, Observer(RIG), StoppedSensors(0.03, **more), READ)
         kinds = {"torque_command": JointState, "joint_states": JointState, "ft": WrenchStamped}
         made.extend(node.create_publisher(kind, topic, COMMAND) for topic, kind in kinds.items())
         publishers = dict(zip(kinds, made[-3:], strict=True))
@@ -101,18 +102,18 @@ def test_states_that_stand_still_while_commands_move_are_noticed(listener, input
     inputs, publishers = inputs_of()
     torques = [0.0] * 60 + [8.0 * math.sin(0.1 * k) for k in range(60)]
     samples = [(u, (0.001, 0.1), 1.0 + 0.01 * (-1) ** k) for k, u in enumerate(torques)]
-    fed(listener, inputs, publishers, samples[:60])
-    assert not inputs.unmoved
-    fed(listener, inputs, publishers, samples)
-    assert inputs.unmoved and inputs.frozen == []
+    feed(listener, inputs, publishers, samples[:60])
+    assert not inputs.stopped.unmoved
+    feed(listener, inputs, publishers, samples)
+    assert inputs.stopped.unmoved and inputs.stopped.frozen == []
 
 
 def test_a_torque_from_an_encoder_may_stand_still_as_long_as_the_joint_does(listener, inputs_of):
     """Of a machine at rest it was said that its sensor had stopped."""
-    inputs, publishers = inputs_of(steps=True, stiffness=RIG["spring.stiffness"])
+    inputs, publishers = inputs_of(ft_repeats=True, stiffness=RIG["spring.stiffness"])
     still = [(0.0, (0.001, 0.0), 1.53)] * 60
-    fed(listener, inputs, publishers, still)
-    assert inputs.frozen == []
+    feed(listener, inputs, publishers, still)
+    assert inputs.stopped.frozen == []
     moving = [(0.0, (0.001 + 1e-4 * k, 0.0), 1.53) for k in range(60)]
-    fed(listener, inputs, publishers, [*still, *moving])
-    assert inputs.frozen == ["ft"]
+    feed(listener, inputs, publishers, [*still, *moving])
+    assert inputs.stopped.frozen == ["ft"]

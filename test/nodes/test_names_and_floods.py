@@ -11,7 +11,7 @@ from msg_adapters.ros import JointState, Trigger, WrenchStamped, stamp_of, torqu
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._bench import MOST, NAMES, Bench
+from rsea_ros.nodes._bench_topics import MOST, NAMES, BenchTopics
 from rsea_ros.nodes._flags import Flags
 from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
 from test.nodes.test_driver import Spy
@@ -49,7 +49,7 @@ def test_joint_frames_and_quality_of_service_are_parameters(drive, listener):
 def test_a_cycle_takes_a_bounded_number_of_commands_and_the_newest_acts(listener, monkeypatch):
     """20 kHz of commands stopped the cycle for as long as they lasted."""
     names = {parameter.name: parameter.default for parameter in NAMES}
-    bench, anchor = Bench(listener.node, names, strict=True), Anchor()
+    bench, anchor = BenchTopics(listener.node, names, strict=True), Anchor()
     publisher = listener.node.create_publisher(JointState, "torque_command", COMMAND)
     listener.until(publisher.get_subscription_count)
     for k in range(1000):
@@ -58,13 +58,13 @@ def test_a_cycle_takes_a_bounded_number_of_commands_and_the_newest_acts(listener
     monkeypatch.setattr(bench.commands, "add", lambda *command: (taken.append(command[1]), add(*command)))
     counts = []
 
-    def polled():
+    def poll():
         before = len(taken)
         bench.poll(anchor)
         counts.append(len(taken) - before)
         return taken and taken[-1] == 999.0
 
-    listener.until(polled)
+    listener.until(poll)
     assert max(counts) <= MOST
     bench.commands.take(anchor.now())
     assert bench.commands.torque == 999.0

@@ -42,11 +42,11 @@ def test_the_deflection_is_published_also_as_an_ft_marked_as_such(drive, listene
     deflections = listener.hear(JointState, "/toy/deflection", MEASUREMENT)
     commands = listener.node.create_publisher(JointState, "/toy/torque_command", COMMAND)
 
-    def pushed():
+    def push_commands():
         commands.publish(torque_command_message(0, 10.0))
         return wrenches and wrenches[-1].wrench.torque.y < -15.0 and deflections[-1].position[0] > 0.0099
 
-    listener.until(pushed)
+    listener.until(push_commands)
     assert (deflections[-1].name, list(deflections[-1].position)) == (["joint"], [0.01])
     assert not deflections[-1].velocity and deflections[-1].header.frame_id == "spring_deflection"
     assert wrench_of(wrenches[-1])[1] == 0.0, "torque.z"

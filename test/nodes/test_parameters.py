@@ -13,7 +13,7 @@ import yaml
 from rsea_ros.errors import ParameterError
 from rsea_ros.interrupts import STOPPING
 from rsea_ros.nodes._parameters import NodeParameter, _refuse_unknown
-from test.nodes.conftest import written
+from test.nodes.conftest import as_argument
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
 NODES = (
@@ -43,13 +43,13 @@ FLAG = NodeParameter("flag", False, "whether")
 )
 def test_a_value_that_does_not_fit_is_refused(parameter, value, message):
     with pytest.raises(ParameterError, match=message):
-        parameter.checked(value)
+        parameter.check(value)
 
 
 def test_a_value_that_fits_comes_in_its_type():
-    assert RATE.checked(280) == 280.0 and isinstance(RATE.checked(280), float)
-    assert (RATE.checked(10.0), RATE.checked(1000.0), COUNT.checked(0)) == (10.0, 1000.0, 0)
-    assert KIND.checked("b") == "b" and FLAG.checked(True) is True
+    assert RATE.check(280) == 280.0 and isinstance(RATE.check(280), float)
+    assert (RATE.check(10.0), RATE.check(1000.0), COUNT.check(0)) == (10.0, 1000.0, 0)
+    assert KIND.check("b") == "b" and FLAG.check(True) is True
 
 
 @pytest.mark.parametrize("name", NODES)
@@ -58,7 +58,7 @@ def test_parameter_file_and_table_agree(name):
     table = importlib.import_module(f"rsea_ros.nodes.{name}").TABLE
     assert document["/**"]["ros__parameters"] == {p.name: p.default for p in table}
     for parameter in table:
-        assert parameter.checked(parameter.default) == parameter.default
+        assert parameter.check(parameter.default) == parameter.default
         assert parameter.description
 
 
@@ -87,10 +87,10 @@ def test_a_process_refuses_what_is_wrong_in_one_line_with_status_2(start):
     processes = {name: start(name, **WRONG[name][0]) for name in PROCESSES}
     for name, process in processes.items():
         assert process.wait() == 2, name
-        refused(name, process.output)
+        assert_refused(name, process.output)
 
 
-def refused(name, lines):
+def assert_refused(name, lines):
     assert len(lines) == 1, lines
     assert WRONG[name][1] in lines[0]
     assert "FATAL" in lines[0]
@@ -107,10 +107,10 @@ def signals():
 
 @pytest.mark.parametrize("name", sorted(WRONG.keys() - set(PROCESSES)))
 def test_every_node_refuses_what_is_wrong_in_one_line_with_status_2(name, signals, monkeypatch, capfd):
-    words = [w for key, value in WRONG[name][0].items() for w in ("-p", f"{key}:={written(value)}")]
+    words = [w for key, value in WRONG[name][0].items() for w in ("-p", f"{key}:={as_argument(value)}")]
     monkeypatch.setattr(sys, "argv", [name, "--ros-args", *words])
     assert importlib.import_module(f"rsea_ros.nodes.{name}").main() == 2
-    refused(name, "".join(capfd.readouterr()).splitlines())
+    assert_refused(name, "".join(capfd.readouterr()).splitlines())
 
 
 def test_a_node_that_is_interrupted_while_it_imports_says_so_in_one_line():

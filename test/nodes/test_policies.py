@@ -34,10 +34,10 @@ def test_only_listed_nodes_may_move_the_machine(plural, verb, name, allowed):
     profiles = {p.get("node"): p for p in XML.parse(FILE).iter("profile")}
     assert set(profiles) == {*_policies.NODES, _policies.OPERATOR}
 
-    def named(profile):
+    def topics_of(profile):
         return [e.text for e in profile.iterfind(f"{plural}[@{verb}='ALLOW']/*")]
 
-    assert {node for node, profile in profiles.items() if name in named(profile)} == allowed
+    assert {node for node, profile in profiles.items() if name in topics_of(profile)} == allowed
 
 
 def test_joints_have_nodes_in_namespaces_that_command_their_own_joint_alone(monkeypatch):

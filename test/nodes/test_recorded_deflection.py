@@ -8,7 +8,7 @@ from msg_adapters import BagWriter, read_record
 from msg_adapters.ros import deflection_message, torque_command_message, wrench_message
 from msg_adapters.topic_map import FIELDS, ROLES, TYPES
 from rsea_ros.nodes import record
-from rsea_ros.nodes._bench import SPRING_FRAME
+from rsea_ros.nodes._bench_topics import SPRING_FRAME
 
 START = 1_700_000_000 * 10**9
 

@@ -35,7 +35,7 @@ PATIENT = {
 def values_of(**given):
     """The values of a driver node with parameters, as `declare` makes them."""
     table = [*driver.TABLE, *joint_table(driver.TABLE, given)]
-    return {p.name: p.checked(given.get(p.name, p.default)) for p in table}
+    return {p.name: p.check(given.get(p.name, p.default)) for p in table}
 
 
 def test_a_parameter_not_given_for_a_joint_is_that_of_the_node():
@@ -95,14 +95,14 @@ class Leg:
         """Command torques until the condition holds; clear what a machine that stands still has latched."""
         clear_now_and_then = every(2.0, self.clear_stalls)
 
-        def pushed():
-            assert self.process.running(), self.process.output[-5:]
+        def push_commands():
+            assert self.process.is_running(), self.process.output[-5:]
             clear_now_and_then()
             for joint, torque in torques.items():
                 self.commands[joint].publish(torque_command_message(time.time_ns(), torque, joint))
             return condition()
 
-        self.listener.until(pushed)
+        self.listener.until(push_commands)
 
     def clear_stalls(self):
         """Clear the faults of joints that no test here provokes."""
@@ -235,11 +235,11 @@ class Strict(Leg):
         """Wait until every motor has a torque and no fault is latched; clear what a stall has latched."""
         clear_now_and_then = every(0.5, lambda: self.call("clear_fault"))
 
-        def driving():
+        def drive():
             clear_now_and_then()
             return all(self.goals()) and set(self.faults()) == {"none"}
 
-        self.listener.until(driving)
+        self.listener.until(drive)
 
 
 @pytest.fixture(scope="module")

@@ -72,7 +72,7 @@ def address(watch, listener):
     return listener.until(lambda: next((line[5:] for line in watch.output if line.startswith("open ")), None))
 
 
-def recorded(state):
+def recorder_status(state):
     """What the node record says that it has got."""
     return {key for each in state["health"] if "record" in each["name"] for key, _ in each["values"]}
 
@@ -82,7 +82,7 @@ def test_a_page_sees_commands_and_records(bench, listener):
     watch, out = bench
     commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
 
-    async def played():
+    async def play():
         page = await Page(address(watch, listener), asyncio.get_running_loop()).connect()
         await page.until(lambda: page.state.get("command", {}).get("why_not") == "" and "ft" in page.last)
         assert page.state["command"]["limit"] == 10.0
@@ -92,7 +92,7 @@ def test_a_page_sees_commands_and_records(bench, listener):
         page.held = HOLD
         await page.until(lambda: page.last["motor"] > 0.9 * AMPLITUDE)
         await page.until(lambda: page.last["command"] == AMPLITUDE)
-        await page.until(lambda: {"torque_command", "ft"} <= recorded(page.state))
+        await page.until(lambda: {"torque_command", "ft"} <= recorder_status(page.state))
         assert page.state["rates"]["ft"] > 100 and not page.errors
         page.close()  # the phone is gone while it holds the command
         again = await Page(address(watch, listener), asyncio.get_running_loop()).connect()
@@ -103,7 +103,7 @@ def test_a_page_sees_commands_and_records(bench, listener):
         await again.until(lambda: "recordings" in again.state and not again.state["recordings"][0]["running"])
         again.close()
 
-    asyncio.run(played())
+    asyncio.run(play())
     listener.until(lambda: commands and commands[-1].effort[0] == 0.0)
     assert max(m.effort[0] for m in commands) <= AMPLITUDE
     (bag,) = out.iterdir()
@@ -115,7 +115,7 @@ def test_only_one_page_commands_at_a_time(bench, listener):
     watch, _ = bench
     other = listener.node.create_publisher(JointState, "/rsea/torque_command", COMMAND)
 
-    async def refused():
+    async def assert_refused():
         page = await Page(address(watch, listener), asyncio.get_running_loop()).connect()
         await page.until(lambda: "listener commands already" in str(page.state.get("command")))
         await page.send(**HOLD)
@@ -123,7 +123,7 @@ def test_only_one_page_commands_at_a_time(bench, listener):
         page.close()
         return page.errors
 
-    assert "/listener commands already" in asyncio.run(refused())[0]
+    assert "/listener commands already" in asyncio.run(assert_refused())[0]
     listener.node.destroy_publisher(other)
 
 

@@ -8,7 +8,7 @@ from fleet_histories import DAY, START, cause, history, recordings
 
 from rsea_ros.trends import alarms, fleet_trends
 from rsea_ros.trends.ranking import by_joint
-from rsea_ros.trends.significance import adjusted, scan_p, scan_threshold
+from rsea_ros.trends.significance import adjust, scan_p, scan_threshold
 
 JOINTS = tuple("abcdefgh")
 QUIET = history(np.random.default_rng(0), joints=JOINTS, days=60, each=1)
@@ -39,9 +39,9 @@ def test_a_cause_that_all_joints_have_is_no_alarm():
 
 def test_a_cause_of_one_joint_from_its_first_recording_is_an_alarm():
     names = recordings(JOINTS, 60, causes=lambda j, d: [cause("backlash", 2e-3)] if j == "b" else [])
-    (found,) = fleet_trends(QUIET, names).appearances
-    assert found.from_first
-    assert found.joint == "b"
+    (causes,) = fleet_trends(QUIET, names).appearances
+    assert causes.from_first
+    assert causes.joint == "b"
 
 
 def test_a_name_given_in_error_now_and_then_is_no_alarm():
@@ -51,8 +51,8 @@ def test_a_name_given_in_error_now_and_then_is_no_alarm():
 
 
 def test_two_days_that_name_it_are_not_enough():
-    found = [cause("backlash", 2e-3)]
-    names = recordings(JOINTS, 9, causes=lambda j, d: found if j == "c" and d >= 7 else [])
+    causes = [cause("backlash", 2e-3)]
+    names = recordings(JOINTS, 9, causes=lambda j, d: causes if j == "c" and d >= 7 else [])
     assert alarms(QUIET, names) == ()
 
 
@@ -115,7 +115,7 @@ def test_an_ongoing_change_comes_before_bad_data():
 
 def test_the_false_discovery_rate_is_that_of_benjamini_and_hochberg():
     p = np.array([0.01, 0.04, 0.03, 0.005, 0.8])
-    assert adjusted(p) == pytest.approx([0.025, 0.05, 0.05, 0.025, 0.8])
+    assert adjust(p) == pytest.approx([0.025, 0.05, 0.05, 0.025, 0.8])
 
 
 @pytest.mark.parametrize("rate", [0.05, 0.01, 1e-5])

@@ -24,9 +24,9 @@ def day(time_s):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_step_of_three_day_effects_is_found_at_its_date_with_its_size(seed):
-    found = trend(seed, course=lambda joint, d: -0.018 * (d >= 120))
-    (change,) = found.changes
-    assert (found.state, change.kind) == ("changed", "step")
+    result = trend(seed, course=lambda joint, d: -0.018 * (d >= 120))
+    (change,) = result.changes
+    assert (result.state, change.kind) == ("changed", "step")
     assert abs(day(change.since_s) - 120.0) <= 3.0
     assert change.size.low < -0.018 * 1500.0 < change.size.high
 
@@ -34,8 +34,8 @@ def test_a_step_of_three_day_effects_is_found_at_its_date_with_its_size(seed):
 def test_the_intervals_of_a_steps_date_and_size_hold_the_truth_as_often_as_they_say():
     inside = []
     for seed in range(40):
-        found = trend(seed, days=120, each=1, course=lambda joint, d: 0.03 * (d >= 50))
-        change = found.changes[0]
+        result = trend(seed, days=120, each=1, course=lambda joint, d: 0.03 * (d >= 50))
+        change = result.changes[0]
         in_dates = day(change.earliest_s) <= 50.0 <= day(change.latest_s) + 1.0
         inside.append((in_dates, change.size.low < 45.0 < change.size.high))
     assert np.all(np.mean(inside, axis=0) > 0.84)  # 95 % of 40, less three standard deviations
@@ -44,10 +44,10 @@ def test_the_intervals_of_a_steps_date_and_size_hold_the_truth_as_often_as_they_
 def test_wear_is_a_trend_with_its_onset_its_slope_and_the_time_to_its_limit():
     inside = []
     for seed in range(18):
-        found = trend(seed, days=200, each=1, course=lambda joint, d: -1e-3 * np.clip(d - 100, 0, None))
-        (change,) = found.changes
-        assert (found.state, change.kind) == ("trending", "ramp")
-        slope, limit = found.per_year, [day(t) for t in found.to_limit_s[1:]]
+        result = trend(seed, days=200, each=1, course=lambda joint, d: -1e-3 * np.clip(d - 100, 0, None))
+        (change,) = result.changes
+        assert (result.state, change.kind) == ("trending", "ramp")
+        slope, limit = result.per_year, [day(t) for t in result.to_limit_s[1:]]
         inside.append((
             day(change.earliest_s) <= 100.0 <= day(change.latest_s),
             slope.low < -1e-3 * 365.25 * 1500.0 < slope.high,
@@ -57,23 +57,23 @@ def test_wear_is_a_trend_with_its_onset_its_slope_and_the_time_to_its_limit():
 
 
 def test_wear_that_a_new_part_ends_is_two_changes():
-    found = trend(1, course=lambda joint, d: np.where(d < 150, -0.1 * np.clip((d - 50) / 100, 0, 1), 0.04))
-    assert [c.kind for c in found.changes] == ["ramp", "step"]
-    assert abs(day(found.changes[1].since_s) - 150.0) <= 2.0
+    result = trend(1, course=lambda joint, d: np.where(d < 150, -0.1 * np.clip((d - 50) / 100, 0, 1), 0.04))
+    assert [c.kind for c in result.changes] == ["ramp", "step"]
+    assert abs(day(result.changes[1].since_s) - 150.0) <= 2.0
 
 
 def test_noise_alone_is_called_a_change_no_oftener_than_stated():
     joints = [f"j{k:03d}" for k in range(150)]
     made = history(np.random.default_rng(5), joints=joints, days=100)
-    found = fleet_trends(made, NOTHING)
-    assert found.tests == 150
-    assert sum(t.state != "steady" for t in found.trends.values()) <= 1
+    result = fleet_trends(made, NOTHING)
+    assert result.tests == 150
+    assert sum(t.state != "steady" for t in result.trends.values()) <= 1
 
 
 def test_a_large_day_effect_is_not_called_a_change():
-    found = trend(2, sd=0.002, day_sd=0.03, each=6, days=60)
-    assert found.state == "steady"
-    assert 0.02 * 1500.0 < found.day_sd < 0.04 * 1500.0
+    result = trend(2, sd=0.002, day_sd=0.03, each=6, days=60)
+    assert result.state == "steady"
+    assert 0.02 * 1500.0 < result.day_sd < 0.04 * 1500.0
 
 
 def season(d, rng):
@@ -85,10 +85,10 @@ def test_a_season_is_not_called_wear_and_wear_beside_it_is_found():
         np.random.default_rng(3), joints="abcdef", per_kelvin=-0.003, temperature=season,
         course=lambda joint, d: -0.06 * np.clip((d - 100) / 150, 0, 1) * (joint == "d"),
     )  # fmt: skip
-    found = fleet_trends(made, NOTHING)
-    states = [t.state for t in found.trends.values()]
+    result = fleet_trends(made, NOTHING)
+    states = [t.state for t in result.trends.values()]
     assert states == ["steady"] * 3 + ["trending"] + ["steady"] * 2
-    assert found.per_kelvin["spring.stiffness"][0] == pytest.approx(-0.003, rel=0.05)
+    assert result.per_kelvin["spring.stiffness"][0] == pytest.approx(-0.003, rel=0.05)
 
 
 def test_one_wild_recording_raises_no_alarm():
@@ -98,15 +98,15 @@ def test_one_wild_recording_raises_no_alarm():
 
 
 def test_too_little_excitation_is_a_result_with_its_reason():
-    found = trend(0, told=0.02, days=100)
-    assert found.state == "undetermined"
-    assert "recordings determine it" in found.reason
+    result = trend(0, told=0.02, days=100)
+    assert result.state == "undetermined"
+    assert "recordings determine it" in result.reason
 
 
 def test_intervals_as_wide_as_the_value_show_nothing():
-    found = trend(0, sd=3.0, days=20)
-    assert found.state == "undetermined"
-    assert "would show" in found.reason
+    result = trend(0, sd=3.0, days=20)
+    assert result.state == "undetermined"
+    assert "would show" in result.reason
 
 
 def test_a_history_without_a_column_is_refused_by_name():
@@ -118,5 +118,5 @@ def test_a_history_without_a_column_is_refused_by_name():
 
 def test_an_empty_store_has_no_trends():
     made = {n: c[:0] for n, c in history(np.random.default_rng(0), days=2).items()}
-    found = fleet_trends(made, {n: c[:0] for n, c in NOTHING.items()})
-    assert (dict(found.trends), found.appearances, found.outliers) == ({}, (), ())
+    result = fleet_trends(made, {n: c[:0] for n, c in NOTHING.items()})
+    assert (dict(result.trends), result.appearances, result.outliers) == ({}, (), ())

@@ -29,7 +29,7 @@ class Browser:
         self._number = 0
         words = [CHROMIUM, *FLAGS, f"--user-data-dir={folder}", "about:blank"]
         self._process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        port = _awaited(lambda: (folder / "DevToolsActivePort").read_text().partition("\n")[0])
+        port = _wait_for(lambda: (folder / "DevToolsActivePort").read_text().partition("\n")[0])
         pages = json.load(urllib.request.urlopen(f"http://127.0.0.1:{port}/json"))
         (page,) = [p for p in pages if p["type"] == "page"]
         self._socket = self._done(lambda: websocket_connect(page["webSocketDebuggerUrl"]))
@@ -81,7 +81,7 @@ class Browser:
 
     def until(self, expression, seconds=WAIT):
         """Wait until an expression is true in the page."""
-        return _awaited(lambda: self.value(f"Boolean({expression})"), seconds, expression)
+        return _wait_for(lambda: self.value(f"Boolean({expression})"), seconds, expression)
 
     def picture(self, path, dark=False):
         """Write the whole page as PNG."""
@@ -102,7 +102,7 @@ class Browser:
         self._process.wait(10)
 
 
-def _awaited(ask, seconds=WAIT, what="an answer"):
+def _wait_for(ask, seconds=WAIT, what="an answer"):
     deadline = time.monotonic() + seconds
     while True:
         try:

@@ -12,7 +12,7 @@ STEP = 1.0 / 280.0
 BOUNDS = Bounds(torque=10.0, slew=2000.0, growth=20.0)
 
 
-def played(commander, begin, seconds, wish=None, who="page"):
+def play_wishes(commander, begin, seconds, wish=None, who="page"):
     """Return time and torque of each cycle; the page repeats its wish every 0.1 s."""
     rows, beat = [], -math.inf
     for k in range(round(seconds / STEP)):
@@ -29,12 +29,12 @@ def values(rows):
 
 
 def test_nothing_is_published_until_somebody_holds_the_command():
-    assert set(values(played(Commander(BOUNDS), 0.0, 0.5))) == {None}
+    assert set(values(play_wishes(Commander(BOUNDS), 0.0, 0.5))) == {None}
 
 
 @pytest.mark.parametrize("wish", [Wish("constant", -8.0), Wish("sine", 8.0, 3.0), Wish("chirp", 8.0, 20.0)])
 def test_the_command_starts_softly_and_stays_within_the_limit(wish):
-    rows = values(played(Commander(BOUNDS), 0.0, 45.0, wish))
+    rows = values(play_wishes(Commander(BOUNDS), 0.0, 45.0, wish))
     assert max(abs(v) for v in rows) == pytest.approx(8.0, rel=0.01)
     for k in range(100):
         assert abs(rows[k]) <= BOUNDS.growth * k * STEP + 1e-9
@@ -45,8 +45,8 @@ def test_the_command_starts_softly_and_stays_within_the_limit(wish):
 @pytest.mark.parametrize("wish", [Wish("constant", 8.0), Wish("sine", 8.0, 3.0)])
 def test_without_a_heartbeat_the_torque_is_zero_and_then_ceases(wish):
     commander = Commander(BOUNDS)
-    rows = played(commander, 0.0, 2.0, wish)
-    after = played(commander, rows[-1][0] + STEP, PATIENCE + RELEASE + CLOSING + 0.1)
+    rows = play_wishes(commander, 0.0, 2.0, wish)
+    after = play_wishes(commander, rows[-1][0] + STEP, PATIENCE + RELEASE + CLOSING + 0.1)
     late = [v for t, v in after if t > rows[-1][0] + PATIENCE + RELEASE + 2 * STEP]
     assert set(late) == {0.0, None} and late[-1] is None
     assert values(after).count(0.0) >= CLOSING / STEP - 2
@@ -54,7 +54,7 @@ def test_without_a_heartbeat_the_torque_is_zero_and_then_ceases(wish):
 
 def test_after_release_the_torque_reaches_zero_in_time():
     commander = Commander(BOUNDS)
-    end = played(commander, 0.0, 2.0, Wish("constant", 8.0))[-1][0]
+    end = play_wishes(commander, 0.0, 2.0, Wish("constant", 8.0))[-1][0]
     commander.release("another")
     assert commander.torque(end + STEP) == pytest.approx(8.0)
     commander.release("page")
@@ -70,8 +70,8 @@ def test_a_second_page_waits_until_the_first_lets_go():
 
 def test_another_shape_begins_at_zero():
     commander = Commander(BOUNDS)
-    end = played(commander, 0.0, 2.0, Wish("constant", 8.0))[-1][0]
-    rows = values(played(commander, end + STEP, 2.0, Wish("sine", 8.0, 5.0)))
+    end = play_wishes(commander, 0.0, 2.0, Wish("constant", 8.0))[-1][0]
+    rows = values(play_wishes(commander, end + STEP, 2.0, Wish("sine", 8.0, 5.0)))
     assert min(abs(v) for v in rows[:130]) < 0.1
     assert max(rows) > 7.5
     jumps = [abs(b - a) for a, b in pairwise(rows)]

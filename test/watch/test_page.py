@@ -37,7 +37,7 @@ def text(page, name):
     return page.value(f"document.getElementById('{name}').innerText")
 
 
-def held(commander):
+def await_torque(commander):
     deadline = time.monotonic() + 60.0
     while (torque := commander.torque(time.monotonic())) is None or torque < 0.5:
         assert time.monotonic() < deadline
@@ -63,7 +63,7 @@ def test_the_page_draws_without_an_error_and_contacts_only_its_server(page, serv
 def test_the_torque_is_zero_when_the_page_is_left(page, commander, leave):
     page.until("!document.getElementById('go').disabled && !document.getElementById('command').hidden")
     page.value("document.getElementById('go').click()")
-    held(commander)
+    await_torque(commander)
     page.value(leave)
     left, late = time.monotonic(), 0.0
     while commander.holder is not None:

@@ -83,7 +83,7 @@ def test_a_port_in_use_is_one_line(server, tmp_path):
         Server(None, Runs(tmp_path), None, port=server.port)
 
 
-async def connected(server):
+async def connect(server):
     host = f"localhost:{server.port}"
     head = {"Cookie": cookie(server), "Origin": f"http://{host}"}
     return await websocket_connect(HTTPRequest(f"ws://{host}/socket", headers=head))
@@ -113,7 +113,7 @@ def test_a_socket_of_another_page_is_refused(server, origin):
 
 def test_a_socket_gets_frames_and_state(server):
     async def talk():
-        page = await connected(server)
+        page = await connect(server)
         frame = await answer(page, "ft")
         state = (await answer(page, "state"))["state"]
         page.close()
@@ -129,7 +129,7 @@ HOLD = {"do": "hold", "kind": "constant", "amplitude": 5.0, "frequency": 1.0}
 
 def test_a_page_whose_socket_is_lost_lets_go_at_once(server, commander):
     async def talk():
-        page = await connected(server)
+        page = await connect(server)
         await page.write_message(json.dumps(HOLD))
         await answer(page, "ft")
         assert commander.holder is not None

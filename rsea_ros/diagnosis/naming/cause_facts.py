@@ -12,7 +12,7 @@ from rsea_ros.diagnosis.naming.weighing import Weighed
 from rsea_ros.diagnosis.result import Alternative, Cause, CauseParameter, Reason, Rejected
 from rsea_ros.diagnosis.score import Score, gain
 from rsea_ros.diagnosis.selection import Selection, Trial
-from rsea_ros.diagnosis.settings import SizeSettings
+from rsea_ros.diagnosis.settings import DiagnosisSettings, SizeSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.estimates import parameters_of
@@ -24,7 +24,11 @@ from rsea_ros.normal import Z95
 
 
 def cause_of(
-    step: tuple[Evaluated, Evaluated], last: Evaluated, channel: str, named: Named, rule: SizeSettings
+    step: tuple[Evaluated, Evaluated],
+    last: Evaluated,
+    channel: str,
+    named: Named,
+    settings: DiagnosisSettings,
 ) -> Cause:
     """Return an accepted cause: its parameters beside all causes, its gain on the test blocks.
 
@@ -32,8 +36,9 @@ def cause_of(
     where its residual falls.
     """
     (without, with_it), effect = step, effect_named(step[1].added)
+    rule, resamples = settings.sizes, settings.acceptance.resamples
     channel = _helped_channel(without.test, with_it.test, channel, rule)
-    held_out, interval = gain(with_it.test, without.test, channel)
+    held_out, interval = gain(with_it.test, without.test, channel, resamples)
     train, _ = gain(with_it.train, without.train, channel)
     return Cause(
         name=effect.name,
@@ -57,16 +62,18 @@ def _helped_channel(without: Score, with_it: Score, channel: str, rule: SizeSett
 
 
 def alternative_of(
-    instead_of: str, weighed: Weighed, probability: float, rule: SizeSettings
+    instead_of: str, weighed: Weighed, probability: float, settings: DiagnosisSettings
 ) -> Alternative:
     """Return a rival of a cause with its size where it acts in that cause's place."""
     claim, evidence = weighed.claim, weighed.evidence
     solution = solve(claim.problem, claim.theta, iterations=0)
-    held_out, interval = gain(claim.with_it, claim.without, evidence.channel)
+    confidence = confidence_of(solution, rule=settings.intervals)
+    resamples = settings.acceptance.resamples
+    held_out, interval = gain(claim.with_it, claim.without, evidence.channel, resamples)
     return Alternative(
         name=claim.name,
         instead_of=instead_of,
-        parameters=sizes(claim.name, parameters_of(solution, confidence_of(solution)), rule),
+        parameters=sizes(claim.name, parameters_of(solution, confidence), settings.sizes),
         gain_holdout=held_out,
         gain_holdout_ci95=interval,
         channel=evidence.channel,

@@ -13,7 +13,7 @@ from rsea_ros.diagnosis.evaluation import Evaluated, Examined, held_out_of
 from rsea_ros.diagnosis.naming.cause_facts import alternative_of, latest, rejected_of, undetermined_play
 from rsea_ros.diagnosis.naming.outcome import Outcome, outcome_of
 from rsea_ros.diagnosis.naming.weighing import Weighed, weigh
-from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
+from rsea_ros.diagnosis.next_experiment import amplitude_series, separating_run
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
 from rsea_ros.diagnosis.result import Alternative, Diagnosis, Experiment, Rejected
 from rsea_ros.diagnosis.score import Score
@@ -89,7 +89,7 @@ def _alternatives(outcome: Outcome, pools: Pools, settings: DiagnosisSettings) -
     """Return the rivals of the named causes, each with its size."""
 
     def alternative(rival: tuple[str, Weighed, float]) -> Alternative:
-        return alternative_of(*rival, settings.sizes)
+        return alternative_of(*rival, settings)
 
     rivals = [(c.name, weighed, p) for c in outcome.causes for weighed, p in outcome.named[c.name].rivals]
     return tuple(pools.fits.map(alternative, rivals))
@@ -127,7 +127,7 @@ def _next_experiment(
     for stage in outcome.stages[1:]:
         rivals = selection.rivals_of(stage.added)
         if rivals:
-            return separating(stage.solution, [m.solution for m in rivals], rate, settings.next_run)
+            return separating_run(stage.solution, [m.solution for m in rivals], rate, settings.next_run)
     if outcome.verdict in ("unexplained", "partly_explained") and not is_at_floor(last.test, settings.floor):
         return amplitude_series(last.solution, last.test.ratio(last.test.worst), rate, settings.next_run)
     return None

@@ -10,15 +10,10 @@ import numpy as np
 from rsea_ros.diagnosis.data_split import TEST, blocks_of, set_of
 from rsea_ros.diagnosis.problem_variants import with_misfit_as_noise, without_effect
 from rsea_ros.diagnosis.score import Score
-from rsea_ros.diagnosis.settings import BlockSettings
+from rsea_ros.diagnosis.settings import BlockSettings, DiagnosisSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian_columns, power, serial
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
-
-LEAST_SHARE = 1e-5
-"""Power of a contribution over that of the residual below which a cause changes nothing. Derived: a cause
-lowers the residual's power by no more than the power that it contributes, here 0.001 %; the least gain that
-is named is 100 times as much."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +39,7 @@ def weight_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Proble
 
 
 def rows_of(
-    problem: Problem, theta: FloatArray, name: str, rule: BlockSettings, run: Map = serial
+    problem: Problem, theta: FloatArray, name: str, settings: DiagnosisSettings, run: Map = serial
 ) -> ContributionRows | None:
     """Return a model's residuals and the contribution of one cause.
 
@@ -57,10 +52,10 @@ def rows_of(
     if not np.isfinite(power(error)) or not np.isfinite(power(without)):
         return None
     contribution = error - without
-    if power(contribution) < LEAST_SHARE * power(error):
+    if power(contribution) < settings.evidence.least_contribution * power(error):
         return None
     which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
-    block, tests, runs = _blocks_of_rows(problem, rule)
+    block, tests, runs = _blocks_of_rows(problem, settings.blocks)
     return ContributionRows(
         contribution=contribution,
         residual=-error,

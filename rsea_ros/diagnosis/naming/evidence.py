@@ -65,18 +65,18 @@ def evidence_for(
     sets, outputs = (*TRAIN, *VALIDATION, *TEST), everything.outputs(claim.theta)
     weights = score_on(everything, cases, sets, outputs, settings.blocks)
     problem = weight_by(claim.problem, cases, weights)
-    rows = rows_of(problem, claim.theta, claim.name, settings.blocks, run)
+    rows = rows_of(problem, claim.theta, claim.name, settings, run)
     if rows is None:
         return None
     parameters = sum(u.name.startswith(claim.name + ".") for u in problem.unknowns)
     channel = min(
         claim.without.sums, key=lambda n: claim.with_it.ratio(n) / max(claim.without.ratio(n), 1e-12)
     )
-    gained, (low, _) = gain(claim.with_it, claim.without, channel)
+    gained, (low, _) = gain(claim.with_it, claim.without, channel, settings.acceptance.resamples)
     return Evidence(
         name=claim.name,
         signature=signature(rows, settings.evidence),
-        flexible=flexible(problem, claim.theta, claim.name, rows),
+        flexible=flexible(problem, claim.theta, claim.name, rows, settings),
         channel=channel,
         gain=gained,
         gain_low=low,

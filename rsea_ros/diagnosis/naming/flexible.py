@@ -18,6 +18,7 @@ import numpy as np
 
 from rsea_ros.diagnosis.naming.contribution import ContributionRows
 from rsea_ros.diagnosis.score import gain_of
+from rsea_ros.diagnosis.settings import DiagnosisSettings, EvidenceSettings
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
@@ -25,11 +26,6 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray
 
-_KNOTS = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
-"""Quantiles of a regressor's size between which the spline is straight, each sign for itself: six pieces a
-sign, finer at both ends, where friction and stops act. The coefficients are fitted with them."""
-_LAGS = (1, 2, 4, 8)
-"""Samples by which a law of the command's past may look back, doubling. Fixed like the knots."""
 _RIDGE = 1e-6
 """Of each column's power: keeps parts of the spline apart that the data do not. Numerical: a thousandth of a
 column's size."""
@@ -48,9 +44,11 @@ class Flexible:
     of_cause: float
 
 
-def flexible(problem: Problem, theta: FloatArray, name: str, rows: ContributionRows) -> Flexible | None:
+def flexible(
+    problem: Problem, theta: FloatArray, name: str, rows: ContributionRows, settings: DiagnosisSettings
+) -> Flexible | None:
     """Return the gain of a spline beside a cause; None for a cause without a suitable regressor."""
-    responses = _responses(problem, theta, effect_named(name))
+    responses = _responses(problem, theta, effect_named(name), settings.evidence)
     if not responses:
         return None
     matrix = np.column_stack([*responses, rows.others])
@@ -63,7 +61,7 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: ContributionR
     weights = np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
     before, after = (_by_block(rows, v) for v in (rows.residual, rows.residual - matrix @ weights))
     cause = float(np.sum((rows.residual + rows.contribution)[rows.tests] ** 2) - before.sum())
-    gain, ci95 = gain_of(after, before)
+    gain, ci95 = gain_of(after, before, settings.acceptance.resamples)
     return Flexible(
         gain=gain,
         ci95=ci95,
@@ -77,14 +75,16 @@ def _by_block(rows: ContributionRows, values: FloatArray) -> FloatArray:
     return np.asarray(power[np.bincount(rows.block, rows.tests) > 0], np.float64)
 
 
-def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[FloatArray]:
+def _responses(
+    problem: Problem, theta: FloatArray, effect: Effect, rule: EvidenceSettings
+) -> list[FloatArray]:
     """Return the weighted responses of all rows to each part of the spline, shape (m,) each."""
     base = problem.outputs(theta)
     signals = [_signal(c, out, effect) for c, out in zip(problem.cases, base, strict=True)]
     if any(s is None for s in signals):
         return []
     parts = [
-        _spline(s, effect, _hold(c), _spans(c, s))
+        _spline(s, effect, _hold(c), _spans(c, s), rule)
         for s, c in zip(signals, problem.cases, strict=True)
         if s is not None
     ]
@@ -126,7 +126,7 @@ def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArra
 
 
 def _spline(
-    signal: FloatArray, effect: Effect, hold: int, spans: Sequence[tuple[int, int]]
+    signal: FloatArray, effect: Effect, hold: int, spans: Sequence[tuple[int, int]], rule: EvidenceSettings
 ) -> list[Callable[[], FloatArray]]:
     """Return what makes each part of the spline along a signal: hats over its size, by sign, or its past.
 
@@ -134,9 +134,9 @@ def _spline(
     """
     if effect.main.unit in ("s", "Hz") and effect.port in (st.Port.COMMAND, st.Port.SENSOR):
         step = hold if effect.port is st.Port.COMMAND else 1
-        return [partial(_since, signal, k * step) for k in _LAGS]
+        return [partial(_since, signal, k * step) for k in rule.lags]
     size = np.abs(signal)
-    knots = np.unique(np.quantile(np.concatenate([size[a:b] for a, b in spans]), _KNOTS))
+    knots = np.unique(np.quantile(np.concatenate([size[a:b] for a, b in spans]), rule.knots))
     if len(knots) < 2:
         return []
     return [partial(_hat, signal, side, knots, k) for side in (1.0, -1.0) for k in range(len(knots))]
@@ -175,17 +175,17 @@ def _with_part(
     cases = tuple(replace(c, drive=d) for c, d in zip(problem.cases, pushed, strict=True))
     outputs = replace(problem, cases=cases).outputs(theta)
     if effect.port is not st.Port.COMMAND:
-        outputs = [{**o, **_kept(b, "motor_torque")} for o, b in zip(outputs, base, strict=True)]
+        outputs = [{**o, **_kept_channel(b, "motor_torque")} for o, b in zip(outputs, base, strict=True)]
     if effect.port is st.Port.SPRING:
-        outputs = [_seen(c, o, d) for c, o, d in zip(problem.cases, outputs, pushed, strict=True)]
+        outputs = [_with_ft_torque(c, o, d) for c, o, d in zip(problem.cases, outputs, pushed, strict=True)]
     return outputs
 
 
-def _kept(base: dict[str, FloatArray], name: str) -> dict[str, FloatArray]:
+def _kept_channel(base: dict[str, FloatArray], name: str) -> dict[str, FloatArray]:
     return {name: base[name]} if name in base else {}
 
 
-def _seen(case: Case, out: dict[str, FloatArray], pushed: Drive) -> dict[str, FloatArray]:
+def _with_ft_torque(case: Case, out: dict[str, FloatArray], pushed: Drive) -> dict[str, FloatArray]:
     """Return channels in which the F/T sensor also measures the torque taken from the spring's."""
     if "ft" not in out or not isinstance(case.drive, Drive):
         return out

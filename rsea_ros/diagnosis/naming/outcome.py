@@ -52,7 +52,7 @@ def outcome_of(weighing: Weighing, examined: Examined, settings: DiagnosisSettin
     if verdict == "unexplained":
         channel, stages = main_channel(stages[0].test, channel, levels.reached), stages[:1]
     causes = tuple(
-        with_rivals(cause_of(step, stages[-1], channel, naming[step[1].added], settings.sizes), selection)
+        with_rivals(cause_of(step, stages[-1], channel, naming[step[1].added], settings), selection)
         for step in itertools.pairwise(stages)
         if is_named(step[1], naming)
     )

@@ -30,8 +30,9 @@ from rsea_ros.diagnosis.candidate import (
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut
 from rsea_ros.diagnosis.naming.evidence import Claim
-from rsea_ros.diagnosis.score import RESAMPLES, Score, tempered_loss
+from rsea_ros.diagnosis.score import Score, tempered_loss
 from rsea_ros.diagnosis.selection import Selection, Trial
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
 
@@ -45,12 +46,9 @@ class Contest:
 
 
 def contests(
-    selection: Selection, stages: Sequence[Evaluated], held_out: HeldOut, pools: Pools, far: float
+    selection: Selection, stages: Sequence[Evaluated], held_out: HeldOut, pools: Pools
 ) -> list[Contest]:
-    """Return the contest for the place of each accepted cause, in the order of the stages.
-
-    far: from how many times the noise on the data are tempered (score.py).
-    """
+    """Return the contest for the place of each accepted cause, in the order of the stages."""
     result = []
     for without, with_it in itertools.pairwise(stages):
         name = with_it.added
@@ -58,7 +56,7 @@ def contests(
         claim = Claim(name, last.problem, last.theta, with_it.test, without.test, 1.0)
         rounds = [t for t in selection.trials if t.name == name and t.reason == "replaced"]
         tried = beside(selection, rounds[-1].beside) if rounds else []
-        result.append(weigh(selection, claim, tried, held_out, pools, far))
+        result.append(weigh(selection, claim, tried, held_out, pools))
     return result
 
 
@@ -69,18 +67,19 @@ def beside(selection: Selection, model: Candidate) -> list[Trial]:
 
 
 def weigh(
-    selection: Selection, claim: Claim, tried: Sequence[Trial], held_out: HeldOut, pools: Pools, far: float
+    selection: Selection, claim: Claim, tried: Sequence[Trial], held_out: HeldOut, pools: Pools
 ) -> Contest:
     """Return a contest of a claim with the effects tried beside the same model, or as good in its place.
 
     Another cause that was accepted too is no rival, whichever of the two came first.
     """
-    accepted, rule = selection.last.causes, selection.last.settings.evidence
+    accepted, settings = selection.last.causes, selection.last.settings
+    rule = settings.evidence
     tried = [t for t in tried if t.name == claim.name or t.name not in accepted]
-    scores, weights = _race(tried, held_out, pools, far)
+    scores, weights = _race(tried, held_out, pools, settings)
     if sum(w >= rule.close_weight for w in weights) > 1:
         tried = _with_close_ones_fitted(tried, weights, selection, pools)
-        scores, weights = _race(tried, held_out, pools, far)
+        scores, weights = _race(tried, held_out, pools, settings)
     weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
         Claim(t.name, t.problem, t.theta, s, held_out.score_of(t.beside), weight_of[t.name])
@@ -90,7 +89,8 @@ def weigh(
     swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(accepted)]
     models = [selection.last, *swapped]
     tested = [held_out.score_of(m) for m in models]
-    among_swapped = _stack(tested, [m.prior_cost for m in models], [m.size for m in models], far)
+    priors, lengths = [m.prior_cost for m in models], [m.size for m in models]
+    among_swapped = _stack(tested, priors, lengths, settings)
     among_tried = weight_of.get(claim.name, 1.0)
     for model, with_it, weight in zip(swapped, tested[1:], among_swapped[1:], strict=True):
         theta = model.solution.theta
@@ -102,12 +102,12 @@ def weigh(
 
 
 def _race(
-    tried: Sequence[Trial], held_out: HeldOut, pools: Pools, far: float
+    tried: Sequence[Trial], held_out: HeldOut, pools: Pools, settings: DiagnosisSettings
 ) -> tuple[list[Score], list[float]]:
     """Return the scores of trials and their weights."""
     scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), tried))
     priors = [prior_cost(t.problem, t.theta) for t in tried]
-    return scores, _stack(scores, priors, [effect_size(t.name) for t in tried], far)
+    return scores, _stack(scores, priors, [effect_size(t.name) for t in tried], settings)
 
 
 def _with_close_ones_fitted(
@@ -134,7 +134,7 @@ def _fit_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Trial:
 
 
 def _stack(
-    scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[int], far: float
+    scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[int], settings: DiagnosisSettings
 ) -> list[float]:
     """Return weights; each parameter of an effect costs the logarithm of the number of blocks.
 
@@ -144,19 +144,23 @@ def _stack(
     if not scores:
         return []
     best = min(scores, key=lambda s: float(s.loss(s).sum()))
-    losses = [tempered_loss(s, best, far) for s in scores]
+    losses = [tempered_loss(s, best, settings.floor.far) for s in scores]
     prices = [p + math.log(len(losses[0])) * size for p, size in zip(priors, sizes, strict=True)]
-    return [float(w) for w in stacking_weights(losses, prices)]
+    return [float(w) for w in stacking_weights(losses, prices, settings.acceptance.resamples)]
 
 
-def stacking_weights(losses: Sequence[FloatArray], prices: Sequence[float]) -> FloatArray:
+def stacking_weights(
+    losses: Sequence[FloatArray],
+    prices: Sequence[float],
+    resamples: int = DEFAULT.acceptance.resamples,
+) -> FloatArray:
     """Return a weight for each model, shape (k,), summing to 1.
 
     losses: twice the negative log likelihood of every block, shape (b,) each. prices: of the priors, alike.
     """
     loss = np.array(losses)
     blocks = loss.shape[1]
-    draws = np.random.default_rng(0).dirichlet(np.ones(blocks), RESAMPLES) * blocks
+    draws = np.random.default_rng(0).dirichlet(np.ones(blocks), resamples) * blocks
     evidence = -0.5 * (draws @ loss.T + np.asarray(prices))
     evidence -= evidence.max(axis=1, keepdims=True)
     likely = np.exp(evidence)

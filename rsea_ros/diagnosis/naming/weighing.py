@@ -59,7 +59,7 @@ def weigh(
     accepted = len(stages)
     if not is_at_floor(stages[-1].test, settings.floor):
         selection, stages = promote_best(selection, stages, held_out, pools, settings)
-    contested = contests(selection, stages, held_out, pools, settings.floor.far)
+    contested = contests(selection, stages, held_out, pools)
     claims = [c for contest in contested for c in (contest.cause, *contest.rivals)]
     weigh_claim = partial(evidence_for, cases=selection.cases, settings=settings, run=pools.run)
     evidence_by_claim = {id(c): e for c, e in zip(claims, pools.fits.map(weigh_claim, claims), strict=True)}

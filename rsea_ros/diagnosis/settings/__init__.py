@@ -1,8 +1,13 @@
 """Every number that steers a verdict: its meaning, its unit, and why it has this value.
 
 data.py: blocks, pieces, levels of a residual; search.py: acceptance and fits; cause_names.py: names and
-sizes; next_run.py: the recommended run. No setting changes the numbers of noise and data, which stand with
-their reasons in identification/noise.py, noise_level.py, coloured.py and in checks/.
+sizes; next_run.py: the recommended run. `identify` estimates noise and intervals by the same rules; their
+settings lie in identification/noise_settings.py and interval_settings.py.
+
+No setting: what happens to a record before any model (checks/, identification/even_stamps.py), where fits
+begin (initial_guess.py, residual_peaks.py, identification/joint_start.py), the steps of derivatives, and what
+is only shown (residual_analysis.py, coherence.lost_above). Those numbers stand with their reasons where they
+are used (docs/decisions/0180-which-numbers-are-settings.md).
 """
 
 from __future__ import annotations
@@ -13,9 +18,11 @@ from dataclasses import dataclass, field, fields
 from rsea_ros.diagnosis.settings.cause_names import EvidenceSettings, NamingSettings, SizeSettings
 from rsea_ros.diagnosis.settings.data import BlockSettings, FloorSettings, PieceSettings, StretchSettings
 from rsea_ros.diagnosis.settings.next_run import NextRunSettings
-from rsea_ros.diagnosis.settings.number import Setting
 from rsea_ros.diagnosis.settings.search import AcceptanceSettings, FitSettings, ForwardSettings
 from rsea_ros.errors import ParameterError
+from rsea_ros.identification.interval_settings import IntervalSettings
+from rsea_ros.identification.noise_settings import NoiseSettings
+from rsea_ros.setting import Setting
 
 MOST_CAUSES = 4
 __all__ = [
@@ -28,8 +35,10 @@ __all__ = [
     "FitSettings",
     "FloorSettings",
     "ForwardSettings",
+    "IntervalSettings",
     "NamingSettings",
     "NextRunSettings",
+    "NoiseSettings",
     "PieceSettings",
     "Setting",
     "SizeSettings",
@@ -60,6 +69,8 @@ class DiagnosisSettings:
     naming: NamingSettings = field(default_factory=NamingSettings)
     sizes: SizeSettings = field(default_factory=SizeSettings)
     next_run: NextRunSettings = field(default_factory=NextRunSettings)
+    noise: NoiseSettings = field(default_factory=NoiseSettings)
+    intervals: IntervalSettings = field(default_factory=IntervalSettings)
 
     def __post_init__(self) -> None:
         if self.max_causes < 1:

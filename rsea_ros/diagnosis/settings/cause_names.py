@@ -13,6 +13,20 @@ class EvidenceSettings:
 
     parts: int = number(4, "1", "parts of amplitude and of time, for the shape of a law", CALIBRATED)
     bands: int = number(6, "1", "frequency bands, for the shape of a law", CALIBRATED)
+    knots: tuple[float, ...] = number(
+        (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0), "1",
+        "quantiles of a regressor's size between which the flexible law is straight, each sign for itself",
+        f"six pieces a sign, finer at both ends, where friction and stops act; {CALIBRATED}",
+    )  # fmt: skip
+    lags: tuple[int, ...] = number(
+        (1, 2, 4, 8), "1", "samples by which the flexible law looks back, for a cause that is a time",
+        f"doubling, to 29 ms at 280 Hz; {CALIBRATED}",
+    )  # fmt: skip
+    least_contribution: float = number(
+        1e-5, "1", "power of a contribution over that of the residual, below which a cause changes nothing",
+        "a cause lowers the residual's power by no more than its contribution's; the least gain that is "
+        "named is 100 times as much",
+    )  # fmt: skip
     least_spread: float = number(
         3e-3, "1", "spread of lambda that two right simulations of one law have", CALIBRATED
     )

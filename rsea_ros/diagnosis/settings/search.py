@@ -15,8 +15,9 @@ class AcceptanceSettings:
         0.025, "1", "quantile of the bootstrap of the gain that must lie above zero", "95 %, two-sided"
     )
     resamples: int = number(
-        1000, "1", "draws of that bootstrap", "25 of them lie beyond the quantile: it is known to a fifth"
-    )
+        1000, "1", "draws of every bootstrap over blocks",
+        "25 of them lie beyond the quantile: it is known to a fifth",
+    )  # fmt: skip
     price: float = number(
         2.0, "1", "loss that each parameter must bring", "what a useless one gains (Akaike 1974)"
     )

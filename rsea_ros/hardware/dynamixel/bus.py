@@ -79,7 +79,7 @@ class Bus:
         """Return the result of a transaction outside the cycle, with several attempts."""
         usual, self.latency = self.latency, max(self.latency, PATIENCE)
         try:
-            return _repeated(transaction)
+            return _repeat(transaction)
         finally:
             self.latency = usual
 
@@ -97,7 +97,7 @@ class Bus:
     @contextmanager
     def _turn(self) -> Iterator[None]:
         """Have the port for a transaction."""
-        with self.port.turns.taken():
+        with self.port.turns.take():
             self.port.latency, self.port.return_delay = self.latency, self.return_delay
             yield
 
@@ -114,7 +114,7 @@ class Bus:
             raise Refused(f"{self._name}: {request} refused: {why}")
 
 
-def _repeated(transaction: Callable[[], T]) -> T:
+def _repeat(transaction: Callable[[], T]) -> T:
     """Return the result of a transaction, repeated when a reply is lost."""
     for _ in range(ATTEMPTS - 1):
         try:

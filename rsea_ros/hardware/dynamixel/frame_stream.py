@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from rsea_ros.hardware.dynamixel.frames import HEADER, LONGEST, OVERHEAD, STATUS, crc16, unstuffed
+from rsea_ros.hardware.dynamixel.frames import HEADER, LONGEST, OVERHEAD, STATUS, crc16, unstuff
 
 SHORTEST = 4
 """LEN of a status without parameters: INST, error, CRC."""
@@ -39,7 +39,7 @@ class StatusFrameParser:
         self._buffer += data
         frames = []
         while (size := self._size()) is not None:
-            frame = self._checked(bytes(self._buffer[:size]), raw)
+            frame = self._check(bytes(self._buffer[:size]), raw)
             if frame is None:
                 del self._buffer[:1]  # search for a header inside the rejected frame
             else:
@@ -64,14 +64,14 @@ class StatusFrameParser:
             self.rejected["length"] += 1
             del buffer[:1]
 
-    def _checked(self, frame: bytes, raw: bool) -> bytes | None:
+    def _check(self, frame: bytes, raw: bool) -> bytes | None:
         """Return an intact status frame with its payload unstuffed."""
         if crc16(frame[:-2]) != int.from_bytes(frame[-2:], "little"):
             self.rejected["crc"] += 1
             return None
         payload: bytes | None = frame[OVERHEAD:-2]
         if not raw:
-            payload = unstuffed(frame[OVERHEAD:-2])
+            payload = unstuff(frame[OVERHEAD:-2])
         if payload is None:
             self.rejected["stuffing"] += 1
             return None

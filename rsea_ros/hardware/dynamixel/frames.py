@@ -36,19 +36,19 @@ def crc16(data: Iterable[int], crc: int = 0) -> int:
     return crc
 
 
-def stuffed(payload: bytes) -> bytes:
+def stuff(payload: bytes) -> bytes:
     """Return INST and parameters with an FD put after every FF FF FD, so that they hold no header."""
     return payload.replace(_PATTERN, _STUFFED)
 
 
-def unstuffed(payload: bytes) -> bytes | None:
+def unstuff(payload: bytes) -> bytes | None:
     """Return the bytes before stuffing; None for bytes that `stuffed` never makes."""
     plain = payload.replace(_STUFFED, _PATTERN)
-    return plain if stuffed(plain) == payload else None
+    return plain if stuff(plain) == payload else None
 
 
 def frame(identity: int, payload: bytes) -> bytes:
     """Return the frame of INST and parameters, stuffed, with its CRC."""
-    body = stuffed(payload)
+    body = stuff(payload)
     head = HEADER + bytes((identity,)) + (len(body) + 2).to_bytes(2, "little") + body
     return head + crc16(head).to_bytes(2, "little")

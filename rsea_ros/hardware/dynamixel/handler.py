@@ -17,7 +17,7 @@ from dynamixel_sdk import (
 )
 
 from rsea_ros.hardware.dynamixel.frame_stream import StatusFrameParser
-from rsea_ros.hardware.dynamixel.frames import LONGEST, OVERHEAD, crc16, frame, stuffed, unstuffed
+from rsea_ros.hardware.dynamixel.frames import LONGEST, OVERHEAD, crc16, frame, stuff, unstuff
 from rsea_ros.hardware.dynamixel.port import SerialPort
 
 EMPTY = 11
@@ -46,14 +46,14 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
 
     def addStuffing(self, packet: Sequence[int]) -> list[int]:
         """Return a packet with INST and parameters stuffed and LEN put right; the CRC is not."""
-        return _with_payload(packet, stuffed(_payload(packet)))
+        return _with_payload(packet, stuff(_payload(packet)))
 
     def removeStuffing(self, packet: Sequence[int]) -> list[int]:
         """Return a packet with INST and parameters as they were before stuffing.
 
         Raises ValueError for one that no stuffing makes.
         """
-        plain = unstuffed(_payload(packet))
+        plain = unstuff(_payload(packet))
         if plain is None:
             raise ValueError(f"packet {bytes(packet).hex(' ')}: FF FF FD inside, expected FF FF FD FD")
         return _with_payload(packet, plain)

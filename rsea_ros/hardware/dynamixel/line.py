@@ -51,7 +51,7 @@ class Line:
 
     def join(self, identity: int, close: Callable[[], None]) -> None:
         """Open the port for a motor, unless it is open. close: closes that motor. Raises PortLost."""
-        with self.port.turns.taken():
+        with self.port.turns.take():
             if not self._joined:
                 self.port.open()
             self._joined[identity] = close
@@ -65,7 +65,7 @@ class Line:
 
     def leave(self, identity: int) -> None:
         """Close the port with the last motor that leaves."""
-        with self.port.turns.taken():
+        with self.port.turns.take():
             self._goals.pop(identity, None)
             if self._joined.pop(identity, None) is not None and not self._joined:
                 self.port.close()
@@ -79,7 +79,7 @@ class Line:
         """Write the goals that were set, then read these motors; `answer` returns the replies."""
         goals, self._goals = self._goals, {}
         if goals:
-            with self.port.turns.taken():
+            with self.port.turns.take():
                 try:
                     self._write(goals)
                     self._answers |= self._read(sorted(goals, key=self._place))
@@ -90,13 +90,13 @@ class Line:
         """Write the goals that were set and read nobody; a port that is lost shows in the next exchange."""
         goals, self._goals = self._goals, {}
         if goals:
-            with self.port.turns.taken():
+            with self.port.turns.take():
                 try:
                     self._write(goals)
                 except PortLost:
                     return
 
-    def asked(self, identity: int) -> bool:
+    def has_read(self, identity: int) -> bool:
         """Whether the last exchange has read a motor and its answer has not been taken yet."""
         return identity in self._answers
 
@@ -115,7 +115,7 @@ class Line:
             close()
 
     def _write(self, goals: dict[int, int]) -> None:
-        goal = self._known.goal_torque
+        goal = self._known_table.goal_torque
         body = bytes((SYNC_WRITE, *_two(goal.address), *_two(goal.size)))
         for identity, counts in goals.items():
             body += bytes((identity, *goal.data(counts)))
@@ -123,7 +123,7 @@ class Line:
 
     def _read(self, order: list[int]) -> dict[int, StatusReply | PortLost | None]:
         """Return the answer of each motor, None of one that has none."""
-        start, size = self._known.sample
+        start, size = self._known_table.sample
         size += self._longer
         fast = self._fast and not self._silent
         code = FAST_SYNC_READ if fast else SYNC_READ
@@ -134,7 +134,7 @@ class Line:
         self.port.latency = self._latency
         self.port.return_delay = sum(self._delays.get(identity, 0.0) for identity in order)
         self.port.setPacketTimeout((EMPTY + size) * len(order))
-        heard = self._heard(order, size, fast=fast)
+        heard = self._receive(order, size, fast=fast)
         instant = (begin + time.monotonic_ns()) // 2
         silent = [identity for identity in order if identity not in heard]
         self._silent = bool(silent)
@@ -143,7 +143,7 @@ class Line:
             self._longer ^= 1  # a reply that comes late has another size than the next one
         return {each: StatusReply(*heard[each], instant) if each in heard else None for each in order}
 
-    def _heard(self, order: list[int], size: int, *, fast: bool) -> dict[int, tuple[int, bytes]]:
+    def _receive(self, order: list[int], size: int, *, fast: bool) -> dict[int, tuple[int, bytes]]:
         heard: dict[int, tuple[int, bytes]] = {}
         while not heard.keys() >= set(order):
             data = self.port.receive()
@@ -158,7 +158,7 @@ class Line:
         return self._last.index(identity) if identity in self._last else -1
 
     @property
-    def _known(self) -> ControlTable:
+    def _known_table(self) -> ControlTable:
         if self._table is None:
             raise PortLost(f"motors on {self.port.port_name}: not open")
         return self._table

@@ -24,11 +24,11 @@ class LineMotor(Motor):
         """Join the line and be set up, torque off. Raises DeviceError, also for a motor of another series."""
         self._line.join(self._id, self.close)
         super().open()
-        self._line.admit(self._id, self.known, self.bus.return_delay)
+        self._line.admit(self._id, self.control_table, self.bus.return_delay)
 
     def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
         """Return the reading of the exchange, or a separate one. Raises NoReply, PortLost, Refused."""
-        if not self._line.asked(self._id):
+        if not self._line.has_read(self._id):
             return super().read(meanwhile)
         if meanwhile is not None:
             meanwhile()

@@ -46,7 +46,7 @@ class Motor:
         self.torque_constant = TorqueConstant(math.nan, math.nan, math.nan, "")
 
     @property
-    def known(self) -> ControlTable:
+    def control_table(self) -> ControlTable:
         """The table of an open motor. Raises PortLost."""
         if self.table is None:
             raise PortLost(f"motor on {self._settings.path}: not open")
@@ -87,7 +87,7 @@ class Motor:
 
     def enable(self) -> None:
         """Switch the torque on, at zero, with a watchdog. Raises DeviceError."""
-        table = self.known
+        table = self.control_table
         self._stop()
         kept = [("torque_enable", table.torque_enable, 1)]
         kept.append(("operating_mode", table.operating_mode, TORQUE_MODE))
@@ -111,7 +111,7 @@ class Motor:
         After a failure the next read is longer or shorter by a byte: a reply that comes late has the wrong
         size and cannot be mistaken for the new one.
         """
-        table = self.known
+        table = self.control_table
         start, size = table.sample
         begin, usual = time.monotonic_ns(), self.bus.latency
         self.bus.latency = usual + self._spared
@@ -129,22 +129,22 @@ class Motor:
 
     def sample(self, data: bytes, instant: int) -> MotorSample:
         """Return the reading with the motor's errors; watched registers are checked here in turn."""
-        table = self.known
+        table = self.control_table
         error = error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
         return sample_of(table, data, instant, error, "" if error else self._watchlist.look())
 
     def write(self, torque: float) -> None:
         """Command a torque (N m). Raises NoReply, PortLost, Refused."""
         try:
-            self.bus.put(self.known.goal_torque, self.counts(torque))
+            self.bus.put(self.control_table.goal_torque, self.counts(torque))
         except NoReply:
             self._unanswered = self.bus.handler.acknowledged
             raise
-        self._spared = self.port.left
+        self._spared = self.port.time_left
 
     def counts(self, torque: float) -> int:
         """Return the goal for a torque (N m)."""
-        return round(torque / self.torque_constant.value / self.known.ampere)
+        return round(torque / self.torque_constant.value / self.control_table.ampere)
 
     def torque_of(self, current: float) -> float:
         """Return the torque (N m) of a current (A)."""
@@ -153,13 +153,13 @@ class Motor:
     def recover(self) -> None:
         """Open the port again if it is lost; raises DeviceError while the motor reports a hardware error."""
         try:
-            self.known  # noqa: B018  a motor that was away when the port was opened again is not set up
+            self.control_table  # noqa: B018  a motor that was away when the port was opened again is not set up
             self.bus.patiently(self.bus.ping)
         except DeviceError:
             self.close()
             self.open()
         self._supervise()
-        error = self.bus.patiently(lambda: self.bus.get(self.known.hardware_error))
+        error = self.bus.patiently(lambda: self.bus.get(self.control_table.hardware_error))
         if error:
             raise DeviceError(f"motor: hardware error {error_names(error)}, expected a reboot first")
 
@@ -197,7 +197,7 @@ class Motor:
 
     def _stop(self) -> None:
         """Switch the torque off, then clear the watchdog: a tripped one refuses a new goal."""
-        table = self.known
+        table = self.control_table
         self._watchlist.expect()
         self.bus.set(table.torque_enable, 0)
         if self._watched:
@@ -207,7 +207,9 @@ class Motor:
     def _supervise(self) -> None:
         """Start a supervisor for a motor without a watchdog, and a new one for one that is dead."""
         if isinstance(self.protection, Supervised):
-            self.protection.guard(self.port.descriptor, stop_frames(self.known, self._settings.identity))
+            self.protection.guard(
+                self.port.descriptor, stop_frames(self.control_table, self._settings.identity)
+            )
 
 
 def stop_frames(table: ControlTable, identity: int) -> list[bytes]:

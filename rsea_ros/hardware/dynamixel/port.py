@@ -30,7 +30,7 @@ class Turns:
         self._next, self._used = threading.Lock(), threading.Lock()
 
     @contextmanager
-    def taken(self) -> Iterator[None]:
+    def take(self) -> Iterator[None]:
         """Wait for the port, and let nobody else have it meanwhile."""
         with self._next:
             self._used.acquire()
@@ -101,7 +101,7 @@ class SerialPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def clearPort(self) -> None:
         """Discard received bytes."""
-        while self._arrived(0.0):
+        while self._has_arrived(0.0):
             self._take()
 
     def setPacketTimeout(self, packet_length: int) -> None:
@@ -114,7 +114,7 @@ class SerialPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._deadline = time.monotonic() + 1e-3 * msec
 
     @property
-    def left(self) -> float:
+    def time_left(self) -> float:
         """The remaining wait, s."""
         return max(0.0, self._deadline - time.monotonic())
 
@@ -124,9 +124,9 @@ class SerialPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def receive(self) -> bytes:
         """Return the bytes received before the deadline, empty after it. Raises PortLost."""
-        return self._take() if self._arrived(self.left) else b""
+        return self._take() if self._has_arrived(self.time_left) else b""
 
-    def _arrived(self, wait: float) -> bool:
+    def _has_arrived(self, wait: float) -> bool:
         """Return whether bytes have arrived since the last call, within a time (s).
 
         Edges, not levels: polling an empty terminal, as select and read do, means waiting for the kernel's

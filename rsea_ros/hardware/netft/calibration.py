@@ -11,7 +11,7 @@ from rsea_ros.decimal_number import is_decimal
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import Wrench
 from rsea_ros.hardware.netft.web_page import get
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 NEWTON = {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "klbf": 4448.2216152605, "kgf": 9.80665}
 """N per unit of force, as the sensor names it (`scfgfu`)."""
@@ -74,7 +74,7 @@ def _fields(page: bytes) -> Mapping[str, str]:
             fields[path[-1]] += data
 
     def entity(name: str, *rest: object) -> None:
-        raise ValueError(f"entity {shown(name)} declared")
+        raise ValueError(f"entity {quote(name)} declared")
 
     parser = expat.ParserCreate()
     parser.buffer_text = True
@@ -90,12 +90,12 @@ def _counts(fields: Mapping[str, str], name: str, where: str) -> float:
     text = fields.get(name, "")
     value = float(text) if is_decimal(text) else 0.0
     if not 1.0 / _MOST < value < _MOST:
-        raise DeviceError(f"{where}: {name} = {shown(text)}, expected a number above 0 and below {_MOST:g}")
+        raise DeviceError(f"{where}: {name} = {quote(text)}, expected a number above 0 and below {_MOST:g}")
     return value
 
 
 def _unit(fields: Mapping[str, str], name: str, units: dict[str, float], where: str) -> float:
     text = fields.get(name, "")
     if text not in units:
-        raise DeviceError(f"{where}: {name} = {shown(text)}, expected one of {', '.join(units)}")
+        raise DeviceError(f"{where}: {name} = {quote(text)}, expected one of {', '.join(units)}")
     return units[text]

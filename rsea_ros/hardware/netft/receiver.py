@@ -133,7 +133,7 @@ class DatagramReceiver:
         if record is None:
             self.refused["length"] += 1
         elif self.sequence.accept(record):
-            stamp = _arrived(ancillary)
+            stamp = _arrival_stamp(ancillary)
             arrival = Arrival(stamp, record, _monotonic(stamp))
             self._waiting.append(arrival)
             if (aside := self._aside) is not None:
@@ -156,7 +156,7 @@ def _until_stamped() -> None:
             probe.send(b"")
             sent = time.time_ns()
             time.sleep(1e-3)
-            if _arrived(probe.recvmsg(1, ANCILLARY)[1]) <= sent:
+            if _arrival_stamp(probe.recvmsg(1, ANCILLARY)[1]) <= sent:
                 return
 
 
@@ -166,7 +166,7 @@ def _monotonic(stamp: int) -> int:
     return now - ago if 0 <= ago <= LONGEST_AGO else now
 
 
-def _arrived(ancillary: list[tuple[int, int, bytes]]) -> int:
+def _arrival_stamp(ancillary: list[tuple[int, int, bytes]]) -> int:
     """Return the kernel's stamp of a datagram, ns; now when it has none."""
     for level, kind, data in ancillary:
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS and len(data) >= _STAMP.size:

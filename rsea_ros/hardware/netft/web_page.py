@@ -9,7 +9,7 @@ from http.client import HTTPException, HTTPResponse
 from typing import Any, cast
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.wording import shown
+from rsea_ros.wording import quote
 
 LARGEST = 1 << 20
 """Bytes. The calibration of an F/T sensor has 4 kB."""
@@ -27,7 +27,7 @@ def get(host: str, port: int, path: str, limit: float) -> bytes:
     except TimeoutError:
         raise DeviceError(f"F/T sensor {address}: no whole answer within {limit:g} s") from None
     except (OSError, HTTPException, ValueError) as error:
-        reason = shown(str(error) or type(error).__name__, 120)[1:-1]
+        reason = quote(str(error) or type(error).__name__, 120)[1:-1]
         raise DeviceError(f"F/T sensor {address}: {reason}, expected its calibration") from None
 
 

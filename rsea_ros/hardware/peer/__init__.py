@@ -1,1 +1,1 @@
-"""The bench on a wire: the far end of the driver's cables, sharing no code with the driver."""
+"""The simulated bench behind real wires: the peer of the driver, sharing no code with it."""

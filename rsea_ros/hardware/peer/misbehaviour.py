@@ -1,4 +1,4 @@
-"""Misbehaviour of the bench on request. Shares are probabilities for one packet."""
+"""Misbehaviour of the simulated bench on request. Shares are probabilities for one packet."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Misbehaviour:
             return True
         return False
 
-    def damaged(self, packet: bytes) -> bytes:
+    def damage(self, packet: bytes) -> bytes:
         """Return a reply as it goes onto the wire: empty when it is dropped."""
         if self.happens("silent") or self.happens("drop"):
             return b""

@@ -114,11 +114,11 @@ class EmulatedMotor:
             return ACCESS
         if name == "torque_enable" and value and self.alert:
             return ACCESS
-        if not register.low <= value <= register.high or (name == "goal" and self._tripped()):
+        if not register.low <= value <= register.high or (name == "goal" and self._is_tripped()):
             return RANGE
         return LIMIT if name == "goal" and abs(value) > self.get("torque_limit") else 0
 
-    def _tripped(self) -> bool:
+    def _is_tripped(self) -> bool:
         return "watchdog" in self.model.registers and self.get("watchdog") == TRIPPED
 
     def shut_down(self, now: int, bits: int) -> None:
@@ -137,7 +137,7 @@ class EmulatedMotor:
 
     def torque(self) -> float:
         """Return the torque that acts, N m."""
-        on = self.get("torque_enable") and self.get("mode") == TORQUE_MODE and not self._tripped()
+        on = self.get("torque_enable") and self.get("mode") == TORQUE_MODE and not self._is_tripped()
         return self.get("goal") * self.model.ampere * self._constant if on else 0.0
 
     def _act(self, now: int) -> None:

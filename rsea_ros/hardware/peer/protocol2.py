@@ -21,12 +21,12 @@ def checksum(data: bytes) -> int:
     """Return the remainder of the bytes, as one long number, modulo x^16 + x^15 + x^2 + 1."""
     register = 0
     for byte in data:
-        register = _divided(register >> 8 ^ byte) ^ (register & 255) << 8
+        register = _remainder(register >> 8 ^ byte) ^ (register & 255) << 8
     return register
 
 
 @cache
-def _divided(byte: int) -> int:
+def _remainder(byte: int) -> int:
     """Return the remainder of byte · x^16."""
     rest = byte << 16
     for bit in range(23, 15, -1):

@@ -1,4 +1,4 @@
-"""A bench in a child process: its addresses, and requests to it."""
+"""A simulated bench in a child process: its addresses, and requests to it."""
 
 from __future__ import annotations
 

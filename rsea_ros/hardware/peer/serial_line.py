@@ -108,7 +108,7 @@ class EmulatedBus:
         """Return the motors that are not booting."""
         return [motor for motor, end in zip(self._motors, self._busy_until, strict=True) if now >= end]
 
-    def _named(self, now: int, identity: int) -> EmulatedMotor | None:
+    def _motor_of(self, now: int, identity: int) -> EmulatedMotor | None:
         return next((motor for motor in self._awake(now) if motor.get("id") == identity), None)
 
     def _ping(self, now: int, motor: EmulatedMotor, request: Request) -> None:
@@ -151,7 +151,7 @@ class EmulatedBus:
         """
         parts = []
         for identity, address, length in wanted:
-            motor = self._named(now, identity)
+            motor = self._motor_of(now, identity)
             if motor is None:
                 break
             error, data = motor.read(now, address, length)
@@ -177,7 +177,7 @@ class EmulatedBus:
         address, length = _pair(request.parameters)
         items = request.parameters[4:]
         for at in range(0, len(items) - length, length + 1):
-            motor = self._named(now, items[at])
+            motor = self._motor_of(now, items[at])
             if motor is not None:
                 motor.write(now, address, items[at + 1 : at + 1 + length])
 
@@ -189,7 +189,7 @@ class EmulatedBus:
         self._send(now, motor, packet, address, data)
 
     def _send(self, now: int, motor: EmulatedMotor, packet: bytes, address: int, data: bytes) -> None:
-        packet = self._wrong.damaged(packet)
+        packet = self._wrong.damage(packet)
         when = now + motor.get("return_delay") * RETURN_DELAY_UNIT
         if self._wrong.happens("delay"):
             when += round(self._wrong.late * 1e9)

@@ -1,4 +1,4 @@
-"""The bench as one loop: serial line, F/T stream and requests, at their instants."""
+"""The simulated bench as one loop: serial line, F/T stream and requests, at their instants."""
 
 from __future__ import annotations
 

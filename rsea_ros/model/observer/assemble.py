@@ -15,7 +15,7 @@ from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls
-from rsea_ros.model.structure import structured
+from rsea_ros.model.structure import with_structure
 from rsea_ros.signals import FloatArray
 
 _GEAR = int(st.Port.GEAR)
@@ -34,13 +34,13 @@ def without_delay(rig: Rig) -> tuple[Rig, float]:
 
 def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[FilterModel, FilterState]:
     """Return the model and the state at rest with nothing known. hold, duration: s."""
-    machine, linear = build(rig, LONGEST_STEP, duration), linear_model(structured(rig))
+    machine, linear = build(rig, LONGEST_STEP, duration), linear_model(with_structure(rig))
     n, size = linear.order, len(linear.start)
     measured = np.zeros((2, size))
     measured[:, :n] = machine.linear.outputs[[0, 2]]
     measured[0, n + 1 :] = 1.0
-    a, scale = _balanced(linear.a)
-    block, block_scale = _balanced(linear.block)
+    a, scale = _balance(linear.a)
+    block, block_scale = _balance(linear.block)
     walk = np.zeros((size, size))
     walk[n, n] = noise.walk / scale[n] ** 2
     estimated = linear.estimated
@@ -58,7 +58,7 @@ def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[F
     return model, state
 
 
-def _balanced(a: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _balance(a: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a matrix balanced in its rows and columns, and the scale that balances it."""
     balanced, (scale, _) = matrix_balance(a, permute=False, separate=True)
     return np.ascontiguousarray(balanced), np.ascontiguousarray(scale)

@@ -32,7 +32,7 @@ def product(a, b, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _scaled(a, factor, out):  # type: ignore[no-untyped-def]
+def _scale(a, factor, out):  # type: ignore[no-untyped-def]
     for i in range(len(a)):
         for j in range(len(a)):
             out[i, j] = factor * a[i, j]
@@ -40,7 +40,7 @@ def _scaled(a, factor, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _copy(a, out):  # type: ignore[no-untyped-def]
-    _scaled(a, 1.0, out)
+    _scale(a, 1.0, out)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -77,7 +77,7 @@ def exponential(a, scale, t, out):  # type: ignore[no-untyped-def]
     _copy(term, out)
     for k in range(TERMS):
         product(a, term, spare)
-        _scaled(spare, part / (k + 1), term)
+        _scale(spare, part / (k + 1), term)
         _add(term, out)
     for _ in range(halvings):
         product(out, out, spare)
@@ -93,13 +93,13 @@ def transition(a, walk, scale, t, f, q):  # type: ignore[no-untyped-def]
     n, halvings = len(a), _halvings(a, t)
     part, term, spare, turned = t / 2.0**halvings, np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
     exponential(a, np.ones(n), part, f)
-    _scaled(walk, part, term)
+    _scale(walk, part, term)
     _copy(term, q)
     for k in range(TERMS):
         product(a, term, spare)
         _transpose(spare, turned)
         _add(turned, spare)
-        _scaled(spare, part / (k + 2), term)
+        _scale(spare, part / (k + 2), term)
         _add(term, q)
     for _ in range(halvings):
         product(f, q, spare)

@@ -29,7 +29,7 @@ def campaign_json(outcome: CampaignOutcome, campaign: Campaign) -> Mapping[str, 
         "why": outcome.why,
         "seconds": outcome.seconds,
         "causes": list(campaign.causes),
-        "limits": campaign.asked.limits.stated(),
+        "limits": campaign.asked.limits.finite_limits(),
         "rounds": rounds,
         "no_run_separates": [proof_json(x) for x in outcome.proofs],
     }

@@ -34,7 +34,7 @@ def campaign_page(
     if played:
         blocks.append(spectrum_figure([(f"run {k}", p) for k, p in played]))
         blocks += [command_figure(p) for _, p in played]
-        blocks.append(limits_section(played[-1][1], limits.stated()))
+        blocks.append(limits_section(played[-1][1], limits.finite_limits()))
     if outcome.proofs:
         blocks.append(section("Not separable by any run", bullets([proof_words(x) for x in outcome.proofs])))
     if notes:

@@ -12,12 +12,12 @@ from rsea_ros.experiment.joint_weighing import RunWeighing
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.report import words
 from rsea_ros.report.experiment.words import plain_name
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _SHOWN = 0.01
 
 
-def known(weighing: RunWeighing) -> str:
+def known_causes(weighing: RunWeighing) -> str:
     """Return the likeliest causes with their probabilities."""
     order = sorted(weighing.probability.items(), key=lambda item: -item[1])
     return "known: " + ", ".join(f"{plain_name(n)} {p:.2f}" for n, p in order if p >= _SHOWN)
@@ -75,4 +75,4 @@ def _runs(outcome: CampaignOutcome) -> str:
 
 def _open(outcome: CampaignOutcome) -> str:
     order = sorted(outcome.weighing.probability.items(), key=lambda item: -item[1])
-    return listed([f"{plain_name(n)} ({p:.2f})" for n, p in order if p >= 0.05])
+    return list_names([f"{plain_name(n)} ({p:.2f})" for n, p in order if p >= 0.05])

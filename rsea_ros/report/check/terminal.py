@@ -10,7 +10,7 @@ from rich.text import Text
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.report import words
 from rsea_ros.report.rig.words import rig_in_brackets
-from rsea_ros.report.wrapped_lines import WIDTH, wrapped
+from rsea_ros.report.wrapped_lines import WIDTH, wrap
 
 _LIGHT, _KIND, _CHANNEL = 7, 14, 25
 """Columns."""
@@ -38,7 +38,7 @@ def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
     lines = []
     for f in _each_remedy_once(findings.findings):
         head = f"{f.light:<{_LIGHT}}{f'{kind(f)} ':<{_KIND}}{f'{_channel(f)} ':<{_CHANNEL}}"
-        text = wrapped(f"{head}{_finding_text(f)}", width, min(len(head), _LIGHT + _KIND + _CHANNEL))
+        text = wrap(f"{head}{_finding_text(f)}", width, min(len(head), _LIGHT + _KIND + _CHANNEL))
         lines.append(Text.assemble((text[:_LIGHT], _STYLES[f.light]), text[_LIGHT:]))
     return lines
 

@@ -37,9 +37,9 @@ def control_report(study: Study) -> str:
     blocks: list[Block] = [
         key_numbers(_keys(study)),
         section("Gains", bullets(list(gains_words(study)))),
-        _held(study),
+        _tracking_figure(study),
         _free(study),
-        _feeling(study),
+        _impedance_figure(study),
         *control_tables(study),
     ]
     return page(verdict(study), f"Torque control · {study.rig.name}", blocks, _footer(study))
@@ -72,17 +72,17 @@ def _keys(study: Study) -> list[tuple[str, str]]:
     ]
 
 
-def _held(study: Study) -> Figure:
+def _tracking_figure(study: Study) -> Figure:
     """Return T_d over desired torque of the clamped actuator, with its band over the set."""
     seen = [(at, at.locked, at.locked_spread) for at in study.rates]
     reached = " and ".join(f"{at.locked.bandwidth:.0f} Hz at {at.design.rate:g} Hz" for at in study.rates)
-    return _following(study, study.rig, f"Held at both ends, torque follows to {reached}", seen)
+    return _following_figure(study, study.rig, f"Held at both ends, torque follows to {reached}", seen)
 
 
 def _free(study: Study) -> Figure:
     """Return the same with the free load, which the controller does not know."""
     seen = [(at, at.free, at.free_spread) for at in study.rates]
-    return _following(study, study.free, _free_title(study), seen, LEARNING)
+    return _following_figure(study, study.free, _free_title(study), seen, LEARNING)
 
 
 def _free_title(study: Study) -> str:
@@ -96,7 +96,7 @@ def _free_title(study: Study) -> str:
     )
 
 
-def _following(
+def _following_figure(
     study: Study,
     rig: Rig,
     title: str,
@@ -133,7 +133,7 @@ def _band(curve: Following, apart: Spread) -> Band:
     return Band(hz, (low, high), (late, early))
 
 
-def _feeling(study: Study) -> Figure:
+def _impedance_figure(study: Study) -> Figure:
     """Return the output impedance."""
     first = study.rates[0].impedance
     items = [(f"{at.design.rate:g} Hz", at.impedance.hz, at.impedance.controlled, c, "solid")

@@ -20,7 +20,7 @@ _SIGNS = {True: "≥", False: "≤"}
 def trial_rows(study: Study) -> Rows:
     """Return each trial with its demand and its value at every rate; a value that misses it is marked."""
     return [
-        [trials[0].what, asked(trials[0]), *(value(trial) for trial in trials)]
+        [trials[0].what, demand_text(trials[0]), *(value(trial) for trial in trials)]
         for trials in zip(*(at.trials for at in study.rates), strict=True)
     ]
 
@@ -30,7 +30,7 @@ def trial_head(study: Study) -> list[str]:
     return ["trial", "asked", *(f"{at.design.rate:g} Hz" for at in study.rates)]
 
 
-def asked(trial: TrialResult) -> str:
+def demand_text(trial: TrialResult) -> str:
     """Return the demand in words."""
     limits = [words.number(limit, 3) for limit in (trial.asked, trial.allowed) if limit is not None]
     if not limits:

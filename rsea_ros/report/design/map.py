@@ -36,7 +36,7 @@ def feasible_map(
         line(1e3 * inertia, np.full(len(inertia), _TOP), "", TRUTH, **hidden),
         line(1e3 * inertia, least, "", TRUTH, fill="tonexty", fillcolor=faint(TRUTH, 0.12), **hidden),
     ]
-    names = [_named("<b>meets all demands</b>", inertia[len(inertia) // 3], 0.6 * _TOP, TRUTH)]
+    names = [_label("<b>meets all demands</b>", inertia[len(inertia) // 3], 0.6 * _TOP, TRUTH)]
     for demand in demands:
         hover: Json = {"hovertemplate": "%{y:.0f} N·m/rad"}
         data.append(line(1e3 * demand.inertia, demand.stiffness, demand.name, demand.colour, **hover))
@@ -45,7 +45,7 @@ def feasible_map(
         )
     for p in points:
         data.append(_dot(p))
-        names.append(_named(f"<b>{p.name}</b>", p.inertia, p.stiffness, p.colour, xshift=8, yshift=-11))
+        names.append(_label(f"<b>{p.name}</b>", p.inertia, p.stiffness, p.colour, xshift=8, yshift=-11))
     return Figure(title, caption, data, _layout(names), 460)
 
 
@@ -61,7 +61,7 @@ def _dot(p: Point) -> Json:
     }
 
 
-def _named(text: str, inertia: float, stiffness: float, colour: str, **parts: float) -> Json:
+def _label(text: str, inertia: float, stiffness: float, colour: str, **parts: float) -> Json:
     return label(text, float(np.log10(1e3 * inertia)), float(np.log10(stiffness)), colour, **parts)
 
 

@@ -82,7 +82,7 @@ def _keys(d: SpringDesign) -> list[tuple[str, str]]:
 
 def _sentences(asked: SpringDesign, least: SpringDesign) -> str:
     r = asked.requirement
-    spin, turns = asked.unit.spin, words.signed(asked.unit.turns, 0)
+    spin, turns = asked.unit.spin, words.signed_text(asked.unit.turns, 0)
     return section(
         "Result of the method, and its gaps",
         equation(

@@ -67,14 +67,14 @@ def _scene() -> Json:
     small = {"size": 11, "color": QUIET}
     plain = {"gridcolor": "#dfe4e8", "backgroundcolor": "rgba(0,0,0,0)", "tickfont": small}
 
-    def named(text: str, **parts: object) -> Json:
+    def axis(text: str, **parts: object) -> Json:
         return {**plain, "title": {"text": text, "font": {"size": 12, "color": QUIET}}, **parts}
 
     return layout(
         scene={
-            "xaxis": named("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
-            "yaxis": named("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
-            "zaxis": named("bandwidth, Hz"),
+            "xaxis": axis("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
+            "yaxis": axis("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
+            "zaxis": axis("bandwidth, Hz"),
             "camera": {"eye": {"x": -1.36, "y": -1.42, "z": 0.68}, "center": {"x": 0, "y": 0, "z": -0.2}},
             "aspectratio": {"x": 1.25, "y": 1.25, "z": 0.85},
         },

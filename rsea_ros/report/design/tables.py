@@ -51,8 +51,8 @@ def trains_table(rows: Sequence[WithTrain], d: SpringDesign) -> str:
     body = [
         [
             words.train(row.train),
-            words.signed(row.turns, 0),
-            words.signed(1e3 * row.inner, 2),
+            words.signed_text(row.turns, 0),
+            words.signed_text(1e3 * row.inner, 2),
             words.hertz(row.band),
             " to ".join(words.hertz(v) for v in row.band_range),
             f"{row.for_band:.0f}",

@@ -11,11 +11,11 @@ from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.sentences import evidence
-from rsea_ros.report.diagnosis.standing import STATUS, standing
+from rsea_ros.report.diagnosis.standing import STATUS, status_line
 from rsea_ros.report.figures.palette import AFTER, GRID, MEASURED, QUIET, faint
 from rsea_ros.report.page.html import bullets, equation, paragraph, section
 from rsea_ros.report.page.html_table import table_of_rows
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _WIDTH, _HEIGHT = 180.0, 18.0
 _GAIN = "Gain: share of the residual that the cause removes, on held-out data."
@@ -24,7 +24,7 @@ _GAIN = "Gain: share of the residual that the cause removes, on held-out data."
 def cause_section(cause: Cause, diagnosis: Diagnosis) -> str:
     """Return a cause with its size, its certainty, and the evidence for it."""
     share = f"{num.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
-    how_sure = standing(cause, diagnosis.alternatives, diagnosis.at_noise_floor)
+    how_sure = status_line(cause, diagnosis.alternatives, diagnosis.at_noise_floor)
     body = [_sizes(cause), paragraph(words.sentence(f"{say.prose(how_sure)}."))]
     body += [equation(cause.equation) if cause.equation else "", paragraph(evidence(cause))]
     body += [paragraph(_gain(cause)), _rivals(cause)]
@@ -58,7 +58,7 @@ def _model_share(estimate: CauseParameter) -> str:
 def _rivals(cause: Cause) -> str:
     if not cause.confusable_with:
         return ""
-    rivals = listed([words.effect(n) for n in cause.confusable_with])
+    rivals = list_names([words.effect(n) for n in cause.confusable_with])
     return paragraph(f"These data do not distinguish it from {rivals}.")
 
 
@@ -88,7 +88,7 @@ def _by_reason(rejected: Sequence[Rejected]) -> list[str]:
     names: dict[str, list[str]] = {}
     for r in rejected:
         names.setdefault(say.rejection(r), []).append(words.effect(r.name))
-    return [f"{words.sentence(say.prose(why))}: {listed(sorted(n))}." for why, n in names.items()]
+    return [f"{words.sentence(say.prose(why))}: {list_names(sorted(n))}." for why, n in names.items()]
 
 
 def _row(name: str, gain: float, outcome: str, strong: bool = False) -> str:

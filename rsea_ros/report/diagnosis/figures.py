@@ -15,7 +15,7 @@ from rsea_ros.report.figures.overlay import Simulated, overlay_figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
 from rsea_ros.report.figures.spectrum import ABOVE_FLOOR, SpectrumLine, finding, in_bands, residual_figure
 from rsea_ros.signals import FloatArray
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _FIRST_VIEW = 3.0
 """s of the record that the figure over time opens with."""
@@ -31,10 +31,10 @@ def spectrum_figure(diagnosis: Diagnosis, spectrum: Spectrum) -> Figure:
     curves = [SpectrumLine("before", BEFORE, s.before), SpectrumLine("after", AFTER, s.after)]
     title, caption = _before_and_after(diagnosis, s), f"Residual of the {channel}: measured minus simulated."
     figure = residual_figure(title, s.channel, s.frequency, curves, s.noise, caption)
-    return replace(figure, data=[_gained(s), *figure.data])
+    return replace(figure, data=[_gain_area(s), *figure.data])
 
 
-def _gained(spectrum: Spectrum) -> dict[str, object]:
+def _gain_area(spectrum: Spectrum) -> dict[str, object]:
     """Return the area between before and after, the improvement."""
     frequency, before = in_bands(spectrum.frequency, spectrum.before)
     _, after = in_bands(spectrum.frequency, spectrum.after)
@@ -42,7 +42,7 @@ def _gained(spectrum: Spectrum) -> dict[str, object]:
 
 
 def _before_and_after(diagnosis: Diagnosis, s: Spectrum) -> str:
-    causes = listed([words.effect(c.name) for c in diagnosis.causes])
+    causes = list_names([words.effect(c.name) for c in diagnosis.causes])
     f, before = in_bands(s.frequency, s.before / s.noise)
     _, after = in_bands(s.frequency, s.after / s.noise)
     k, left = int(np.argmax(before)), int(np.argmax(after))

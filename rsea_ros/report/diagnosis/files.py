@@ -35,5 +35,5 @@ def write_diagnosis(
     with NewFiles(out) as new:
         new.write(DIAGNOSIS_JSON, json_text(with_provenance(diagnosis_json(diagnosis), provenance)))
         new.write(MODEL, rig_text(diagnosis.extended_rig))
-        write(overlay_records(diagnosis, record), new.staged(OVERLAY))
+        write(overlay_records(diagnosis, record), new.stage(OVERLAY))
         return new.write(REPORT, diagnosis_report(diagnosis, provenance))

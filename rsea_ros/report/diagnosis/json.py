@@ -16,7 +16,6 @@ from rsea_ros.diagnosis.result import (
 )
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.report.diagnosis import words as say
-from rsea_ros.report.diagnosis.noise_numbers import NOISE_NUMBERS
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence, evidence, next_run
 from rsea_ros.report.identification.json import parameter
 from rsea_ros.report.json_values import fault_json, finite, numbers
@@ -51,7 +50,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "misfit": [_misfit(m) for m in d.misfit],
         "causes": [_cause(c) for c in d.causes],
         "alternatives": [_alternative(a) for a in d.alternatives],
-        "rejected": [_rejected(r) for r in d.rejected],
+        "rejected": [_rejection(r) for r in d.rejected],
         "extended": {
             "residual_rms": numbers(d.extended_residual_rms),
             "fit_percent": numbers(d.extended_fit_percent),
@@ -61,13 +60,14 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": _experiment(d.next_experiment),
         "statements": list(remark_sentences(d.remarks)),
         "settings": _settings(d.settings),
-        "noise_numbers": {s.name: s.value for s in NOISE_NUMBERS},
+        "noise_numbers": {s.name: s.value for s in d.settings.listed() if s.name.startswith("noise.")},
     }
 
 
 def _settings(settings: DiagnosisSettings) -> dict[str, Any]:
     """Return every number that steered the verdict, `group.name`: value."""
-    numbers = {s.name: s.value for s in settings.listed()}
+    values = ((s.name, s.value) for s in settings.listed())
+    numbers = {name: list(v) if isinstance(v, tuple) else v for name, v in values}
     return {"max_causes": settings.max_causes, "without": list(settings.without), **numbers}
 
 
@@ -130,7 +130,7 @@ def _pair(interval: tuple[float, float]) -> list[float | None]:
     return [finite(side) for side in interval]
 
 
-def _rejected(rejected: Rejected) -> dict[str, Any]:
+def _rejection(rejected: Rejected) -> dict[str, Any]:
     return {
         "name": rejected.name,
         "gain_holdout": finite(rejected.gain_holdout),

@@ -20,11 +20,11 @@ def overlay_records(diagnosis: Diagnosis, record: Record) -> Mapping[str, Record
     """
     return {
         MEASURED: record,
-        BEFORE: _simulated(record, diagnosis.before),
-        AFTER: _simulated(record, diagnosis.after),
+        BEFORE: _simulated_record(record, diagnosis.before),
+        AFTER: _simulated_record(record, diagnosis.after),
     }
 
 
-def _simulated(record: Record, overlays: Sequence[Overlay]) -> Record:
+def _simulated_record(record: Record, overlays: Sequence[Overlay]) -> Record:
     channels = {o.channel: Channel(o.t, o.simulated) for o in overlays}
     return Record(channels, record.source, record.epoch_ns)

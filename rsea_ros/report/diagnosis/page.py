@@ -22,7 +22,7 @@ from rsea_ros.report.fault_words import fault_lines, faults
 from rsea_ros.report.figures.palette import AFTER, BEFORE
 from rsea_ros.report.identification.parameters import parameter_table
 from rsea_ros.report.page.frame import Block, page
-from rsea_ros.report.page.html import bullets, folded, key_numbers, paragraph, section
+from rsea_ros.report.page.html import bullets, fold, key_numbers, paragraph, section
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.report.rig.page import right_rig_block
@@ -56,7 +56,7 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
     yield _final(d)
     yield tried_section(d)
     yield channel_section(d)
-    yield _undetermined(d)
+    yield _undetermined_values(d)
     if d.next_experiment is not None:
         yield experiment_section(d.next_experiment)
     yield _faults(d)
@@ -81,7 +81,7 @@ def _kicker(d: Diagnosis) -> str:
     return f"Diagnosis of {rig} · {d.duration:.0f} s of data at {d.rate:.0f} Hz"
 
 
-def _undetermined(d: Diagnosis) -> str:
+def _undetermined_values(d: Diagnosis) -> str:
     sentences = [*say.confusions(d), *remark_sentences(split_off_rig(d.remarks)[1])]
     body = bullets(sentences) if sentences else paragraph("The data determine every free value.")
     return section("What these data cannot determine", body)
@@ -100,7 +100,7 @@ def _faults(d: Diagnosis) -> str:
 def _baseline(d: Diagnosis) -> str:
     """Return the values fitted before the causes, folded: they compensate the missing causes."""
     title = "Values of the rig, fitted before the search for causes"
-    return folded(title, parameter_table(d.baseline)) if d.causes else ""
+    return fold(title, parameter_table(d.baseline)) if d.causes else ""
 
 
 def _final(d: Diagnosis) -> str:

@@ -42,7 +42,7 @@ def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
     if channel not in before:
         return ()
     overlay, noise = before[channel], diagnosis.noise_rms[channel]
-    counted = _counted(diagnosis, overlay)
+    counted = _counted_samples(diagnosis, overlay)
     residuals = [((o[channel].measured - o[channel].simulated) / noise)[counted] for o in (before, after)]
     if counted.sum() < _FEWEST:
         return ()
@@ -53,7 +53,7 @@ def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
     return tuple(shown)
 
 
-def _counted(diagnosis: Diagnosis, overlay: Overlay) -> FloatArray:
+def _counted_samples(diagnosis: Diagnosis, overlay: Overlay) -> FloatArray:
     """Return which samples count: neither those before the bench has settled nor faulty ones."""
     out = np.asarray(diagnosis.masked.get(overlay.channel, np.zeros(len(overlay.t), bool)))
     good: FloatArray = (overlay.t >= overlay.t[0] + SKIPPED_START) & ~out

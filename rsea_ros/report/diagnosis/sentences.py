@@ -13,7 +13,7 @@ from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.rig.words import values_off
 from rsea_ros.signals import Fault
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _AMPLITUDES = {0.5: "half", 2.0: "twice"}
 
@@ -35,13 +35,13 @@ def verdict_sentence(
     off: how many values are not the rig's, empty for none. rest: of the misfit, where a part is explained.
     """
     name, data = words.channel(channel), (f" {off}." if off else "") + _data(faults)
-    named = words.sentence(listed([words.effect(c.name) for c in causes]))
+    named = words.sentence(list_names([words.effect(c.name) for c in causes]))
     pronoun, explains = ("them", "explain") if len(causes) > 1 else ("it", "explains")
     fall = f"with {pronoun} the {name} residual falls from {before:.1f} to"
     silent = [words.channel(n) for n in silent_channels(faults)]
     if verdict == "unexplained" and silent and at_floor:
         return (
-            f"The {listed(silent)} measures nothing and is left out; with the model's values re-fitted "
+            f"The {list_names(silent)} measures nothing and is left out; with the model's values re-fitted "
             f"the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
         )
     if verdict == "nothing_wrong" and is_unexcited(faults):
@@ -93,7 +93,7 @@ def evidence(cause: Cause) -> str:
 
 def next_run(experiment: Experiment) -> str:
     """Return the question that a run would decide, or why none is recommended, without a full stop."""
-    rivals = f"{experiment.cause} and {listed(experiment.rivals)}"
+    rivals = f"{experiment.cause} and {list_names(experiment.rivals)}"
     alike = f"{rivals} do as well on these data"
     if experiment.reason == "other_amplitude":
         return f"{alike}; a run at another amplitude would show more"
@@ -128,5 +128,5 @@ def _data(faults: Sequence[Fault]) -> str:
 
 def _fault(kind: str, channels: Sequence[str]) -> str:
     """Return `frozen samples in ft`, or `velocity missing`."""
-    names = listed(channels)
+    names = list_names(channels)
     return f"{names} missing" if kind == "missing_topic" else f"{kind.replace('_', ' ')} in {names}"

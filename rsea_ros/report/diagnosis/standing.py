@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rsea_ros.diagnosis.result import Alternative, Cause
 from rsea_ros.report import words
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 STATUS = {"confirmed": "confirmed", "leading": "leading", "one_of": "one of"}
 _REASON = {
@@ -16,21 +16,21 @@ _REASON = {
 }
 
 
-def standing(cause: Cause, alternatives: Sequence[Alternative] = (), at_floor: bool = False) -> str:
+def status_line(cause: Cause, alternatives: Sequence[Alternative] = (), at_floor: bool = False) -> str:
     """Return `leading: command_delay 9.10 ms [8.40, 9.80], probability 0.87; …` of a cause.
 
     alternatives: of the whole diagnosis. at_floor: the residual with all causes is noise.
     """
     rivals = against(cause, alternatives)
     items: list[Cause | Alternative] = [cause, *rivals]
-    listed_items = [f"{sized(item)}, probability {item.probability:.2f}" for item in items]
+    listed_items = [f"{size_text(item)}, probability {item.probability:.2f}" for item in items]
     reason = _REASON[cause.status]
     if at_floor and cause.status == "leading":
         reason = "it reduces the residual to the noise, but another law may do the same"
     if cause.status == "one_of" and rivals:
-        return f"one of: {listed(listed_items, 'or')}; {reason}"
+        return f"one of: {list_names(listed_items, 'or')}; {reason}"
     text = f"{STATUS[cause.status]}: {listed_items[0]}; {reason}"
-    return f"{text}; less likely instead: {listed(listed_items[1:], 'or')}" if rivals else text
+    return f"{text}; less likely instead: {list_names(listed_items[1:], 'or')}" if rivals else text
 
 
 def against(cause: Cause, alternatives: Sequence[Alternative]) -> list[Alternative]:
@@ -38,11 +38,11 @@ def against(cause: Cause, alternatives: Sequence[Alternative]) -> list[Alternati
     return sorted((a for a in alternatives if a.instead_of == cause.name), key=lambda a: -a.probability)
 
 
-def sized(item: Cause | Alternative) -> str:
+def size_text(item: Cause | Alternative) -> str:
     """Return name and main parameter with its 95 % interval: `command_delay 9.10 ms [8.40, 9.80]`."""
     if not item.parameters:
         return item.name
     parameter = next(iter(item.parameters.values()))
-    factor, unit = words.scaled(parameter.value, parameter.unit)
+    factor, unit = words.unit_factor(parameter.value, parameter.unit)
     value, low, high = (words.number(v * factor) for v in (parameter.value, *parameter.ci95))
     return f"{item.name} {value}{f' {unit}' if unit else ''} [{low}, {high}]"

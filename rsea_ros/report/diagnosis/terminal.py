@@ -12,11 +12,11 @@ from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.causes import fitted_rivals
 from rsea_ros.report.diagnosis.sentences import next_run
-from rsea_ros.report.diagnosis.standing import standing
+from rsea_ros.report.diagnosis.standing import status_line
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.report.rig.words import command, rig_named, right_rig, split_off_rig
-from rsea_ros.report.wrapped_lines import LABEL, WIDTH, command_row, row, wrapped
+from rsea_ros.report.wrapped_lines import LABEL, WIDTH, command_row, row, wrap
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
 _MOST = 3
@@ -28,7 +28,7 @@ def terminal_lines(diagnosis: Diagnosis, width: int = WIDTH) -> list[Text]:
     style = _STYLES.get(diagnosis.verdict, "bold yellow" if off else "bold green")
     rows = [*_rig(diagnosis, width), *(row(name, text, width) for name, text in _rows(diagnosis))]
     shown = (Text.assemble((text[:LABEL], "dim"), text[LABEL:]) for text in rows)
-    return [Text(wrapped(say.headline(diagnosis), width), style=style), *shown]
+    return [Text(wrap(say.headline(diagnosis), width), style=style), *shown]
 
 
 def _rig(d: Diagnosis, width: int) -> Iterator[str]:
@@ -51,7 +51,7 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in cause.parameters.items())}"
         gain, interval = num.percent(cause.gain_holdout), num.percent_range(cause.gain_holdout_ci95)
         yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
-        yield "status", standing(cause, d.alternatives, d.at_noise_floor)
+        yield "status", status_line(cause, d.alternatives, d.at_noise_floor)
     if d.misfit and d.verdict != "nothing_wrong":
         yield "wrong at", "; ".join(say.misfit(m) for m in _worst(d))
     for rival in fitted_rivals(d)[:_MOST]:

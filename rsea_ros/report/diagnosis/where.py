@@ -12,7 +12,7 @@ from rsea_ros.report.diagnosis.profile import Profile
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, NOISE, QUIET
 from rsea_ros.signals import FloatArray
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _DEPENDS = 1.5
 _GAP = 0.035
@@ -52,7 +52,7 @@ def finding(profiles: Sequence[Profile]) -> str:
     most = max(physical or profiles, key=lambda p: p.contrast)
     if most.contrast >= _DEPENDS or not physical:
         return f"The residual depends most on {say.respect(most.what)}: {_extremes(most)}"
-    respects = listed([say.respect(p.what) for p in physical], "or")
+    respects = list_names([say.respect(p.what) for p in physical], "or")
     alike = f"The residual is the same at every {respects}"
     changing = [p for p in profiles if p.what == "time" and p.contrast >= _DEPENDS]
     return f"{alike}; over time it changes: {_extremes(changing[0])}" if changing else alike

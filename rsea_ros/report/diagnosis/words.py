@@ -11,7 +11,7 @@ from rsea_ros.identification.silent import is_unexcited, silent_channels
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.rig.words import values_off
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _REASONS: Mapping[Reason, str] = {
     "far_behind": "much worse than the best effect on the training data",
@@ -59,9 +59,9 @@ def size(cause: Cause) -> str:
     return number if estimate.unit != "1" else f"{name.replace('_', ' ')} {number}"
 
 
-def named(causes: Sequence[Cause]) -> str:
+def cause_list(causes: Sequence[Cause]) -> str:
     """Return causes with their sizes: `Coulomb friction (3.00 N·m) and backlash (1.20 mrad)`."""
-    return listed([f"{words.effect(c.name)} ({size(c)})" for c in causes])
+    return list_names([f"{words.effect(c.name)} ({size(c)})" for c in causes])
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -74,7 +74,9 @@ def _verdict(diagnosis: Diagnosis) -> str:
     channel, (before, _) = words.channel(n), num.times_noise(d, n)
     silent = [words.channel(name) for name in silent_channels(d.faults)]
     if d.verdict == "unexplained" and silent and d.at_noise_floor:
-        return f"{words.sentence(listed(silent))} measures nothing; in the other channels only noise is left"
+        return (
+            f"{words.sentence(list_names(silent))} measures nothing; in the other channels only noise is left"
+        )
     if d.verdict == "nothing_wrong" and is_unexcited(d.faults):
         return "These data show nothing: the command never changes, so no cause could be seen"
     if d.verdict == "nothing_wrong" and values_off(d.remarks):
@@ -92,7 +94,7 @@ def _verdict(diagnosis: Diagnosis) -> str:
         rest = f"probably {explains} the misfit; only noise is left"
     else:
         rest = f"{explains} part of the misfit; the rest stays unexplained"
-    return words.sentence(f"{named(d.causes)} {rest}")
+    return words.sentence(f"{cause_list(d.causes)} {rest}")
 
 
 def misfit(m: Misfit) -> str:
@@ -128,7 +130,7 @@ def excitation(settings: Mapping[str, float | str]) -> str:
 
 
 def _either(names: Sequence[str]) -> str:
-    return listed([words.effect(n) for n in names], "or")
+    return list_names([words.effect(n) for n in names], "or")
 
 
 def _times(ratio: float) -> str:

@@ -23,7 +23,7 @@ def advice_json(advice: Advice) -> dict[str, Any]:
         "sentence": verdict(advice),
         "causes": {h.name: h.probability for h in advice.hypotheses},
         "excluded": dict(advice.excluded),
-        "limits": advice.asked.limits.stated(),
+        "limits": advice.asked.limits.finite_limits(),
         "limits_hold_with_probability": LEVEL,
         "run": None if p is None else proposal_json(p),
         "no_run_separates": [proof_json(x) for x in advice.proofs],

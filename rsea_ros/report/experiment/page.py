@@ -37,7 +37,7 @@ def advice_page(advice: Advice, provenance: Provenance | None = None) -> str:
             command_figure(p),
             spectrum_figure([("run", p)]),
         ]
-        blocks += [limits_section(p, advice.asked.limits.stated())]
+        blocks += [limits_section(p, advice.asked.limits.finite_limits())]
     if advice.proofs:
         blocks.append(section("Not separable by any run", bullets([proof_words(x) for x in advice.proofs])))
     rig = advice.hypotheses[0].problem.rig.name

@@ -10,7 +10,7 @@ from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.experiment.run_limits import UNITS
 from rsea_ros.report import words
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 
 def plain_name(name: str) -> str:
@@ -31,14 +31,15 @@ def verdict(advice: Advice) -> str:
     p = advice.proposal
     names = [plain_name(h.name) for h in advice.hypotheses]
     if p is None:
-        return f"No run within the limits separates {listed(names)}"
+        return f"No run within the limits separates {list_names(names)}"
     if len(names) == 1:
-        return f"{_narrowed(advice.hypotheses[0], p)}: {shape_words(p)}"
+        return f"{_narrowing(advice.hypotheses[0], p)}: {shape_words(p)}"
     share = f"{100.0 * p.decided:.0f} %"
-    return f"The next run is expected to decide between {listed(names)} in {share} of cases: {shape_words(p)}"
+    between = list_names(names)
+    return f"The next run is expected to decide between {between} in {share} of cases: {shape_words(p)}"
 
 
-def _narrowed(hypothesis: Hypothesis, p: Proposal) -> str:
+def _narrowing(hypothesis: Hypothesis, p: Proposal) -> str:
     """Return how much a run narrows each interval where one cause is left: the geometric mean over them."""
     if hypothesis.name == NOTHING:
         return "No cause is in doubt; a run can only narrow the intervals of the rig, and this one does most"

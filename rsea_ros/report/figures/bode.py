@@ -10,7 +10,7 @@ from rsea_ros.report import words
 from rsea_ros.report.figures.bode_words import caption, finding
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, MEASURED, QUIET, faint
-from rsea_ros.report.figures.thinned import thinned
+from rsea_ros.report.figures.thinned import thin
 from rsea_ros.signals import UNITS, ComplexArray, FloatArray
 
 _SIDE = Z95 / np.sqrt(2.0)
@@ -21,7 +21,7 @@ _MOST_DECIBEL = 12.0
 
 def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) -> Figure:
     """Return gain, phase and coherence over frequency. model: at the measured frequencies."""
-    shown, shown_model = thinned(measured, model)
+    shown, shown_model = thin(measured, model)
     data = [*_gain(shown, shown_model), *_phase(shown, shown_model), *_ratio(shown, shown_model)]
     data.append(
         line(shown.frequency, shown.coherence, "coherence", QUIET, 1.2, yaxis="y4", hovertemplate="%{y:.3f}")

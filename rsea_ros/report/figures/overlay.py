@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout
-from rsea_ros.report.figures.packing import packed
+from rsea_ros.report.figures.packing import pack
 from rsea_ros.report.figures.palette import MEASURED, faint
 from rsea_ros.signals import UNITS, FloatArray
 
@@ -42,15 +42,15 @@ def overlay_figure(
     caption: str = "",
 ) -> Figure:
     """Return the figure of one channel. t: s."""
-    keep = sampled(measured, measured - simulations[-1].values)
+    keep = sample_extremes(measured, measured - simulations[-1].values)
     unit = words.unit(UNITS[channel])
     pauses = pauses_of(t[keep])
     shown = measured[keep]
     shown[list(pauses)] = np.nan
     extra = {
-        "t": packed(without(pauses, t[keep] - t[0]), _MICROSECOND),
+        "t": pack(without(pauses, t[keep] - t[0]), _MICROSECOND),
         "pauses": list(pauses.items()),
-        "measured": {"colour": MEASURED, "y": packed(shown, _fineness(measured, _MEASURED))},
+        "measured": {"colour": MEASURED, "y": pack(shown, _fineness(measured, _MEASURED))},
         "residuals": [_residual(s, shown - s.values[keep]) for s in simulations],
         "unit": unit,
     }
@@ -88,7 +88,7 @@ def _residual(simulated: Simulated, values: FloatArray) -> Json:
     return {
         "name": simulated.name,
         "colour": simulated.colour,
-        "y": packed(values, _fineness(values, _RESIDUAL)),
+        "y": pack(values, _fineness(values, _RESIDUAL)),
     }
 
 
@@ -97,7 +97,7 @@ def _fineness(values: FloatArray, part: float) -> float:
     return part * float(np.nanstd(values)) if np.isfinite(values).any() else 0.0
 
 
-def sampled(measured: FloatArray, residual: FloatArray) -> npt.NDArray[np.int64]:
+def sample_extremes(measured: FloatArray, residual: FloatArray) -> npt.NDArray[np.int64]:
     """Return the indices that stay when a trace is too long: the extremes of both in each block."""
     n = len(measured)
     if n <= MOST_SAMPLES:

@@ -15,7 +15,7 @@ STEPS = 60_000
 _LEVEL = 6
 
 
-def packed(values: FloatArray, step: float = 0.0) -> dict[str, Any]:
+def pack(values: FloatArray, step: float = 0.0) -> dict[str, Any]:
     """Return values for a page: value k = first + slope·k + step·(whole number k).
 
     step: allowed rounding, in the unit of the values; 0: the resolution of 16 bits.

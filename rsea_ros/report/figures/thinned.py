@@ -14,7 +14,7 @@ _SMALLEST = 1e-100
 """Standard deviation whose inverse square is still a number."""
 
 
-def thinned(
+def thin(
     measured: FrequencyResponse, model: ComplexArray | None
 ) -> tuple[FrequencyResponse, ComplexArray | None]:
     """Return measurement and model averaged in the same bands, weighted by 1/sd²."""

@@ -18,7 +18,7 @@ def cause_figure(naming: Naming, appearance: Appearance | None, steps: Steps) ->
     """Return the figure of a cause that has a size."""
     assert naming.size is not None
     typical = float(np.nanmedian(np.abs(naming.size))) if np.any(np.isfinite(naming.size)) else 1.0
-    factor, unit = (100.0, "%") if naming.unit == "1" else words.scaled(typical, naming.unit)
+    factor, unit = (100.0, "%") if naming.unit == "1" else words.unit_factor(typical, naming.unit)
     limit = naming.limit * factor
     shapes = _since(appearance) + _limit_band(limit)
     note = (

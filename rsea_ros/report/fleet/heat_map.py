@@ -15,7 +15,7 @@ from rsea_ros.signals import FloatArray
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.series import BoolArray
-from rsea_ros.trends.weeks import Steps, binned
+from rsea_ros.trends.weeks import Steps, bin_days
 
 _ROW = 17
 """Pixels of a row, as in fleet.css."""
@@ -90,7 +90,7 @@ def _row(trend: Trend | None, steps: Steps) -> tuple[FloatArray, BoolArray]:
     empty = np.full(len(steps), np.nan)
     if trend is None:
         return empty, np.zeros(len(steps), bool)
-    bins = binned(trend, steps)
+    bins = bin_days(trend, steps)
     if trend.first is None or not trend.first.value:
         return empty, bins.recorded > 0
     change: FloatArray = (bins.value - trend.first.value) / abs(trend.first.value)

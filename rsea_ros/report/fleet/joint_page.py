@@ -14,7 +14,7 @@ from rsea_ros.report.fleet.parameter_figure import parameter_figure
 from rsea_ros.report.fleet.tables import alarm_table, parameter_rows
 from rsea_ros.report.fleet.words import finding, sentence, short_day
 from rsea_ros.report.page.frame import Block, page
-from rsea_ros.report.page.html import folded, key_numbers, paragraph, section
+from rsea_ros.report.page.html import fold, key_numbers, paragraph, section
 from rsea_ros.report.page.html_table import table_of_cells
 from rsea_ros.report.words import sentence as capital
 from rsea_ros.trends.alarms import Alarm
@@ -55,7 +55,7 @@ def _blocks(
         yield section("Findings", alarm_table(alarms, links, with_joint=False))
     yield from _pictures(joint, trends, fleet, steps)
     yield section("All parameters", parameter_rows(trends))
-    yield folded("The latest recordings", _recordings(recordings, rows, links))
+    yield fold("The latest recordings", _recordings(recordings, rows, links))
 
 
 def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: Steps) -> Iterator[Block]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from rsea_ros.report import words
 from rsea_ros.trends.series import Table
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _SURE = ("confirmed", "leading")
 
@@ -24,7 +24,7 @@ def latest_causes(joints: Sequence[str], recordings: Table) -> Mapping[str, str]
             continue
         last = done[np.argmax(np.nan_to_num(time_s[done]))]
         if causes := _sure(recordings["causes"][last]):
-            named[joint] = listed(causes)
+            named[joint] = list_names(causes)
     return named
 
 

@@ -19,13 +19,13 @@ from rsea_ros.report.fleet.tables import (
 from rsea_ros.report.fleet.timeline import timeline
 from rsea_ros.report.fleet.words import about, day, name, percent
 from rsea_ros.report.page.frame import Block, page
-from rsea_ros.report.page.html import bullets, folded, key_numbers, paragraph, section
+from rsea_ros.report.page.html import bullets, fold, key_numbers, paragraph, section
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.ranking import by_joint, worst_first
 from rsea_ros.trends.result import FleetTrends
 from rsea_ros.trends.series import Table
 from rsea_ros.trends.weeks import Steps
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _NAMED = 3
 """Joints that the headline names."""
@@ -55,32 +55,34 @@ def _blocks(
     yield timeline(ranked, steps, links)
     if ranked:
         yield section("Worst joints first", alarm_table(ranked, links))
-    for parameter in _mapped(fleet):
+    for parameter in _parameters_with_map(fleet):
         yield heat_map(parameter, joints[:_ROWS], fleet, steps, links)
     for kind, subject in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
-        yield naming_map(subject, kind, _naming(fleet, kind, subject, joints)[:_ROWS], fleet, steps, links)
+        yield naming_map(
+            subject, kind, _name_lines(fleet, kind, subject, joints)[:_ROWS], fleet, steps, links
+        )
     yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
-    yield _undetermined(fleet, links)
-    yield folded("Certainty of these findings", bullets(_sure(fleet)))
+    yield _undetermined_text(fleet, links)
+    yield fold("Certainty of these findings", bullets(_sure(fleet)))
 
 
-def _mapped(fleet: FleetTrends) -> list[str]:
+def _parameters_with_map(fleet: FleetTrends) -> list[str]:
     """Return the parameters that have a map, those that moved most first; of causes the usual ones."""
     sized = [p for _, p in fleet.sizes]
     usual = [p for p in dict.fromkeys(sized) if 2 * sized.count(p) > len(fleet.joints)]
     courses = {**fleet.trends, **fleet.sizes}
 
-    def moved(parameter: str) -> float:
+    def movement(parameter: str) -> float:
         changed = [t for (_, p), t in courses.items() if p == parameter and t.changes]
         return -max((abs(t.relative) for t in changed), default=0.0)
 
-    return sorted([*dict.fromkeys(p for _, p in fleet.trends), *usual], key=moved)
+    return sorted([*dict.fromkeys(p for _, p in fleet.trends), *usual], key=movement)
 
 
 def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:
     if not any(t.state != "undetermined" for t in fleet.trends.values()):
         latest = [f"{cause} in {joint}" for joint, cause in latest_causes(fleet.joints, recordings).items()]
-        now = f"; the latest name {listed(latest[:_NAMED])}" if latest else ""
+        now = f"; the latest name {list_names(latest[:_NAMED])}" if latest else ""
         return f"Too few recordings yet for trends{now}"
     groups = by_joint(alarms)
     if not groups:
@@ -97,7 +99,7 @@ def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table)
         (f"{len(groups)} of {len(fleet.joints)}", "joints need a look"),
         (str(kinds.count("trend") + kinds.count("change")), f"changes, {kinds.count('trend')} going on"),
         (str(kinds.count("cause")), "causes that appeared"),
-        (_grouped(done), f"recordings used, of {_grouped(len(recordings['joint']))}"),
+        (_group_digits(done), f"recordings used, of {_group_digits(len(recordings['joint']))}"),
         (
             str(len(undetermined_trends(fleet))),
             f"of {len(fleet.trends)} courses cannot be determined, or no more",
@@ -105,17 +107,17 @@ def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table)
     ]
 
 
-def _grouped(number: int) -> str:
+def _group_digits(number: int) -> str:
     """Return a number with its thousands apart."""
     return f"{number:,}".replace(",", " ")
 
 
-def _naming(fleet: FleetTrends, kind: str, subject: str, joints: Sequence[str]) -> list[str]:
+def _name_lines(fleet: FleetTrends, kind: str, subject: str, joints: Sequence[str]) -> list[str]:
     naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, subject)}
     return [j for j in joints if j in naming]
 
 
-def _undetermined(fleet: FleetTrends, links: Links) -> str:
+def _undetermined_text(fleet: FleetTrends, links: Links) -> str:
     undetermined = undetermined_trends(fleet)
     if not undetermined:
         return section(
@@ -137,7 +139,7 @@ def _sure(fleet: FleetTrends) -> list[str]:
         "estimated from the scatter of the days, by restricted likelihood, and is not a change.",
     ]
     if warm:
-        lines.append(f"Change per kelvin, estimated across the joints of this fleet: {listed(warm)}.")
+        lines.append(f"Change per kelvin, estimated across the joints of this fleet: {list_names(warm)}.")
     return lines
 
 

@@ -11,7 +11,7 @@ from rsea_ros.report.fleet.marks import change_marks, date_axis, points
 from rsea_ros.report.fleet.words import amount, dates, finding, name, percent, short_day, value
 from rsea_ros.trends.result import Change, Interval, Trend
 from rsea_ros.trends.settings import DAY, YEAR
-from rsea_ros.trends.weeks import Binned, Steps, binned
+from rsea_ros.trends.weeks import Binned, Steps, bin_days
 
 _AHEAD = 0.5
 """Share of the time covered up to which a trend is drawn on."""
@@ -19,8 +19,8 @@ _AHEAD = 0.5
 
 def parameter_figure(trend: Trend, steps: Steps) -> Figure:
     """Return the figure of a parameter that the recordings determine."""
-    factor, unit = words.scaled(trend.now.value if trend.now else 1.0, trend.series.unit)
-    bins = binned(trend, steps)
+    factor, unit = words.unit_factor(trend.now.value if trend.now else 1.0, trend.series.unit)
+    bins = bin_days(trend, steps)
     ahead, until = _ahead(trend, steps, factor)
     marks = [m for c in trend.changes if not c.open_start
              for m in change_marks(c.since_s, c.earliest_s, c.latest_s)]  # fmt: skip
@@ -29,7 +29,12 @@ def parameter_figure(trend: Trend, steps: Steps) -> Figure:
     return Figure(
         title=finding(trend),
         caption=_caption(trend),
-        data=[*_course(trend, factor), *ahead, _weeks(bins, steps, factor, unit), _undetermined(bins, steps)],
+        data=[
+            *_course(trend, factor),
+            *ahead,
+            _weeks(bins, steps, factor, unit),
+            _undetermined_marks(bins, steps),
+        ],
         layout=layout(
             xaxis=date_axis(steps, until),
             yaxis=axis(f"{name(trend.series.parameter)}, {unit}".rstrip(", "), hoverformat=".4g"),
@@ -64,7 +69,7 @@ def _weeks(bins: Binned, steps: Steps, factor: float, unit: str) -> Json:
     )
 
 
-def _undetermined(bins: Binned, steps: Steps) -> Json:
+def _undetermined_marks(bins: Binned, steps: Steps) -> Json:
     """Return a mark at the bottom for each week whose recordings could not determine the parameter."""
     none = (bins.recorded > 0) & (bins.identifiable == 0)
     return points(

@@ -12,7 +12,7 @@ from rsea_ros.report import words
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import Change, Interval, Trend
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 _MONTHS = ("January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
            "November", "December")  # fmt: skip
@@ -52,7 +52,7 @@ def name(about: str) -> str:
 
 def value(v: Interval, unit: str) -> str:
     """Return a value with its 95 % interval and unit, `3.90 ± 0.08 mrad`; a bare number in percent."""
-    factor, shown = (100.0, "%") if unit == "1" else words.scaled(v.value, unit)
+    factor, shown = (100.0, "%") if unit == "1" else words.unit_factor(v.value, unit)
     text, doubt = words.with_doubt(v.value * factor, v.low * factor, v.high * factor)
     return f"{text}{doubt} {shown}".strip()
 
@@ -127,17 +127,17 @@ def _finding(trend: Trend) -> str:
         enough = bool(np.mean(trend.series.identifiable) > 0.5)
         return f"{plain}: {'too few recordings' if enough else 'not enough excitation'} to tell"
     if trend.state == "steady":
-        factor, shown = words.scaled(trend.detectable, unit)
+        factor, shown = words.unit_factor(trend.detectable, unit)
         level = trend.now.value if trend.now is not None else 0.0
         share = f", {amount(trend.detectable / abs(level))}" if level else ""
         return f"{plain} is steady: no step above {words.number(trend.detectable * factor, 2)} {shown}{share}"
     if trend.state == "trending" and trend.per_year is not None:
         way = "rising" if trend.per_year.value > 0.0 else "falling"
         return f"{plain} is {way}: {percent(trend.relative)} since the first day{_limit(trend)}"
-    return f"{plain} {listed([_moved(c, trend) for c in trend.changes[:_MOST]])}"
+    return f"{plain} {list_names([_movement_text(c, trend) for c in trend.changes[:_MOST]])}"
 
 
-def _moved(change: Change, trend: Trend) -> str:
+def _movement_text(change: Change, trend: Trend) -> str:
     way = "rose" if change.size.value > 0.0 else "fell"
     size = change.size.value / abs(trend.first.value) if trend.first and trend.first.value else float("nan")
     how = f" by {amount(size)}" if math.isfinite(size) else ""

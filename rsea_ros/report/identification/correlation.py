@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
-from rsea_ros.report.page.html import folded, paragraph
+from rsea_ros.report.page.html import fold, paragraph
 from rsea_ros.signals import FloatArray
 
 STRONG = 0.9
@@ -31,7 +31,7 @@ def correlation_section(names: Sequence[str], matrix: FloatArray) -> str:
         f"<div class='scroll'><table class='matrix'><thead><tr><th></th>{heads}</tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"
     )
-    return folded("Correlation of the parameters", paragraph(finding(names, matrix)), table)
+    return fold("Correlation of the parameters", paragraph(finding(names, matrix)), table)
 
 
 def finding(names: Sequence[str], matrix: FloatArray) -> str:

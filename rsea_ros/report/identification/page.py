@@ -37,9 +37,9 @@ def identification_report(identification: Identification, provenance: Provenance
     responses = identification.responses
     models = identification.models or (None,) * len(responses)
     blocks += [bode_figure(r, m) for r, m in zip(responses, models, strict=True)]
-    for overlay in _shown(identification):
+    for overlay in _shown_overlays(identification):
         blocks += [_over_time(identification, overlay), _over_frequency(identification, overlay)]
-    blocks += [_undetermined(identification), _correlation(identification)]
+    blocks += [_undetermined_values(identification), _correlation(identification)]
     footer = [*_footer(identification), *(provenance.lines if provenance else ())]
     return page(verdict_sentence(identification), _kicker(identification), blocks, footer)
 
@@ -102,7 +102,7 @@ def _parameter_finding(identification: Identification) -> str:
     return f"The data determine {len(settled)} of {len(physical)} parameters"
 
 
-def _shown(identification: Identification) -> list[Overlay]:
+def _shown_overlays(identification: Identification) -> list[Overlay]:
     """Return the overlays that get a figure; the motor torque is left out, it only repeats the command."""
     by_name = {o.channel: o for o in identification.overlays}
     return [by_name[n] for n in SENSED if n in by_name] or list(identification.overlays)
@@ -129,7 +129,7 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
     return residual_figure(title, n, frequency, curves, noise)
 
 
-def _undetermined(identification: Identification) -> str:
+def _undetermined_values(identification: Identification) -> str:
     title = "What these data cannot determine"
     others = split_off_rig(identification.remarks)[1]
     sentences = (*doubt_sentences(identification), *remark_sentences(others))

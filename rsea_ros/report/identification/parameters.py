@@ -48,11 +48,11 @@ def value_text(p: ParameterEstimate) -> tuple[str, str]:
         return value, f" ± {half}"
     step = 10.0 ** (math.floor(math.log10(sides[1])) - 2)
     ends = (step * math.floor(low / step), step * math.ceil(high / step))
-    value, low_text, high_text = (_rounded(v, step) for v in (p.value, *ends))
+    value, low_text, high_text = (_round_text(v, step) for v in (p.value, *ends))
     return value, f" ({low_text} … {high_text})"
 
 
-def _rounded(value: float, step: float) -> str:
+def _round_text(value: float, step: float) -> str:
     """Return a value to a decimal step, plain where that is short."""
     decimals = -round(math.log10(step))
     shown = f"{value:.{max(0, decimals)}f}" if decimals < 9 else f"{value:.2e}"

@@ -6,20 +6,20 @@ from rsea_ros.identification.result import Identification
 from rsea_ros.report import words
 from rsea_ros.report.remark_words import coloured_noise
 from rsea_ros.report.rig.words import command, rig_in_brackets, values_off
-from rsea_ros.wording import listed
+from rsea_ros.wording import list_names
 
 
 def verdict_sentence(identification: Identification) -> str:
     """Return whether the model fits, by the worst channel's residual over its noise, and the rig by name."""
-    parts = (_verdict(identification), values_off(identification.remarks), _biased(identification))
+    parts = (_verdict(identification), values_off(identification.remarks), _bias_text(identification))
     return "; ".join(filter(None, parts))
 
 
-def _biased(identification: Identification) -> str:
+def _bias_text(identification: Identification) -> str:
     """Return that the intervals do not hold where a channel was averaged: the values make up for it."""
     averaged = [words.channel(f.channel) for f in identification.faults if f.kind == "smoothing"]
     biased = "averaged before logging, which biases values beyond their intervals"
-    return f"{listed(averaged)} {biased}" if averaged else ""
+    return f"{list_names(averaged)} {biased}" if averaged else ""
 
 
 def _verdict(identification: Identification) -> str:
@@ -32,7 +32,7 @@ def _verdict(identification: Identification) -> str:
     if not identification.at_noise:
         return f"The model does not fit: {size}"
     if identification.silent:
-        silent = words.sentence(listed([words.channel(n) for n in identification.silent]))
+        silent = words.sentence(list_names([words.channel(n) for n in identification.silent]))
         return f"{silent} measures nothing; the model fits the rest: {size}"
     if identification.verdict == "not_identifiable":
         return f"The model fits: {size}; but these data determine none of its values"

@@ -21,9 +21,9 @@ _CURVE = 160
 def over_figure(written: WrittenLaw) -> Figure:
     """Return the missing torque and the law over the law's variable."""
     shown, law = written.shown, written.law
-    x, y, unit = _folded(written), shown.values, "rad" if law.place == "encoder" else "N m"
+    x, y, unit = _fold_angle(written), shown.values, "rad" if law.place == "encoder" else "N m"
     centre, low, high = _curve(x, shown.law)
-    middle, error = _binned(x, y, centre)
+    middle, error = _bin_means(x, y, centre)
     windows = np.array_split(np.argsort(shown.t), _WINDOWS)
     data: list[Json] = [
         _points(x, y, faint(MEASURED, 0.28), 3.5, "measured"),
@@ -85,7 +85,7 @@ def _cycles(written: WrittenLaw) -> float:
     return cycles[0] if cycles and written.shown.over == "theta" else 0.0
 
 
-def _folded(written: WrittenLaw) -> FloatArray:
+def _fold_angle(written: WrittenLaw) -> FloatArray:
     """Return the variable of the drawing; a wave's angle within one period."""
     cycles, x = _cycles(written), written.shown.x
     return np.mod(x, 2.0 * np.pi / cycles) if cycles else x
@@ -106,7 +106,7 @@ def _curve(x: FloatArray, law: FloatArray) -> tuple[FloatArray, FloatArray, Floa
     return centre[keep], low[keep], high[keep]
 
 
-def _binned(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _bin_means(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the mean of y near each centre with its 95 % half-width, nan where few points are."""
     edges = np.concatenate([[-np.inf], 0.5 * (centre[1:] + centre[:-1]), [np.inf]])
     which = np.searchsorted(edges, x) - 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rsea_ros.effects.catalogue import lent
+from rsea_ros.effects.catalogue import lend
 from rsea_ros.laws.result import LawResult
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.new_files import Destination, NewFiles
@@ -17,7 +17,7 @@ from rsea_ros.report.provenance import Provenance
 
 def write_law(result: LawResult, out: Destination | str | Path, provenance: Provenance | None = None) -> Path:
     """Write law.json, the effect files, base.yaml, model.yaml and report.html; return the report's path."""
-    with NewFiles(out) as new, lent(*(w.effect for w in result.laws)):
+    with NewFiles(out) as new, lend(*(w.effect for w in result.laws)):
         new.write(LAW_JSON, json_text(with_provenance(law_json(result), provenance)))
         for written in result.laws:
             new.write(f"{written.law.name}.py", written.source)

@@ -9,7 +9,7 @@ from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, QUIET, faint
 from rsea_ros.report.law.words import gain_sentence
-from rsea_ros.report.page.html import folded, paragraph, section
+from rsea_ros.report.page.html import fold, paragraph, section
 from rsea_ros.report.page.html_table import table_of_rows
 from rsea_ros.signals import UNITS as CHANNEL_UNITS
 
@@ -75,7 +75,7 @@ def tried_section(result: LawResult) -> str:
         "The shortest law within one standard error of the best is taken (bold); its terms are then fitted "
         "in the simulation, and those that it does not need fall away."
     )
-    return folded("Other candidates", note, table_of_rows(("Terms", "#left, held out"), rows))
+    return fold("Other candidates", note, table_of_rows(("Terms", "#left, held out"), rows))
 
 
 def _share_bar(share: float) -> str:

@@ -22,7 +22,7 @@ def headline(result: LawResult) -> str:
     if result.at_floor:
         return "No law is needed: the model is at the noise floor"
     if not result.laws:
-        return f"{_remaining(result)} remains, but no law of it holds on held-out blocks"
+        return f"{_remaining_text(result)} remains, but no law of it holds on held-out blocks"
     law = result.laws[0].law
     kind = "A learnt law, which names no cause: " if law.is_learnt else ""
     share = min(100.0 * result.share, 100.0)
@@ -31,7 +31,7 @@ def headline(result: LawResult) -> str:
     return f"{kind}{sentence}"
 
 
-def _remaining(result: LawResult) -> str:
+def _remaining_text(result: LawResult) -> str:
     """Return the worst residual on the test blocks: `A residual of 1.19 times the noise (F/T torque)`."""
     ratios = {n: before / result.noise[n] for n, before in result.before.items() if result.noise.get(n)}
     if not ratios:
@@ -84,12 +84,13 @@ def parameter_lines(law: Law) -> list[str]:
         rows += [(s, part.shape, part.shape_ci95, part.term.shape_unit)] if s and s not in seen else []
         seen.add(s)
         lines += [
-            f"{name} = {_valued(value, ci95)} {words.unit(unit)}".rstrip() for name, value, ci95, unit in rows
+            f"{name} = {_value_text(value, ci95)} {words.unit(unit)}".rstrip()
+            for name, value, ci95, unit in rows
         ]
     return lines
 
 
-def _valued(value: float, ci95: tuple[float, float] | None) -> str:
+def _value_text(value: float, ci95: tuple[float, float] | None) -> str:
     if ci95 is None or not all(map(math.isfinite, ci95)):
         return f"{value:.4g}"
     middle, half = words.with_interval(value, *ci95)

@@ -22,7 +22,7 @@ Block = Figure | str
 
 def page(title: str, kicker: str, blocks: Sequence[Block], footer: Sequence[str]) -> str:
     """Return the document. title: the verdict in a sentence. kicker: the subject, above the title."""
-    body, contents = _numbered("\n".join(_block(block, i) for i, block in enumerate(blocks)))
+    body, contents = _number_sections("\n".join(_block(block, i) for i, block in enumerate(blocks)))
     figures = [block for block in blocks if isinstance(block, Figure)]
     plotly = plotly_for(figures) if figures else ""
     foot = "".join(f"<p>{escape(line)}</p>" for line in footer)
@@ -49,7 +49,7 @@ def page(title: str, kicker: str, blocks: Sequence[Block], footer: Sequence[str]
 """
 
 
-def _numbered(body: str) -> tuple[str, str]:
+def _number_sections(body: str) -> tuple[str, str]:
     """Return a body whose sections have names, and the table of contents that leads to them."""
     titles: list[str] = []
 

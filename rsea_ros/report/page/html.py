@@ -12,7 +12,7 @@ def section(title: str, *blocks: str, caption: str = "") -> str:
     return f"<section><h2>{escape(title)}</h2>{under}{''.join(blocks)}</section>"
 
 
-def folded(title: str, *blocks: str) -> str:
+def fold(title: str, *blocks: str) -> str:
     """Return a section that opens when its title is clicked, for details."""
     return (
         f'<section class="folded"><details><summary><h2>{escape(title)}</h2></summary>'

@@ -9,7 +9,7 @@ import numpy as np
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, inner_inertia, pure_torque_bandwidth, undamped_band
 from rsea_ros.model.equations import train_ratio
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper import formulas
@@ -30,7 +30,7 @@ def documentation_figures() -> dict[str, str]:
     return {
         "general_circuit.svg": _on_white(general_circuit()),
         "epicyclic_circuit.svg": _on_white(epicyclic_circuit()),
-        "clamped.svg": _clamped(),
+        "clamped.svg": _clamped_part(),
         "moving_output.svg": _moving_output(),
         "end_to_end.svg": _end_to_end(),
     }
@@ -41,9 +41,9 @@ def _on_white(svg: str) -> str:
     return svg.replace('style="', 'style="background:#ffffff;', 1) + "\n"
 
 
-def _clamped() -> str:
+def _clamped_part() -> str:
     rig = load_rig("paper_high_impedance")
-    apart = lumped(rig)
+    apart = lumped_rig(rig)
     read = {
         "T_d/T_m, both models": (AFTER, rig, outputs.distal(rig, "element")),
         "T_p/T_m, lumped": (BEFORE, apart, outputs.proximal(apart)),
@@ -78,7 +78,7 @@ def _end_to_end() -> str:
     marks = [Mark(edge, f"{edge:.1f} Hz")]
     for train, colour, anchor in zip(PROTOTYPE_TRAINS, (BEFORE, TRUTH), ("start", "end"), strict=True):
         turned = replace(rig, train=train)
-        name = f"spin, n = {words.signed(train_ratio(turned), 0)}"
+        name = f"spin, n = {words.signed_text(train_ratio(turned), 0)}"
         curves.append(ResponseCurve(name, colour, hz, end_to_end(turned)(2j * np.pi * hz)))
         edge = float(undamped_band(k_s, inner_inertia(turned)))
         marks.append(Mark(edge, f"{edge:.1f} Hz", anchor))

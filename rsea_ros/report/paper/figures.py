@@ -23,7 +23,7 @@ from rsea_ros.report.design.surface import Point, bandwidth_surface, slices
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
 from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
-from rsea_ros.report.figures.thinned import thinned
+from rsea_ros.report.figures.thinned import thin
 from rsea_ros.signals import FloatArray
 
 _HZ: FloatArray = np.geomspace(0.1, 140.0, 500)
@@ -41,7 +41,7 @@ def figure_9() -> list[Figure]:
         points.append(Point(name, k_s, rig["chassis.inertia"], colour, side="middle right"))
         for train, pole in _senses(rig):
             turned = replace(rig, train=train)
-            sign = "" if rig.train == "planetary" else f", n = {words.signed(train_ratio(turned), 0)}"
+            sign = "" if rig.train == "planetary" else f", n = {words.signed_text(train_ratio(turned), 0)}"
             inner = inner_inertia(turned)
             points.append(Point(f"{name}, with spin{sign}", k_s, inner, BEFORE, pole, "middle left"))
     whole = bandwidth_surface(
@@ -70,7 +70,7 @@ def figure_15(measured: FrequencyResponse) -> Figure:
     table_2 = frequency_response(rig, outputs.end_torque(rig, "spring_end"), _HZ)
     element = formulas.eq_1_lumped_distal_per_motor(1530.456, 0.957, 26.088)(s)
     curves = [
-        _measured(measured, "simulated test"),
+        _measured_curve(measured, "simulated test"),
         ResponseCurve("Eq. (10) as printed", BEFORE, _HZ, np.asarray(c_0 / (s**2 + c_1 * s + c_2))),
         ResponseCurve("Eq. (4), Table 2", INK, _HZ, element, 1.4, "dash"),
         ResponseCurve("the same, sensor<br>sees K_s + b_s s", AFTER, _HZ, table_2),
@@ -86,7 +86,7 @@ def figure_15(measured: FrequencyResponse) -> Figure:
 def figure_18(test: MovingOutput) -> Figure:
     """Return the moving-output test: the bench's data, both fitted models."""
     measured = test.responses["spring_end"]
-    curves = [_measured(measured, "data of the<br>simulated bench")]
+    curves = [_measured_curve(measured, "data of the<br>simulated bench")]
     for rival, colour in zip(test.rivals, (AFTER, BEFORE), strict=True):
         values = frequency_response(rival.rig, outputs.end_torque(rival.rig, "spring_end"), _HZ)
         share = 100 * rival.held_out[0].explained
@@ -153,7 +153,7 @@ def figure_20() -> Figure:
     marks = [Mark(55.5, "55.5 Hz, printed")]
     for train, dash in zip(PROTOTYPE_TRAINS, ("solid", "dash"), strict=True):
         turned = replace(rig, train=train)
-        name = f"with the rotor's spin,<br>n = {words.signed(train_ratio(turned), 0)}"
+        name = f"with the rotor's spin,<br>n = {words.signed_text(train_ratio(turned), 0)}"
         curves.append(ResponseCurve(name, BEFORE, hz, end_to_end(turned)(s), dash=dash))
         edge = float(undamped_band(k_s, inner_inertia(turned)))
         marks.append(Mark(edge, f"{edge:.1f} Hz", "left" if not marks[1:] else "right"))
@@ -174,7 +174,7 @@ def figure_20() -> Figure:
     return response_figure(title, curves, marks, caption, decibel=(-20, 20))
 
 
-def _measured(response: FrequencyResponse, name: str) -> ResponseCurve:
-    shown, _ = thinned(response, None)
+def _measured_curve(response: FrequencyResponse, name: str) -> ResponseCurve:
+    shown, _ = thin(response, None)
     keep = (shown.frequency >= _HZ[0]) & (shown.coherence > 0.02)
     return ResponseCurve(name, faint(MEASURED, 0.6), shown.frequency[keep], shown.response[keep], 5.0)

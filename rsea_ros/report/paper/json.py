@@ -26,7 +26,7 @@ def paper_json(tests: PaperTests) -> dict[str, Any]:
         "bands": {name: _bands(b) for name, b in actuator_bands().items()},
         "arrangements": [asdict(a) for a in arrangements(rig)],
         "limits": [asdict(limit) for limit in limits(rig)],
-        "moving_output": {name: _moving(test) for name, test in tests.moving.items()},
+        "moving_output": {name: _moving_output(test) for name, test in tests.moving.items()},
     }
 
 
@@ -42,5 +42,5 @@ def _bands(b: Bands) -> dict[str, Any]:
     }
 
 
-def _moving(test: MovingOutput) -> dict[str, Any]:
+def _moving_output(test: MovingOutput) -> dict[str, Any]:
     return {rival.name: [asdict(j) for j in rival.held_out] for rival in test.rivals}

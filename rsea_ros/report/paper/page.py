@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.bandwidth import inner_inertia, pure_torque_bandwidth
-from rsea_ros.model.lumped import lumped as lumped_model
+from rsea_ros.model.lumped import lumped_rig as lumped_model
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.arrangements import arrangements, limits

@@ -44,7 +44,7 @@ def claims_table(claims: Sequence[PaperClaim]) -> str:
     for c in claims:
         unit = words.unit(c.unit)
         ours = words.number(c.ours, 5)
-        same = "to the last digit" if c.agrees else f"{words.signed(100 * c.difference, 2)} %"
+        same = "to the last digit" if c.agrees else f"{words.signed_text(100 * c.difference, 2)} %"
         rows.append([c.where, c.what, c.printed, ours, unit, same, c.status, c.how])
     head = ["Where", "What", "Printed", "Ours", "", "Difference", "", "Ours comes from"]
     title = (
@@ -142,9 +142,9 @@ def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> 
     body = [
         [
             words.train(r.train),
-            words.signed(r.ratio, 0),
+            words.signed_text(r.ratio, 0),
             f"{r.outer:.4f}",
-            words.signed(r.inner, 5),
+            words.signed_text(r.inner, 5),
             "T_d/T_m = (b_s s + K_s)/den",
             "T_p/T_m = (J_in s² + b_s s + K_s)/den",
         ]

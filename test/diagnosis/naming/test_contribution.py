@@ -32,5 +32,5 @@ def test_a_stop_beyond_the_travel_has_no_evidence(problem, angle, acts):
     stop = effect_named("hard_stop")
     start = {**stop.typical, "angle": angle}
     larger, theta = add_effect(problem, start_vector(problem.unknowns), stop, start)
-    rows = rows_of(larger, theta, "hard_stop", DEFAULT.blocks)
+    rows = rows_of(larger, theta, "hard_stop", DEFAULT)
     assert (rows is not None) == acts

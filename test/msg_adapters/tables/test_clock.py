@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from msg_adapters.tables.clock import repaired
+from msg_adapters.tables.clock import spread_repeats
 
 
 def _true_times(rng, count, rate, wander, stalls):
@@ -22,7 +22,7 @@ def _true_times(rng, count, rate, wander, stalls):
 def test_stamps_come_within_a_sample_of_the_truth(tick, wander, stalls):
     rng = np.random.default_rng(8)
     truth = _true_times(rng, 20_000, 400.0, wander, stalls)
-    stamps, report = repaired(np.floor(truth / tick) * tick)
+    stamps, report = spread_repeats(np.floor(truth / tick) * tick)
     error = stamps - truth
     error -= np.median(error)
     period = (1 + wander) / 400
@@ -39,7 +39,7 @@ def test_stamps_come_within_a_sample_of_the_truth(tick, wander, stalls):
 @pytest.mark.parametrize("tick", [1 / 64, 0.01, 0.1])
 def test_even_samples_are_dated_far_better_than_their_ticks(tick):
     truth = 3.0 + np.arange(20_000) / 280.0
-    stamps, report = repaired(np.round(truth / tick) * tick)
+    stamps, report = spread_repeats(np.round(truth / tick) * tick)
     assert np.max(np.abs(np.diff(stamps) - 1.0 / 280.0)) < 1e-6
     assert np.max(np.abs(stamps - truth)) < 0.02 * tick
     assert "fit, 280 Hz" in report
@@ -52,12 +52,12 @@ def test_a_line_through_all_samples_would_be_worse():
     coarse = np.floor(truth * 64) / 64
     index = np.arange(truth.size)
     line = np.polyval(np.polyfit(index, coarse, 1), index)
-    assert np.std(line - truth) > 20 * np.std(repaired(coarse)[0] - truth)
+    assert np.std(line - truth) > 20 * np.std(spread_repeats(coarse)[0] - truth)
 
 
 def test_a_good_clock_stays_as_it_is():
     t = np.cumsum(np.random.default_rng(1).uniform(0.5e-3, 1.5e-3, 500))
-    stamps, report = repaired(t)
+    stamps, report = spread_repeats(t)
     assert stamps is t
     assert report == ""
 
@@ -65,7 +65,7 @@ def test_a_good_clock_stays_as_it_is():
 def test_one_repeated_stamp_moves_nothing_else():
     t = np.arange(100) * 1e-3
     t[40] = t[39]
-    stamps, report = repaired(t)
+    stamps, report = spread_repeats(t)
     others = np.arange(100) != 40
     assert np.allclose(stamps[others], t[others], rtol=0, atol=1e-12)
     assert t[39] < stamps[40] < t[41]

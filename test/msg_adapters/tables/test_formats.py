@@ -65,7 +65,7 @@ def test_every_format_gives_the_same_numbers(write, suffix, columns):
     assert table[columns[1]].tolist() == Q[:, 2].tolist()
 
 
-def refused(file, column, text):
+def assert_refused(file, column, text):
     with pytest.raises(ImportMapError, match=text) as error:
         read_columns(file, ["t", column] if file.suffix not in (".csv", ".npy") else [column])
     assert str(file) in str(error.value)
@@ -96,7 +96,7 @@ def refused(file, column, text):
     ],
 )
 def test_an_unknown_column_is_named(write, suffix, column, text):
-    refused(write(suffix), column, text)
+    assert_refused(write(suffix), column, text)
 
 
 def test_records_nested_below_other_keys_are_read(tmp_path):
@@ -140,13 +140,15 @@ def test_json_beyond_a_size_is_refused(tmp_path, monkeypatch):
 
 def test_no_pickle_is_opened(tmp_path):
     np.savez(tmp_path / "run.npz", t=T, q=np.array([{}, print], dtype=object))
-    refused(tmp_path / "run.npz", "q", "array 'q' holds Python objects, expected numbers")
+    assert_refused(tmp_path / "run.npz", "q", "array 'q' holds Python objects, expected numbers")
 
 
 def test_the_size_of_an_array_is_checked_before_it_is_read(tmp_path, monkeypatch):
     np.savez(tmp_path / "run.npz", t=T, q=Q)
     monkeypatch.setattr(npz_file, "LARGEST", 10)
-    refused(tmp_path / "run.npz", "q[0]", r"array 'q' is float64 \(6, 3\), expected fewer than 10 numbers")
+    assert_refused(
+        tmp_path / "run.npz", "q[0]", r"array 'q' is float64 \(6, 3\), expected fewer than 10 numbers"
+    )
 
 
 def test_an_array_that_promises_more_than_the_file_holds_is_refused(tmp_path):
@@ -173,7 +175,7 @@ def test_a_damaged_header_is_one_line(tmp_path, header):
 def test_npy_is_read_as_one_matrix_and_as_fields(tmp_path):
     np.save(tmp_path / "run.npy", Q)
     assert read_columns(tmp_path / "run.npy", ["2"])["2"].tolist() == Q[:, 1].tolist()
-    refused(tmp_path / "run.npy", "4", "no column '4', expected one of 1, 2, 3")
+    assert_refused(tmp_path / "run.npy", "4", "no column '4', expected one of 1, 2, 3")
     np.save(tmp_path / "fields.npy", np.array([(0.0, 1), (0.1, 2)], [("t", "f8"), ("n", "i4")]))
     assert read_columns(tmp_path / "fields.npy", ["n"])["n"].tolist() == [1.0, 2.0]
 
@@ -185,13 +187,14 @@ def test_stamps_holes_and_fields_of_parquet_are_read(tmp_path):
     table = read_columns(tmp_path / "run.parquet", ["t", "pose.x"])
     assert table["t"][:2].tolist() == [0.0, 0.005]
     assert [np.isnan(column).sum() for column in table.columns.values()] == [1, 2]
-    refused(tmp_path / "run.parquet", "word", "column 'word' is string, expected numbers")
-    refused(tmp_path / "run.parquet", "pose.y", "pose is struct.*, expected a struct with y")
+    assert_refused(tmp_path / "run.parquet", "word", "column 'word' is string, expected numbers")
+    assert_refused(tmp_path / "run.parquet", "pose.y", "pose is struct.*, expected a struct with y")
 
 
 def test_a_missing_reader_of_parquet_is_one_line(write, monkeypatch):
     monkeypatch.setattr(parquet_file, "find_spec", lambda name: None)
-    refused(write(".parquet"), "q[0]", r"needs the package pyarrow, which is not installed: pip install")
+    missing = r"needs the package pyarrow, which is not installed: pip install"
+    assert_refused(write(".parquet"), "q[0]", missing)
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".npy", ".parquet", ".json"])

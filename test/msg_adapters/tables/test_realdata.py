@@ -10,7 +10,7 @@ from scipy.signal import butter, filtfilt
 
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.identification.joint_start import joint_start
-from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
@@ -21,7 +21,7 @@ if not REAL.is_dir():
     pytest.skip(f"{REAL} is missing", allow_module_level=True)
 
 
-def _imported(file: str, name: str) -> Record:
+def _import(file: str, name: str) -> Record:
     return import_record(REAL / file, load_map(REPOSITORY / "config" / "imports" / f"{name}.yaml"))
 
 
@@ -32,7 +32,7 @@ def _smooth(y: np.ndarray, cutoff: float, rate: float) -> np.ndarray:
 @pytest.mark.parametrize("name", ["emps_identification", "emps_pulses"])
 def test_emps_obeys_its_published_force_balance_and_its_controller(name):
     """M 95.109 kg, 203.503 N s/m, 20.394 N, -3.165 N: with vir·gtau as the force, pulses or not."""
-    record = _imported({"emps_pulses": "emps/DATA_EMPS_PULSES.mat"}.get(name, "emps/DATA_EMPS.mat"), name)
+    record = _import({"emps_pulses": "emps/DATA_EMPS_PULSES.mat"}.get(name, "emps/DATA_EMPS.mat"), name)
     force, q, reference = record["command"].y, record["position"].y, record["reference"].y
     smooth = _smooth(q, 20, 1000)
     v = np.gradient(smooth, 1e-3)
@@ -54,7 +54,7 @@ def test_emps_obeys_its_published_force_balance_and_its_controller(name):
     ],
 )
 def test_cycloidal_travel_between_the_ramps_ends(file, degrees):
-    record = _imported(f"cycloidal/{file}.csv.gz", "cycloidal_short_ramps")
+    record = _import(f"cycloidal/{file}.csv.gz", "cycloidal_short_ramps")
     command, position = record["command"].y, np.degrees(record["position"].y)
     travel = np.median(position[command > 3.9]) - np.median(position[command < -3.9])
     assert travel == pytest.approx(degrees, abs=0.15)
@@ -64,13 +64,13 @@ def test_cycloidal_travel_between_the_ramps_ends(file, degrees):
 
 def test_cycloidal_current_limit_shows_in_the_long_ramps():
     file = "cycloidal/2024-07-18__10-58-26__torqueramp__base_onyx_runin1.csv.gz"
-    record = _imported(file, "cycloidal_long_ramps")
+    record = _import(file, "cycloidal_long_ramps")
     assert record["command"].y.max() == 40.0
     assert 24.0 < record["motor_torque"].y.max() < 27.0
 
 
 def test_the_pendulums_gravity_is_that_of_the_readme():
-    record = _imported("pendulum/gravity_compensation.measured.csv.gz", "pendulum")
+    record = _import("pendulum/gravity_compensation.measured.csv.gz", "pendulum")
     torque, position = record["command"].y, record["position"].y
     sine = np.sin(position)
     assert np.dot(sine, torque) / np.dot(sine, sine) == pytest.approx(3.31, abs=0.01)
@@ -79,7 +79,7 @@ def test_the_pendulums_gravity_is_that_of_the_readme():
 
 def test_sea_gamma_has_one_spring_behind_two_sensors():
     """Where the motion is slow the F/T torque over the encoder's angle is the stiffness of the drawing."""
-    record = _imported("sea_gamma/open_5_1_31.csv", "sea_gamma")
+    record = _import("sea_gamma/open_5_1_31.csv", "sea_gamma")
     slow = record.between(0.5, 2.0)
     torque, angle = slow["ft"].y, slow["deflection"].y
     assert np.corrcoef(torque, angle)[0, 1] > 0.9
@@ -91,6 +91,6 @@ def test_so101_joints_hold_what_their_targets_ask(joint):
     """A fit of a joint that begins from a regression along its motion explains most of a slow run."""
     mapping = load_map(REPOSITORY / "config" / "imports" / "so101.yaml")
     rig = load_rig("so101_joint")
-    record = commanded(import_record(REAL / "so101" / "friction_gravity", mapping, joint), rig)
+    record = with_command(import_record(REAL / "so101" / "friction_gravity", mapping, joint), rig)
     begun = joint_start(record, rig).with_effect("coulomb_friction", torque=0.05)
     assert predict(begun, record.between(0.0, 30.0))["position"].fit_percent > 60.0

@@ -32,7 +32,7 @@ TEXTS = {
 }
 
 
-def imported(folder, text, more=""):
+def import_file(folder, text, more=""):
     (folder / "run.csv").write_text(text)
     (folder / "map.yaml").write_text(MAP + more)
     return import_record(folder / "run.csv", load_map(folder / "map.yaml"))
@@ -40,7 +40,7 @@ def imported(folder, text, more=""):
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_it_is_read(name, tmp_path):
-    command = imported(tmp_path, *TEXTS[name])["command"]
+    command = import_file(tmp_path, *TEXTS[name])["command"]
     np.testing.assert_allclose(command.t, STAMPS, atol=1e-12)
     np.testing.assert_allclose(command.y, VALUES)
 
@@ -60,7 +60,7 @@ def test_a_table_without_names_is_read_or_refused_with_the_line_that_reads_it(de
 
 
 def test_what_is_left_out_is_noted(tmp_path):
-    notes = " ".join(imported(tmp_path, *TEXTS["preamble and units"]).notes)
+    notes = " ".join(import_file(tmp_path, *TEXTS["preamble and units"]).notes)
     assert "lines 1 to 2 above the names of the columns are left out" in notes
     assert "line 4 is taken for the units: s;Nm" in notes
 
@@ -68,15 +68,15 @@ def test_what_is_left_out_is_noted(tmp_path):
 @pytest.mark.parametrize("row", ["0x10,1.5", "12:30,s", "1.2.3,N m"])
 def test_a_first_row_with_a_number_that_is_none_is_refused_as_before(row, tmp_path):
     with pytest.raises(ImportMapError, match="line 2, column 't' is"):
-        imported(tmp_path, f"t,u\n{row}\n0,1.5\n0.1,-2.5\n")
+        import_file(tmp_path, f"t,u\n{row}\n0,1.5\n0.1,-2.5\n")
 
 
 def test_decimal_commas_between_commas_are_refused_with_what_is_missing(tmp_path):
     """The message was "no column 't', expected one of t,u": the comma was never tried as a delimiter."""
     with pytest.raises(ImportMapError, match=r"line 2 has 4 fields, expected 2, .* need quotes"):
-        imported(tmp_path, "t,u\n0,0,1,5\n0,1,2,5\n", 'decimal: ","\n')
+        import_file(tmp_path, "t,u\n0,0,1,5\n0,1,2,5\n", 'decimal: ","\n')
 
 
 def test_another_decimal_sign_is_refused(tmp_path):
     with pytest.raises(ImportMapError, match=r"decimal is ';', expected '\.' or ','"):
-        imported(tmp_path, "t,u\n0,1\n1,2\n", 'decimal: ";"\n')
+        import_file(tmp_path, "t,u\n0,1\n1,2\n", 'decimal: ";"\n')

@@ -18,20 +18,20 @@ LAYOUTS = Path(__file__).resolve().parents[3] / "config" / "layouts"
 @functools.cache
 def messages(path: Path) -> dict[str, list[Any]]:
     """Return the messages of a bag by topic, read by rosbags itself."""
-    found: dict[str, list[Any]] = {}
+    read: dict[str, list[Any]] = {}
     with AnyReader([path]) as reader:
         for connection, _, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
-            found.setdefault(f"{connection.topic} {connection.msgtype}", []).append(message)
-    return found
+            read.setdefault(f"{connection.topic} {connection.msgtype}", []).append(message)
+    return read
 
 
-def stamps(found: list[Any]) -> list[int]:
-    return [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in found]
+def stamps(read: list[Any]) -> list[int]:
+    return [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in read]
 
 
 def test_overlay_reads_back_as_the_arrays_with_the_stamps_of_the_record(diagnosed) -> None:
-    found = messages(diagnosed.out / "overlay.mcap")
+    read = messages(diagnosed.out / "overlay.mcap")
     simulations = {
         "/simulated_before": diagnosed.diagnosis.before,
         "/simulated_after": diagnosed.diagnosis.after,
@@ -39,8 +39,8 @@ def test_overlay_reads_back_as_the_arrays_with_the_stamps_of_the_record(diagnose
     arrays = {"": {n: (c.t, c.y) for n, c in diagnosed.record.channels.items()}}
     arrays |= {ns: {o.channel: (o.t, o.simulated) for o in os} for ns, os in simulations.items()}
     for namespace, channels in arrays.items():
-        wrenches = found[f"/rsea{namespace}/ft geometry_msgs/msg/WrenchStamped"]
-        states = found[f"/rsea{namespace}/joint_states sensor_msgs/msg/JointState"]
+        wrenches = read[f"/rsea{namespace}/ft geometry_msgs/msg/WrenchStamped"]
+        states = read[f"/rsea{namespace}/joint_states sensor_msgs/msg/JointState"]
         expected = diagnosed.record.epoch_ns + np.rint(channels["ft"][0] * 1e9).astype(np.int64)
         assert stamps(wrenches) == stamps(states) == expected.tolist()
         assert np.array_equal([m.wrench.torque.z for m in wrenches], channels["ft"][1])
@@ -48,14 +48,14 @@ def test_overlay_reads_back_as_the_arrays_with_the_stamps_of_the_record(diagnose
         for field, name in fields.items():
             assert np.array_equal([getattr(m, field)[0] for m in states], channels[name][1])
         assert {m.name[0] for m in states} == {"joint"}
-    command = found["/rsea/torque_command sensor_msgs/msg/JointState"]
+    command = read["/rsea/torque_command sensor_msgs/msg/JointState"]
     assert np.array_equal([m.effort[0] for m in command], diagnosed.record["command"].y)
 
 
 def test_the_simulation_after_is_nearer_to_the_measurement(diagnosed) -> None:
-    found = messages(diagnosed.out / "overlay.mcap")
+    read = messages(diagnosed.out / "overlay.mcap")
     measured, before, after = (
-        np.array([m.wrench.torque.z for m in found[f"/rsea{ns}/ft geometry_msgs/msg/WrenchStamped"]])
+        np.array([m.wrench.torque.z for m in read[f"/rsea{ns}/ft geometry_msgs/msg/WrenchStamped"]])
         for ns in ("", "/simulated_before", "/simulated_after")
     )
     assert np.std(measured - after) < 0.1 * np.std(measured - before)

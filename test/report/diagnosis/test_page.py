@@ -63,11 +63,11 @@ def test_every_verdict_makes_a_page(diagnosed, name: str) -> None:
         ),
     )
     html = diagnosis_report(d)
-    own = html[: html.index('id="plotly"')]
-    assert "Faults in the data, masked: frozen samples and NaN in F/T torque." in own
-    assert "ros2 run rsea_ros excite --ros-args -p kind:=steps -p amplitude:=12.5" in own
-    assert "&lt;a&gt;" in own and "<a>" not in own
-    assert ("do not distinguish it from hard stop or F/T sensor lag" in own) == (name == "partly_explained")
+    head = html[: html.index('id="plotly"')]
+    assert "Faults in the data, masked: frozen samples and NaN in F/T torque." in head
+    assert "ros2 run rsea_ros excite --ros-args -p kind:=steps -p amplitude:=12.5" in head
+    assert "&lt;a&gt;" in head and "<a>" not in head
+    assert ("do not distinguish it from hard stop or F/T sensor lag" in head) == (name == "partly_explained")
 
 
 def test_a_failure_leaves_the_old_files_and_nothing_half_written(diagnosed, tmp_path: Path) -> None:

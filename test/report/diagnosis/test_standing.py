@@ -7,7 +7,7 @@ from dataclasses import replace
 from rsea_ros.diagnosis.result import Alternative, Cause, CauseParameter
 from rsea_ros.report.diagnosis.json import diagnosis_json
 from rsea_ros.report.diagnosis.page import diagnosis_report
-from rsea_ros.report.diagnosis.standing import standing
+from rsea_ros.report.diagnosis.standing import status_line
 
 DELAY = Cause(
     "command_delay",
@@ -38,18 +38,18 @@ CONSTANT = Alternative(
 
 
 def test_a_leading_cause_has_size_interval_and_probability():
-    assert standing(DELAY) == (
+    assert status_line(DELAY) == (
         "leading: command_delay 9.10 ms [8.40, 9.80], probability 0.87; "
         "it certainly helps on held-out data, but part of the misfit remains"
     )
 
 
 def test_one_of_names_its_rival_with_its_size():
-    assert standing(GAIN, (CONSTANT,)) == (
+    assert status_line(GAIN, (CONSTANT,)) == (
         "one of: ft_gain_error 0.891 [0.886, 0.896], probability 0.55 or "
         "torque_constant_error 1.12 [1.11, 1.13], probability 0.40; these data do not distinguish them"
     )
-    assert standing(DELAY, (CONSTANT,)) == standing(DELAY)
+    assert status_line(DELAY, (CONSTANT,)) == status_line(DELAY)
 
 
 def test_file_and_page_carry_status_probability_and_alternatives(diagnosed):

@@ -12,8 +12,7 @@ import pytest
 from rich.console import Console
 
 from rsea_ros.diagnosis.result import CauseParameter, Misfit, Reason, Rejected
-from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
-from rsea_ros.identification import coloured, noise_level
+from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings, NoiseSettings
 from rsea_ros.identification.result import Overlay
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
@@ -128,7 +127,7 @@ def test_an_experiment_is_described_with_its_units():
 def test_a_number_without_unit_is_named(diagnosed):
     cause = replace(diagnosed.diagnosis.causes[0], name="ft_gain_error",
                     parameters={"gain": CauseParameter(1.05, "1", (1.04, 1.06))})  # fmt: skip
-    assert say.named([cause]) == "F/T gain error (gain 1.05)"
+    assert say.cause_list([cause]) == "F/T gain error (gain 1.05)"
 
 
 def laid_out(diagnosed, residual):
@@ -143,12 +142,12 @@ def laid_out(diagnosed, residual):
 
 def test_a_residual_at_high_speed_is_located_at_high_speed(diagnosed):
     limit = float(np.quantile(diagnosed.record["velocity"].y, 1.0 - 1.0 / BINS))
-    found = laid_out(diagnosed, lambda speed, t: np.where(speed > limit, 30.0, 2.0))
-    assert set(found) == {"amplitude", "velocity", "angle", "time"}
-    assert found["velocity"].before[-1] == pytest.approx(30.0, rel=0.05)
-    assert found["velocity"].before[:-2] == pytest.approx(2.0)
-    assert found["velocity"].after == pytest.approx(0.0)
-    assert finding(list(found.values())).startswith("The residual depends most on speed: ")
+    sentence = laid_out(diagnosed, lambda speed, t: np.where(speed > limit, 30.0, 2.0))
+    assert set(sentence) == {"amplitude", "velocity", "angle", "time"}
+    assert sentence["velocity"].before[-1] == pytest.approx(30.0, rel=0.05)
+    assert sentence["velocity"].before[:-2] == pytest.approx(2.0)
+    assert sentence["velocity"].after == pytest.approx(0.0)
+    assert finding(list(sentence.values())).startswith("The residual depends most on speed: ")
 
 
 def test_faulty_samples_count_for_nothing(diagnosed):
@@ -161,8 +160,8 @@ def test_faulty_samples_count_for_nothing(diagnosed):
 
 
 def test_a_uniform_residual_is_described_as_uniform(diagnosed):
-    found = laid_out(diagnosed, lambda speed, t: 5.0 + 0.0 * t)
-    assert finding(list(found.values())) == "The residual is the same at every load, speed or rotor angle"
+    sentence = laid_out(diagnosed, lambda speed, t: 5.0 + 0.0 * t)
+    assert finding(list(sentence.values())) == "The residual is the same at every load, speed or rotor angle"
 
 
 def test_a_residual_of_zero_in_a_bin_leaves_the_axis_finite():
@@ -185,8 +184,10 @@ def test_the_settings_are_in_json_and_page_and_a_changed_one_stands_out(diagnose
     assert section.count("<b>") == 1
 
 
-def test_the_numbers_of_the_noise_are_shown_beside_the_settings(diagnosed):
-    written = diagnosis_json(diagnosed.diagnosis)["noise_numbers"]
-    assert (written["noise.above"], written["noise.fewest"]) == (noise_level.ABOVE, coloured.FEWEST)
-    section = settings_section(DiagnosisSettings())
-    assert all(f"<code>{name}</code>" in section for name in written)
+def test_the_numbers_of_the_noise_are_settings_in_json_and_page(diagnosed):
+    changed = DiagnosisSettings(noise=NoiseSettings(above=1.1))
+    written = diagnosis_json(replace(diagnosed.diagnosis, settings=changed))
+    assert written["noise_numbers"].items() <= written["settings"].items()
+    assert (written["settings"]["noise.above"], written["settings"]["noise.fewest"]) == (1.1, 1500)
+    assert "<b>1.1</b> (default 1.04)" in settings_section(changed)
+    assert "0, 0.1, 0.25" in settings_section(changed)

@@ -16,12 +16,12 @@ from rsea_ros.report.figures.overlay import (
     Simulated,
     overlay_figure,
     pauses_of,
-    sampled,
+    sample_extremes,
     without,
 )
 from rsea_ros.report.figures.palette import AFTER, BEFORE
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
-from rsea_ros.report.figures.thinned import thinned
+from rsea_ros.report.figures.thinned import thin
 
 
 def as_json(figure: Figure) -> str:
@@ -48,12 +48,12 @@ def test_the_title_names_the_band_above_the_noise() -> None:
 
 def test_thinning_keeps_the_shape_of_the_response(identification: Identification) -> None:
     measured, model = identification.responses[0], identification.models[0]
-    shown, shown_model = thinned(measured, model)
+    shown, shown_model = thin(measured, model)
     assert shown_model is not None
     assert len(shown.frequency) < len(measured.frequency)
-    there = np.interp(shown.frequency, measured.frequency, np.abs(model))
+    interpolated = np.interp(shown.frequency, measured.frequency, np.abs(model))
     inside = (shown.frequency > 0.5) & (shown.frequency < 100.0)
-    assert np.abs(shown_model)[inside] == pytest.approx(there[inside], rel=0.02)
+    assert np.abs(shown_model)[inside] == pytest.approx(interpolated[inside], rel=0.02)
 
 
 def test_the_bode_title_says_where_a_wrong_model_deviates(identification: Identification) -> None:
@@ -69,7 +69,7 @@ def test_long_traces_keep_their_extremes() -> None:
     y = np.random.default_rng(5).standard_normal(500_000)
     residual = 0.01 * y
     y[123_456], residual[333_333] = 50.0, -9.0
-    keep = sampled(y, residual)
+    keep = sample_extremes(y, residual)
     assert len(keep) <= MOST_SAMPLES
     assert 123_456 in keep
     assert 333_333 in keep

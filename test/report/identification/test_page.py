@@ -40,9 +40,9 @@ def test_browser_draws_every_figure_without_an_error(
 
 def test_report_needs_no_network_and_stays_small(identification: Identification) -> None:
     html = identification_report(identification)
-    own = html[: html.index('id="plotly"')]
-    assert not re.search(r'(src|href)="(?!data:|#)', own)
-    assert "url(" not in own
+    head = html[: html.index('id="plotly"')]
+    assert not re.search(r'(src|href)="(?!data:|#)', head)
+    assert "url(" not in head
     assert len(html.encode()) <= LARGEST
 
 

@@ -17,14 +17,14 @@ from rsea_ros.report.identification.correlation import correlation_section, find
 from rsea_ros.report.identification.page import identification_report
 from rsea_ros.report.json_values import with_provenance
 from rsea_ros.report.page.frame import page
-from rsea_ros.report.page.html import folded, section
+from rsea_ros.report.page.html import fold, section
 from rsea_ros.report.provenance import provenance_of
 
 from ..conftest import Diagnosed
 
 
 def test_every_section_is_in_the_contents_and_can_be_reached():
-    html = page("t", "k", [section("One & two"), folded("Three", "<p>x</p>")], [])
+    html = page("t", "k", [section("One & two"), fold("Three", "<p>x</p>")], [])
     links = re.findall(r'<a href="#(part-\d)">(.*?)</a>', html)
     assert links == [("part-1", "One &amp; two"), ("part-2", "Three")]
     assert all(f'<section id="{name}"' in html for name, _ in links)

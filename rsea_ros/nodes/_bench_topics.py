@@ -43,7 +43,7 @@ MOST = 100
 """Commands taken in a cycle: 28 kHz of them at 280 Hz; each costs 10 us."""
 
 
-class Bench:
+class BenchTopics:
     """Publishes readings, and queues messages on `torque_command`.
 
     Messages are serialised templates with the numbers filled in: making them from Python objects takes 60 us
@@ -97,7 +97,7 @@ class Bench:
         """Put all commands that have arrived into the queue; of a flood no more than a cycle has time for."""
         now = anchor.now()
         for stamp, (torque,), received in self._wanted.take(*((MOST,) if self._strict else ())):
-            arrival = anchor.arrived(received, self._polled)
+            arrival = anchor.arrival(received, self._polled)
             if self._strict and now - arrival > HORIZON:
                 self.commands.refuse()
             else:
