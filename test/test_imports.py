@@ -10,7 +10,7 @@ from import_graph import MODULES, ROOT, imports, name_of
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-STAMPS = {"coverage", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order", "torque_edge"}
+STAMPS = {"coverage", "held_commands", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order", "torque_edge"}
 FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -19,6 +19,7 @@ OWN = {
     "errors": set(),
     "signals": {"errors", "arrays"},
     "coverage": {"signals"},
+    "held_commands": {"signals"},
     "held_samples": {"signals"},
     "mixed_rows": {"signals"},
     "stamps": {"errors", "signals", *(STAMPS - {"stamps"})},
@@ -116,6 +117,7 @@ FOREIGN = {
     "coverage": {"numpy"},
     "stamps": {"numpy"},
     "stamp_gaps": {"numpy"},
+    "held_commands": {"numpy"},
     "held_samples": {"numpy"},
     "mixed_rows": {"numpy"},
     "stamp_order": {"numpy"},
