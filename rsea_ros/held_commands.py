@@ -1,7 +1,7 @@
 """Commands that are published only when they change: each holds until the next one.
 
-A log of such a publisher has one message for each step, which may last for seconds. What reads a record expects
-the commands of a control loop, one for each of its cycles.
+A log of such a publisher has one message for each step, which may last for seconds. What reads a record
+expects the commands of a control loop, one for each of its cycles.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ _FEWEST = 2
 def with_held_commands(record: Record) -> tuple[Record, list[Fault]]:
     """Return the record with a command in each sample period of its sensors, where each command is a step.
 
-    A note says so; no fault comes with it. The stamps of the steps are kept exactly, and the last one is held to
-    the end of the sensors.
+    A note says so; no fault comes with it. The stamps of the steps are kept exactly, and the last one is held
+    to the end of the sensors.
     """
     period = _sensor_period(record)
     last = max((float(c.t[-1]) for c in record.channels.values() if len(c)), default=0.0)

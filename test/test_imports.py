@@ -10,7 +10,10 @@ from import_graph import MODULES, ROOT, imports, name_of
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-STAMPS = {"coverage", "held_commands", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order", "torque_edge"}
+STAMPS = {
+    "coverage", "held_commands", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order",
+    "torque_edge",
+}  # fmt: skip
 FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}

@@ -11,7 +11,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 
 PATIENCE = 1.5
-"""s from the first measurement on in which a bench says how it is; a driver does once a second, others never."""
+"""s from the first measurement on in which a bench reports its status; a driver does once a second."""
 
 
 class BenchStatus:
