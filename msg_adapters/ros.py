@@ -25,8 +25,8 @@ from msg_adapters.topic_map import AXES, sign_and_index
 from rsea_ros.errors import ParameterError
 
 __all__ = [
-    "Bool", "ChangeState", "Clock", "DiagnosticArray", "GetAvailableTransitions", "GetState", "JointState",
-    "Time", "Trigger", "WrenchStamped",
+    "Bool", "ChangeState", "Clock", "DiagnosticArray", "DiagnosticStatus", "GetAvailableTransitions",
+    "GetState", "JointState", "Time", "Trigger", "WrenchStamped",
 ]  # fmt: skip
 
 OK, WARN, ERROR, STALE = (b"\x00", b"\x01", b"\x02", b"\x03")

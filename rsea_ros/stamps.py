@@ -11,6 +11,7 @@ import numpy as np
 from rsea_ros.coarse_clock import even_behind_ticks
 from rsea_ros.coverage import absent_spans
 from rsea_ros.errors import ChannelError
+from rsea_ros.held_commands import with_held_commands
 from rsea_ros.held_samples import without_held_samples
 from rsea_ros.mixed_rows import without_mixed_rows
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
@@ -60,6 +61,7 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         faults += dropped_samples(channel, name, int(repeated.sum()))
         channels[name] = channel
     repaired, held = without_held_samples(record.with_channels(**channels))
+    repaired, _ = with_held_commands(repaired)
     repaired, early = behind_the_edge(repaired)
     faults += [*held, *early]
     explained = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}

@@ -31,6 +31,7 @@ def test_the_tutorial_runs_and_finds_the_play(capsys):
     names: dict[str, object] = {}
     for block in blocks:
         exec(compile(block, "tutorial.md", "exec"), names)
+    assert names["dx"].verdict == "explained"  # it began in mid-motion, and a rest stayed unexplained
     assert names["fit"].verdict == "misfit"
     assert names["cause"].name == "backlash"
     assert names["cause"].parameters["gap"].value == pytest.approx(4e-3, rel=0.02)

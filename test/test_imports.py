@@ -10,8 +10,10 @@ from import_graph import MODULES, ROOT, imports, name_of
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-STAMPS = {"coarse_clock", "coverage", "held_samples", "mixed_rows", "stamps", "stamp_gaps", "stamp_order",
-          "torque_edge"}  # fmt: skip
+STAMPS = {
+    "coarse_clock", "coverage", "held_commands", "held_samples", "mixed_rows", "stamps", "stamp_gaps",
+    "stamp_order", "torque_edge",
+}  # fmt: skip
 FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
 BASE = FACTS | {"progress", "setting", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -21,6 +23,7 @@ OWN = {
     "signals": {"errors", "arrays"},
     "coarse_clock": {"signals"},
     "coverage": {"signals"},
+    "held_commands": {"signals"},
     "held_samples": {"signals"},
     "mixed_rows": {"signals"},
     "stamps": {"errors", "signals", *(STAMPS - {"stamps"})},
@@ -120,6 +123,7 @@ FOREIGN = {
     "coverage": {"numpy"},
     "stamps": {"numpy"},
     "stamp_gaps": {"numpy"},
+    "held_commands": {"numpy"},
     "held_samples": {"numpy"},
     "mixed_rows": {"numpy"},
     "stamp_order": {"numpy"},

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from msg_adapters.tables import json_file
 from msg_adapters.tables.column_table import Table
+from msg_adapters.tables.foreign_files import refuse_foreign
 from msg_adapters.tables.json_file import read_json
 from msg_adapters.tables.mat_file import read_mat
 from msg_adapters.tables.npz_file import read_npy, read_npz
@@ -49,7 +50,14 @@ def read_columns(
     """
     reader = read_zarr if is_group(path) else READERS.get(path.suffix.lower())
     try:
-        return reader(path, columns) if reader else read_text(path, columns, delimiter, header, decimal)
+        if reader:
+            return reader(path, columns)
+        refuse_foreign(path)
+        return read_text(path, columns, delimiter, header, decimal)
+    except IsADirectoryError:
+        raise ImportMapError(
+            f"{path}: is a directory, expected a file; only a map with `file:` reads a directory"
+        ) from None
     except (gzip.BadGzipFile, zlib.error, EOFError):
         raise ImportMapError(f"{path}: damaged or no gzip file, expected a packed table") from None
     except OSError as error:

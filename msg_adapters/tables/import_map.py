@@ -75,6 +75,14 @@ class ImportMap:
                 f"{self.path}: column {left[0]!r} holds several joints, expected the number of one, from 0 "
                 "(--index)"
             )
+        for name, terms in channels.items():
+            if lists := [term.by_joint for term in terms if term.by_joint]:
+                count = len(lists[0])
+                asked = "no joint is chosen" if index is None else f"joint {index} is chosen"
+                raise ImportMapError(
+                    f"{self.path}: channels.{name} has a sign, scale or constant for each of {count} joints "
+                    f"and {asked}, expected --index 0 to {count - 1}"
+                )
         return replace(self, channels=channels, where=where)
 
     def of_file(self, file: str) -> ImportMap:

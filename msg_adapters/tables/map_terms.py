@@ -15,6 +15,8 @@ from rsea_ros.errors import FieldError
 from rsea_ros.keys import NEEDED, Key
 from rsea_ros.wording import quote
 
+PER_JOINT = {"sign": 1, "scale": 1, "constant": 0}
+"""Keys that may be a list with a number for each joint, and their values where they are left out."""
 LARGEST = 1e300
 """Of the numbers in a map: products of two of them and a unit stay finite."""
 
@@ -24,7 +26,8 @@ class ChannelTerm:
     """A part of a channel, in SI: sign · scale · column · (SI factor of its unit) + constant.
 
     expression: of columns, in the place of the column. file: in the directory that is read; empty for the one
-    file that is. held: the log repeats a value until the next one arrives.
+    file that is. held: the log repeats a value until the next one arrives. by_joint: gain and constant of
+    each joint, where the map has a list of them and none is chosen yet.
     """
 
     column: str
@@ -34,6 +37,7 @@ class ChannelTerm:
     file: str = ""
     expression: Expression | None = None
     held: bool = False
+    by_joint: tuple[tuple[float, float], ...] = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -41,11 +45,15 @@ class ChannelTerm:
         return (self.column,) if self.expression is None else self.expression.columns
 
     def at(self, index: int | None) -> ChannelTerm:
-        """Return the term for one number of lists in cells."""
-        if self.expression is None:
-            return replace(self, column=choose_element(self.column, index))
-        text = choose_element(self.expression.text, index)
-        return replace(self, column=text, expression=parse(text))
+        """Return the term for one number of lists in cells, and in the map."""
+        term = self
+        if self.by_joint and index is not None and index < len(self.by_joint):
+            gain, constant = self.by_joint[index]
+            term = replace(self, gain=gain, constant=constant, by_joint=())
+        if term.expression is None:
+            return replace(term, column=choose_element(term.column, index))
+        text = choose_element(term.expression.text, index)
+        return replace(term, column=text, expression=parse(text))
 
 
 def terms_of(channel: str, value: object) -> tuple[ChannelTerm, ...]:
@@ -76,20 +84,49 @@ def term_of(field: str, value: object, dimension: str) -> ChannelTerm:
             "or a scale to it",
             f"{field}.unit",
         )
-    sign = number(body.get("sign", 1), f"{field}.sign")
-    if sign not in (1, -1):
-        raise FieldError(f"{field}.sign is {sign}, expected 1 or -1", f"{field}.sign")
-    scale = number(body.get("scale", 1), f"{field}.scale")
-    if scale == 0.0:
+    expression = _expression(body, field)
+    column = expression.text if expression else column_name(body["column"], f"{field}.column")
+    file = _file(body.get("file", ""), f"{field}.file")
+    held = _flag(body.get("held", False), f"{field}.held")
+    joints = _gains_and_constants(body, field, factor)
+    listed = any(isinstance(body.get(name), list) for name in PER_JOINT)
+    return ChannelTerm(
+        column, str(body["unit"]), *joints[0], file, expression, held, joints if listed else ()
+    )
+
+
+def _gains_and_constants(
+    body: Mapping[str, Any], field: str, factor: float
+) -> tuple[tuple[float, float], ...]:
+    """Return gain and constant of each joint; one of both where the map has no list. factor: to SI."""
+    signs, scales, constants = (_numbers(body, field, name) for name in PER_JOINT)
+    for sign in signs:
+        if sign not in (1, -1):
+            raise FieldError(f"{field}.sign is {sign}, expected 1 or -1", f"{field}.sign")
+    if 0.0 in scales:
         raise FieldError(
             f"{field}.scale is 0, expected another number: the channel would be lost", f"{field}.scale"
         )
-    expression = _expression(body, field)
-    column = expression.text if expression else column_name(body["column"], f"{field}.column")
-    constant = number(body.get("constant", 0), f"{field}.constant")
-    file = _file(body.get("file", ""), f"{field}.file")
-    held = _flag(body.get("held", False), f"{field}.held")
-    return ChannelTerm(column, str(body["unit"]), sign * factor * scale, constant, file, expression, held)
+    count = max(map(len, (signs, scales, constants)))
+    for name, values in zip(PER_JOINT, (signs, scales, constants), strict=True):
+        if len(values) not in (1, count):
+            where = f"{field}.{name}"
+            raise FieldError(f"{where} has {len(values)} numbers, expected one, or {count} as others", where)
+    signs, scales, constants = (v * count if len(v) == 1 else v for v in (signs, scales, constants))
+    return tuple(
+        (sign * factor * scale, constant)
+        for sign, scale, constant in zip(signs, scales, constants, strict=True)
+    )
+
+
+def _numbers(body: Mapping[str, Any], field: str, name: str) -> tuple[float, ...]:
+    """Return a number of a map, or the list of them, one for each joint."""
+    value, where = body.get(name, PER_JOINT[name]), f"{field}.{name}"
+    if not isinstance(value, list):
+        return (number(value, where),)
+    if not value:
+        raise FieldError(f"{where} is an empty list, expected a number for each joint", where)
+    return tuple(number(item, where) for item in value)
 
 
 def _expression(body: Mapping[str, Any], field: str) -> Expression | None:

@@ -8,13 +8,13 @@ from typing import Literal
 
 from msg_adapters.tables.child import Reader
 from msg_adapters.tables.column_table import LARGEST, Table
+from msg_adapters.tables.foreign_files import HDF5
 
 CHILD = Path(__file__).with_name("_mat_reader.py")
 TIME = 90.0
 """s. The largest file that is read takes 3 s."""
 _HEADER = 128
 """Bytes before the first variable."""
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def read_mat(path: Path, columns: Sequence[str]) -> Table:
@@ -27,8 +27,10 @@ def read_mat(path: Path, columns: Sequence[str]) -> Table:
 def _refuse_version_7_3(path: Path) -> None:
     with path.open("rb") as file:
         head = file.read(520)
-    if head.startswith(b"MATLAB 7.3") or _HDF5 in (head[:8], head[512:]):
-        raise ValueError("MAT file of version 7.3 (HDF5), expected version 7: save(…, '-v7') in MATLAB")
+    if head.startswith(b"MATLAB 7.3") or HDF5 in (head[:8], head[512:]):
+        raise ValueError(
+            "MAT file of version 7.3 (HDF5), expected version 7: save(…, '-v7') in MATLAB, or docs/import.md"
+        )
 
 
 def _refuse_cut_off(path: Path) -> None:

@@ -12,6 +12,7 @@ from rsea_ros.checks.running_clock import at_rates
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
+from rsea_ros.held_commands import with_held_commands
 from rsea_ros.held_samples import without_held_samples
 from rsea_ros.mixed_rows import without_mixed_rows
 from rsea_ros.model.pace import check_pace
@@ -80,7 +81,7 @@ def _with_even_clocks(record: Record, findings: Findings) -> Record:
 
 def _repair(record: Record) -> Record:
     """Return the record as the check used it, with its reported faults repaired."""
-    for repair in (without_mixed_rows, without_held_samples, behind_the_edge):
+    for repair in (without_mixed_rows, without_held_samples, with_held_commands, behind_the_edge):
         record, _ = repair(record)
     return record
 

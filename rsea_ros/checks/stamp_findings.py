@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from rsea_ros.checks.finding import Finding, Light
+from rsea_ros.held_commands import with_held_commands, words_on_steps
 from rsea_ros.model.pace import AS_SECONDS, FAST, SKIPPED_START, SLOW, is_slow, is_too_fast
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
@@ -67,15 +69,18 @@ def fault_finding(fault: Fault) -> Finding:
 
 def rates(record: Record, rig: Rig) -> list[Finding]:
     """Return the sample rate of every channel, and where it is too low for the rig."""
-    natural, command = natural_frequency(rig), record["command"].rate if "command" in record else math.nan
-    timed = {n: c for n, c in record.channels.items() if len(c) > 2}
+    held, _ = with_held_commands(record)
+    natural, command = natural_frequency(rig), held["command"].rate if "command" in record else math.nan
+    timed = {n: c for n, c in held.channels.items() if len(c) > 2}
     if is_too_fast(record):
         expected = f"more than {SKIPPED_START:g} s at up to {FAST:g} Hz"
         return [_other_unit(n, c, expected, "") for n, c in timed.items()]
     slow = is_slow(record)
     if slow and natural is None:
         return [_other_unit(n, c, f"> {SLOW:g} Hz", "record faster") for n, c in timed.items()]
-    return [_rate(n, c, natural, command, slow) for n, c in timed.items()]
+    findings = [_rate(n, c, natural, command, slow) for n, c in timed.items()]
+    words = words_on_steps(record)
+    return [replace(f, detail=words[f.channel]) if f.channel in words else f for f in findings]
 
 
 def _other_unit(name: str, channel: Channel, expected: str, else_: str) -> Finding:

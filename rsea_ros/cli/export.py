@@ -16,7 +16,9 @@ from rsea_ros.new_files import check_free, write_file
 if TYPE_CHECKING:
     from rsea_ros.exports.difference import Difference
     from rsea_ros.exports.represented import Export
+    from rsea_ros.exports.verification import Verification
     from rsea_ros.model.rig import Rig
+    from rsea_ros.signals import FloatArray
 
 HELP = "convert a rig to MuJoCo, FMI, URDF, SDF, Isaac Lab or BAM, and list the parts left out"
 EXAMPLE = "rsea export --mjcf paper_high_impedance --out bench.xml"
@@ -45,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--effect", action="append", default=[], metavar="NAME:param=value,…", help=effect)
     add("--actuator", default="", metavar="NAME", help="for --bam: name of the servo in BAM, such as mx106")
     add("--no-play", action="store_true", help="write the file without verifying it")
-    played = "duration of the chirp that verifies --mjcf and --fmu, s"
+    played = "duration of the chirp that verifies the export, s"
     add("--duration", type=positive, default=DURATION, help=f"{played} (default %(default)s)")
     add("--amplitude", type=positive, help="its amplitude, N·m, position loop: rad (default 10, 0.4)")
     limit = "exit status 1 if a channel differs by more than TIMES times its noise"
@@ -68,15 +70,16 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or Path(f"{rig.name}{suffix}")
     check_free([out], force=args.force, inputs=[source])
     made = _exporters(args)[target](rig)
-    difference, not_played = _play(made, rig, args)
+    verified = _verification(made, rig, args)
     write_file(out, made.content, force=args.force)
     if args.json:
-        print(json.dumps(_document(made, rig, out, difference, not_played), indent=2))
+        print(json.dumps(_document(made, rig, out, verified), indent=2))
     else:
-        for line in _lines(made, rig, out, difference, not_played):
+        for line in _lines(made, rig, out, verified):
             say(line, indent=4)
-    too_far = args.limit is not None and any(not one.times_noise <= args.limit for one in difference)
-    return FOUND if too_far else 0
+    if args.limit is None or all(one.times_noise <= args.limit for one in verified.differences):
+        return 0
+    return FOUND
 
 
 def _exporters(args: argparse.Namespace) -> Mapping[str, Callable[[Rig], Export]]:
@@ -96,69 +99,55 @@ def _exporters(args: argparse.Namespace) -> Mapping[str, Callable[[Rig], Export]
     }  # fmt: skip
 
 
-def _play(made: Export, rig: Rig, args: argparse.Namespace) -> tuple[tuple[Difference, ...], str]:
-    """Return the differences to our simulation, and the reason if there are none.
-
-    Raises ParameterError if --limit needs them and they are not available.
-    """
+def _verification(made: Export, rig: Rig, args: argparse.Namespace) -> Verification:
+    """Return the verification. Raises ParameterError if --limit needs a play and there is none."""
     from rsea_ros.errors import ParameterError
-    from rsea_ros.exports.difference import RATE, differences, ours
-    from rsea_ros.exports.fmu_play import play_fmu
-    from rsea_ros.exports.mujoco_play import play_mujoco
+    from rsea_ros.exports.verification import Verification, verify
 
-    players: Mapping[str, Callable[..., Any]] = {"mjcf": play_mujoco, "fmu": play_fmu}
-    why = "--no-play" if args.no_play else ""
-    if made.target not in players:
-        why = "only --mjcf and --fmu are verified by simulation"
-    if not why:
-        command = _excitation(rig, args, RATE)
-        try:
-            theirs = players[made.target](made.content, rig, command)
-            difference = differences(rig, ours(rig, command, RATE), theirs)
-            why = "" if difference else "the rig states no sensor noise, expected sensors.ft.noise or another"
-        except ParameterError as error:
-            difference, why = (), str(error)
-        if difference:
-            return difference, ""
-    if args.limit is not None:
-        raise ParameterError(f"--limit {args.limit:g}: not played: {why}")
-    return (), why
+    verified = Verification(not_played="--no-play")
+    if not args.no_play:
+        verified = verify(made, rig, _chirp(rig, args))
+    if args.limit is not None and verified.not_played:
+        raise ParameterError(f"--limit {args.limit:g}: not played: {verified.not_played}")
+    return verified
 
 
-def _excitation(rig: Rig, args: argparse.Namespace, rate: float) -> Any:
-    """Return the chirp that verifies the export, N m or rad."""
+def _chirp(rig: Rig, args: argparse.Namespace) -> FloatArray:
+    """Return the command that verifies the export, N m or rad."""
     from dataclasses import replace
 
+    from rsea_ros.exports.difference import RATE
     from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
 
     default = JOINT if rig.loop else ExcitationSettings(amplitude=10.0, noise=2.0, high=60.0)
     size = args.amplitude or default.amplitude
     noise = default.noise * size / default.amplitude
     low = max(0.5, 1.0 / args.duration)
-    settings = replace(default, rate=rate, duration=args.duration, low=low, amplitude=size, noise=noise)
+    settings = replace(default, rate=RATE, duration=args.duration, low=low, amplitude=size, noise=noise)
     return excitation("chirp", settings)
 
 
-def _lines(
-    made: Export, rig: Rig, out: Path, differences: tuple[Difference, ...], not_played: str
-) -> list[str]:
-    """Return the report as text: file, content, omissions, differences."""
+def _lines(made: Export, rig: Rig, out: Path, verified: Verification) -> list[str]:
+    """Return the report as text: file, content, omissions and what they cost, differences."""
     from rsea_ros.exports.represented import coverage_lines
-    from rsea_ros.units import plain
 
     lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]
     lines += [f"  {line}" for line in coverage_lines(made.represented, made.omitted)]
-    lines += [
-        f"played in both: {one.channel} differs by {one.times_noise:.3g} times the sensor's noise "
+    lines += [f"  without {name}: {_apart(one)}" for name, one in verified.losses.items()]
+    lines += [f"played in both: {_apart(one)}" for one in verified.differences]
+    return [*lines, f"not played: {verified.not_played}"] if verified.not_played else lines
+
+
+def _apart(one: Difference) -> str:
+    from rsea_ros.units import plain
+
+    return (
+        f"{one.channel} differs by {one.times_noise:.3g} times the sensor's noise "
         f"({one.rms:.3g} {plain(one.unit)} of {one.signal:.3g})"
-        for one in differences
-    ]
-    return [*lines, f"not played: {not_played}"] if not_played else lines
+    )
 
 
-def _document(
-    made: Export, rig: Rig, out: Path, differences: tuple[Difference, ...], not_played: str
-) -> dict[str, Any]:
+def _document(made: Export, rig: Rig, out: Path, verified: Verification) -> dict[str, Any]:
     return {
         "schema": 1,
         "rig": rig.name,
@@ -166,12 +155,14 @@ def _document(
         "file": str(out),
         "says": {one.name: one.how for one in made.represented},
         "leaves_out": {one.name: one.why for one in made.omitted},
-        "not_played": not_played or None,
-        "difference": {
-            one.channel: {
-                "times_noise": one.times_noise, "rms": one.rms, "signal": one.signal, "noise": one.noise,
-                "unit": one.unit,
-            }
-            for one in differences
-        },
+        "loss": {name: {"channel": one.channel, **_numbers(one)} for name, one in verified.losses.items()},
+        "not_played": verified.not_played or None,
+        "difference": {one.channel: _numbers(one) for one in verified.differences},
+    }
+
+
+def _numbers(one: Difference) -> dict[str, float | str]:
+    return {
+        "times_noise": one.times_noise, "rms": one.rms, "signal": one.signal, "noise": one.noise,
+        "unit": one.unit,
     }  # fmt: skip

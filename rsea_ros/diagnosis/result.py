@@ -164,6 +164,7 @@ class Diagnosis:
     """The verdict and its basis. Dicts are by channel, in the channel's unit.
 
     channel: the main one, of verdict, misfits and the gains of rejected effects.
+    baseline: values of the nominal model; extended: those of the extended one, its effects included.
     residual_rms: of the re-fitted nominal model; extended_residual_rms: of the extended one; both held out.
     remarks: on values that the data cannot determine, and others for the reader.
     before, after, masked: of the first record; masked: which samples of `before` do not count, by channel,
@@ -180,6 +181,7 @@ class Diagnosis:
     baseline_rig: Rig
     baseline: tuple[ParameterEstimate, ...]
     extended_rig: Rig
+    extended: tuple[ParameterEstimate, ...]
     noise_rms: Mapping[str, float]
     residual_rms: Mapping[str, float]
     fit_percent: Mapping[str, float]
@@ -199,3 +201,9 @@ class Diagnosis:
     masked: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     settings: DiagnosisSettings = DEFAULT
     rig_choice: RigChoice = field(default_factory=RigChoice)
+
+    @property
+    def final(self) -> tuple[ParameterEstimate, ...]:
+        """The rig's own values in the extended model: those of `baseline` compensate the missing causes."""
+        extended = {p.name: p for p in self.extended}
+        return tuple(extended.get(p.name, p) for p in self.baseline)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +45,23 @@ def ours(rig: Rig, command: FloatArray, rate: float) -> dict[str, FloatArray]:
     names = [name for name in CHANNELS if rig.measures(name)]
     asked = {name: Channel(t, np.zeros(len(t))) for name in names}
     return simulate(rig, Record({driven: Channel(t, command), **asked}), refine=REFINE)
+
+
+def losses(
+    rig: Rig, omitted: Iterable[str], mine: Mapping[str, FloatArray], command: FloatArray, rate: float
+) -> dict[str, Difference]:
+    """Return what each omitted effect of a rig changes, in the channel where it changes most.
+
+    mine: of the whole rig, as `ours` gives it. command: N m or rad. rate: Hz.
+    """
+    lost = {}
+    names = set(omitted)
+    for name in (effect.name for effect in rig.effects if effect.name in names):
+        without = rig.with_effects(*(effect for effect in rig.effects if effect.name != name))
+        apart = differences(rig, mine, ours(without, command, rate))
+        if apart:
+            lost[name] = max(apart, key=lambda one: one.times_noise)
+    return lost
 
 
 def differences(

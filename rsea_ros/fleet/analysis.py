@@ -82,7 +82,6 @@ def _diagnose(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     """
     from rsea_ros.diagnosis.diagnose import diagnose
     from rsea_ros.report.diagnosis.json import diagnosis_json
-    from rsea_ros.report.diagnosis.page import final_values
 
     try:
         check_diagnosable(record)
@@ -90,7 +89,7 @@ def _diagnose(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     except RseaError as error:
         row["reason"] = f"no diagnosis: {error}"
         return {}
-    parameters = [_parameter(p) for p in final_values(result)]
+    parameters = [_parameter(p) for p in result.final]
     causes = [_cause(c) for c in result.causes]
     row |= {"diagnosis": result.verdict, "causes": causes, "parameters": parameters}
     return {

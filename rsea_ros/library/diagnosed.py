@@ -63,10 +63,13 @@ class Diagnosed:
         return "\n".join(line.plain for line in terminal_lines(self.result))
 
     def to_frame(self) -> Any:
-        """Return the parameters of the re-fitted rig as a DataFrame. Raises ParameterError without pandas."""
+        """Return the rig's values together with the causes, as a DataFrame.
+
+        Raises ParameterError without pandas.
+        """
         from rsea_ros.library.data_frames import parameter_frame
 
-        return parameter_frame(self.result.baseline)
+        return parameter_frame(self.result.final)
 
     def plot(self) -> Figure:
         """Return a plotly figure: each channel measured, simulated without the causes, and with them."""

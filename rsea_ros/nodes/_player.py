@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 
 import numpy as np
 from rclpy.node import Node
@@ -24,7 +25,8 @@ SOFT = 0.1
 class Player:
     """Publishes one command (N m, at `rate` Hz), each value `lead` s before it takes effect.
 
-    wanted: subscriptions of torque_command to wait for. publisher: of a node that plays more than once.
+    wanted: subscriptions of torque_command to wait for. ready: whether it may begin, beside that.
+    publisher: of a node that plays more than once.
     next: values that are out. left_out: values that came too late.
     """
 
@@ -37,12 +39,13 @@ class Player:
         lead: float,
         wanted: int,
         joint: str,
+        ready: Callable[[], bool] = lambda: True,
         publisher: Publisher[JointState] | None = None,
     ) -> None:
         self.command, self.rate = command, rate
         self.next, self.left_out, self.started = 0, 0, False
         self._node, self._lead, self._wanted, self._joint = node, round(lead * SECOND), wanted, joint
-        self._stamp, self._last = 0, 0.0
+        self._stamp, self._last, self._ready = 0, 0.0, ready
         self._stopped_at = -1
         self._publisher = publisher or node.create_publisher(JointState, "torque_command", COMMAND)
         self._measurements = node.create_subscription(JointState, "joint_states", self._begin, MEASUREMENT)
@@ -92,7 +95,7 @@ class Player:
 
     def _begin(self, message: JointState) -> None:
         """Start at a whole number of periods after a measurement, once all subscribers listen."""
-        if self.started or self.stopped or self.subscriptions < self._wanted:
+        if self.started or self.stopped or self.subscriptions < self._wanted or not self._ready():
             return
         self.started = True
         self.cycle.start(self._first(stamp_of(message.header.stamp)) - self._lead)

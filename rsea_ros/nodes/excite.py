@@ -1,4 +1,7 @@
-"""excite: plays an excitation as torque commands, and always ends with zeros."""
+"""excite: plays an excitation as torque commands, and always ends with zeros.
+
+It waits for a driver that is not active, and ends with one line where it has latched a fault.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from rclpy.node import Node
 
 from rsea_ros.experiment.run_file import read_run
 from rsea_ros.identification.excitation import KINDS, ExcitationSettings, check_limits, excitation
+from rsea_ros.nodes._bench_status import BenchStatus
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import JOINT, NodeParameter
 from rsea_ros.nodes._player import Player
@@ -45,14 +49,17 @@ class ExciteNode:
         command, rate = plan(values)
         check_limits(command, values["limit"], rate)
         self._node, self._wanted = node, values["subscribers"]
+        self._bench = BenchStatus(node, values["joint"])
         self._player = Player(
-            node, command, rate, lead=values["lead"], wanted=self._wanted, joint=values["joint"]
-        )
+            node, command, rate, lead=values["lead"], wanted=self._wanted, joint=values["joint"],
+            ready=self._bench.ready,
+        )  # fmt: skip
         self._health = Health(node, self._report)
         node.create_timer(1.0, self._tell, clock=STEADY)
 
     def is_finished(self) -> bool:
-        """Return whether the whole excitation is out."""
+        """Return whether the whole excitation is out. Raises DeviceError where the bench makes no torque."""
+        self._bench.check(playing=self._player.started)
         return self._player.over()
 
     def conclude(self) -> None:
@@ -70,7 +77,7 @@ class ExciteNode:
             share = min(1.0, p.next / len(p.command))
             self._node.get_logger().info(f"{share:.0%} of {len(p.command) / p.rate:.1f} s")
         else:
-            wanted = (
+            wanted = self._bench.idle or (
                 f"{p.subscriptions} of {self._wanted} subscriptions of torque_command and a message on "
                 "joint_states"
             )

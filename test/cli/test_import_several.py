@@ -89,6 +89,16 @@ def test_the_shipped_map_imports_a_lerobot_data_set(episodes):
     assert len(list(out.iterdir())) == 2
 
 
+def test_the_shipped_map_scales_each_joint_of_a_normalised_data_set(episodes):
+    """An elbow at 50 % of its travel was read as 50 degrees."""
+    file, degrees, share = str(episodes / "file-000.parquet"), episodes / "degrees", episodes / "share"
+    assert main(["import", file, "--map", "lerobot", "--index", "1", "--out", str(degrees)]) == 0
+    assert main(["import", file, "--map", "lerobot_normalised", "--index", "1", "--out", str(share)]) == 0
+    for name in (path.name for path in degrees.iterdir()):
+        was, scaled = (read_record(folder / name)["position"].y for folder in (degrees, share))
+        assert np.allclose(scaled, np.rad2deg(was) * 0.01745, atol=1e-9)
+
+
 def test_the_shipped_maps_import_pace_and_echoed_joint_states(tmp_path):
     q = np.arange(20.0).reshape(10, 2)
     np.savez(tmp_path / "chirp_data.npz", time=np.arange(10) / 400, dof_pos=q, des_dof_pos=q + 1)

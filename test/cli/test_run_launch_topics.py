@@ -94,10 +94,14 @@ def test_a_launched_graph_hears_the_documented_controller_and_one_signal_ends_it
     graph = subprocess.Popen(
         rsea("launch", "simulation", "model:=false", "identify:=false"), cwd=ROOT
     )
-    controller = subprocess.Popen(rsea("run", "my_controller.py"), cwd=tmp_path)
+    controller = subprocess.Popen(
+        rsea("run", "my_controller.py"), cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    )
     try:
         assert first_message("joint_states", graph)["name"] == ["joint"]
         assert abs(first_message("torque_command", graph, controller)["effort"][0]) > 0.0
+        controller.send_signal(signal.SIGINT)
+        assert controller.communicate(timeout=20)[1] == ""  # Ctrl-C is no traceback
     finally:
         controller.kill()
         controller.wait()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from rsea_ros.exports.fmu_play import play_fmu
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.mujoco_play import play_mujoco
 from rsea_ros.model.rig import EffectSetting
-from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_file import load_rig, save_rig
 
 MUJOCO = pytest.mark.skipif(
     sys.version_info < (3, 11), reason="MuJoCo 4 has no wheel for Python 3.10: nothing is played in it there"
@@ -134,6 +136,30 @@ def test_the_limit_is_an_exit_status(tmp_path, capsys):
     document = json.loads(capsys.readouterr().out)
     assert document["difference"]["ft"]["times_noise"] == pytest.approx(1.0 / 0.03, rel=0.01)
     assert document["leaves_out"]["ft_bias"] == "MuJoCo has no element for it"
+    assert document["loss"]["ft_bias"]["times_noise"] == pytest.approx(1.0 / 0.03, rel=0.01)
+
+
+@pytest.mark.parametrize("target", ["urdf", "sdf", "isaac", "bam"])
+def test_what_an_omitted_effect_costs_is_printed_for_targets_that_do_not_run_here(target, tmp_path, capsys):
+    arguments = ["--effect", "ft_bias:bias=0.6", "--effect", "backlash", "--out", str(tmp_path / "a")]
+    assert main(["export", f"--{target}", "paper_high_impedance", *arguments, "--duration", "0.4"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    times = re.search(r"without ft_bias: ft differs by (\S+) times the sensor's noise", text)
+    assert float(times[1]) == pytest.approx(0.6 / 0.03, rel=0.01)
+    assert "without backlash: " in text
+    asked = ["--limit", "1", "--out", str(tmp_path / "b")]
+    assert main(["export", f"--{target}", "paper_high_impedance", *asked]) == 2
+    assert "only --mjcf and --fmu are verified" in capsys.readouterr().err
+
+
+def test_a_rig_with_silent_sensors_has_no_losses(tmp_path, capsys):
+    rig = load_rig("paper_high_impedance")
+    silent = {name: replace(sensor, noise=0.0) for name, sensor in rig.sensors.items()}
+    save_rig(replace(rig, sensors=silent), tmp_path / "rig.yaml")
+    arguments = ["--effect", "ft_bias", "--duration", "0.4", "--out", str(tmp_path / "a")]
+    assert main(["export", "--mjcf", str(tmp_path / "rig.yaml"), *arguments]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "without ft_bias" not in text and "not played: the rig states no sensor noise" in text
 
 
 @pytest.mark.parametrize(("target", "package"), [("mjcf", "mujoco"), ("fmu", "fmpy")])

@@ -92,6 +92,41 @@ def test_a_fault_is_published_on_diagnostics_and_ends_by_service(wire, listener)
     wire.drive()
 
 
+def _excite(start):
+    """Begin an excitation of the bench for longer than any test."""
+    return start("excite", remaps={"__ns": "/main"}, amplitude=3.0, noise=0.0, duration=200.0, rate=100.0)
+
+
+def test_excite_plays_nothing_to_a_driver_that_has_latched_a_fault(wire, listener, start):
+    """It played to the end, and the recording showed a machine that never moved."""
+    wire.drive()
+    wire.bench.ask("set", temperature=90)
+    wire.push(lambda: wire.goal() == (0, True))
+    commands = listener.hear(JointState, "/main/torque_command", COMMAND)
+    excite = _excite(start)
+    listener.until(lambda: not excite.running())
+    assert excite.wait() == 2 and "temperature: 90 °C, limit 70 °C" in excite.output[-1]
+    assert excite.output[-1].endswith("rsea call /main/driver clear_fault")
+    assert not any(message.effort[0] for message in commands)
+    wire.bench.ask("set", temperature=30)
+    assert wire.trigger("clear_fault").success
+
+
+def test_excite_waits_for_an_active_driver_and_stops_at_a_fault(wire, listener, start):
+    wire.drive()
+    assert wire.change(Transition.TRANSITION_DEACTIVATE).success
+    excite = _excite(start)
+    listener.until(lambda: any("is not active; rsea call /main/driver activate" in x for x in excite.output))
+    commands = listener.hear(JointState, "/main/torque_command", COMMAND)
+    assert not commands and wire.change(Transition.TRANSITION_ACTIVATE).success
+    listener.until(lambda: sum(message.effort[0] != 0.0 for message in commands) > 50)
+    assert wire.trigger("stop").success
+    listener.until(lambda: not excite.running())
+    assert excite.wait() == 2 and "has latched a fault, stopped" in excite.output[-1]
+    assert commands[-1].effort[0] == 0.0
+    assert wire.trigger("clear_fault").success
+
+
 def test_a_shutdown_of_the_motor_ends_by_reboot(wire):
     wire.drive()
     wire.bench.ask("alert", bits=0x20)

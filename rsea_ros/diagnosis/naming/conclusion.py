@@ -60,6 +60,7 @@ def _diagnosis(
         baseline_rig=identified_rig(first.solution, baseline),
         baseline=baseline,
         extended_rig=identified_rig(last.solution, final),
+        extended=final,
         noise_rms=dict(case.noise),
         residual_rms=_rms(first.test, case),
         fit_percent=_fit(first, selection.cases),
@@ -106,13 +107,13 @@ def _rejections(selection: Selection, outcome: Outcome, pools: Pools) -> tuple[R
 
 def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
     """Return the remarks on values that the data cannot determine and on the extended model."""
-    first, last = outcome.stages[0].solution.problem, outcome.stages[-1].solution.problem
+    last = outcome.stages[-1].solution.problem
     named = {c.name for c in outcome.causes}
     unnamed = tuple(n for n in last.added if n not in named)
     lost, channel = lost_above(case, outcome.channel), outcome.channel
     return [
         *([Remark("also_in_model", unnamed)] if unnamed else []),
-        *undetermined_remarks(first.unknowns, outcome.stages[0].confidence),
+        *undetermined_remarks(last.unknowns, outcome.stages[-1].confidence),
         *([Remark("coherence_lost", (channel,), (lost,), "Hz")] if lost is not None else []),
         *([Remark("on_measured_angle")] if last.ride else []),
         *([Remark("coloured_noise", tuple(sorted(case.coloured)))] if case.coloured else []),

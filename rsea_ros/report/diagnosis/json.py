@@ -52,6 +52,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "alternatives": [_alternative(a) for a in d.alternatives],
         "rejected": [_rejection(r) for r in d.rejected],
         "extended": {
+            "parameters": {p.name: parameter(p) for p in d.final},
             "residual_rms": numbers(d.extended_residual_rms),
             "fit_percent": numbers(d.extended_fit_percent),
             "at_noise_floor": d.at_noise_floor,

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from html import escape
 
 from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
@@ -106,15 +104,4 @@ def _baseline(d: Diagnosis) -> str:
 def _final(d: Diagnosis) -> str:
     """Return the rig's values at the end: beside all causes, where there are any."""
     title = "Values of the rig together with the causes" if d.causes else "Values of the rig"
-    return section(title, parameter_table(final_values(d)))
-
-
-def final_values(d: Diagnosis) -> list[ParameterEstimate]:
-    """Return the rig's own values in the extended model, with their intervals."""
-    quantities = d.extended_rig.quantities
-    return [
-        replace(p, value=quantities[p.name].value, ci95=quantities[p.name].ci95 or p.ci95)
-        if p.name in quantities
-        else p
-        for p in d.baseline
-    ]
+    return section(title, parameter_table(d.final))

@@ -148,7 +148,7 @@ def test_a_folder_and_a_pipe_are_refused(files, tmp_path):
     mapping = load_map(tmp_path / "map.yaml")
     (tmp_path / "folder.csv").mkdir()
     os.mkfifo(tmp_path / "pipe.csv")
-    for name, message in (("folder.csv", "Is a directory"), ("pipe.csv", "is a pipe")):
+    for name, message in (("folder.csv", "is a directory, expected a file"), ("pipe.csv", "is a pipe")):
         with pytest.raises(ImportMapError, match=f"{name}: {message}"):
             import_record(tmp_path / name, mapping)
 

@@ -57,6 +57,52 @@ def test_a_cell_that_is_not_a_list_is_refused(motion):
         import_record(motion, load_map(MAPS / "so101.yaml"), 0)
 
 
+PER_JOINT = """time: {rate: 100}
+channels:
+  position: {column: "q[#]", unit: deg, sign: [1, -1, 1], scale: 2, constant: [0, 0.5, 1]}
+"""
+
+
+@pytest.fixture
+def joints(tmp_path):
+    np.savez(tmp_path / "run.npz", q=np.arange(30.0).reshape(10, 3))
+
+    def made(text):
+        (tmp_path / "map.yaml").write_text(text)
+        return tmp_path / "run.npz", load_map(tmp_path / "map.yaml")
+
+    return made
+
+
+@pytest.mark.parametrize(("index", "sign", "constant"), [(0, 1.0, 0.0), (1, -1.0, 0.5), (2, 1.0, 1.0)])
+def test_a_map_may_have_a_sign_and_a_constant_for_each_joint(joints, index, sign, constant):
+    record = import_record(*joints(PER_JOINT), index)
+    q = np.arange(30.0).reshape(10, 3)[:, index]
+    assert np.allclose(record["position"].y, 2.0 * sign * np.deg2rad(q) + constant)
+
+
+@pytest.mark.parametrize("index", [None, 3])
+def test_values_for_each_joint_need_one_of_the_joints(joints, index):
+    text = PER_JOINT.replace('"q[#]"', '"q[0]"')
+    with pytest.raises(ImportMapError, match=r"map.yaml: channels.position .* expected --index 0 to 2"):
+        import_record(*joints(text), index)
+
+
+@pytest.mark.parametrize(
+    ("was", "put", "words"),
+    [
+        ("[1, -1, 1]", "[1, -1]", r"sign has 2 numbers, expected one, or 3 as others"),
+        ("[1, -1, 1]", "[1, 2, 1]", r"sign is 2\.0, expected 1 or -1"),
+        ("scale: 2", "scale: []", "scale is an empty list, expected a number for each joint"),
+        ("scale: 2", "scale: [1, 0, 1]", "scale is 0, expected another number"),
+        ("scale: 2", "scale: [1, x, 1]", "scale is 'x', expected a number"),
+    ],
+)
+def test_wrong_values_for_joints_are_refused(joints, was, put, words):
+    with pytest.raises(ImportMapError, match=words):
+        joints(PER_JOINT.replace(was, put))
+
+
 def test_a_file_in_place_of_a_directory_is_refused(motion):
     with pytest.raises(ImportMapError, match=r"expected the one that holds control\.csv, state_motor\.csv"):
         import_record(motion / "control.csv", load_map(MAPS / "so101.yaml"), 0)

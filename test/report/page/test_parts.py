@@ -11,7 +11,7 @@ import pytest
 
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.result import Identification
-from rsea_ros.report.diagnosis.page import diagnosis_report, final_values
+from rsea_ros.report.diagnosis.page import diagnosis_report
 from rsea_ros.report.diagnosis.sketch import part_of, sketch
 from rsea_ros.report.identification.correlation import correlation_section, finding
 from rsea_ros.report.identification.page import identification_report
@@ -57,7 +57,7 @@ def test_the_values_shown_first_are_those_beside_the_cause(diagnosed: Diagnosed)
     d = diagnosed.diagnosis
     html = diagnosis_report(d)
     assert html.index("together with the causes") < html.index("before the search for causes")
-    final = {p.name: p.value for p in final_values(d)}
+    final = {p.name: p.value for p in d.final}
     assert final["rotor.reflected_damping"] == d.extended_rig["rotor.reflected_damping"]
     biased = {p.name: p.value for p in d.baseline}
     assert abs(final["rotor.reflected_damping"] - biased["rotor.reflected_damping"]) > 0.1

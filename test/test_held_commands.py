@@ -1,0 +1,96 @@
+"""Commands that are published only when they change are held until the next, as the bench held them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rsea_ros as rsea
+from msg_adapters import read_record, write_record
+from rsea_ros.checks.check import check_record
+from rsea_ros.held_commands import with_held_commands
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel
+from rsea_ros.stamps import repair_stamps
+
+RIG = "paper_high_impedance"
+RATE = 280.0
+
+
+def steps(count: int, seconds: float, seed: int = 4) -> np.ndarray:
+    """Commands of a loop: levels that each last about so long."""
+    rng = np.random.default_rng(seed)
+    lasts = rng.uniform(0.5, 1.5, count) * seconds * RATE
+    return np.repeat(rng.uniform(-15.0, 15.0, count), np.rint(lasts).astype(int))
+
+
+def on_change(record):
+    """The record of a publisher that sends a command only when it differs from the last."""
+    command = record["command"]
+    new = np.concatenate([[True], np.diff(command.y) != 0.0])
+    return record.with_channels(command=Channel(command.t[new], command.y[new]))
+
+
+@pytest.fixture(scope="module")
+def run():
+    return rsea.simulate(load_rig(RIG).with_values({"spring.stiffness": 1500.0}), steps(12, 1.0), RATE)
+
+
+def test_held_commands_are_those_that_the_loop_had(run):
+    filled, _ = with_held_commands(on_change(run))
+    assert filled["command"].t == pytest.approx(run["command"].t, abs=1e-9)
+    assert np.array_equal(filled["command"].y, run["command"].y)
+    assert "12 messages" in filled.notes[-1]
+
+
+def test_identify_from_a_few_messages_gives_what_all_of_them_give(run, tmp_path):
+    """A dozen commands were refused: command has 12 usable samples, expected at least 32."""
+    write_record(on_change(run), tmp_path / "bag")
+    fit, whole = (rsea.identify(record, RIG) for record in (read_record(tmp_path / "bag"), run))
+    assert fit.verdict == "adequate"
+    for name, parameter in fit.parameters.items():
+        assert parameter.value == pytest.approx(whole.parameters[name].value, rel=1e-6)
+    low, high = fit.parameters["spring.stiffness"].ci95
+    assert low < 1500.0 < high
+
+
+def test_the_door_takes_them_too(run):
+    assert rsea.identify(on_change(run), RIG).verdict == "adequate"
+    assert rsea.diagnose(on_change(run), load_rig(RIG)).verdict == "nothing_wrong"
+
+
+def test_a_check_calls_them_neither_slow_nor_lost(run):
+    findings = check_record(on_change(run), load_rig(RIG)).findings
+    bad = [(f.kind, f.channel) for f in findings if f.channel == "command" and f.light != "green"]
+    assert not bad
+    assert any("12 messages" in f.detail for f in findings if f.kind == "rate")
+
+
+@pytest.mark.parametrize("every", [1, 6, 20])
+def test_commands_of_a_slow_loop_are_left_as_they_are(run, every):
+    """A loop at 14 Hz and more sends samples of a signal, and each counts as lost where it is missing."""
+    noise = np.random.default_rng(1).standard_normal(len(run["command"]))
+    slow = run.with_channels(command=Channel(run["command"].t[::every], noise[::every]))
+    assert with_held_commands(slow)[0] is slow
+
+
+def test_a_log_with_repeats_is_left_as_it_is(run):
+    command = run["command"]
+    rare = run.with_channels(command=Channel(command.t[::100], np.repeat([1.0, -1.0], len(command))[::200]))
+    assert with_held_commands(rare)[0] is rare
+
+
+def test_the_last_command_is_held_to_the_end_of_the_sensors(run):
+    filled, faults = repair_stamps(on_change(run))
+    assert filled["command"].t[-1] == pytest.approx(run["command"].t[-1], abs=0.01)
+    assert not [fault for fault in faults if fault.channel == "command"]
+
+
+def test_targets_of_a_position_loop_are_held_too(run):
+    targets = run.with_channels(reference=Channel(np.arange(6.0), np.arange(6.0)))
+    assert len(with_held_commands(targets)[0]["reference"]) > 5 * RATE
+
+
+def test_commands_without_a_sensor_are_left_as_they_are(run):
+    alone = rsea.Record({"command": on_change(run)["command"]})
+    assert with_held_commands(alone)[0] is alone
