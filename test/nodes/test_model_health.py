@@ -23,7 +23,8 @@ class Node:
     def __init__(self, amplitude, sensed):
         self._observer, self._error = Observer(RIG, hold=0.05), ErrorFlag(RIG)
         self.inputs = SimpleNamespace(
-            frozen=[], unmoved=False, ft_silent=False, ft_age=0.0, refused=0, unstamped=0, period=math.nan
+            stopped=SimpleNamespace(frozen=[], unmoved=False), ft_silent=False, ft_age=0.0, refused=0,
+            unstamped=0, period=math.nan,
         )
         self.health = ModelHealth(RIG, NOISE, self._observer, PureTorque(RIG), self._error, self.inputs)
         self._amplitude, self._sensed, self._k = amplitude, sensed, 0
@@ -79,5 +80,5 @@ def test_a_torque_too_small_to_judge_is_not_compared(amplitude):
 def test_states_that_do_not_follow_the_commands_are_reported():
     node = Node(8.0, lambda t, torque: torque)
     node.run(2.0)
-    node.inputs.unmoved = True
+    node.inputs.stopped.unmoved = True
     assert UNMOVED in node.health.report().summary

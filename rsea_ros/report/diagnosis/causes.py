@@ -11,7 +11,7 @@ from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.sentences import evidence
-from rsea_ros.report.diagnosis.standing import STATUS, status_line
+from rsea_ros.report.diagnosis.status_line import STATUS, status_line
 from rsea_ros.report.figures.palette import AFTER, GRID, MEASURED, QUIET, faint
 from rsea_ros.report.page.html import bullets, equation, paragraph, section
 from rsea_ros.report.page.html_table import table_of_rows

@@ -12,7 +12,7 @@ from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.causes import fitted_rivals
 from rsea_ros.report.diagnosis.sentences import next_run
-from rsea_ros.report.diagnosis.standing import status_line
+from rsea_ros.report.diagnosis.status_line import status_line
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.report.rig.words import command, rig_named, right_rig, split_off_rig
