@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from distributed.scheduler import DEFAULT_EXTENSIONS
@@ -12,11 +12,10 @@ from distributed.spans import SpansSchedulerExtension
 class UnlistedSpans(SpansSchedulerExtension):
     """Spans without Dask's list of all submissions: it grows for as long as any task is in flight."""
 
-    def observe_tasks(self, tss: Iterable[Any], **stated: Any) -> dict[Any, dict[Any, Any]]:
+    def observe_tasks(self, tss: Any, code: Any, span_metadata: Any) -> dict[Any, dict[Any, Any]]:
         """Note new tasks as Dask does, but not the kind of collection that they were submitted as."""
-        kept = {name: None if name == "span_metadata" else value for name, value in stated.items()}
-        observed: dict[Any, dict[Any, Any]] = super().observe_tasks(tss, **kept)
-        return observed
+        nothing: Any = None
+        return super().observe_tasks(tss, code, nothing)
 
 
 def embedded_extensions() -> Mapping[str, Any]:
