@@ -51,7 +51,10 @@ def real() -> bool:
         run_real(warm, make_fleet(root / "one", 1))
         stores, took = {}, {}
         stores[0], took[0] = open_store(root / "serial", create=True), 0.0
-        took[0] = timed(lambda: run_real(stores[0], bags))
+        spent: list[float] = []
+        busy = time.process_time()
+        took[0] = timed(lambda: run_real(stores[0], bags, spent=spent))
+        busy = time.process_time() - busy
         for count in (1, 2):
             stores[count] = open_store(root / f"dask{count}", create=True)
             with on_this_machine(count, MEMORY, "127.0.0.1:0") as (workers, _):
@@ -66,6 +69,7 @@ def real() -> bool:
         good &= line("1 → 2 workers", "≥ 1.8 ×", said, faster >= 1.8)
         files = stores[0].rows.rglob("*.parquet")
         work = sum(read(file, ["seconds"])["seconds"].to_numpy().sum() for file in files)
+        overhead("overhead, serial, processor", busy, sum(spent))
         return good & overhead("overhead, serial", took[0], work)
 
 
@@ -160,13 +164,14 @@ def reading(count: int = 100_000) -> bool:
         store = make_store(Path(folder) / "store", count)
         known = timed(store.known)
         line("keys of 100 000 rows", "–", f"{known:.1f} s, before a run begins")
-        begin = time.perf_counter()
+        begin, busy = time.perf_counter(), time.process_time()
         columns, rows = history(store.path), recordings(store.path)
         read_in = time.perf_counter() - begin
         line("reading 100 000 rows", "–", f"{read_in:.1f} s, {len(columns['value'])} parameters")
         write_fleet_report(columns, rows, Path(folder) / "report", store=store.path)
-        whole = time.perf_counter() - begin
-        return line("reporting 100 000 rows", "≤ 10 s", f"{whole:.1f} s with the pages", whole <= 10.0)
+        whole, busy = time.perf_counter() - begin, time.process_time() - busy
+        said = f"{whole:.1f} s with the pages, {busy:.1f} s of CPU"
+        return line("reporting 100 000 rows", "≤ 10 s", said, whole <= 10.0)
 
 
 def memory() -> bool:
