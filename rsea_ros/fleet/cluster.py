@@ -18,10 +18,12 @@ from typing import Any
 
 import dask
 import distributed
+from dask.utils import key_split
 from distributed.scheduler import KilledWorker
 
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
 from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet.scheduler_extensions import embedded_extensions
 from rsea_ros.interrupts import deaf_to_interrupts
 
 SETTINGS: Mapping[str, Any] = {
@@ -34,10 +36,14 @@ SETTINGS: Mapping[str, Any] = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.work-stealing": False,
     "distributed.deploy.lost-worker-timeout": "5s",
+    "distributed.admin.system-monitor.log-length": 600,
 }
-"""Tasks wait at the scheduler, so that a worker that ends takes along what it ran and hardly more."""
+"""Tasks wait at the scheduler, so that a worker that ends takes along what it ran and hardly more. The log of
+the dashboard's load curves covers five minutes: an hour of it, Dask's default, looks like a leak."""
 PER_WORKER = 3
 """Tasks in flight for each worker: one that runs, and some that wait at the scheduler."""
+NAMES = 1000
+"""Jobs after which Dask's cache of their names is emptied: it keeps the last 100 000, about 0.3 kB each."""
 CONNECT = "30s"
 COUNTED_EVERY = 10.0
 """s, after which the workers are counted anew: those of another cluster come and go."""
@@ -54,6 +60,7 @@ class OnDask:
         self._done: queue.Queue[Any] = queue.Queue()
         self._jobs: dict[str, tuple[Job, Any]] = {}
         self._places, self._counted = 0, -math.inf
+        self._named = 0
 
     @property
     def places(self) -> int:
@@ -66,6 +73,9 @@ class OnDask:
 
     def submit(self, job: Job) -> None:
         """Send a job to the scheduler."""
+        self._named += 1
+        if self._named % NAMES == 0:
+            key_split.cache_clear()
         future = self._client.submit(job.function, job.argument, pure=False)
         self._jobs[future.key] = job, future
         future.add_done_callback(self._done.put)
@@ -128,6 +138,7 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
                 host="127.0.0.1",
                 dashboard_address=dashboard,
                 silence_logs=logging.CRITICAL,
+                scheduler_kwargs={"extensions": embedded_extensions()},
             )
         client = distributed.Client(cluster, set_as_default=False)  # type: ignore[no-untyped-call]
         with cluster, client:
