@@ -32,7 +32,6 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RseaError
 from rsea_ros.library.diagnosed import diagnose
 from rsea_ros.library.identified import identify
-from rsea_ros.report.diagnosis.page import final_values
 from rsea_ros.signals import Record
 
 SAMPLE = Path(__file__).with_name("fleet_trends_played.json")
@@ -150,7 +149,7 @@ def truth(bench: Bench) -> dict[str, float]:
 
 def summary_of(d: Diagnosis) -> dict[str, Any]:
     """Return the result of a diagnosis, rounded: parameters, causes, faults, verdict."""
-    parameters = {p.name: [p.value, *p.ci95, p.told_by_data] for p in final_values(d) if p.name in TRUE}
+    parameters = {p.name: [p.value, *p.ci95, p.told_by_data] for p in d.final if p.name in TRUE}
     causes = [
         {
             "name": c.name,

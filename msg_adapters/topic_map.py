@@ -86,7 +86,7 @@ class TopicMap:
         name: str = getattr(self, role)
         return name if name.startswith("/") else f"/{self.namespace.strip('/')}/{name}".replace("//", "/")
 
-    def rename(self, assignments: Sequence[str]) -> TopicMap:
+    def with_topics(self, assignments: Sequence[str]) -> TopicMap:
         """Return the map with `role=topic` assignments applied, as the command line gives them.
 
         Those topics are required of a bag. Raises ParameterError for an unknown role.

@@ -36,7 +36,7 @@ def add_topic_options(parser: argparse.ArgumentParser) -> None:
 
 def topic_map(args: argparse.Namespace) -> TopicMap:
     """Return the topic map of the options. Raises ParameterError for an impossible one."""
-    return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).rename(args.topic)
+    return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).with_topics(args.topic)
 
 
 def topic_options(args: argparse.Namespace) -> tuple[str, ...]:

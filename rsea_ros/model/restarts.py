@@ -45,7 +45,7 @@ def _lost_commands(record: Record) -> list[tuple[float, float]]:
     if command is None or torque is None or len(command) < 3 or not np.all(np.diff(command.t) > 0.0):
         return []
     pauses = np.flatnonzero(np.diff(command.t) > max(SHORTEST, PERIODS / command.rate))
-    if not len(pauses):
+    if not len(pauses) or not np.isfinite(torque.y).any():
         return []
     hold = _shown_commands(command, torque)
     off = np.square(torque.y - command.y[hold])

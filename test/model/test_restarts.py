@@ -70,6 +70,12 @@ def test_commands_that_are_published_on_change_are_held():
     assert gaps(only_commands_without(held, 1400.5 / 280.0, 1600.0 / 280.0)) == []
 
 
+def test_a_motor_torque_that_is_never_a_number_shows_nothing_of_a_pause():
+    paused = only_commands_without(SOUND, 5.0, 5.7)
+    dead = Channel(paused["motor_torque"].t, np.full(len(paused["motor_torque"]), np.nan))
+    assert gaps(paused.with_channels(motor_torque=dead)) == []
+
+
 def test_commands_that_are_no_numbers_are_lost_ones():
     """A diagnosis drew a line through them and found 59 times the noise."""
     command = SOUND["command"].y.copy()

@@ -176,7 +176,7 @@ def test_senseless_topic_options_are_refused():
     with pytest.raises(
         ParameterError, match="topic 'wrench=/ft': expected ROLE=TOPIC with ROLE one of torque_command"
     ):
-        TopicMap().rename(["wrench=/ft"])
+        TopicMap().with_topics(["wrench=/ft"])
 
 
 def test_a_message_in_another_encoding_is_refused(tmp_path):

@@ -81,7 +81,7 @@ def test_other_topic_names_and_unrelated_topics_are_read(tmp_path):
     rows += [("/rosout_like", EPOCH, make("std_msgs/msg/String", data="hello"))]
     rows += [("/lab/knee/pure_torque", EPOCH, make("std_msgs/msg/Bool", data=True))]
     bag = write_foreign(tmp_path / "bag", rows)
-    topics = TopicMap(namespace="lab/knee").rename(["ft=/wrist/wrench"])
+    topics = TopicMap(namespace="lab/knee").with_topics(["ft=/wrist/wrench"])
     assert_is_the_run(read_record(bag, topics=topics))
 
 
@@ -90,7 +90,7 @@ def test_a_topic_that_was_named_must_be_in_the_bag(tmp_path, strict):
     """Without it a record without F/T torque was identified, and nobody was told."""
     bag = write_foreign(tmp_path / "bag", run_rows(COUNT))
     with pytest.raises(BagError, match=r"no topic /rsea/fft for ft, did you mean /rsea/ft\?; the bag holds"):
-        read_record(bag, topics=TopicMap().rename(["ft=fft"]), strict=strict)
+        read_record(bag, topics=TopicMap().with_topics(["ft=fft"]), strict=strict)
 
 
 def test_split_bags_and_several_files_are_one_run(tmp_path):

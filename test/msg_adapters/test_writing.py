@@ -42,7 +42,7 @@ def test_a_record_comes_back(tmp_path, record, target):
 
 
 def test_notes_names_joint_and_axis_come_back(tmp_path, record):
-    topics = TopicMap(namespace="/lab", joint="knee", axis="-force.x").rename(["ft=/wrist"])
+    topics = TopicMap(namespace="/lab", joint="knee", axis="-force.x").with_topics(["ft=/wrist"])
     write_record(replace(record, notes=("one: with a colon", "two")), tmp_path / "bag", topics)
     got = read_record(tmp_path / "bag", topics=topics)
     assert_same(got, record)
@@ -136,13 +136,13 @@ def test_an_unknown_message_type_is_recorded_too(tmp_path):
 BAD_TOPICS = {
     "a blank": TopicMap(namespace="a b"),
     "a digit first": TopicMap(namespace="1abc"),
-    "a minus": TopicMap().rename(["ft=left-wrist"]),
+    "a minus": TopicMap().with_topics(["ft=left-wrist"]),
     "a letter of another alphabet": TopicMap(namespace="\N{GREEK SMALL LETTER OMEGA}"),
-    "a slash at the end": TopicMap().rename(["ft=/wrist/"]),
+    "a slash at the end": TopicMap().with_topics(["ft=/wrist/"]),
     "a tilde": TopicMap(namespace="~bench"),
     "too many letters": TopicMap(namespace="n" * 250),
-    "two types": TopicMap().rename(["ft=torque_command"]),
-    "two roles": TopicMap().rename(["joint_states=torque_command"]),
+    "two types": TopicMap().with_topics(["ft=torque_command"]),
+    "two roles": TopicMap().with_topics(["joint_states=torque_command"]),
 }
 
 

@@ -104,7 +104,7 @@ def test_excite_plays_nothing_to_a_driver_that_has_latched_a_fault(wire, listene
     wire.push(lambda: wire.goal() == (0, True))
     commands = listener.hear(JointState, "/main/torque_command", COMMAND)
     excite = _excite(start)
-    listener.until(lambda: not excite.running())
+    listener.until(lambda: not excite.is_running())
     assert excite.wait() == 2 and "temperature: 90 °C, limit 70 °C" in excite.output[-1]
     assert excite.output[-1].endswith("rsea call /main/driver clear_fault")
     assert not any(message.effort[0] for message in commands)
@@ -121,7 +121,7 @@ def test_excite_waits_for_an_active_driver_and_stops_at_a_fault(wire, listener, 
     assert not commands and wire.change(Transition.TRANSITION_ACTIVATE).success
     listener.until(lambda: sum(message.effort[0] != 0.0 for message in commands) > 50)
     assert wire.trigger("stop").success
-    listener.until(lambda: not excite.running())
+    listener.until(lambda: not excite.is_running())
     assert excite.wait() == 2 and "has latched a fault, stopped" in excite.output[-1]
     assert commands[-1].effort[0] == 0.0
     assert wire.trigger("clear_fault").success
