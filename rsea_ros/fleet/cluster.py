@@ -28,6 +28,7 @@ from rsea_ros.interrupts import deaf_to_interrupts
 
 SETTINGS: Mapping[str, Any] = {
     "distributed.worker.preload": ["rsea_ros.fleet.worker"],
+    "distributed.worker.profile.enabled": False,
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
