@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
@@ -174,3 +175,13 @@ def test_coloured_noise_has_an_allowance_for_its_doubt(world, left, first, gone,
     known = world.known(case({"ft": 9.0}, mask={"ft": keep}, first=first, ft=left))
     assert known.coloured == {"ft"}
     assert known.noise["ft"] == pytest.approx(rms * (1.0 + 2.0 * doubt), rel=1e-9)
+
+
+def test_seams_are_the_samples_that_follow_a_span_of_the_drive():
+    spans = replace(DRIVE, spans=((0, 512), (1024, 2048)))
+    one = case({"ft": 1.0}, drive=spans, ft=np.zeros(1536))
+    kept = {"ft": START + np.concatenate([np.arange(512), np.arange(1024, 2048)]) / RATE}
+    one = Case(spans, kept, one.measured, one.noise, one.mask)
+    assert noise_level._seams(one, "ft").tolist() == [512]
+    assert noise_level._seams(case({"ft": 1.0}, ft=np.zeros(64)), "ft").tolist() == []
+    assert noise_level._seams(case({"ft": 1.0}, drive=MOTION, ft=np.zeros(64)), "ft").tolist() == []

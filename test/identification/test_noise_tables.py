@@ -271,3 +271,29 @@ GRID = np.resize(np.arange(-3.0, 4.0), 100)
 )
 def test_the_step_of_coarse_values_is_found(values, step):
     assert step_of(values) == pytest.approx(step)
+
+
+# nine segments of 512 samples, each begins 256 after the one before; a seam at its first sample is not inside
+@pytest.mark.parametrize(
+    ("seams", "without"),
+    [
+        ([], []),
+        ([256], [0]),
+        ([257], [0, 1]),
+        ([511], [0, 1]),
+        ([512], [1]),
+        ([768, 1500], [2, 4, 5]),
+        ([2559], [8]),
+        (range(1, 2560, 100), []),
+    ],
+)
+def test_segments_with_a_seam_inside_are_left_out_unless_all_have_one(seams, without):
+    whole = noise._seamless(np.zeros((9, 257), complex), list(seams))
+    assert np.flatnonzero(~whole).tolist() == without
+
+
+def test_a_jump_at_a_seam_is_no_noise():
+    y = np.random.default_rng(1).normal(size=4096)
+    joined = y + 1000.0 * (np.arange(4096) >= 2100)
+    assert top_of_band(joined, [2100])[0] == pytest.approx(top_of_band(y)[0], rel=0.05)
+    assert top_of_band(joined)[0] > 1.2 * top_of_band(y)[0]
