@@ -13,6 +13,7 @@ from msg_adapters import read_record
 from msg_adapters.ros import JointState
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.watch.command import PATIENCE
+from test.watch.browser import hang_up
 
 AMPLITUDE = 3.0
 HOLD = {"do": "hold", "kind": "constant", "amplitude": AMPLITUDE, "frequency": 1.0}
@@ -36,7 +37,7 @@ class Page:
         return self._socket.write_message(json.dumps(words))
 
     def close(self):
-        self._socket.close()
+        hang_up(self._socket)
 
     async def until(self, condition, seconds=60.0):
         """Read, and beat, until a condition holds."""

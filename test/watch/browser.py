@@ -30,7 +30,8 @@ class Browser:
         words = [CHROMIUM, *FLAGS, f"--user-data-dir={folder}", "about:blank"]
         self._process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         port = _wait_for(lambda: (folder / "DevToolsActivePort").read_text().partition("\n")[0])
-        pages = json.load(urllib.request.urlopen(f"http://127.0.0.1:{port}/json"))
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as answer:
+            pages = json.load(answer)
         (page,) = [p for p in pages if p["type"] == "page"]
         self._socket = self._done(lambda: websocket_connect(page["webSocketDebuggerUrl"]))
         for domain in ("Runtime", "Log", "Network", "Page"):
@@ -94,12 +95,19 @@ class Browser:
     def close(self):
         """End it."""
         async def leave():
-            self._socket.close()
+            hang_up(self._socket)
 
         self._done(leave)
         self._loop.close()
         self._process.terminate()
         self._process.wait(10)
+
+
+def hang_up(socket):
+    """Close a client's web socket at once: a loop that ends before the other end's answer leaves it open."""
+    stream = socket.protocol.stream
+    socket.close()
+    stream.close()
 
 
 def _wait_for(ask, seconds=WAIT, what="an answer"):

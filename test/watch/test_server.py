@@ -18,6 +18,7 @@ from rsea_ros.watch.command import PATIENCE
 from rsea_ros.watch.desk import MOST_PAGES, MOST_WAITING, Desk
 from rsea_ros.watch.runs import Runs
 from rsea_ros.watch.server import Server
+from test.watch.browser import hang_up
 
 
 def status(server, path, **headers):
@@ -116,7 +117,7 @@ def test_a_socket_gets_frames_and_state(server):
         page = await connect(server)
         frame = await answer(page, "ft")
         state = (await answer(page, "state"))["state"]
-        page.close()
+        hang_up(page)
         return frame, state
 
     frame, state = asyncio.run(talk())
@@ -139,7 +140,7 @@ def test_a_page_whose_socket_is_lost_lets_go_at_once(server, commander):
             before = time.monotonic()
             await asyncio.sleep(0.005)
             late += time.monotonic() - before - 0.005  # by which this machine stood still
-        page.close()
+        hang_up(page)
         return time.monotonic() - begun - late
 
     assert asyncio.run(talk()) < PATIENCE
