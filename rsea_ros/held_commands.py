@@ -24,11 +24,11 @@ def with_held_commands(record: Record) -> tuple[Record, list[Fault]]:
     A note says so; no fault comes with it. The stamps of the steps are kept exactly, and the last one is held
     to the end of the sensors.
     """
-    period = _sensor_period(record)
-    last = max((float(c.t[-1]) for c in record.channels.values() if len(c)), default=0.0)
     words = words_on_steps(record)
     if not words:
         return record, []
+    period = _sensor_period(record)
+    last = max(float(c.t[-1]) for c in record.channels.values() if len(c))
     held = {name: _filled(record[name], period, last) for name in words}
     notes = (f"{name}: {sentence}" for name, sentence in words.items())
     return replace(record.with_channels(**held), notes=(*record.notes, *notes)), []

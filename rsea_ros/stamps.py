@@ -51,14 +51,11 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     for name, channel in record.channels.items():
         channel, jumps = _without_jumps(channel, name, _expected_span(record, name), _pauses(record, name))
         channel, disorder = sort_by_stamp(channel, name)
-        repeated = np.diff(channel.t, prepend=-np.inf) <= _repeat(channel.t)
-        faults += [*jumps, *disorder]
-        if repeated.any():
-            channel, fault = _with_repeats_dated(channel, name, repeated)
-            faults.append(fault)
-            repeated = repeated if fault.kind == "duplicate_stamps" else np.zeros_like(repeated)
+        count = len(channel)
+        channel, repeats = _without_repeats(channel, name)
+        faults += [*jumps, *disorder, *repeats]
         _check_even(channel, f"{record.source}: {name}")
-        faults += dropped_samples(channel, name, int(repeated.sum()))
+        faults += dropped_samples(channel, name, count - len(channel))
         channels[name] = channel
     repaired, held = without_held_samples(record.with_channels(**channels))
     repaired, _ = with_held_commands(repaired)
@@ -69,17 +66,21 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     return repaired, [*new, *(fault for fault in absent_spans(repaired) if fault not in record.faults)]
 
 
-def _with_repeats_dated(channel: Channel, name: str, repeated: BoolArray) -> tuple[Channel, Fault]:
+def _without_repeats(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
     """Return a channel without stamps that repeat, and the fault.
 
     Repeats with other values that fit an even clock are samples between the ticks of a coarse one; all others
     are left out but for the first of each.
     """
+    repeated = np.diff(channel.t, prepend=-np.inf) <= _repeat(channel.t)
+    if not repeated.any():
+        return channel, []
     even, share = even_behind_ticks(channel.t), float(repeated.mean())
     if even is None or np.mean(np.diff(channel.y)[repeated[1:]] != 0.0) < _NEW_VALUES:
-        return Channel(channel.t[~repeated], channel.y[~repeated]), Fault("duplicate_stamps", name, share)
+        channel = Channel(channel.t[~repeated], channel.y[~repeated])
+        return channel, [Fault("duplicate_stamps", name, share)]
     detail = f"{int(repeated.sum())} of {len(even)} stamps repeat: dated by the even clock that they fit"
-    return Channel(even, channel.y), Fault("coarse_stamps", name, share, detail)
+    return Channel(even, channel.y), [Fault("coarse_stamps", name, share, detail)]
 
 
 def _repeat(t: FloatArray) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import pytest
 
 from msg_adapters import TopicMap, read_record
@@ -9,7 +11,7 @@ from msg_adapters.ros import JointState
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import COMMAND
 from test.nodes.on_wire import PATIENT, Driven
-from test.watch.browser import CHROMIUM, Browser
+from test.watch.browser import Browser
 
 LIMIT = 3.0
 INK = """(() => { const c = document.getElementById('torque'); const d = c.getContext('2d')
@@ -22,11 +24,8 @@ RECORDED = """[...document.querySelectorAll('#health li')].map((x) => x.textCont
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    if CHROMIUM is None:
-        pytest.skip("chromium not installed: apt-get install chromium")
-    made = Browser(tmp_path_factory.mktemp("profile"))
-    yield made
-    made.close()
+    with closing(Browser(tmp_path_factory.mktemp("profile"))) as made:
+        yield made
 
 
 @pytest.fixture(scope="module")

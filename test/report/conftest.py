@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -25,9 +24,9 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.report.diagnosis.files import write_diagnosis
 from rsea_ros.signals import Channel, Record
+from test.watch.browser import chromium
 
 DURATION, RATE = 160.0, 280.0
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
@@ -40,12 +39,10 @@ def opened() -> Callable[[str, Path], tuple[str, str]]:
     """Return a function that gives a page after its scripts have run, and what the browser logged."""
 
     def open_page(html: str, folder: Path) -> tuple[str, str]:
-        if CHROMIUM is None:
-            pytest.skip("chromium not installed: apt-get install chromium")
         path = folder / "page.html"
         path.write_text(html, encoding="utf-8")
         done = subprocess.run(
-            [CHROMIUM, *FLAGS, f"--user-data-dir={folder / 'profile'}", "--dump-dom", path.as_uri()],
+            [chromium(), *FLAGS, f"--user-data-dir={folder / 'profile'}", "--dump-dom", path.as_uri()],
             capture_output=True, text=True, timeout=120, check=True,
         )  # fmt: skip
         return done.stdout, done.stderr

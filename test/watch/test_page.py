@@ -1,11 +1,12 @@
 """The page in a real browser: it draws, logs no error, contacts no other server, and releases the command."""
 
 import time
+from contextlib import closing
 
 import pytest
 
 from rsea_ros.watch.command import PATIENCE, RELEASE
-from test.watch.browser import CHROMIUM, Browser
+from test.watch.browser import Browser
 
 HIDDEN = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true});" \
     "document.dispatchEvent(new Event('visibilitychange'))"  # fmt: skip
@@ -16,11 +17,8 @@ INK = """(() => { const c = document.getElementById('%s'); const d = c.getContex
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    if CHROMIUM is None:
-        pytest.skip("chromium not installed: apt-get install chromium")
-    made = Browser(tmp_path_factory.mktemp("profile"))
-    yield made
-    made.close()
+    with closing(Browser(tmp_path_factory.mktemp("profile"))) as made:
+        yield made
 
 
 @pytest.fixture

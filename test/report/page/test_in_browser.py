@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 
 import pytest
 
@@ -10,7 +11,7 @@ from rsea_ros.report.diagnosis.sketch import sketch, upright_sketch
 from rsea_ros.report.figures.figure import Figure, layout
 from rsea_ros.report.figures.palette import INK
 from rsea_ros.report.page.frame import page
-from test.watch.browser import CHROMIUM, Browser
+from test.watch.browser import Browser
 
 CAUSE = ["ft_gain_error"]
 CURVE = Figure("Rising", "", [{"type": "scatter", "x": [0, 1], "y": [0, 1], "name": "y"}], layout())
@@ -22,15 +23,12 @@ LIGHT, DARK = ([{"name": "prefers-color-scheme", "value": value}] for value in (
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    if CHROMIUM is None:
-        pytest.skip("chromium not installed: apt-get install chromium")
     folder = tmp_path_factory.mktemp("page")
     (folder / "page.html").write_text(page("t", "k", [sketch(CAUSE) + upright_sketch(CAUSE), CURVE], []))
-    made = Browser(folder)
-    made.open((folder / "page.html").as_uri())
-    made.until("document.querySelector('[data-drawn]')")
-    yield made
-    made.close()
+    with closing(Browser(folder)) as made:
+        made.open((folder / "page.html").as_uri())
+        made.until("document.querySelector('[data-drawn]')")
+        yield made
 
 
 @pytest.mark.parametrize("width", [1400, 400, 320])
