@@ -9,7 +9,8 @@ too, is done again, at most TRIES times; the row says so.
 Each rate as any process, and with both nodes at SCHED_FIFO where permitted (--priority), with the defaults of
 config/nodes but for 4 Mbit/s; --patient: late replies, silent sensor and late commands are no fault, and the
 error is that between stalls. The bench runs at SCHED_FIFO where permitted, above both nodes: motor and sensor
-have processors of their own, and at 1 kHz a bench that waits for one is a motor that does not answer.
+have processors of their own, and at 1 kHz a bench that waits for one is a motor that does not answer. At
+SCHED_FIFO each node keeps to a processor of its own (cpu_affinity), the bench to none.
 
 The last row of a rate is another trial, with the simulated motor in place of the wire: the controller is held
 up until lateness latches a fault, and the time from that to zero torque is measured (driver_lateness.py).
@@ -128,10 +129,11 @@ def _trial(
     with ExitStack() as kept, ExitStack() as nodes:
         bench = kept.enter_context(RemoteBench(path, "--rig", kind.rig))
         bench.hurry(priority + 1 if priority else 50)
+        first, last = _processors(priority)
         parameters = {**bench.parameters(), "baud": 4_000_000, "autostart": "true", "rig": kind.rig}
         both = {"rate": rate, "realtime_priority": priority}
-        nodes.enter_context(run_node_process("driver", 0, **parameters, **both, **patient))
-        nodes.enter_context(run_node_process("controller", 0, rig=kind.rig, **both))
+        nodes.enter_context(run_node_process("driver", 0, cpu_affinity=first, **parameters, **both, **patient))
+        nodes.enter_context(run_node_process("controller", 0, cpu_affinity=last, rig=kind.rig, **both))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
         kept.enter_context(burn_cores(load))
         late = _lateness(rate)
@@ -151,6 +153,12 @@ def _trial(
     told += f", bare loop late in {late:.1%} of its cycles"
     lost = any(fault.startswith("no_reply") for fault in faults)
     return Trial(told, largest, lost, wire_faults, alone)
+
+
+def _processors(priority: int) -> tuple[int, int]:
+    """Return the processors of driver and controller: one each at SCHED_FIFO, any (-1) without priority."""
+    allowed = os.sched_getaffinity(0)
+    return (min(allowed), max(allowed)) if priority else (-1, -1)
 
 
 def _errors(errors: Sequence[float]) -> str:

@@ -58,7 +58,7 @@ TABLE = (
     NodeParameter("late_share", 0.5, "of the commands of late_time that may be late", "", 0.01, 1.0),
     NodeParameter("late_time", 1.0, "over which late commands are counted", "s", 0.05, 60.0),
     JOINT,
-    REALTIME,
+    *REALTIME,
 )
 
 

@@ -1,4 +1,4 @@
-"""Threads that keep time: exact timers, and real-time priority where the system permits it."""
+"""Threads that keep time: exact timers, a processor of their own, and real-time priority where permitted."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import gc
 import os
 import sys
 import threading
+from collections.abc import Mapping, Set
 from contextlib import suppress
-from typing import Protocol
+from typing import Any, Protocol
 
 from rclpy.node import Node
 
@@ -19,9 +20,17 @@ SET_TIMER_SLACK = 29
 """Of Linux' prctl."""
 SWITCH_INTERVAL = 1e-5
 """s after which a thread of Python must let another one in."""
-REALTIME = NodeParameter(
-    "realtime_priority", 0, "of the thread that keeps time, SCHED_FIFO; 0: as any process", "", 0,
-    os.sched_get_priority_max(os.SCHED_FIFO), whole=True,
+PROCESSORS = os.sched_getaffinity(0)
+"""That this process may run on."""
+REALTIME = (
+    NodeParameter(
+        "realtime_priority", 0, "of the thread that keeps time, SCHED_FIFO; 0: as any process", "", 0,
+        os.sched_get_priority_max(os.SCHED_FIFO), whole=True,
+    ),
+    NodeParameter(
+        "cpu_affinity", -1, "processor that all threads of the node run on; -1: any", "", -1,
+        max(PROCESSORS), whole=True,
+    ),
 )  # fmt: skip
 """Of every node that has to answer in time."""
 
@@ -35,11 +44,12 @@ class Worker(Protocol):
         """Begin."""
 
 
-def keep_time(node: Node, worker: Worker, priority: int) -> None:
-    """Start a worker with a timed thread, at the requested priority (0: normal)."""
+def keep_time(node: Node, worker: Worker, values: Mapping[str, Any]) -> None:
+    """Start a worker with a timed thread, as the parameters REALTIME of its node say."""
     _let_in_at_once()
     worker.start()
-    _hurry(node, worker.thread, priority)
+    _settle(node, values["cpu_affinity"])
+    _hurry(node, worker.thread, values["realtime_priority"])
 
 
 def _let_in_at_once() -> None:
@@ -51,6 +61,17 @@ def _let_in_at_once() -> None:
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.collect()
     gc.freeze()
+
+
+def _settle(node: Node, processor: int) -> None:
+    """Keep all threads on one processor (below zero: any); warn where this process has no right to it."""
+    if processor in PROCESSORS:
+        _bind({processor})
+    elif processor >= 0:
+        allowed = ", ".join(map(str, sorted(PROCESSORS)))
+        node.get_logger().warning(
+            f"parameter cpu_affinity = {processor}, expected one of {allowed}; runs on any"
+        )
 
 
 def _hurry(node: Node, first: threading.Thread, priority: int) -> None:
@@ -86,10 +107,18 @@ def exact_timers() -> None:
     ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)
 
 
-def usual_priority() -> None:
-    """Let all threads run as any others again."""
+def as_any_process() -> None:
+    """Let all threads run at normal priority, on any processor, again."""
+    _bind(PROCESSORS)
     for thread in _threads():
         _schedule(thread, os.SCHED_OTHER, 0)
+
+
+def _bind(processors: Set[int]) -> None:
+    """Let all threads of this process run on these processors only; those that they start do likewise."""
+    for thread in _threads():
+        with suppress(ProcessLookupError):  # it has ended meanwhile
+            os.sched_setaffinity(thread, processors)
 
 
 def _threads() -> list[int]:

@@ -66,7 +66,7 @@ class ControllerNode:
         for line in (*summary(self._design), link_words(self._link)):
             node.get_logger().info(line)
         self._waiter = Waiter(node, self._inputs.subscriptions, self._work, WATCH)
-        keep_time(node, self._waiter, values["realtime_priority"])
+        keep_time(node, self._waiter, values)
 
     def _work(self) -> None:
         """Command for each measurement that came, and see to their absence."""

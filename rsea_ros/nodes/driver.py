@@ -31,7 +31,7 @@ from rsea_ros.nodes._jobs import Jobs
 from rsea_ros.nodes._joint import DrivenJoint, offer
 from rsea_ros.nodes._joints import JOINTS, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter
-from rsea_ros.nodes._realtime import REALTIME, keep_time, usual_priority
+from rsea_ros.nodes._realtime import REALTIME, keep_time, as_any_process
 from rsea_ros.nodes._run import run_node
 from rsea_ros.wording import printable
 
@@ -41,7 +41,7 @@ TABLE = (
     NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
     NodeParameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 1_000_000_000),
     NodeParameter("autostart", False, "whether to configure and activate at once", whole=True),
-    REALTIME,
+    *REALTIME,
     JOINTS,
     *SAFETY,
     *MOTOR,
@@ -102,7 +102,7 @@ class DriverNode(ManagedEntity):
         self._cycle = Cycle(self._values["rate"], self._step, catch_up=False, anchor=anchor)
         for joint in self.joints:
             joint.runs_in(self._cycle)
-        keep_time(self._node, self._cycle, self._values["realtime_priority"])
+        keep_time(self._node, self._cycle, self._values)
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -159,9 +159,8 @@ class DriverNode(ManagedEntity):
                 self._cycle.stop()
         finally:
             self._close_devices()
-        if self._cycle is not None and self._values["realtime_priority"]:
-            usual_priority()
         if self._cycle is not None:
+            as_any_process()
             self._node.get_logger().info("torque zero, device closed")
         self._take_topics_away()
 

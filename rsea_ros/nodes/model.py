@@ -59,7 +59,7 @@ TABLE = (
     NodeParameter("hold_off", 0.005, "how long before it falls", "s", 0.0, 10.0),
     NodeParameter("quiet", 0.2, "time below the noise floor that is no torque", "s", 0.0, 100.0),
     JOINT,
-    REALTIME,
+    *REALTIME,
 )
 NAMES = ("distal", "proximal", "disturbance")
 TICK = 0.02
@@ -88,7 +88,7 @@ class ModelNode:
         self._lock = threading.Lock()
         self._health = Health(node, self._report, values["rig"])
         self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
-        keep_time(node, self._waiter, values["realtime_priority"])
+        keep_time(node, self._waiter, values)
         node.get_logger().info(f"rig {rig.name}: pure torque up to {self._error.edge.hz:.1f} Hz")
 
     def _work(self) -> None:

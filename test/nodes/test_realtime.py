@@ -1,5 +1,6 @@
-"""Priorities of threads, in a process of its own so that the tests keep theirs."""
+"""Priorities and processors of threads, in a process of its own so that the tests keep theirs."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
 import os, subprocess, sys, threading
 from rsea_ros.errors import ParameterError
-from rsea_ros.nodes._realtime import raise_priority, usual_priority
+from rsea_ros.nodes._realtime import as_any_process, raise_priority
 
 def priorities():
     own = [os.sched_getparam(thread).sched_priority for thread in (first.native_id, 0)]
@@ -26,7 +27,7 @@ first.start()
 try:
     raise_priority(first, 20)
     raised = priorities()
-    usual_priority()
+    as_any_process()
     print(*raised, *priorities())
 except ParameterError as error:
     print(error)
@@ -39,6 +40,39 @@ def test_one_thread_gets_the_priority_the_others_one_below_and_children_none():
     said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     expected = "20 19 0 0 0 0" if may_have(20) else "parameter realtime_priority = 20: "
     assert said.stdout.startswith(expected), said.stderr
+
+
+AFFINITY = """
+import os, subprocess, sys, threading
+from types import SimpleNamespace
+from rsea_ros.nodes._realtime import PROCESSORS, as_any_process, keep_time
+
+def processors():
+    threads = [os.sched_getaffinity(thread) for thread in (worker.thread.native_id, 0)]
+    ask = "import os; from rsea_ros.hardware.supervisor import hurry; hurry(); print(*os.sched_getaffinity(0))"
+    return *threads, {*map(int, subprocess.check_output([sys.executable, "-c", ask]).split())}
+
+logger = SimpleNamespace(warning=print)
+node = SimpleNamespace(get_logger=lambda: logger)
+stop = threading.Event()
+thread = threading.Thread(target=stop.wait)
+worker = SimpleNamespace(thread=thread, start=thread.start)
+keep_time(node, worker, {"realtime_priority": 0, "cpu_affinity": max(PROCESSORS)})
+assert processors() == ({max(PROCESSORS)}, {max(PROCESSORS)}, PROCESSORS), processors()
+as_any_process()
+assert processors() == (PROCESSORS,) * 3, processors()
+worker.start = lambda: None
+keep_time(node, worker, {"realtime_priority": 0, "cpu_affinity": max(PROCESSORS) + 1})
+stop.set()
+"""
+
+
+def test_a_node_keeps_to_one_processor_and_its_supervisor_does_not():
+    command = [sys.executable, "-c", AFFINITY]
+    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    highest = max(os.sched_getaffinity(0))
+    assert said.startswith(f"parameter cpu_affinity = {highest + 1}, expected one of 0")
+    assert said.endswith("; runs on any\n")
 
 
 def test_a_wait_for_replies_counts_as_faults_by_the_drivers_rule():
