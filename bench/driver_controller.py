@@ -9,8 +9,9 @@ too, is done again, at most TRIES times; the row says so.
 Each rate as any process, and with both nodes at SCHED_FIFO where permitted (--priority), with the defaults of
 config/nodes but for 4 Mbit/s; --patient: late replies, silent sensor and late commands are no fault, and the
 error is that between stalls. The bench runs at SCHED_FIFO where permitted, above both nodes: motor and sensor
-have processors of their own, and at 1 kHz a bench that waits for one is a motor that does not answer. At
-SCHED_FIFO each node keeps to a processor of its own (cpu_affinity), the bench to none.
+have processors of their own, and at 1 kHz a bench that waits for one is a motor that does not answer. So do
+the kernel's workers that are its wire (hurried_wire.py). At SCHED_FIFO each node keeps to a processor of its
+own (cpu_affinity), the bench to none.
 
 The last row of a rate is another trial, with the simulated motor in place of the wire: the controller is held
 up until lateness latches a fault, and the time from that to zero torque is measured (driver_lateness.py).
@@ -37,6 +38,7 @@ from lifecycle_msgs.srv import ChangeState
 from bench.bare_loop import may_have
 from bench.bare_wire import ALONE, wire_alone
 from bench.driver_lateness import Torques, noted_controller, row, to_zero
+from bench.hurried_wire import hurried_wire
 from bench.torque_control_nodes import Outside, run_node_process, sine
 from msg_adapters.ros import Trigger
 from rsea_ros.hardware.peer.remote import RemoteBench
@@ -129,10 +131,12 @@ def _trial(
     with ExitStack() as kept, ExitStack() as nodes:
         bench = kept.enter_context(RemoteBench(path, "--rig", kind.rig))
         bench.hurry(priority + 1 if priority else 50)
+        kept.enter_context(hurried_wire(priority and priority + 2))
         first, last = _processors(priority)
         parameters = {**bench.parameters(), "baud": 4_000_000, "autostart": "true", "rig": kind.rig}
         both = {"rate": rate, "realtime_priority": priority}
-        nodes.enter_context(run_node_process("driver", 0, cpu_affinity=first, **parameters, **both, **patient))
+        parameters.update(both, cpu_affinity=first, **patient)
+        nodes.enter_context(run_node_process("driver", 0, **parameters))
         nodes.enter_context(run_node_process("controller", 0, cpu_affinity=last, rig=kind.rig, **both))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
         kept.enter_context(burn_cores(load))
@@ -141,6 +145,7 @@ def _trial(
         begun = time.monotonic_ns()
         errors = sine(outside, kind.amplitude, rate)
         largest, faults = max(abs(torque) for _, torque, _ in outside.wrenches), _faults(outside)
+        stood = bench.stood_still(begun)  # asked first: the bench stands still while it writes its log
         acting = sum(goal != 0 and on for _, goal, on in bench.log(begun)["torque"])
         nodes.close()
         wire_faults, alone = wire_alone(rate, priority, path.parent, bench)
@@ -150,7 +155,7 @@ def _trial(
     told = _errors(errors)
     told += f", {acting} writes of torque, feedback at the end {share}, {health.get('late_commands')} late"
     told += f", {missed} measurements missed, faults {faults or 'none'}"
-    told += f", bare loop late in {late:.1%} of its cycles"
+    told += f", bare loop late in {late:.1%} of its cycles, the bench itself stood still for {stood:.1f} ms"
     lost = any(fault.startswith("no_reply") for fault in faults)
     return Trial(told, largest, lost, wire_faults, alone)
 

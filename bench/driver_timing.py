@@ -19,6 +19,7 @@ import numpy as np
 
 from bench.bare_loop import BareLoop, may_have
 from bench.driver_node import Node
+from bench.hurried_wire import hurried_wire
 from bench.reception import Reception
 from msg_adapters.ros import JointState
 from rsea_ros.hardware.peer.remote import RemoteBench
@@ -45,7 +46,7 @@ def timing(args: argparse.Namespace, folder: Path) -> list[Row]:
 
 def _at(rate: float, seconds: float, priority: int, folder: Path) -> list[Row]:
     patient = {"autostart": True, "lost_cycles": 100, "ft_timeout": 1.0, "command_timeout": 10.0}
-    with RemoteBench(folder / "tty") as bench:
+    with RemoteBench(folder / "tty") as bench, hurried_wire(priority and priority + 2):
         if priority:
             bench.hurry(priority + 1)
         node = Node(
