@@ -49,7 +49,8 @@ from rsea_ros.nodes._realtime import PROCESSORS, as_any_process, keep_time
 
 def processors():
     threads = [os.sched_getaffinity(thread) for thread in (worker.thread.native_id, 0)]
-    ask = "import os; from rsea_ros.hardware import supervisor as s; s.hurry(); print(*os.sched_getaffinity(0))"
+    ask = "import os; from rsea_ros.hardware import supervisor; supervisor.hurry()"
+    ask += "; print(*os.sched_getaffinity(0))"
     return *threads, {*map(int, subprocess.check_output([sys.executable, "-c", ask]).split())}
 
 logger = SimpleNamespace(warning=print)
