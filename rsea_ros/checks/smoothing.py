@@ -87,5 +87,5 @@ def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: floa
 def _share_left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> FloatArray:
     """Return the share of a response's power that each filter leaves at its best gain. h: shape (k, n)."""
     gain = (h.conj() * response).real @ weight / (np.abs(h) ** 2 @ weight)
-    left: FloatArray = np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight)
-    return left
+    share: FloatArray = np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight)
+    return share
