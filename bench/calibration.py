@@ -26,7 +26,7 @@ from json_log import append_to_log, read_log
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.criteria import is_at_floor, takes_most
 from rsea_ros.diagnosis.diagnose import nominal_problem, search
-from rsea_ros.diagnosis.evaluation import held_out_of
+from rsea_ros.diagnosis.evaluation import held_out_data
 from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, weigh
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.workers import worker_pools
@@ -138,7 +138,7 @@ def _weigh(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
             if kept:
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 kept.write_bytes(pickle.dumps((selection, stages)))
-        accepted, held_out = len(stages), held_out_of(selection, None)
+        accepted, held_out = len(stages), held_out_data(selection, None)
         weighing = weigh(selection, stages, held_out, pools, settings)
     first, last = weighing.stages[0].test, weighing.stages[-1].test
     return {

@@ -6,7 +6,12 @@ late: a table test must hold each decision function.
 
 from __future__ import annotations
 
-GUARD = ("hardware/test_limit_tables.py", "hardware/test_guard_tables.py", "hardware/test_limits.py")
+GUARD = (
+    "hardware/test_limit_tables.py",
+    "hardware/test_guard_tables.py",
+    "hardware/test_unmeasured_tables.py",
+    "hardware/test_limits.py",
+)
 
 TARGETS: dict[str, tuple[str, ...]] = {
     "hardware/limits": GUARD,
@@ -22,7 +27,11 @@ TARGETS: dict[str, tuple[str, ...]] = {
         "identification/test_coloured_tables.py",
         "identification/test_coloured_measures.py",
     ),
-    "identification/clocks": ("identification/test_clock_tables.py",),
+    "identification/clocks": (
+        "identification/test_clock_tables.py",
+        "identification/test_drift_tables.py",
+    ),
+    "identification/lag_line": ("identification/test_lag_line_tables.py",),
     "diagnosis/score": ("diagnosis/test_score_tables.py", "diagnosis/test_tempering.py"),
     "diagnosis/criteria": (
         "diagnosis/test_criteria_edges.py",

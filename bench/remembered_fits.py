@@ -62,7 +62,8 @@ class Remembered:
 
     def _key(self, what: str, problem: Problem, *others: Any) -> str:
         cases = [self._digest(c) for c in problem.cases]
-        of_problem = (problem.rig, problem.unknowns, problem.channels, problem.ride, sorted(problem.stated))
+        stated = sorted(problem.stated)
+        of_problem = (problem.rig, problem.unknowns, problem.channels, problem.on_angle, stated)
         return _hash(what, *cases, *of_problem, *others)
 
     def _digest(self, case: Case) -> str:

@@ -93,7 +93,7 @@ class _Scanner:
             if opcode == 0 or at + RECORD.size + size > stop:
                 following = self._next_chunk(buffer, at)
                 if following is None:
-                    self._broken_off(buffer, at, opcode)
+                    self._take_broken_chunk(buffer, at, opcode)
                     return self.ended
                 self.damage.add("damaged_records", f"no record at byte {at}", following - at)
                 at = following
@@ -121,7 +121,7 @@ class _Scanner:
         later = chunks[bisect_right(chunks, at) :]
         return next((start for start in later if start < len(buffer) and buffer[start] == CHUNK), None)
 
-    def _broken_off(self, buffer: Buffer, at: int, opcode: int) -> None:
+    def _take_broken_chunk(self, buffer: Buffer, at: int, opcode: int) -> None:
         """Use the present part of an uncompressed chunk; report other remains."""
         if opcode == CHUNK and not self.ended:
             self._chunk(buffer, at + RECORD.size, len(buffer), complete=False)

@@ -31,10 +31,10 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]
     """Return numba's decorator for a compiled function, with its options. cache: store the compiled code."""
 
     def decorate(function: Callable[..., Any]) -> Any:
-        made = numba.njit(**options)(function)
+        compiled = numba.njit(**options)(function)
         if cache:
-            made._cache = _cache_of(function)
-        return made
+            compiled._cache = _cache_of(function)
+        return compiled
 
     return decorate
 
@@ -43,11 +43,11 @@ def cfunc(signature: Any, *, cache: bool = False, **options: Any) -> Callable[[C
     """Return numba's decorator for a function with an address that compiled code can call."""
 
     def decorate(function: Callable[..., Any]) -> Any:
-        made = _cfunc(function, _normalized(signature), locals={}, options=options)
+        compiled = _cfunc(function, _normalized(signature), locals={}, options=options)
         if cache:
-            made._cache = _cache_of(function)
-        made.compile()
-        return made
+            compiled._cache = _cache_of(function)
+        compiled.compile()
+        return compiled
 
     return decorate
 

@@ -28,7 +28,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "clock_jump": "the clock of the stamps jumped; the jump is removed",
         "clock_offset": "the clock of a channel differs from the command's",
         "clock_drift": "the clock of a channel runs faster or slower than the command's",
-        "early_torque": "each motor torque is of the command with its stamp, and is read behind that",
+        "early_torque": "each motor torque has the stamp of its command; it is read just after that stamp",
         "dropped_samples": "samples are missing: the stamps have gaps",
         "mixed_rows": "the clock stepped back and the log was sorted by it: rows of two times, left out",
         "partly_recorded": "a channel starts later or ends earlier than the run",

@@ -29,7 +29,7 @@ def with_held_commands(record: Record) -> tuple[Record, list[Fault]]:
         return record, []
     period = _sensor_period(record)
     last = max(float(c.t[-1]) for c in record.channels.values() if len(c))
-    held = {name: _filled(record[name], period, last) for name in words}
+    held = {name: _repeat_values(record[name], period, last) for name in words}
     notes = (f"{name}: {sentence}" for name, sentence in words.items())
     return replace(record.with_channels(**held), notes=(*record.notes, *notes)), []
 
@@ -60,7 +60,7 @@ def _is_steps(channel: Channel, period: float) -> bool:
     return changes and float(np.median(np.diff(channel.t))) >= _LONG * period
 
 
-def _filled(channel: Channel, period: float, last: float) -> Channel:
+def _repeat_values(channel: Channel, period: float, last: float) -> Channel:
     """Return the channel with each step repeated evenly until the next, the last one until `last`, s."""
     ends = np.append(channel.t[1:], max(last, float(channel.t[-1])))
     lasts: FloatArray = ends - channel.t

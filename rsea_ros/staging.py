@@ -26,8 +26,8 @@ def make_stage(parent: Path, mode: int = 0o700) -> Stage:
     """Make a stage in a folder, and remove stages of killed writers in it. Raises OSError."""
     put_back(parent)
     remove_left(parent)
-    made = make_locked(parent, KIND, mode)
-    return Stage(made.path, made.lock)
+    folder = make_locked(parent, KIND, mode)
+    return Stage(folder.path, folder.lock)
 
 
 def remove_left(parent: Path) -> None:

@@ -114,7 +114,7 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
     pauses = {name: np.abs(np.diff(c.t)) > _pause(c.t) for name, c in channels.items()}
     if all(at.any() for at in pauses.values()):
         for name, at in pauses.items():
-            channels[name], jump = _taken_out(channels[name], name, at)
+            channels[name], jump = _shorten_steps(channels[name], name, at)
             faults += jump
     return record.with_channels(**channels), faults
 
@@ -172,7 +172,7 @@ def _without_jumps(
         and not _is_shared(channel.t[largest : largest + 2], beside)
     ):
         at[largest] = True
-    return _taken_out(channel, name, at) if at.any() else (channel, [])
+    return _shorten_steps(channel, name, at) if at.any() else (channel, [])
 
 
 def _is_shared(step: FloatArray, beside: FloatArray) -> bool:
@@ -181,7 +181,7 @@ def _is_shared(step: FloatArray, beside: FloatArray) -> bool:
     return bool(np.any((beside[0] <= begin) & (beside[1] >= end)))
 
 
-def _taken_out(channel: Channel, name: str, at: BoolArray) -> tuple[Channel, list[Fault]]:
+def _shorten_steps(channel: Channel, name: str, at: BoolArray) -> tuple[Channel, list[Fault]]:
     """Return the channel with each step of `at` as long as a period, and the fault."""
     step = np.diff(channel.t)
     shift = np.concatenate([[0.0], np.cumsum(np.where(at, step - median_period(channel.t), 0.0))])

@@ -27,7 +27,7 @@ _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamp
 """Faults that the diagnosis finds and masks itself."""
 
 
-def held_against(record: Record, rig: Rig, axis: str = "torque.z", *, masks: bool) -> Record:
+def with_check_faults(record: Record, rig: Rig, axis: str = "torque.z", *, masks: bool) -> Record:
     """Return the record with the faults that the checks find, for the result.
 
     axis: of the wrench that `ft` was read from. masks: see with_faults.

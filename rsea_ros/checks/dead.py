@@ -34,8 +34,9 @@ def dead_channels(
     if not is_commanded(record):
         return []
     constant = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in MEASURED}
-    judged = {} if is_inverse(rig) else quotients(compared)  # a torque also has friction that no motion shows
-    for n, q in judged.items():
+    # A torque also has friction that no motion shows.
+    responses = {} if is_inverse(rig) else quotients(compared)
+    for n, q in responses.items():
         shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
         alone = shows and q.is_unrelated and not lag_behind(record, rig, n, compared[n])
         if n in constant and not constant[n] and n not in frozen and alone and not _is_confirmed(record, n):

@@ -12,7 +12,13 @@ import numpy as np
 
 from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side, sides
-from rsea_ros.checks.frozen import SMALLEST_SHARE, frozen_samples, held_together, longest, while_others_moved
+from rsea_ros.checks.frozen import (
+    SMALLEST_SHARE,
+    frozen_samples,
+    longest,
+    simultaneous_holds,
+    while_others_moved,
+)
 from rsea_ros.checks.moved_spans import is_commanded
 from rsea_ros.checks.rounded_stamps import rounded_stamps
 from rsea_ros.held_samples import repeats_of
@@ -104,7 +110,7 @@ def _mask(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
         if kind in _WHILE_MOVING:
             marked = while_others_moved(record, name, marked, kind)
         if kind == "frozen_samples":
-            marked |= held_together(record, name) & ~bad
+            marked |= simultaneous_holds(record, name) & ~bad
         share = np.count_nonzero(marked) / max(len(marked), 1)
         if share > (SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
             where = longest(channel, marked) if kind == "frozen_samples" else ""

@@ -78,7 +78,7 @@ def _in_runs(repeat: BoolArray, least: float) -> BoolArray:
     return long
 
 
-def held_together(record: Record, name: str) -> BoolArray:
+def simultaneous_holds(record: Record, name: str) -> BoolArray:
     """Return the samples at which a sensor and another one hold their values while the command changes.
 
     Both have noise, which never holds two sensors at once, so nothing need have moved.

@@ -86,12 +86,12 @@ def _of_channel(r: ChannelCorrection, axis: str) -> list[Finding]:
 
 def _scale_finding(r: ChannelCorrection, factor: Factor) -> Finding:
     """Return the finding of a channel in another unit; its factor, or the measured one where that is off."""
-    meant = " or ".join(f.meaning for f in (factor, *r.also))
+    meanings = " or ".join(f.meaning for f in (factor, *r.also))
     measured = factor.value * math.exp(r.gain)
     if abs(r.gain) < _UNIT:
-        value, detail, remedy = factor.value, f"looks like {meant}", _unit(r.channel, factor)
+        value, detail, remedy = factor.value, f"looks like {meanings}", _unit(r.channel, factor)
     else:
-        value, detail = measured, f"times SI; {meant} would be {factor.value:.3g}: no unit explains it all"
+        value, detail = measured, f"times SI; {meanings} would be {factor.value:.3g}: no unit explains it all"
         remedy = f"`scale: {1.0 / measured:.3g}` for {r.channel} in the import map, if it is {_BY_A_CONSTANT}"
     return Finding(
         "red",

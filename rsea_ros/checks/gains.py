@@ -179,13 +179,13 @@ def _correction_for(channel: str, sign: float, gain: float, rig: Rig) -> Channel
     if abs(gain) < ALLOWED:
         return ChannelCorrection(channel, sign, None, gain)
     known = sorted(factors(channel, rig), key=lambda f: abs(math.log(f.value) - gain))
-    left = gain - math.log(known[0].value)
-    if abs(left) > _NEAR:
+    remaining = gain - math.log(known[0].value)
+    if abs(remaining) > _NEAR:
         of_inertia = rig.rigid_spring and channel == "motor_torque"
         odd = not of_inertia or abs(gain) > _WITHIN * inertia_spread(rig)
         return ChannelCorrection(channel, sign, None, gain, odd=odd)
     also = tuple(f for f in known[1:] if abs(math.log(f.value / known[0].value)) < _ALIKE)
-    return ChannelCorrection(channel, sign, known[0], left, also=also)
+    return ChannelCorrection(channel, sign, known[0], remaining, also=also)
 
 
 def inertia_spread(rig: Rig) -> float:

@@ -32,7 +32,7 @@ def clock_findings(linear: LinearisedFit, duration: float) -> list[Finding]:
 def _offset(name: str, offset: Number, linear: LinearisedFit) -> Finding:
     """Return the finding of an offset; only sensors that disagree with each other make a fault."""
     if offset.sd > _OPEN:
-        return _left_open("clock_offset", name, offset.sd)
+        return _undetermined_clock("clock_offset", name, offset.sd)
     others = [n for n in linear.offset if (n in JOINT) != (name in JOINT)]
     low, high = offset.ci95
     light: Light = "green"
@@ -60,7 +60,7 @@ def _offset(name: str, offset: Number, linear: LinearisedFit) -> Finding:
 
 def _drift(name: str, drift: Number, linear: LinearisedFit, duration: float) -> Finding:
     if drift.sd * duration > _OPEN:
-        return _left_open("clock_drift", name, drift.sd * duration)
+        return _undetermined_clock("clock_drift", name, drift.sd * duration)
     sure = abs(drift.value) > SURE * drift.sd and abs(drift.value) * duration > _ALLOWED
     light: Light = "amber" if sure and _is_clear(linear, (name,)) else "green"
     return drift_finding(light, name, drift, duration, _beside(linear, name).removeprefix("; "))
@@ -83,7 +83,7 @@ def drift_finding(light: Light, name: str, drift: Number, duration: float, besid
     )
 
 
-def _left_open(kind: str, name: str, sd: float) -> Finding:
+def _undetermined_clock(kind: str, name: str, sd: float) -> Finding:
     """Return that these data do not determine a clock. sd: s, of its offset or of its drift by the end."""
     detail = f"not determined: these data leave {1e3 * sd:.2g} ms, one sigma"
     return Finding("green", kind, name, detail=detail)

@@ -108,7 +108,7 @@ class LinearisedRows:
     block: IntArray
 
 
-def left_of(setting: LinearSetting, state: LinearState) -> FitResidual:
+def residual_at(setting: LinearSetting, state: LinearState) -> FitResidual:
     """Return the residual of a state, by one simulation."""
     record = on_time(setting.record, setting.start, setting.timed, state)
     case = replace(setting.case, drive=drive_of(record, setting.rig))
@@ -136,22 +136,22 @@ def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> F
     misfits = []
     for k in range(m):
         columns, residuals = plain[of == k], residual[of == k]
-        left = residuals - columns @ np.linalg.lstsq(columns, residuals, rcond=None)[0]
-        misfits.append(float(np.sqrt(np.mean(left**2))))
+        unexplained = residuals - columns @ np.linalg.lstsq(columns, residuals, rcond=None)[0]
+        misfits.append(float(np.sqrt(np.mean(unexplained**2))))
     return np.array(misfits)
 
 
-def rows_of(setting: LinearSetting, left: FitResidual, known: Slope | None = None) -> LinearisedRows:
+def rows_of(setting: LinearSetting, residual: FitResidual, known: Slope | None = None) -> LinearisedRows:
     """Lay out the rows about a state: one simulation for each unknown, none where a slope is known near."""
-    (case,), n, at = left.problem.cases, len(setting.values), left.theta
-    if known is None or not known.holds_at(at, left.problem.unknowns):
-        known = Slope(jacobian(left.problem, at, left.residual), at)
+    (case,), n, at = residual.problem.cases, len(setting.values), residual.theta
+    if known is None or not known.holds_at(at, residual.problem.unknowns):
+        known = Slope(jacobian(residual.problem, at, residual.residual), at)
     moved = known.matrix
     t = _of_rows(case, case.t, setting.timed)
-    of_channel = (left.of == np.arange(len(setting.timed))[:, None]).astype(float).T
+    of_channel = (residual.of == np.arange(len(setting.timed))[:, None]).astype(float).T
     columns = [moved[:, n:] * (t - setting.start)[:, None]]
-    columns += [of_channel * column[:, None] for column in left.plain.T]
-    weight = 1.0 / np.maximum(left.misfit, _LEAST_MISFIT)[left.of]
+    columns += [of_channel * column[:, None] for column in residual.plain.T]
+    weight = 1.0 / np.maximum(residual.misfit, _LEAST_MISFIT)[residual.of]
     block = np.floor((t - t.min()) / min(DEFAULT.block, case.duration / _BLOCKS)).astype(np.int64)
     matrix = np.column_stack([moved, *columns]) * weight[:, None]
-    return LinearisedRows(left, known, left.residual * weight, matrix, block)
+    return LinearisedRows(residual, known, residual.residual * weight, matrix, block)

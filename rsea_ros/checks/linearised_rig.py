@@ -10,7 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.checks.linear_rows import LinearisedRows, LinearSetting, LinearState, left_of, on_time, rows_of
+from rsea_ros.checks.linear_rows import (
+    LinearisedRows,
+    LinearSetting,
+    LinearState,
+    on_time,
+    residual_at,
+    rows_of,
+)
 from rsea_ros.checks.linear_step import gauss_newton_step
 from rsea_ros.checks.response_shape import FittedShape
 from rsea_ros.errors import IdentificationError
@@ -108,12 +115,12 @@ def _descend(
     setting: LinearSetting, state: LinearState
 ) -> tuple[LinearState, LinearisedRows, FloatArray, bool]:
     """Return where the rounds end: the state, rows, one sigma of each unknown, whether the clocks stand."""
-    rows = rows_of(setting, left_of(setting, state))
+    rows = rows_of(setting, residual_at(setting, state))
     step, sd = gauss_newton_step(rows, setting, state)
     settled = False
     for k in range(_ROUNDS):
         parts = _PARTS[k // 2 :]  # whole steps turn to and fro about the end
-        tried = ((at, left_of(setting, at)) for at in (state.move(part * step) for part in parts))
+        tried = ((at, residual_at(setting, at)) for at in (state.move(part * step) for part in parts))
         better = next((t for t in tried if t[1].loss < _WORSE * rows.left.loss), None)
         if better is None:
             break

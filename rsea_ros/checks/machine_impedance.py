@@ -114,12 +114,12 @@ def _fit(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> Impedance
     inverse = np.linalg.pinv(rows / doubt[:, None] / size)
     stiffness, inertia = (inverse @ (z.real / doubt)) / size
     stiffness_sd, inertia_sd = np.linalg.norm(inverse, axis=1) / size
-    left = np.abs(z.real - rows @ [stiffness, inertia]) / np.abs(z)
+    misfit = np.abs(z.real - rows @ [stiffness, inertia]) / np.abs(z)
     return ImpedanceFit(
         stiffness=float(stiffness),
         stiffness_sd=float(stiffness_sd),
         inertia=float(inertia),
         inertia_sd=float(inertia_sd),
-        left=float(np.median(left)),
+        left=float(np.median(misfit)),
         lowest=float(w[0]) / (2.0 * math.pi),
     )

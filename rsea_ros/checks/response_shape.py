@@ -128,9 +128,9 @@ class ShapeFit:
         shape = self._response(self._rig_at(theta)) / self._nominal
         n, m = len(self._start), len(self.channels)
         gain, delay = theta[n : n + m][self._of], theta[n + m :][self._of]
-        left = sign * self._value / shape * np.exp(2j * np.pi * self._frequency * delay)
+        ratio = sign * self._value / shape * np.exp(2j * np.pi * self._frequency * delay)
         with np.errstate(all="ignore"):
-            both = np.concatenate([(np.log(np.abs(left)) - gain) / self._sd, np.angle(left) / self._sd])
+            both = np.concatenate([(np.log(np.abs(ratio)) - gain) / self._sd, np.angle(ratio) / self._sd])
         return np.asarray(np.nan_to_num(both, nan=1e3, posinf=1e3, neginf=-1e3))
 
     def _slope(self, theta: FloatArray, residual: FloatArray, sign: FloatArray) -> FloatArray:
@@ -163,8 +163,8 @@ class ShapeFit:
 
     def _phase_costs(self, of: BoolArray, sign: FloatArray) -> FloatArray:
         turned = np.exp(2j * np.pi * np.outer(_DELAYS, self._frequency[of])) * (sign * self._value)[of]
-        left = np.log1p((np.angle(turned) / (3.0 * self._sd[of])) ** 2).sum(axis=1)
-        costs: FloatArray = left + (_DELAYS / DELAY_DOUBT) ** 2
+        misfit = np.log1p((np.angle(turned) / (3.0 * self._sd[of])) ** 2).sum(axis=1)
+        costs: FloatArray = misfit + (_DELAYS / DELAY_DOUBT) ** 2
         return costs
 
     def _rig_at(self, theta: FloatArray) -> Rig:
@@ -180,12 +180,12 @@ class ShapeFit:
             response[rows[name]] = values
         return response
 
-    def _middle(self, left: FloatArray, k: int, weight: FloatArray) -> float:
+    def _middle(self, residual: FloatArray, k: int, weight: FloatArray) -> float:
         """Return the weighted median of a channel's residual."""
         of = self._of == k
-        rising = np.argsort(left[of])
+        rising = np.argsort(residual[of])
         share = np.cumsum(weight[of][rising])
-        return float(left[of][rising][int(np.searchsorted(share, 0.5 * share[-1]))])
+        return float(residual[of][rising][int(np.searchsorted(share, 0.5 * share[-1]))])
 
     def _data_shares(
         self, theta: FloatArray, residual: FloatArray, doubt: FloatArray, sign: FloatArray
@@ -198,7 +198,7 @@ class ShapeFit:
 
     def _shape(self, theta: FloatArray, residual: FloatArray, cost: float, shares: FloatArray) -> FittedShape:
         n, m, lines = len(self._start), len(self.channels), len(self._of)
-        left = np.hypot(residual[:lines], residual[lines:]) * self._sd
+        misfit = np.hypot(residual[:lines], residual[lines:]) * self._sd
         measured = self._share * np.abs(self._value) ** 2
         known = zip(self.unknowns, theta[:n], strict=True)
         return FittedShape(
@@ -210,8 +210,8 @@ class ShapeFit:
             data_share={u.name: float(share) for u, share in zip(self.unknowns, shares, strict=False)},
             gain=dict(zip(self.channels, theta[n : n + m].tolist(), strict=True)),
             delay=dict(zip(self.channels, theta[n + m :].tolist(), strict=True)),
-            error={c: self._middle(left, k, self._share) for k, c in enumerate(self.channels)},
-            error_measured={c: self._middle(left, k, measured) for k, c in enumerate(self.channels)},
+            error={c: self._middle(misfit, k, self._share) for k, c in enumerate(self.channels)},
+            error_measured={c: self._middle(misfit, k, measured) for k, c in enumerate(self.channels)},
             cost=cost,
         )
 

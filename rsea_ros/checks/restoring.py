@@ -32,7 +32,7 @@ def restoring_findings(record: Record, rig: Rig) -> list[Finding]:
         motion = motion_from(record)
     except (RseaError, ValueError):
         return []
-    without, held = left_of(motion)
+    without, held = residual_shares(motion)
     if not held < _FALLS * without:
         return []
     return [
@@ -49,7 +49,7 @@ def restoring_findings(record: Record, rig: Rig) -> list[Finding]:
     ]
 
 
-def left_of(motion: Motion) -> tuple[float, float]:
+def residual_shares(motion: Motion) -> tuple[float, float]:
     """Return the share of the torque's RMS that is left without and with the restoring terms."""
     sign = np.tanh(motion.v / max(_SHARP * float(np.std(motion.v)), 1e-300))
     holding = [motion.q, np.sin(motion.q), np.cos(motion.q)]

@@ -50,7 +50,7 @@ def _identifiability(p: ParameterEstimate) -> Finding:
         "%",
         expected="below the rig's spread",
         detail="one sigma, only with what the rig states" if amber else "one sigma that these data leave",
-        remedy="measure it apart, or excite it more" if amber else "",
+        remedy="measure it separately, or excite it more" if amber else "",
     )
 
 

@@ -71,7 +71,7 @@ def _rest(share: float) -> list[Finding]:
             100.0 * share,
             "%",
             expected=f"less than {100.0 * _MOSTLY:.0f} %",
-            detail="of the record nothing moves",
+            detail="of the record is at rest",
             remedy="cut it with --from and --to" if share > _MOSTLY else "",
         )
     ]

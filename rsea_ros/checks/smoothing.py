@@ -5,7 +5,8 @@ gain: errors of drive, inertia and damping are in both. An average of the last n
 
     H(f) = sin(pi f n T) / (n sin(pi f T)) exp(-i pi f (n - 1) T)
 
-and one of the samples on either side, made after the run, has its size without its lag.
+and one of the samples on either side, made after the run, has its size without its lag. Below its resonance,
+a mode at the other sensor looks alike: it raises that one's response as an average lowers this one's.
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ _MOST = 60
 """Samples of the longest average that is tried."""
 _LAGS = np.geomspace(2e-4, 0.1, 60)
 """s. Time constants of a lag, which is a sensor's, not a program's."""
+_MODE_FREQUENCIES, _PARTICIPATIONS = np.geomspace(1.05, 6.0, 12), np.geomspace(0.1, 2.0, 8)
+"""Of modes at the other sensor: times the highest line, and share of its torque or motion."""
 _FALLS = 0.2
-"""Of what no filter leaves, and of what the best lag leaves: the average must leave less."""
+"""Of what no filter leaves, and of what the best lag or mode leaves: the average must leave less."""
 _FITS = 0.15
 """Of the response: what the average may leave."""
 _FEWEST = 8
@@ -76,16 +79,31 @@ def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: floa
     averages = np.asarray(size * np.exp(-1j * (number - 1.0) * turn), dtype=np.complex128)
     none = np.ones((1, len(f)), complex)
     tried = _share_left(response, np.vstack([none, averages, none, size[1::2]]), weight)
-    lags = np.asarray(1.0 / (1.0 + 2j * np.pi * f * _LAGS[:, None]), dtype=np.complex128)
-    lagged = _share_left(response, lags, weight).min()
+    alike = _share_left(response, np.vstack([_lags(f), _modes(f)]), weight).min()
     best = int(np.argmin(tried))
-    if not (tried[best] < _FALLS * min(tried[0], lagged) and tried[best] < _FITS**2):
+    if not (tried[best] < _FALLS * min(tried[0], alike) and tried[best] < _FITS**2):
         return 1, False
     return (best + 1, False) if best < _MOST else (2 * (best - _MOST) + 1, True)
+
+
+def _lags(f: FloatArray) -> ComplexArray:
+    """Return the responses of lags of first order, shape (k, n)."""
+    return np.asarray(1.0 / (1.0 + 2j * np.pi * f * _LAGS[:, None]), dtype=np.complex128)
+
+
+def _modes(f: FloatArray) -> ComplexArray:
+    """Return the responses over those of a sensor with an undamped mode above the lines, shape (k, n).
+
+    1 / (1 + p f^2 / (f_0^2 - f^2)), p the participation.
+    """
+    ratio = (f / (_MODE_FREQUENCIES[:, None] * f.max())) ** 2
+    raised = ratio / (1.0 - ratio)
+    modes = 1.0 / (1.0 + _PARTICIPATIONS[:, None, None] * raised)
+    return np.asarray(modes.reshape(-1, len(f)), dtype=np.complex128)
 
 
 def _share_left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> FloatArray:
     """Return the share of a response's power that each filter leaves at its best gain. h: shape (k, n)."""
     gain = (h.conj() * response).real @ weight / (np.abs(h) ** 2 @ weight)
-    left: FloatArray = np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight)
-    return left
+    share: FloatArray = np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight)
+    return share

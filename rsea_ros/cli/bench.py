@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--deflection", action="store_true",
         help="no F/T sensor: an encoder on the spring of the first motor, with ID 100 on the same line")
     add("--torque-constant", type=float, default=0.0, help="N·m at the output per A; 0: that of the model")
-    add("--return-delay", type=int, default=0, help="delay of each reply, unit 2 µs, 0 to 254")
+    add("--return-delay", type=int, default=0, help="delay of each reply in units of 2 µs, 0 to 254")
     add("--seed", type=seed, default=0, help="seed of the sensor noise and of the misbehaviour")
     add("--requests", action="store_true", help="read requests to misbehave from stdin, JSON lines")
 

@@ -33,7 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="rig whose ends are the lightest load (default: the rig; the paper's pendulum if it is clamped)",
     )
     parser.add_argument(
-        "--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help="Hz (default 280 1000)"
+        "--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ",
+        help="rates of the control loop, Hz (default 280 1000)",
     )
     add_results(parser, f"{CONTROL_JSON} and {REPORT}", "out/control")
     add_json(parser, CONTROL_JSON)

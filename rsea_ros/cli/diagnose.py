@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add_runs(parser, "several runs of one bench")
     add_rig(parser)
-    add("--holdout", metavar="BAG", help="a run for testing only (default: every fourth second of the runs)")
+    add("--holdout", metavar="BAG", help="a run for testing only (default: a quarter of the runs, in blocks)")
     add_results(parser, ", ".join(DIAGNOSIS), "out/diagnose-BAG")
     add(
         "--without",
@@ -100,7 +100,7 @@ def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None)
     return record
 
 
-def left_unexplained(result: Diagnosis) -> float:
+def unexplained_share(result: Diagnosis) -> float:
     """Return the power above the noise with the causes, relative to that of the baseline."""
     n = result.channel
     noise, before, after = (
@@ -122,6 +122,6 @@ def _print(result: Diagnosis, report: Path) -> None:
     for line in terminal_lines(result, width):
         console.print(line, highlight=False, soft_wrap=True)
     print(f"report      {report}")
-    if left_unexplained(result) > _MUCH:
+    if unexplained_share(result) > _MUCH:
         law = command("law", result.sources, result.rig_name, result.rig_choice, str(report.parent / MODEL))
         print(command_row("law", "of the remaining residual:", law, width))

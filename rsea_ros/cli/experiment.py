@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = "model.yaml of each cause (its last effect), a diagnosis.json beside its model.yaml, or a rig"
     add("models", nargs="+", metavar="MODEL", help=what)
     add("--limits", required=True, metavar="NAME=VALUE,…", help=f"limits in both directions: {units}")
-    add("--bag", nargs="+", action="extend", default=[], help="earlier runs, which weigh the causes")
+    add("--bag", nargs="+", action="extend", default=[], help="earlier runs, used to weight the causes")
     add("--rate", type=positive, default=280.0, help="rate of the commands, Hz (default %(default)g)")
     add("--longest", type=positive, default=10.0, help="longest duration of the run, s (default %(default)g)")
     add(

@@ -37,7 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--index", type=whole_numbers, default=(None,), metavar="N", help=which)
     add_force(parser)
-    parser.add_argument("--storage", default="mcap", choices=("mcap", "sqlite3"), help="of a directory")
+    storage = "format of a bag that is a directory (default mcap)"
+    parser.add_argument("--storage", default="mcap", choices=("mcap", "sqlite3"), help=storage)
     add_topic_options(parser)
 
 

@@ -24,9 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--port", type=int, default=8270, help="port of the page; 0: any free port (default %(default)s)")
     add("--command", action="store_true", help="allow a page to command torque within the driver's limits")
     add("--limit", type=positive, default=10.0,
-        help="largest torque of a page, N·m (default %(default)s); a smaller limit of the driver prevails")
+        help="largest torque that a page may command, N·m (default %(default)s); a smaller limit of the"
+        " driver prevails")
     add("--rate", type=positive, default=280.0,
-        help="rate of the commands of a page, Hz, that of the bench (default %(default)s)")
+        help="rate at which a page commands, Hz; use that of the bench (default %(default)s)")
     add("--out", type=path, default=Path("runs"), help="folder of the recordings (default %(default)s)")
     add("--namespace", default="rsea", help="namespace of the topics (default %(default)s)")
     add("--joint", default="joint", help="name of the joint (default %(default)s)")

@@ -149,13 +149,13 @@ class TorqueController:
         back = 0.0 if late else trust * back
         compensated, crossing = self._compensating_torque(reading, forward), self._crossing(ahead)
         known = learned + compensated
-        asked = forward + more + back + lead + compensated + crossing
-        torque = min(max(asked, self._sent - most, -largest), self._sent + most, largest)
-        if (asked - torque) * error > 0.0:
+        whole = forward + more + back + lead + compensated + crossing
+        torque = min(max(whole, self._sent - most, -largest), self._sent + most, largest)
+        if (whole - torque) * error > 0.0:
             state = state._replace(slow=self._state.slow, integral=self._state.integral)
         self._remember(hold(state, torque - known), torque, known, learned)
         self.share = Share(
-            float(model.now[0]), forward + more, back, lead + compensated + crossing, torque, torque != asked
+            float(model.now[0]), forward + more, back, lead + compensated + crossing, torque, torque != whole
         )
         model.advance(forward, float(ahead[0]))
         return torque

@@ -57,10 +57,10 @@ class Moved:
         sensed = self.plant.copy()
         sensed[FT] *= self.sensor
         _, whole = returns(law, sensed, self.hz, self.path, self.current)
-        asked = (on_ft * self.sensor * self.torque + on_velocity * self.speed) / z_of(law.period, self.hz)
-        asked = asked - on_link / (2j * np.pi * self.hz)
-        felt: ComplexArray = self.torque - self.plant[FT] * self.path * asked / whole
-        return felt
+        commanded = (on_ft * self.sensor * self.torque + on_velocity * self.speed) / z_of(law.period, self.hz)
+        commanded = commanded - on_link / (2j * np.pi * self.hz)
+        opposed: ComplexArray = self.torque - self.plant[FT] * self.path * commanded / whole
+        return opposed
 
     def ratio(self, law: FeedbackLaw, on_link: ComplexArray | float = 0.0) -> FloatArray:
         """Return |T / w_d| over that of the bare spring. on_link: as `impedance` has it."""
@@ -84,8 +84,8 @@ def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: BenchVariant, u: Un
 
 def impedance(rig: Rig, rate: float, gains: Gains, hz: FloatArray) -> OutputImpedance:
     """Return the impedance of the distal side against a clamped housing. hz: below half the rate."""
-    felt = distal_responses(rig, rate, hz)
-    return OutputImpedance(hz, felt.impedance(law_of(rig, rate, gains)), felt.torque, felt.spring)
+    moved = distal_responses(rig, rate, hz)
+    return OutputImpedance(hz, moved.impedance(law_of(rig, rate, gains)), moved.torque, moved.spring)
 
 
 def _without_motor(rig: Rig, hz: FloatArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -96,6 +96,6 @@ def _without_motor(rig: Rig, hz: FloatArray, s: ComplexArray) -> tuple[ComplexAr
     free = replace(rig.with_values({"spring_end.inertia": 1.0}), clamped=frozenset({"housing_end"}))
     distal = Output(np.zeros((3, COORDINATES)), np.zeros_like(outputs.position().d))
     distal.c[0, D] = 1.0
-    asked = (outputs.end_torque(free, "spring_end"), outputs.position(), distal)
-    torque, angle, turned = (frequency_response(free, output, hz, "distal") for output in asked)
+    measured = (outputs.end_torque(free, "spring_end"), outputs.position(), distal)
+    torque, angle, turned = (frequency_response(free, output, hz, "distal") for output in measured)
     return torque / (s * turned), angle / turned

@@ -143,12 +143,12 @@ class Learning:
             rows = rows - state
         return rows
 
-    def _has_stopped(self, seen: FloatArray) -> bool:
+    def _has_stopped(self, rows: FloatArray) -> bool:
         """Return whether the gear no longer turns as the torque would have its load turn."""
         quick = self._period / QUICK
-        expected = float(self.load[1:] @ seen[1:3])
+        expected = float(self.load[1:] @ rows[1:3])
         self._expected += quick * (expected**2 - self._expected)
-        self._followed += quick * (expected * float(seen[3] - self.load[0] * seen[0]) - self._followed)
+        self._followed += quick * (expected * float(rows[3] - self.load[0] * rows[0]) - self._followed)
         return self._expected > FOLLOWS**2 and self._followed < STOPPED * self._expected
 
     def _power_left(self, which: int, x: FloatArray) -> float:

@@ -60,8 +60,8 @@ def spread(
         f = family(loads, corners((name,), u), u, design.rate, hz)
         _, whole = returns(law, f.plant, hz, f.path, f.current)
         sensor = np.array([mode_of(u.mode, case.participation, hz) for case in f.cases])
-        made = f.plant[FT] / sensor * f.path / whole
-        apart = made / made[f.nominal]
+        transfer = f.plant[FT] / sensor * f.path / whole
+        apart = transfer / transfer[f.nominal]
         gains.append(20.0 * np.log10(np.abs(apart)))
         phases.append(np.unwrap(np.angle(apart), axis=-1))
     limits = [(np.min(v, axis=0), np.max(v, axis=0)) for v in map(np.vstack, (gains, phases))]
@@ -72,6 +72,6 @@ def softness(rig: Rig, design: ControllerDesign, hz: FloatArray) -> Softness:
     """Return the impedance of the set's locked benches. hz: below half the rate."""
     u, law = Uncertainty(), law_of(rig, design.rate, design.gains)
     benches = [moved_bench(rig, design.rate, hz, case, u) for case in corners((LOCKED,), u)]
-    felt = np.abs([bench.impedance(law) for bench in benches])
+    impedances = np.abs([bench.impedance(law) for bench in benches])
     worst = max(float(bench.ratio(law).max()) for bench in benches)
-    return Softness(hz, felt.min(axis=0), felt.max(axis=0), worst)
+    return Softness(hz, impedances.min(axis=0), impedances.max(axis=0), worst)

@@ -105,18 +105,18 @@ def family(
     loads: Mapping[str, Rig], cases: Sequence[BenchVariant], u: Uncertainty, rate: float, hz: FloatArray
 ) -> Family:
     """Return the responses of cases at frequencies, Hz, below half the rate."""
-    made: dict[tuple[str, float, float], tuple[ComplexArray, ComplexArray]] = {}
+    computed: dict[tuple[str, float, float], tuple[ComplexArray, ComplexArray]] = {}
     plants, paths, currents = [], [], []
     for case in cases:
         key = case.load, case.stiffness, case.damping
-        if key not in made:
+        if key not in computed:
             rig = variant_rig(loads[case.load], case)
-            made[key] = lag_responses(rig, sample_rig(rig, rate), hz)
-        response, path = made[key]
-        seen = response.copy()
-        seen[FT] *= mode_of(u.mode, case.participation, hz)
+            computed[key] = lag_responses(rig, sample_rig(rig, rate), hz)
+        response, path = computed[key]
+        plant = response.copy()
+        plant[FT] *= mode_of(u.mode, case.participation, hz)
         late, current = lags_of(case, rate, hz)
-        plants.append(seen)
+        plants.append(plant)
         paths.append(path * late)
         currents.append(path * current)
     return Family(tuple(cases), hz, np.stack(plants, axis=1), np.array(paths), np.array(currents))

@@ -13,7 +13,7 @@ from dataclasses import replace
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
-from rsea_ros.diagnosis.evaluation import Evaluated, Examined, evaluate, held_out_of
+from rsea_ros.diagnosis.evaluation import Evaluated, Examined, evaluate, held_out_data
 from rsea_ros.diagnosis.naming.conclusion import conclude
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.selection import Selection
@@ -22,6 +22,7 @@ from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
+from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.joint_start import joint_start
@@ -50,7 +51,9 @@ def diagnose(
     Effects that it only guesses do not: the search treats them as all others.
     holdout: a record on which the models are tested; without it, the test blocks of the records.
     settings: the effects to try and the numbers that steer the verdict, DiagnosisSettings() by default.
-    Raises IdentificationError when the records are too short or lack a channel that the rig needs.
+    Its channels that no record has are not tested.
+    Raises IdentificationError when the records are too short or lack a channel that the rig needs, or the
+    held-out record lacks all of theirs.
     """
     settings = settings or DiagnosisSettings()
     tell = progress or (lambda step, share: None)
@@ -63,6 +66,8 @@ def diagnose(
     checked, remarks = _steady([check(r, rig) for r in records], rig)
     nominal = nominal_problem(checked, rig, settings)
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
+    if tested is not None:
+        _check_testable(tested, nominal)
     examined = Examined(records, checked, tested, rig)
     with worker_pools() as pools:
         tell("choosing stretches", 0.0)
@@ -81,6 +86,17 @@ def nominal_problem(
     cases = tuple(case_from(c.record, rig, c.masked, settings.noise) for c in checked)
     stated = frozenset(e.name for e in rig.effects)
     return Problem(cases, rig, unknowns_of(rig, cases), MEASURED, stated=stated)
+
+
+def _check_testable(holdout: Checked, nominal: Problem) -> None:
+    """Raise IdentificationError where a held-out record has no channel that models are fitted to."""
+    fitted = sorted({n for case in nominal.cases for n in case.measured})
+    (case,) = nominal_problem([holdout], nominal.rig).cases
+    if not case.measured.keys() & set(fitted):
+        raise IdentificationError(
+            f"{case.source}: held out, but has only {', '.join(sorted(case.measured))}; expected one of the"
+            f" channels that the models are fitted to: {', '.join(fitted)}"
+        )
 
 
 def search(
@@ -102,7 +118,7 @@ def search(
     tell("looking for a simpler model", 0.9)
     selection = eliminate_backwards(selection, effects, pools, settings)
     tell("evaluating on the test blocks", 0.95)
-    held_out = held_out_of(selection, holdout)
+    held_out = held_out_data(selection, holdout)
     stages = pools.fits.map(lambda m: evaluate(selection, m, held_out, pools, settings), selection.models)
     return selection, list(stages)
 

@@ -86,7 +86,7 @@ class HeldOut:
         if self.record is None:
             return None
         case = case_from(self.record.record, self.nominal, self.record.masked, self.settings.noise)
-        return spread_over(replace(case, noise=self.cases[0].noise), self.nominal, self.settings)
+        return spread_over(case.with_noise(fitted_noise(self.cases)), self.nominal, self.settings)
 
     def score(
         self, problem: Problem, theta: FloatArray, outputs: list[dict[str, FloatArray]] | None = None
@@ -98,14 +98,20 @@ class HeldOut:
             return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta), rule)
         rig, offsets = apply(problem.rig, problem.unknowns, theta)
         phased = in_phase(rig, self.record.record)
-        return score(problem, (case,), simulate_cases((case,), phased, offsets, ride=problem.ride), rule)
+        outputs = simulate_cases((case,), phased, offsets, on_angle=problem.on_angle)
+        return score(problem, (case,), outputs, rule)
 
     def score_of(self, model: Candidate) -> Score:
         """Return the score of a model that is fitted and simulated on the cases."""
         return self.score(model.problem, model.solution.theta, model.outputs)
 
 
-def held_out_of(selection: Selection, record: Checked | None) -> HeldOut:
+def fitted_noise(cases: Sequence[Case]) -> dict[str, float]:
+    """Return the noise of each channel that some case has, of the first case with it."""
+    return {n: noise for case in reversed(cases) for n, noise in case.noise.items()}
+
+
+def held_out_data(selection: Selection, record: Checked | None) -> HeldOut:
     """Return the data that test the models of a selection. record: replaces the test blocks."""
     return HeldOut(selection.cases, selection.models[0].problem.rig, record, selection.last.settings)
 

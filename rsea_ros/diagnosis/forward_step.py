@@ -50,7 +50,7 @@ class ForwardStep:
     def run(self) -> StepResult:
         """Try every effect, and two at once where none helps alone."""
         screened = self.fits.screen(self.fits.on_pieces)
-        close = self._fitted_to_pieces(screened)
+        close = self._fit_to_pieces(screened)
         finalists = self._finalists(screened, close)
         models = self.fits.fit_all(finalists)
         if not self._acceptable(models):
@@ -84,7 +84,7 @@ class ForwardStep:
         """Return the model to accept and those that do as well."""
         return break_tie(models, self.present.validation, self.settings)
 
-    def _fitted_to_pieces(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
+    def _fit_to_pieces(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
         """Return the best of the screening fitted to the pieces, best first.
 
         Also where no step helped: the guess may have been poor.

@@ -131,9 +131,9 @@ class RecordView:
         if not isinstance(case.drive, Drive) or "motor_torque" not in case.measured:
             return None
         steps = np.rint(case.drive.at["motor_torque"]).astype(np.int64) - 1
-        asked = np.abs(case.drive.command[np.clip(steps, 0, len(case.drive.command) - 1)])
-        is_silent = np.abs(case.measured["motor_torque"]) < share * asked
-        return float(np.max(asked[case.mask["motor_torque"] & is_silent], initial=0.0))
+        commanded = np.abs(case.drive.command[np.clip(steps, 0, len(case.drive.command) - 1)])
+        is_silent = np.abs(case.measured["motor_torque"]) < share * commanded
+        return float(np.max(commanded[case.mask["motor_torque"] & is_silent], initial=0.0))
 
     def gain(self, channel: str) -> float | None:
         """Return the factor that brings the simulated channel nearest to the measured one; None without."""

@@ -28,8 +28,8 @@ def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) 
     worst = _worst(by_frequency(case.t[channel], residual, case.noise[channel], channel))
     keep = case.mask[channel]
     for respect in _respects(case, channel, rig):
-        seen = respect._replace(values=respect.values[keep])
-        worst += _worst(_level_in_bins(seen, residual[keep], case.noise[channel], channel))
+        masked = respect._replace(values=respect.values[keep])
+        worst += _worst(_level_in_bins(masked, residual[keep], case.noise[channel], channel))
     return tuple(worst)
 
 

@@ -61,8 +61,8 @@ def _repetitions(angle: FloatArray, values: FloatArray) -> list[dict[str, float]
     """Return cycles per revolution, amplitude and phase of the strongest repetitions over an angle (rad)."""
     values = values - np.mean(values)
     cycles, power = _periodogram(angle, values)
-    seen = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
-    power = np.where(seen & (cycles < _MOST), power, 0.0)
+    resolvable = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
+    power = np.where(resolvable & (cycles < _MOST), power, 0.0)
     repeating = [interpolate_peak(cycles, power, k) for k in peaks(power, apart=_APART)]
     return [{"cycles_per_revolution": c, **sine_at(angle, values, c)} for c in repeating]
 

@@ -126,8 +126,8 @@ class StepFits:
         """
         gained = loss_excess(self.present, chosen)
         least = self.settings.forward.undecided * gained
-        left = self.pools.fits.map(lambda s: self._least_loss(s, chosen), left_out)
-        return [s for s, excess in zip(left_out, left, strict=True) if excess < least]
+        excesses = self.pools.fits.map(lambda s: self._least_loss(s, chosen), left_out)
+        return [s for s, excess in zip(left_out, excesses, strict=True) if excess < least]
 
     def on_measured_angle(self) -> list[Candidate]:
         """Return models with an effect of the rotor's angle, simulated on the measured angle.
@@ -137,7 +137,7 @@ class StepFits:
         little: otherwise it imitates another missing effect.
         """
         base, most = self.on_pieces, self.settings.forward.hope_on_angle
-        on_angle = replace(base, problem=replace(base.problem, ride=True))
+        on_angle = replace(base, problem=replace(base.problem, on_angle=True))
         effects = [e for e in self.effects if ROTOR_ANGLE in e.reads and e.name not in base.problem.acting]
         screened = (screen(on_angle, e, self.guesses[e.name], self.settings.forward) for e in effects)
         fitted = [self._fit_pieces(s) for s in screened if s is not None]
@@ -169,8 +169,8 @@ class StepFits:
         masked = setup.mask(problem)
         start = min(self._starts(problem, theta), key=lambda t: power(masked.residual(t)))
         first = fit_candidate(setup, problem, start)
-        if problem.ride:
-            free = fit_candidate(setup, replace(problem, ride=False), first.solution.theta)
+        if problem.on_angle:
+            free = fit_candidate(setup, replace(problem, on_angle=False), first.solution.theta)
             first = free if is_equally_good(free, first, self.settings) else first
         if not self._has_moved(first):
             return first

@@ -8,7 +8,7 @@ from rsea_ros.effects.effect import Parameter
 SETTLING = Parameter(
     "time_constant", "s", null=math.inf, low=0.3, high=1e5, typical=1e5, starts=(3.0, 15.0), logarithmic=True,
     optional=True, is_fixed=True,
-    reason="from what a run shows as settling to a straight line",
+    reason="from a drift that settles within a run to one that is a straight line",
 )
 """With which a drift settles; one that is hundreds of records long is a straight line."""
 _STRAIGHT = 300.0

@@ -26,11 +26,11 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "offset", "N m", null=0.0, low=-50.0, high=50.0, typical=0.5,
-            reason="with more than the largest torque it would not move",
+            reason="friction above the largest torque would hold the machine still",
         ),
         Parameter(
             "viscous_difference", "N m s/rad", null=0.0, low=-100.0, high=100.0, typical=5.0,
-            reason="it counts up to 2 b_m: four times the paper's 23 N·m·s/rad",
+            reason="four times the paper's 23 N·m·s/rad; the law limits it to 2 b_m",
         ),
     ),
     claims=Claims("position", "even", amplitude_exponent=None),

@@ -99,8 +99,8 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "gap", "rad", null=0.0, low=0.0, high=0.1, typical=4e-3, starts=(1e-3, 0.012), is_fixed=True,
-            reason="an angle of gears, not of machines: 3 to 6 arcmin in a good one, 0.03 rad in a toy "
-            "servo's",
+            reason="it does not depend on the size of the machine: 3 to 6 arcmin in a good gear, 0.03 rad "
+            "in a toy servo",
         ),
     ),
     claims=Claims("position", "odd", amplitude_exponent=None, passive=True, confusable_with=("hard_stop",)),

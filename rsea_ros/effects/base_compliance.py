@@ -65,18 +65,18 @@ EFFECT = Effect(
         Parameter(
             "stiffness", "N m/rad", null=math.inf, low=2e3, high=1e7, typical=3e4, starts=(8e3, 2e5),
             logarithmic=True,
-            reason="softer than the spring it would be the spring; thousands of times as stiff it does "
+            reason="softer than the spring, it would be the spring; thousands of times stiffer, it does "
             "not show",
         ),
         Parameter(
             "inertia", "kg m^2", null=0.5, low=1e-3, high=100.0, typical=0.5, starts=(0.05, 3.0),
             logarithmic=True,
-            reason="a thousandth of the rotor's to a hundred times it",
+            reason="from a thousandth of the rotor's to a hundred times it",
         ),
         Parameter(
             "damping_ratio", "1", null=0.02, low=1e-3, high=1.0, typical=0.02, logarithmic=True,
             optional=True,
-            reason="0.001 to 0.1 of metal structures (Ewins), 1 without an overshoot",
+            reason="0.001 to 0.1 for metal structures (Ewins); 1: no overshoot",
         ),
         Parameter(
             "above_sensor", "1", null=0.0, low=0.0, high=1.0, typical=0.0, optional=True, shapes=True,

@@ -50,7 +50,7 @@ EFFECT = Effect(
         Parameter(
             "delay", "s", null=0.0, low=0.0, high=0.06, typical=5e-3, starts=(1e-3, 0.015, 0.03),
             is_fixed=True,
-            reason="buses and drivers: a cycle at 1 kHz to three at 50 Hz; short steps keep no more commands",
+            reason="buses and drivers: one cycle at 1 kHz to three at 50 Hz; short steps store no more",
         ),
     ),
     claims=Claims(

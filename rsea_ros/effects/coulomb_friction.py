@@ -32,7 +32,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
-            reason="with more than the largest torque it would not move",
+            reason="friction above the largest torque would hold the machine still",
         ),
         PRESLIDING,
     ),

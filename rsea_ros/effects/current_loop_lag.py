@@ -32,7 +32,7 @@ EFFECT = Effect(
         Parameter(
             "time_constant", "s", null=0.0, low=1e-5, high=0.1, typical=4e-3, starts=(1e-3, 0.015),
             logarithmic=True,
-            reason="corners of 1.6 Hz to 16 kHz: slower is no current loop, faster shows nowhere",
+            reason="corners of 1.6 Hz to 16 kHz: no current loop is slower, and a faster one has no effect",
         ),
     ),
     claims=Claims(

@@ -49,11 +49,11 @@ EFFECT = Effect(
         Parameter(
             "time_constant", "s", null=0.0, low=1e-4, high=0.05, typical=4e-3, starts=(1.5e-3, 0.01),
             logarithmic=True,
-            reason="natural frequencies of 3 Hz to 1.6 kHz, as of the lag",
+            reason="natural frequencies of 3 Hz to 1.6 kHz, as for the lag",
         ),
         Parameter(
             "overshoot", "1", null=0.3, low=0.01, high=0.9, typical=0.3, logarithmic=True,
-            reason="less is a lag of first order, more rings without an end",
+            reason="below, the loop is a lag of first order; above, it rings without end",
         ),
     ),
     claims=Claims(

@@ -24,7 +24,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "relative_change", "1", null=0.0, low=-0.95, high=5.0, typical=0.3,
-            reason="grease is some times as thick when cold (Bittencourt); damping never ends below zero",
+            reason="cold grease is several times as thick (Bittencourt); damping never falls below zero",
         ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0),

@@ -50,7 +50,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "width", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
-            reason="a command below it makes nothing: with the largest torque nothing would move",
+            reason="commands below it make no torque: above the largest one, nothing would move",
         ),
         Parameter(
             "jump", "1", null=0.0, low=0.0, high=1.0, typical=0.0, starts=(1.0,), optional=True,

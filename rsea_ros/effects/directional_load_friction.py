@@ -34,15 +34,15 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "motor_coefficient", "1", null=0.0, low=0.0, high=0.9, typical=0.15,
-            reason="with 1 the gear locks itself",
+            reason="at 1 the gear locks itself",
         ),
         Parameter(
             "load_coefficient", "1", null=0.0, low=0.0, high=0.9, typical=0.05,
-            reason="with 1 the gear locks itself",
+            reason="at 1 the gear locks itself",
         ),
         Parameter(
             "quadratic", "1/(N m)", null=0.0, low=0.0, high=0.1, typical=0.0, optional=True,
-            reason="at the largest torque three times that torque",
+            reason="three times the largest torque, at that torque",
         ),
         PRESLIDING,
     ),

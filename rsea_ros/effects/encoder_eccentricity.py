@@ -35,17 +35,17 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "amplitude", "rad", null=0.0, low=0.0, high=0.05, typical=1e-4, is_fixed=True,
-            reason="an angle of encoders, not of machines: 3 degrees are a broken one",
+            reason="it does not depend on the size of the machine; an encoder with 3 degrees is broken",
         ),
         Parameter(
             "cycles_per_revolution", "1", null=1.0, low=0.001, high=60.0, typical=1.0, starts=(2.0,),
             logarithmic=True,
-            reason="of a slow gear stage to as many poles as a magnet ring has",
+            reason="from a slow gear stage to the poles of a magnet ring",
         ),
         Parameter(
             "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.7, starts=(-2.4, -0.9,
             2.3), is_fixed=True,
-            reason="a turn either way: a fit may pass the end of one",
+            reason="one turn either way, so that a fit can pass the end of a turn",
         ),
     ),
     claims=Claims("velocity", "neither", amplitude_exponent=None),

@@ -23,7 +23,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "bias", "N m", null=0.0, low=-60.0, high=60.0, typical=0.5,
-            reason="twice the largest torque: the sensor's largest reading holds its bias",
+            reason="twice the largest torque, as the largest reading contains the bias",
         ),
     ),
     claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_drift",)),

@@ -24,7 +24,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "drift", "N m", null=0.0, low=-60.0, high=60.0, typical=0.5,
-            reason="twice the largest torque: the sensor's largest reading holds its drift",
+            reason="twice the largest torque, as the largest reading contains the drift",
         ),
         SETTLING,
     ),

@@ -23,7 +23,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "gain", "1", null=1.0, low=0.2, high=3.0, typical=0.95,
-            reason="a calibration so far off is another sensor or unit, which the checks of the data find",
+            reason="a larger error means another sensor or unit, which the data checks find",
         ),
     ),
     claims=Claims("ft", "odd", amplitude_exponent=1.0, confusable_with=("torque_constant_error",)),

@@ -37,7 +37,7 @@ EFFECT = Effect(
         Parameter(
             "time_constant", "s", null=0.0, low=1e-5, high=0.1, typical=3e-3, starts=(1e-3, 0.01),
             logarithmic=True,
-            reason="filters of 1.6 Hz and more: makers offer some 5 to 800 Hz",
+            reason="filters of 1.6 Hz and more; manufacturers offer about 5 to 800 Hz",
         ),
     ),
     claims=Claims("ft", "odd", amplitude_exponent=1.0),

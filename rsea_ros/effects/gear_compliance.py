@@ -51,16 +51,16 @@ EFFECT = Effect(
         Parameter(
             "stiffness", "N m/rad", null=math.inf, low=500.0, high=1e7, typical=1e4, starts=(3e3, 5e4),
             logarithmic=True,
-            reason="a third of the spring's to thousands of times it, where it does not show",
+            reason="from a third of the spring's to thousands of times it, where it has no visible effect",
         ),
         Parameter(
             "damping_ratio", "1", null=0.0, low=0.0, high=0.1, typical=0.0, optional=True, spread=0.02,
-            reason="0.001 to 0.1 of metal structures (Ewins); 0.02 is usual, and one sigma around none",
+            reason="0.001 to 0.1 for metal structures (Ewins); 0.02 is usual, and one sigma about zero",
         ),
         Parameter(
             _SHARE, "1", null=0.02, low=1e-3, high=0.5, typical=0.02, logarithmic=True, optional=True,
             spread=1.6,
-            reason="0.02 times or over 5, one sigma: the paper's is a 240th, a large one a tenth",
+            reason="one sigma is a factor of 5 about 0.02: the paper's is a 240th, a large one a tenth",
         ),
     ),
     claims=Claims(

@@ -34,7 +34,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "torque", "N m", null=0.0, low=-50.0, high=50.0, typical=2.0,
-            reason="with more than the largest torque the machine could not hold it",
+            reason="the machine could not hold more than its largest torque",
         ),
     ),
     claims=Claims("position", "odd", amplitude_exponent=None),

@@ -85,11 +85,11 @@ def at_lines(channel: str, frequency: str = "frequency", sine: Sequence[str] = (
 
     def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
         shown = channel if channel in view.channels else view.channels[0]
-        made = []
+        at_peaks = []
         for f in view.lines(shown, is_sharp="amplitude" in sine):
             fitted = view.sine(shown, f) if sine else {}
-            made.append({**defaults[0], frequency: f, **{n: fitted[n] for n in sine}})
-        return made if sine and made else [*made, defaults[0]]
+            at_peaks.append({**defaults[0], frequency: f, **{n: fitted[n] for n in sine}})
+        return at_peaks if sine and at_peaks else [*at_peaks, defaults[0]]
 
     return guesses
 

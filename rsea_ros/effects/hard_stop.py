@@ -29,12 +29,12 @@ EFFECT = Effect(
         Parameter(
             "angle", "rad", null=math.inf, low=5e-4, high=0.1, typical=8e-3, starts=(4e-3, 0.015),
             logarithmic=True,
-            reason="a fortieth of the deflection that the largest torque makes, to five times it",
+            reason="from a fortieth of the deflection at the largest torque to five times it",
         ),
         Parameter(
             "stiffness", "N m/rad", null=0.0, low=50.0, high=1e5, typical=5e3, starts=(1e3, 3e4),
             logarithmic=True,
-            reason="a thirtieth of the spring's to seventy times it, as good as rigid",
+            reason="from a thirtieth of the spring's to seventy times it, which is nearly rigid",
         ),
     ),
     claims=Claims(

@@ -26,7 +26,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "coefficient", "1", null=0.0, low=0.0, high=1.0, typical=0.15,
-            reason="with 1 the gear locks itself",
+            reason="at 1 the gear locks itself",
         ),
         PRESLIDING,
     ),

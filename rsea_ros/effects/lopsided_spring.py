@@ -31,7 +31,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "quadratic", "1/rad", null=0.0, low=-50.0, high=50.0, typical=3.0,
-            reason="where the largest torque deflects it, the whole stiffness more or less",
+            reason="at the deflection of the largest torque, stiffness doubles or vanishes",
         ),
     ),
     claims=Claims("position", "even", amplitude_exponent=2.0),

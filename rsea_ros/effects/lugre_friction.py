@@ -38,24 +38,24 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "coulomb_torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
-            reason="with more than the largest torque it would not move",
+            reason="friction above the largest torque would hold the machine still",
         ),
         Parameter(
             "bristle_stiffness", "N m/rad", null=0.0, low=50.0, high=1e5, typical=2500.0, starts=(500.0, 1e4),
             logarithmic=True,
-            reason="a thirtieth of the spring's to seventy times it: stiffer bristles are Coulomb's law",
+            reason="from a thirtieth of the spring's to seventy times it; stiffer is Coulomb friction",
         ),
         Parameter(
             "stribeck_torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.0,
-            reason="with more than the largest torque it would not move",
+            reason="friction above the largest torque would hold the machine still",
         ),
         Parameter(
             "stribeck_velocity", "rad/s", null=0.03, low=0.003, high=1.0, typical=0.03, logarithmic=True,
-            reason="from half a hundredth of the largest speed to beyond it",
+            reason="from half a percent of the largest speed to more than it",
         ),
         Parameter(
             "bristle_damping", "N m s/rad", null=0.0, low=0.0, high=100.0, typical=5.0, optional=True,
-            reason="four times the paper's viscous 23 N·m·s/rad",
+            reason="four times the paper's viscous damping, 23 N·m·s/rad",
         ),
     ),
     claims=Claims(

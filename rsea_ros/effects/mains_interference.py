@@ -26,16 +26,16 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "amplitude", "N m", null=0.0, low=0.0, high=60.0, typical=0.3,
-            reason="twice the largest torque: the sensor's largest reading holds the hum",
+            reason="twice the largest torque, as the largest reading contains the hum",
         ),
         Parameter(
             "frequency", "Hz", null=50.0, low=45.0, high=65.0, typical=50.0, starts=(60.0,), is_fixed=True,
-            reason="50 or 60 Hz on every machine, which a grid keeps to 1 %",
+            reason="50 or 60 Hz on every machine; a grid keeps it to 1 %",
         ),
         Parameter(
             "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.0, starts=(-1.6, 1.6,
             3.1), optional=True, per_record=True, is_fixed=True,
-            reason="a turn either way: a fit may pass the end of one",
+            reason="one turn either way, so that a fit can pass the end of a turn",
         ),
     ),
     claims=Claims("ft", "even", amplitude_exponent=0.0),

@@ -29,7 +29,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "cubic", "1/rad^2", null=0.0, low=-2000.0, high=20000.0, typical=500.0,
-            reason="where the largest torque deflects it, four fifths softer to eight times stiffer",
+            reason="at the deflection of the largest torque, from four fifths softer to eight times stiffer",
         ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=3.0, confusable_with=("hard_stop",)),

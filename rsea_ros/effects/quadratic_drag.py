@@ -30,7 +30,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "coefficient", "N m s^2/rad^2", null=0.0, low=0.0, high=500.0, typical=12.0,
-            reason="at the largest speed six times the largest torque",
+            reason="six times the largest torque, at the largest speed",
         ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=2.0, passive=True),

@@ -78,11 +78,11 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.0,
-            reason="with more than the largest torque it would not move",
+            reason="friction above the largest torque would hold the machine still",
         ),
         Parameter(
             "angle", "rad", null=2e-3, low=1e-4, high=0.05, typical=2e-3, logarithmic=True,
-            reason="a two-hundredth of the deflection that the largest torque makes, to beyond it",
+            reason="from 1/200 of the deflection at the largest torque to more than it",
         ),
         Parameter(
             "gamma", "1", null=0.0, low=-3.0, high=0.95, typical=0.0, optional=True,

@@ -22,7 +22,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "relative_change", "1", null=0.0, low=-0.8, high=3.0, typical=0.1,
-            reason="a spring does not lose all of its stiffness or gain three times it in a run",
+            reason="in one run a spring neither loses all of its stiffness nor quadruples it",
         ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0),

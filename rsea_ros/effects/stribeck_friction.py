@@ -36,15 +36,15 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "coulomb_torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.5,
-            reason="with more than the largest torque it would not move",
+            reason="friction above the largest torque would hold the machine still",
         ),
         Parameter(
             "stribeck_torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
-            reason="with more than the largest torque it would not move",
+            reason="friction above the largest torque would hold the machine still",
         ),
         Parameter(
             "stribeck_velocity", "rad/s", null=0.05, low=0.005, high=1.0, typical=0.05, logarithmic=True,
-            reason="from a hundredth of the largest speed to beyond it",
+            reason="from a hundredth of the largest speed to more than it",
         ),
         PRESLIDING,
     ),

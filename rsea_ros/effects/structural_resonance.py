@@ -44,7 +44,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "damping_ratio", "1", null=0.02, low=1e-3, high=0.5, typical=0.02, logarithmic=True,
-            reason="0.001 to 0.1 of metal structures (Ewins); with more there is no mode to see",
+            reason="0.001 to 0.1 for metal structures (Ewins); above, no mode is visible",
         ),
         Parameter(
             "participation", "1", null=0.0, low=-5.0, high=5.0, typical=0.3,

@@ -25,7 +25,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "relative_change", "1", null=0.0, low=-0.8, high=2.0, typical=-0.15,
-            reason="magnets lose 0.2 % a kelvin, but a derating drive may take all",
+            reason="magnets lose 0.2 % per kelvin, but a drive that derates may take all",
         ),
         SETTLING,
     ),

@@ -22,7 +22,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
 
 
 _LOW, _HIGH = 0.2, 3.0
-"""Bounds of the gain: no torque constant is farther from its data sheet."""
+"""Bounds of the gain: no torque constant is further from its data sheet."""
 
 
 def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
@@ -43,7 +43,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "gain", "1", null=1.0, low=_LOW, high=_HIGH, typical=0.9, logarithmic=True,
-            reason="no torque constant is farther from its data sheet",
+            reason="no torque constant is further from its data sheet",
         ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0, confusable_with=("ft_gain_error",)),

@@ -48,17 +48,17 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "amplitude", "N m", null=0.0, low=0.0, high=50.0, typical=1.0,
-            reason="with more than the largest torque the rotor would stay in a detent",
+            reason="above the largest torque the rotor would stay in a detent",
         ),
         Parameter(
             "cycles_per_revolution", "1", null=4.0, low=0.2, high=60.0, typical=4.0, starts=(1.0, 2.0, 6.0,
             8.0, 12.0), logarithmic=True,
-            reason="of a slow gear stage to cogging of many poles",
+            reason="from a slow gear stage to the cogging of many poles",
         ),
         Parameter(
             "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.7, starts=(-2.4, -0.9,
             2.3), is_fixed=True,
-            reason="a turn either way: a fit may pass the end of one",
+            reason="one turn either way, so that a fit can pass the end of a turn",
         ),
     ),
     claims=Claims("position", "neither", amplitude_exponent=None),

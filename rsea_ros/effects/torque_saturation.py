@@ -28,7 +28,7 @@ EFFECT = Effect(
         Parameter(
             "limit", "N m", null=math.inf, low=0.5, high=200.0, typical=15.0, starts=(20.0, 10.0, 6.0),
             logarithmic=True,
-            reason="a sixtieth of the largest torque to beyond it, where it does not act",
+            reason="from a sixtieth of the largest torque to more than it, where it does not act",
         ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=None),

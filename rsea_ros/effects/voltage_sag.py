@@ -35,11 +35,11 @@ EFFECT = Effect(
         Parameter(
             "limit", "N m", null=math.inf, low=0.5, high=200.0, typical=18.0, starts=(25.0, 12.0),
             logarithmic=True,
-            reason="a sixtieth of the largest torque to beyond it, where it does not act",
+            reason="from a sixtieth of the largest torque to more than it, where it does not act",
         ),
         Parameter(
             "no_load_speed", "rad/s", null=math.inf, low=0.1, high=100.0, typical=1.5, logarithmic=True,
-            reason="a sixth of the largest speed to where it does not act",
+            reason="from a sixth of the largest speed to where it does not act",
         ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=None, confusable_with=("torque_saturation",)),

@@ -46,7 +46,7 @@ def _smaller(name: str, guesses: Sequence[Guess]) -> list[Guess]:
     return [{**g, main.name: main.null + _SHARE * (g[main.name] - main.null)} for g in guesses]
 
 
-def fitted_again(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
+def repeat_fits(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
     """Return the fits, those that left a little more than the best once more from the rig's values there.
 
     A fit that began far from the final values of the rig may stop in a local minimum.

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.checks.faults import check
-from rsea_ros.experiment.fits import fit_cause, fitted_again
+from rsea_ros.experiment.fits import fit_cause, repeat_fits
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.prior import problem_of, weights_of
 from rsea_ros.identification.problem import Case, case_from
@@ -128,7 +128,7 @@ def weigh(
     solutions = {NOTHING: nominal}
     for name in (n for n in names if n != NOTHING):
         solutions[name] = fit_cause(name, problem_of(name, rig, cases), _where(before, name), near, run)
-    return _weigh(fitted_again(solutions, run), cases)
+    return _weigh(repeat_fits(solutions, run), cases)
 
 
 def _where(before: RunWeighing | None, name: str) -> FloatArray | None:

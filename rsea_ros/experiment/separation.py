@@ -25,12 +25,12 @@ ENOUGH = 12.0
 
 def separation(true: Response, rival: Response, information: FloatArray) -> float:
     """Return S of a rival, with the priors of its numbers."""
-    left = rival.predicted - true.if_there
-    if not np.isfinite(left).all():
+    difference = rival.predicted - true.if_there
+    if not np.isfinite(difference).all():
         return 0.0
-    slope = rival.slope.T @ left
+    slope = rival.slope.T @ difference
     reached = np.linalg.solve(rival.slope.T @ rival.slope + information, slope)
-    return max(float(left @ left - slope @ reached), 0.0)
+    return max(float(difference @ difference - slope @ reached), 0.0)
 
 
 def separations(hypotheses: Sequence[Hypothesis], responses: Sequence[Response]) -> FloatArray:
@@ -64,8 +64,8 @@ def refit(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial) ->
 
     case: the run, as run_case makes it. Gauss-Newton from the rival's values, steps halved where they fail.
     """
-    seen = replace(true.problem, cases=(case,)).outputs(true.if_there())[0]
-    problem = replace(rival.problem, cases=(replace(case, measured=seen),))
+    predicted = replace(true.problem, cases=(case,)).outputs(true.if_there())[0]
+    problem = replace(rival.problem, cases=(replace(case, measured=predicted),))
     low, high = rival.bounds()
     theta, start, known = rival.theta, rival.theta, rival.information
     residual = problem.residual(theta)

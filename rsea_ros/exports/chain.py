@@ -114,7 +114,7 @@ def chain_of(rig: Rig) -> Chain:
         joints.append(Joint("spring", "chassis", "distal", *spring))
     links.append(Link("rotor", rotor_inertia(rig)))
     joints.append(Joint("rotor", base, "rotor", mimics="gear", multiplier=train_ratio(rig)))
-    return Chain(tuple(links), tuple(joints), _left_out(rig))
+    return Chain(tuple(links), tuple(joints), _omitted_elements(rig))
 
 
 def check_rotary(rig: Rig) -> None:
@@ -151,7 +151,7 @@ def _to_world(rig: Rig, end: str, name: str) -> Joint:
     return Joint(end, WORLD, name, rig[f"{end}.damping"], rig[f"{end}.stiffness"])
 
 
-def _left_out(rig: Rig) -> dict[str, str]:
+def _omitted_elements(rig: Rig) -> dict[str, str]:
     """Return the elements between parts that are not neighbours in the chain."""
     left = {}
     free = [end for end in ("housing_end", "spring_end") if rig.end_is_free(end)]

@@ -26,7 +26,7 @@ def say_loop(rig: Rig, root: xml.Element) -> tuple[Represented, list[Omitted]]:
     if math.isfinite(limit):
         first.set("forcerange", f"{-limit!r} {limit!r}")
     how = "pid actuator, " + ", ".join(f"{name} {value:g}" for name, value in gains.items())
-    return Represented(f"{rig.loop} loop", how), list(_left_out(rig))
+    return Represented(f"{rig.loop} loop", how), list(_omitted_terms(rig))
 
 
 def _gains(rig: Rig) -> dict[str, float]:
@@ -38,7 +38,7 @@ def _gains(rig: Rig) -> dict[str, float]:
     return {name: value for name, value in named.items() if value}
 
 
-def _left_out(rig: Rig) -> Iterator[Omitted]:
+def _omitted_terms(rig: Rig) -> Iterator[Omitted]:
     if rig.encoder_end == "spring_end":
         why = "an actuator's loop closes over its own tendon, that of the gear output"
         yield Omitted("encoder at the spring's end", why)

@@ -55,8 +55,8 @@ def _columns(solution: Solution) -> dict[str, FloatArray]:
     problem = solution.problem
     measured = [n for n in problem.channels if any(n in case.measured for case in problem.cases)]
     timed = [n for n in measured if n != "motor_torque"]
-    made = clock_columns(problem, solution.theta, clocks(timed, problem.rig))
-    return dict(zip(timed, made.T, strict=True))
+    columns = clock_columns(problem, solution.theta, clocks(timed, problem.rig))
+    return dict(zip(timed, columns.T, strict=True))
 
 
 def _case_of(problem: Problem) -> FloatArray:

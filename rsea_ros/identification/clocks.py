@@ -59,20 +59,21 @@ def required_clocks(solution: Solution, run: Map = serial) -> RequiredClocks:
         return RequiredClocks()
     channels = sorted({n for case in problem.cases for n in problem.present(case)})
     free = {u.name for u in problem.unknowns}
-    left = [u for u in (*clocks(channels, problem.rig), *clock_rates(channels)) if u.name not in free]
-    columns, blocks = clock_columns(problem, solution.theta, left, run), sample_blocks(problem, DEFAULT.block)
-    taken: list[int] = []
-    for _ in left:
-        rest = [i for i in range(len(left)) if i not in taken]
-        z = [_score(solution, columns, [*taken, i], left, blocks) for i in rest]
+    fixed = [u for u in (*clocks(channels, problem.rig), *clock_rates(channels)) if u.name not in free]
+    columns = clock_columns(problem, solution.theta, fixed, run)
+    blocks = sample_blocks(problem, DEFAULT.block)
+    chosen: list[int] = []
+    for _ in fixed:
+        rest = [i for i in range(len(fixed)) if i not in chosen]
+        z = [_score(solution, columns, [*chosen, i], fixed, blocks) for i in rest]
         if max(z) < ASKED:
             break
-        taken.append(rest[int(np.argmax(z))])
-    if _remainder(solution, columns[:, taken], [left[i] for i in taken]) > MISFIT:
-        taken = [i for i in taken if not left[i].is_rate]
-    others = [i for i, c in enumerate(left) if not c.is_rate and i not in taken]
+        chosen.append(rest[int(np.argmax(z))])
+    if _remainder(solution, columns[:, chosen], [fixed[i] for i in chosen]) > MISFIT:
+        chosen = [i for i in chosen if not fixed[i].is_rate]
+    others = [i for i, c in enumerate(fixed) if not c.is_rate and i not in chosen]
     return RequiredClocks(
-        tuple(left[i] for i in taken), _cost(solution, columns[:, others], [left[i] for i in others])
+        tuple(fixed[i] for i in chosen), _cost(solution, columns[:, others], [fixed[i] for i in others])
     )
 
 
@@ -87,10 +88,10 @@ def with_drifts(solution: Solution, run: Map = serial) -> Solution:
         return solution
     for theta in (solution.theta, start_vector(problem.unknowns)):
         rates = _drifts(problem, theta)
-        asked = clock_rates(sorted(rates))
-        begin = np.concatenate([theta, [rates[u.name.split(".")[1]] for u in asked]])
-        free = replace(problem, unknowns=(*problem.unknowns, *asked))
-        if asked and _rms(drifting := solve(free, begin, run=run)) <= MISFIT:
+        added = clock_rates(sorted(rates))
+        begin = np.concatenate([theta, [rates[u.name.split(".")[1]] for u in added]])
+        free = replace(problem, unknowns=(*problem.unknowns, *added))
+        if added and _rms(drifting := solve(free, begin, run=run)) <= MISFIT:
             return drifting
     return solution
 
@@ -111,10 +112,10 @@ def _rms(solution: Solution) -> float:
     return float(np.sqrt(np.mean(solution.residual**2)))
 
 
-def free_clocks(solution: Solution, asked: RequiredClocks) -> tuple[Problem, FloatArray]:
+def free_clocks(solution: Solution, required: RequiredClocks) -> tuple[Problem, FloatArray]:
     """Return the problem of a fit with the required clocks among its unknowns, and its start."""
-    problem = replace(solution.problem, unknowns=(*solution.problem.unknowns, *asked.clocks))
-    return problem, np.concatenate([solution.theta, np.zeros(len(asked.clocks))])
+    problem = replace(solution.problem, unknowns=(*solution.problem.unknowns, *required.clocks))
+    return problem, np.concatenate([solution.theta, np.zeros(len(required.clocks))])
 
 
 def without_needless(solution: Solution) -> tuple[Problem, FloatArray]:
@@ -130,11 +131,14 @@ def without_needless(solution: Solution) -> tuple[Problem, FloatArray]:
 
 
 def _score(
-    solution: Solution, columns: FloatArray, which: Sequence[int], left: Sequence[Unknown], blocks: IntArray
+    solution: Solution, columns: FloatArray, which: Sequence[int], fixed: Sequence[Unknown], blocks: IntArray
 ) -> float:
-    """Return |z| of the last of some clocks, beside the fit's unknowns and the clocks before it."""
+    """Return |z| of the last of some clocks, beside the fit's unknowns and the clocks before it.
+
+    fixed: the clocks that the fit has not freed; which: some of them, by place.
+    """
     base = np.column_stack([solution.jacobian, columns[:, list(which[:-1])]])
-    known = (*solution.problem.unknowns, *(left[i] for i in which[:-1]))
+    known = (*solution.problem.unknowns, *(fixed[i] for i in which[:-1]))
     normal = base.T @ base + np.diag([u.doubt**-2 for u in known])
     column = columns[:, which[-1]]
     column = column - base @ np.linalg.lstsq(normal, base.T @ column, rcond=None)[0]
@@ -148,10 +152,10 @@ def _score(
     return abs(total) / math.sqrt(max(float(scores @ scores), information))
 
 
-def _remainder(solution: Solution, columns: FloatArray, taken: Sequence[Unknown]) -> float:
+def _remainder(solution: Solution, columns: FloatArray, chosen: Sequence[Unknown]) -> float:
     """Return the RMS over the noise of the residual with some clocks free, by the derivatives."""
     base = np.column_stack([solution.jacobian, columns])
-    known = (*solution.problem.unknowns, *taken)
+    known = (*solution.problem.unknowns, *chosen)
     normal = base.T @ base + np.diag([u.doubt**-2 for u in known])
     step = np.linalg.lstsq(normal, base.T @ solution.residual, rcond=None)[0]
     return float(np.sqrt(np.mean((solution.residual - base @ step) ** 2)))

@@ -38,21 +38,21 @@ def is_noise(
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
     False where the record is too short to decide.
     """
-    left = residual_of(case, outputs, channel)
-    if len(left) < rule.fewest or not np.any(left):
+    residual = residual_of(case, outputs, channel)
+    if len(residual) < rule.fewest or not np.any(residual):
         return False
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
-    if _lasting_share(left) > rule.lasting or _slow(left, rate) > rule.slow:
+    if _lasting_share(residual) > rule.lasting or _slow(residual, rate) > rule.slow:
         return False
-    spectra = segment_spectra(left, _LONG, 8)
+    spectra = segment_spectra(residual, _LONG, 8)
     shape = shape_of(spectra)
     if shape.off > rule.shape or _unsteady(spectra, shape, rate) > rule.unsteady:
         return False
-    if _kurtosis(shape, left) > rule.spiky:
+    if _kurtosis(shape, residual) > rule.spiky:
         return False
-    seen = segment_spectra(left, _SHORT, 16)
+    short_spectra = segment_spectra(residual, _SHORT, 16)
     others = (segment_spectra(w, _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
-    return all(_coherent_share(seen, other, rate) < rule.shared for other in others)
+    return all(_coherent_share(short_spectra, other, rate) < rule.shared for other in others)
 
 
 def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:

@@ -133,12 +133,12 @@ def _prefer_even(
 ) -> set[str]:
     """Return the channels with a smaller residual on the even clock: each sensor, the command by all."""
     sensors = set(changed) - {"command"}
-    chosen, left = _sensors_preferred(record, steady, sensors, rig, solution)
+    chosen, stamped = _sensors_preferred(record, steady, sensors, rig, solution)
     if "command" not in changed:
         return chosen
     driven = _with_channels_of(record, steady, ["command"])
     others, even = _sensors_preferred(driven, steady, sensors, rig, solution)
-    falls = [even[n] / max(left[n], _TINY) for n in left.keys() & even.keys() - {"motor_torque"}]
+    falls = [even[n] / max(stamped[n], _TINY) for n in stamped.keys() & even.keys() - {"motor_torque"}]
     return {"command", *others} if falls and min(falls) < _FALL and max(falls) < _NO_WORSE else chosen
 
 

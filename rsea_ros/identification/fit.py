@@ -64,9 +64,9 @@ def fit(
         solution, problem = drifting, drifting.problem
         outputs = problem.outputs(solution.theta)
         known = _with_noise_of(problem, outputs)
-    asked = required_clocks(solution, run)
-    if asked.clocks:
-        solution = solve(*free_clocks(solution, asked), run=run)
+    required = required_clocks(solution, run)
+    if required.clocks:
+        solution = solve(*free_clocks(solution, required), run=run)
         solution = solve(*without_needless(solution), run=run)
         problem = solution.problem
         outputs = problem.outputs(solution.theta)
@@ -78,7 +78,7 @@ def fit(
         cases = tuple(reweight(c, ratios) for c in solution.problem.cases)
         solution = solve(replace(problem, cases=cases), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
-    return solution, known, asked
+    return solution, known, required
 
 
 def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:

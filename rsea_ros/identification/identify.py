@@ -64,12 +64,12 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
     with worker_pools() as pools:
-        solution, cases, asked = fit(cases, rig, run=pools.run, start=_start(records[0], rig, responses))
+        solution, cases, required = fit(cases, rig, run=pools.run, start=_start(records[0], rig, responses))
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
         while misfits and (more := even_out(steady.records, rig, solution)).scatter:
             steady = Evened(more.records, {**steady.scatter, **more.scatter})
             cases = tuple(case_from(record, rig) for record in steady.records)
-            solution, cases, asked = fit(cases, rig, run=pools.run, start=identified_rig(solution, ()))
+            solution, cases, required = fit(cases, rig, run=pools.run, start=identified_rig(solution, ()))
             misfits = _misfits(solution, cases)
         report("confidence", 0.8)
         outputs = solution.problem.outputs(solution.theta)
@@ -81,7 +81,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     return replace(
         result,
         remarks=(*steady.remarks, *result.remarks),
-        clocks=asked.remarks,
+        clocks=required.remarks,
     )
 
 

@@ -97,5 +97,5 @@ def _lag_of(
         if size == 0.0:
             return begin, 0.0
         lag = float(np.clip(lag - float(slopes @ off) / size, begin - far, begin + far))
-    left = y - np.interp(t - lag, at, p)
-    return lag, 1.0 - float(np.var(left)) / max(float(np.var(y)), 1e-300)
+    residual = y - np.interp(t - lag, at, p)
+    return lag, 1.0 - float(np.var(residual)) / max(float(np.var(y)), 1e-300)

@@ -36,8 +36,8 @@ def torque_size(case: Case, rig: Rig) -> float:
     """
     if rig.loop is None:
         shown = [_largest(case, n) for n in ("motor_torque", "ft") if n in case.measured]
-        asked = [_quantile(case.drive.command)] if isinstance(case.drive, Drive) else []
-        return max([*asked, *shown], default=0.0)
+        commanded = [_quantile(case.drive.command)] if isinstance(case.drive, Drive) else []
+        return max([*commanded, *shown], default=0.0)
     if "motor_torque" in case.measured:
         return _largest(case, "motor_torque")
     return _torque_of_errors(case, rig)

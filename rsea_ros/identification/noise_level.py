@@ -37,19 +37,19 @@ def reestimate_noise(
     only where every channel above its white noise passes for noise: a misfit seldom shows in one alone.
     """
     channels = [n for n in case.measured if n in outputs and case.mask[n].any()]
-    left = {n: residual_of(case, outputs, n) for n in channels}
-    rms = {n: float(np.sqrt(np.mean(left[n][case.mask[n]] ** 2))) for n in channels}
+    residuals = {n: residual_of(case, outputs, n) for n in channels}
+    rms = {n: float(np.sqrt(np.mean(residuals[n][case.mask[n]] ** 2))) for n in channels}
     noise = dict(case.noise)
     for n in channels:
-        white, is_white = top_of_band(left[n], _seams(case, n), rule)
-        seen = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
-        noise[n] = max(min(noise[n], seen), case.least.get(n, 0.0))
+        white, is_white = top_of_band(residuals[n], _seams(case, n), rule)
+        level = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
+        noise[n] = max(min(noise[n], level), case.least.get(n, 0.0))
     above = [n for n in channels if rms[n] > rule.above * noise[n]]
     if not above or not all(is_noise(case, outputs, n, ratio, rule) for n in above):
         return replace(case, noise=noise, coloured=frozenset())
     coloured = frozenset(n for n in above if rms[n] > _surely_above(case, n, rule) * noise[n])
     for n in above:
-        noise[n] = rms[n] * (1.0 + 2.0 * _doubt(case, left[n], n) if n in coloured else 1.0)
+        noise[n] = rms[n] * (1.0 + 2.0 * _doubt(case, residuals[n], n) if n in coloured else 1.0)
     return replace(case, noise=noise, coloured=coloured)
 
 
@@ -68,13 +68,13 @@ def _surely_above(case: Case, channel: str, rule: NoiseSettings) -> float:
     return max(rule.above, 1.0 + rule.sure * _WHITE_DOUBT / float(np.sqrt(samples)))
 
 
-def _doubt(case: Case, left: FloatArray, channel: str) -> float:
+def _doubt(case: Case, residual: FloatArray, channel: str) -> float:
     """Return the relative standard deviation of the RMS of a residual, from how it varies over time."""
     keep = case.mask[channel]
     block = np.floor((case.t[channel][keep] - case.start) / _BLOCK).astype(np.int64)
     block -= block.min()
     counts = np.bincount(block)
-    power = (np.bincount(block, left[keep] ** 2) / np.maximum(counts, 1))[counts > 0]
+    power = (np.bincount(block, residual[keep] ** 2) / np.maximum(counts, 1))[counts > 0]
     if len(power) < 2 or power.mean() == 0.0:
         return 0.0
     return float(0.5 * power.std() / power.mean() / np.sqrt(len(power)))

@@ -61,6 +61,17 @@ class Case:
             mask={n: m[samples[n]] for n, m in self.mask.items()},
         )
 
+    def with_noise(self, noise: Mapping[str, float]) -> Case:
+        """Return the case with the channels of another noise only, weighted by it."""
+        channels = [n for n in self.t if n in noise]
+        return replace(
+            self,
+            t={n: self.t[n] for n in channels},
+            measured={n: self.measured[n] for n in channels},
+            noise={n: noise[n] for n in channels},
+            mask={n: self.mask[n] for n in channels},
+        )
+
     @property
     def start(self) -> float:
         """Record time at which the case begins, s."""
@@ -162,14 +173,14 @@ def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
 
 
 def simulate_cases(
-    cases: Sequence[Case], rig: Rig, clocks: Clocks, *, ride: bool = False
+    cases: Sequence[Case], rig: Rig, clocks: Clocks, *, on_angle: bool = False
 ) -> list[dict[str, FloatArray]]:
     """Return the simulated channels of cases, sensors read as their clocks have it.
 
     A channel whose zero is unknown comes with the measured mean.
     """
     drives = [_shift(c.drive, clocks) for c in cases if isinstance(c.drive, Drive)]
-    simulations = iter(simulate_drives(rig, drives, ride=ride))
+    simulations = iter(simulate_drives(rig, drives, on_angle=on_angle))
     return [
         {"motor_torque": inverse_torque(rig, c.drive)}
         if isinstance(c.drive, Motion)
@@ -206,6 +217,7 @@ def weighted_residual(case: Case, outputs: Mapping[str, FloatArray], channels: S
 class Problem:
     """Records, the rig, and the unknowns. channels: of the residual.
 
+    on_angle: effects of the rotor's angle act along the measured one.
     stated: names of the effects that belong to the nominal rig; a search adds others beside them.
     newest: name of the effect that the search added last; empty for none.
     """
@@ -214,7 +226,7 @@ class Problem:
     rig: Rig
     unknowns: tuple[Unknown, ...]
     channels: tuple[str, ...]
-    ride: bool = False
+    on_angle: bool = False
     stated: frozenset[str] = frozenset()
     newest: str = ""
 
@@ -231,7 +243,7 @@ class Problem:
     def outputs(self, theta: FloatArray) -> list[dict[str, FloatArray]]:
         """Return the simulated channels of every case at theta."""
         rig, clocks = apply(self.rig, self.unknowns, theta)
-        return simulate_cases(self.cases, rig, clocks, ride=self.ride)
+        return simulate_cases(self.cases, rig, clocks, on_angle=self.on_angle)
 
     def residual_of(self, outputs: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
         """Return the weighted residuals of all cases, shape (m,)."""

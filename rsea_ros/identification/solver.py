@@ -88,8 +88,8 @@ def jacobian_columns(
 
     columns = dict(zip(others, run(column, others), strict=True))
     if clocks:
-        made = clock_columns(problem, theta, tuple(clocks.values()), run)
-        columns |= dict(zip(clocks, made.T, strict=True))
+        of_clocks = clock_columns(problem, theta, tuple(clocks.values()), run)
+        columns |= dict(zip(clocks, of_clocks.T, strict=True))
     return np.column_stack([columns[i] for i in which]) if len(which) else np.empty((len(residual), 0))
 
 
@@ -119,7 +119,7 @@ def _read_later(problem: Problem, theta: FloatArray, delay: float) -> FloatArray
     """Return the weighted residuals with every sensor read `delay` s later than it was."""
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
     shifted = clocks.move(delay, problem.channels)
-    return problem.residual_of(simulate_cases(problem.cases, rig, shifted, ride=problem.ride))
+    return problem.residual_of(simulate_cases(problem.cases, rig, shifted, on_angle=problem.on_angle))
 
 
 def central_jacobian(problem: Problem, theta: FloatArray, run: Map = serial) -> FloatArray:

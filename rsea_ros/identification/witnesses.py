@@ -27,8 +27,8 @@ def witnesses(
     t = case.t[channel]
     for n in case.measured.keys() & outputs.keys():
         if n != channel and {n, channel} != _ONE_SENSOR:
-            left = np.where(case.mask[n], case.measured[n] - outputs[n], 0.0)
-            yield np.interp(t, case.t[n], left)
+            residual = np.where(case.mask[n], case.measured[n] - outputs[n], 0.0)
+            yield np.interp(t, case.t[n], residual)
     command, q, v, load = _motion(case, outputs, t)
     late = (t - t.mean()) / max(float(np.ptp(t)), 1e-9)
     yield command

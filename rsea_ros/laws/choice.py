@@ -41,9 +41,9 @@ def make_search(base: Base) -> Search:
     problem, theta = base.problem, base.solution.theta
     rows = rows_of(problem, theta)
     cases = tuple(case_model(problem, theta, c, o) for c, o in zip(base.cases, base.outputs, strict=True))
-    made = candidates_of(cases)
-    gram = gram_of(rows, columns_of(rows, cases, made))
-    return Search(base, cases, tuple(c for c, _ in made), gram)
+    candidates = candidates_of(cases)
+    gram = gram_of(rows, columns_of(rows, cases, candidates))
+    return Search(base, cases, tuple(c for c, _ in candidates), gram)
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def _is_sure(gain: FloatArray, errors: float, worse: float) -> bool:
     return gain.sum() > 0.0 and bool(gain.sum() > errors * standard_error(gain) or lost < worse * won)
 
 
-def tried_of(search: Search, choice: Choice, taken: Sequence[SparseLaw]) -> tuple[Tried, ...]:
+def summarize_models(search: Search, choice: Choice, taken: Sequence[SparseLaw]) -> tuple[Tried, ...]:
     """Return the compared models with their held-out residuals over that of the base."""
     gram, first = search.gram, len(search.gram.prior)
     none = gram.held_out(np.array([], np.int64))
@@ -126,7 +126,7 @@ def tried_of(search: Search, choice: Choice, taken: Sequence[SparseLaw]) -> tupl
     rows = []
     for model in choice.compared:
         terms = [search.candidates[k - first].term for k in model.columns]
-        left = float((model.left[SELECTION] @ weight).sum()) / whole
-        rows.append(Tried(model.place, tuple(t.name for t in terms if t), float(np.sqrt(max(left, 0.0))),
+        share = float((model.left[SELECTION] @ weight).sum()) / whole
+        rows.append(Tried(model.place, tuple(t.name for t in terms if t), float(np.sqrt(max(share, 0.0))),
                           any(model is t for t in taken)))  # fmt: skip
     return tuple(rows)

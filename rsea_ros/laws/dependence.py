@@ -40,35 +40,35 @@ class Dependence:
 
 def families(candidates: Sequence[TermCandidate], first: int) -> dict[tuple[Place, str], list[int]]:
     """Return the columns of splines over every variable, and of memories where a spline is impossible."""
-    made: dict[tuple[Place, str], list[int]] = {}
+    columns: dict[tuple[Place, str], list[int]] = {}
     for k, c in enumerate(candidates):
         if c.part is not None:
-            made.setdefault((c.place, c.regressor), []).append(first + k)
+            columns.setdefault((c.place, c.regressor), []).append(first + k)
     for k, c in enumerate(candidates):
         if c.term is not None and (
-            (c.place, c.regressor) not in made or c.term.memory or c.term.shape == "cycles_per_revolution"
+            (c.place, c.regressor) not in columns or c.term.memory or c.term.shape == "cycles_per_revolution"
         ):
-            made.setdefault((c.place, c.regressor), []).append(first + k)
-    return made
+            columns.setdefault((c.place, c.regressor), []).append(first + k)
+    return columns
 
 
 def dependences(
     gram: Gram, candidates: Sequence[TermCandidate], given: Sequence[int] = ()
 ) -> tuple[Dependence, ...]:
     """Return the dependences of the residual, the largest first. given: columns of a law that acts."""
-    made = families(candidates, len(gram.prior))
+    groups = families(candidates, len(gram.prior))
     none = gram.held_out(np.array([], np.int64))
     law = gram.held_out(np.array([*given], np.int64)) if given else none
     weight, near = gram.weights(none, SELECTION), gram.weights(law, SELECTION)
     result = []
-    for key, columns in made.items():
+    for key, columns in groups.items():
         alone = (none - gram.held_out(np.array(columns), _RIDGE))[SELECTION] @ weight
         more = [k for k in columns if k not in given]
         beside = (law - gram.held_out(np.array([*given, *more]), _RIDGE))[SELECTION] @ near
-        left = float((law[SELECTION] @ near).sum())
+        power = float((law[SELECTION] @ near).sum())
         room = max(float(((none - gram.count)[SELECTION] @ weight).sum()), 1e-9)
         result.append(
             Dependence(*key, float(alone.sum()) / room, standard_error(alone) / room,
-                       float(beside.sum()) / left, standard_error(beside) / left)
+                       float(beside.sum()) / power, standard_error(beside) / power)
         )  # fmt: skip
     return tuple(sorted(result, key=lambda d: -d.share))

@@ -61,7 +61,7 @@ def finish_laws(
             continue
         intervals = {n: refined.ci95[f"{name}.{n}"] for n in values if f"{name}.{n}" in refined.ci95}
         law = draft.law if draft.law.is_learnt else draft.law.with_parameters(values, intervals)
-        shown = shown_of(problem, refined, law, values)
+        shown = torque_points(problem, refined, law, values)
         whole = len(law.parts) == len(draft.law.parts)
         effect = draft.effect if whole else effect_from(Draft.source(law), law.name)
         with lend(effect):
@@ -72,7 +72,7 @@ def finish_laws(
     return written
 
 
-def shown_of(problem: Problem, refined: Refined, law: Law, values: dict[str, float]) -> FigurePoints:
+def torque_points(problem: Problem, refined: Refined, law: Law, values: dict[str, float]) -> FigurePoints:
     """Return the missing torque of the fitted model without a law, over the law's variable."""
     off = {n: 0.0 if n in _sizes(law) else v for n, v in values.items()}
     rig = problem.rig

@@ -42,8 +42,8 @@ class Gram:
     def by_set(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The sums a, b and rr of each set of blocks, channels apart."""
         sets = range(4)
-        made = ([v[groups_of((k,))].sum(axis=0) for k in sets] for v in (self.a, self.b, self.rr))
-        a, b, rr = (np.array(v) for v in made)
+        sums = ([v[groups_of((k,))].sum(axis=0) for k in sets] for v in (self.a, self.b, self.rr))
+        a, b, rr = (np.array(v) for v in sums)
         return a, b, rr
 
     @property
@@ -69,8 +69,8 @@ class Gram:
         penalty = np.zeros(len(which))
         penalty[: len(self.prior)] = (self.prior * self.scale[: len(self.prior)] ** -1.0) ** 2
         for _ in range(_REWEIGHTINGS):
-            left = rr - 2.0 * b @ beta + np.einsum("i,cij,j->c", beta, a, beta)
-            weight = 1.0 / np.maximum(left / count, 1.0)
+            squares = rr - 2.0 * b @ beta + np.einsum("i,cij,j->c", beta, a, beta)
+            weight = 1.0 / np.maximum(squares / count, 1.0)
             normal = np.tensordot(weight, a, 1)
             normal = normal + np.diag(penalty + ridge * np.diag(normal) + 1e-30)
             beta = np.linalg.solve(normal, weight @ b)

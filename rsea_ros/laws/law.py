@@ -72,14 +72,14 @@ class Law:
     @property
     def names(self) -> list[tuple[str, str]]:
         """Names of the coefficient and shape of each term; a second one of a name gets a number."""
-        seen: dict[str, int] = {}
+        counts: dict[str, int] = {}
 
         def unique(name: str) -> str:
-            seen[name] = seen.get(name, 0) + 1
-            return name if seen[name] == 1 else f"{name}_{seen[name]}"
+            counts[name] = counts.get(name, 0) + 1
+            return name if counts[name] == 1 else f"{name}_{counts[name]}"
 
         shared: dict[float, str] = {}
-        made = []
+        names = []
         for part in self.parts:
             name = unique(part.term.name)
             if part.term.shape == "cycles_per_revolution":
@@ -87,8 +87,8 @@ class Law:
                 shared[part.shape] = shape
             else:
                 shape = unique(part.term.shape) if part.term.shape else ""
-            made.append((name, shape))
-        return made
+            names.append((name, shape))
+        return names
 
     def with_parameters(self, values: Mapping[str, float], ci95: Mapping[str, tuple[float, float]]) -> Law:
         """Return the law with fitted parameters and their intervals, by name."""

@@ -11,7 +11,7 @@ from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws.assembly import curve_of, law_of
 from rsea_ros.laws.base import Base, fitted_base, levels_of
-from rsea_ros.laws.choice import MATTERS, Choice, Search, chosen_models, make_search, tried_of
+from rsea_ros.laws.choice import MATTERS, Choice, Search, chosen_models, make_search, summarize_models
 from rsea_ros.laws.dependence import Dependence, dependences
 from rsea_ros.laws.effect_source import LawProvenance
 from rsea_ros.laws.file import Draft, finish_laws
@@ -71,7 +71,7 @@ def _result(
         refined = refined_laws(base, drafts) if drafts else None
         if refined is None or gain_on_tests(base, refined)[0] < MATTERS:
             return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,
-                           tried=tried_of(search, choice, ()))  # fmt: skip
+                           tried=summarize_models(search, choice, ()))  # fmt: skip
         gain, ci95 = gain_on_tests(base, refined)
         before, noise = levels_of(base.problem, base.outputs, base.cases)
         problem = replace(refined.solution.problem, cases=base.cases)
@@ -85,7 +85,7 @@ def _result(
         rig_name=rigs[0].name, sources=tuple(r.source for r in records),
         duration=sum(c.duration for c in base.cases), base_rig=rigs[0],
         rig=_with_files(rigs[1], rigs[0], written),
-        dependences=tuple(depends), tried=tried_of(search, choice, choice.taken), laws=tuple(written),
+        dependences=tuple(depends), tried=summarize_models(search, choice, choice.taken), laws=tuple(written),
         gain=gain, gain_ci95=ci95, share=share, before=before, after=after, noise=noise, at_floor=False,
     )  # fmt: skip
 

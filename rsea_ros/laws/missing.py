@@ -56,10 +56,10 @@ def missing_torque(
     size = 2 * count
     answer = _pulse_answers(injector, period, count, place)
     spectra = {n: np.fft.rfft(answer[n], size) for n in used}
-    seen = {n: np.fft.rfft(_on_grid(case, residual[n], n, drive.start + t), size) for n in used}
+    residuals = {n: np.fft.rfft(_on_grid(case, residual[n], n, drive.start + t), size) for n in used}
     noise = {n: case.noise[n] ** 2 for n in used}
     information: FloatArray = np.sum([np.abs(spectra[n]) ** 2 / noise[n] for n in used], axis=0)
-    right = np.sum([np.conj(spectra[n]) * seen[n] / noise[n] for n in used], axis=0)
+    right = np.sum([np.conj(spectra[n]) * residuals[n] / noise[n] for n in used], axis=0)
     prior = _prior(right, information, count)
     d = right / (information + 1.0 / prior)
     variance = 1.0 / (information + 1.0 / prior)

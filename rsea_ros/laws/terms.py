@@ -68,9 +68,9 @@ class Term:
     def values(self, variables: Mapping[str, FloatArray], shape: float) -> FloatArray:
         """Return the term over arrays, for a coefficient of 1. variables: by their letters, m included."""
         namespace = {**_ARRAYS, **variables, "a": shape}
-        made = eval(_code(self.expression), {"__builtins__": {}}, namespace)
-        made = made * np.tanh(variables["w"] / CREEP) * -1.0 if self.friction else made
-        return np.broadcast_to(np.asarray(made, np.float64), variables["w"].shape)
+        values = eval(_code(self.expression), {"__builtins__": {}}, namespace)
+        values = values * np.tanh(variables["w"] / CREEP) * -1.0 if self.friction else values
+        return np.broadcast_to(np.asarray(values, np.float64), variables["w"].shape)
 
 
 CREEP = 2e-3
@@ -206,18 +206,18 @@ ENCODER_TERMS = (
 
 def wave_terms(cycles: float) -> tuple[Term, ...]:
     """Return terms that repeat with the rotor's angle, so often a turn: torque, stiffness, encoder error."""
-    made = []
+    terms = []
     for name, f in (("sine", "sin"), ("cosine", "cos")):
         wave, shown = f"{f}(a * theta)", f"{f}({{a}}·θ)"
         shape = ("cycles_per_revolution", "1", "", (cycles,))
-        made += [
+        terms += [
             Term(name, "gear", "position, periodic", wave, shown, "N m", *shape),
             Term(f"spring_{name}", "spring", "deflection and position, periodic", f"d * {wave}",
                  f"d·{shown}", "N m/rad", *shape),
             Term(f"angle_{name}", "encoder", "position, periodic, at the encoder", wave, shown, "rad",
                  *shape),
         ]  # fmt: skip
-    return tuple(made)
+    return tuple(terms)
 
 
 def hum_terms(frequency: float) -> tuple[Term, ...]:
@@ -231,7 +231,7 @@ def hum_terms(frequency: float) -> tuple[Term, ...]:
 
 def mode_terms(frequencies: Sequence[float]) -> tuple[Term, ...]:
     """Return terms of a mode that the load or the deflection shakes, and of a drive that overshoots."""
-    made = []
+    terms = []
     for name, zeta, tried in (
         *((f"mode_{round(100 * z)}", z, tuple(frequencies)) for z in (0.02, 0.05, 0.12)),
         *((f"overshoot_{round(100 * z)}", z, (12.0, 20.0, 32.0, 50.0, 80.0)) for z in (0.2, 0.4, 0.7)),
@@ -242,9 +242,9 @@ def mode_terms(frequencies: Sequence[float]) -> tuple[Term, ...]:
             ("command", "u", "command's past", "1"), ("motor", "u", "command's past", "1"),
         ):  # fmt: skip
             if tried and slow == (place in ("ft", "spring")):
-                made.append(
+                terms.append(
                     Term(f"{name}_percent", cast(Place, place), regressor, f"m - {letter}",
                          f"(mode({letter}, {{a}}, ζ = {zeta:g}) - {letter})", unit, "mode_frequency", "Hz",
                          "", tried, memory="ring", constant=zeta)
                 )  # fmt: skip
-    return tuple(made)
+    return tuple(terms)

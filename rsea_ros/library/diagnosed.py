@@ -115,7 +115,7 @@ def diagnose(
     IdentificationError for records that cannot be diagnosed, RigError for the rig. Method: docs/diagnosis.md.
     Not to be confused with identify, which trusts the structure of the rig and fits only its values.
     """
-    from rsea_ros.checks.carried import held_against
+    from rsea_ros.checks.carried import with_check_faults
     from rsea_ros.checks.usable import check_diagnosable
     from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
     from rsea_ros.library.inputs import records_of
@@ -124,7 +124,7 @@ def diagnose(
     rig, records = load_rig(rig), records_of(data)
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
-    carrying = [held_against(record, rig, masks=True) for record in records]
+    carrying = [with_check_faults(record, rig, masks=True) for record in records]
     with shown_in_notebook(progress) as say:
         result = diagnose_records(carrying, rig, holdout, say, settings=settings)
     return Diagnosed(result, records[0])

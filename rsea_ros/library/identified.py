@@ -100,12 +100,12 @@ def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progr
     output error, docs/architecture.md.
     Not to be confused with diagnose, which also searches for effects that the rig lacks.
     """
-    from rsea_ros.checks.carried import held_against
+    from rsea_ros.checks.carried import with_check_faults
     from rsea_ros.identification.identify import identify as identify_records
     from rsea_ros.library.inputs import records_of, without_missing
     from rsea_ros.library.notebook_progress import shown_in_notebook
 
     rig = load_rig(rig)
-    records = [without_missing(held_against(r, rig, masks=False)) for r in records_of(data)]
+    records = [without_missing(with_check_faults(r, rig, masks=False)) for r in records_of(data)]
     with shown_in_notebook(progress) as say:
         return Fit(identify_records(records, rig, say))

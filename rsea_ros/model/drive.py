@@ -132,8 +132,8 @@ def drive_from(
         )
     knots, torque = in_steps(command.t, start, step), command.y
     if closed_loop:
-        made = "motor_torque" if "motor_torque" in record else "command"
-        torque = torque - np.interp(command.t, *_ty(record[made]))
+        shown = "motor_torque" if "motor_torque" in record else "command"
+        torque = torque - np.interp(command.t, *_ty(record[shown]))
     jumps = hold == "zero"
     means = {"zero": mean_of_held, "first": mean_of_line, "band": partial(mean_of_curve, steps)}
     held = means[hold](knots, torque, count)

@@ -215,7 +215,7 @@ def _undone(machine: Machine, motion: Motion, torque: FloatArray, period: float)
         return torque
     command = torque
     for _ in range(_UNDOINGS):
-        command = command + torque - _made_of(*_parts(machine), command, motion.v)
+        command = command + torque - _command_torque(*_parts(machine), command, motion.v)
     return smooth(command, period)
 
 
@@ -236,15 +236,15 @@ def motor_gains(calls, s, effect_x, count):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _made_of(calls, s, effect_x, command, v):  # type: ignore[no-untyped-def]
+def _command_torque(calls, s, effect_x, command, v):  # type: ignore[no-untyped-def]
     """Return the torque (N m) after the effects at the command, along a motion."""
-    made = np.empty(len(command))
+    torque = np.empty(len(command))
     for k in range(len(command)):
         s[st.TIME], s[st.OUTPUT_VELOCITY] = k * s[st.STEP], v[k]
         s[st.COMMAND] = s[st.CURRENT] = command[k]
         call_port(_COMMAND, calls, s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data)
-        made[k] = s[st.COMMAND]
-    return made
+        torque[k] = s[st.COMMAND]
+    return torque
 
 
 @njit(cache=True, error_model="numpy")

@@ -68,12 +68,12 @@ def _shown_commands(command: Channel, torque: Channel) -> IntArray:
 
 def restarts(record: Record, start: float, step: float, *, from_rest: bool) -> tuple[Restart, ...]:
     """Return where a drive begins anew. start: s, of its first step; from_rest: it began at angle zero."""
-    made = []
+    states = []
     for _, end in gaps(record):
         k = int(np.ceil((end - start) / step))
         position, velocity = state_at(record, end, start + k * step)
-        made.append((k, (position - state_at(record, start, start)[0] * from_rest, velocity)))
-    return tuple(made)
+        states.append((k, (position - state_at(record, start, start)[0] * from_rest, velocity)))
+    return tuple(states)
 
 
 def outside_gaps(record: Record, t: FloatArray, settling: float) -> BoolArray:

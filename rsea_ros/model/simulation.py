@@ -79,12 +79,14 @@ def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
     )
 
 
-def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, FloatArray]:
-    """Return each channel of a drive at its sampling instants. ride: use the measured rotor angle."""
-    return simulate_drives(rig, (drive,), ride=ride)[0]
+def simulate_drive(rig: Rig, drive: Drive, *, on_angle: bool = False) -> dict[str, FloatArray]:
+    """Return each channel of a drive at its sampling instants. on_angle: use the measured rotor angle."""
+    return simulate_drives(rig, (drive,), on_angle=on_angle)[0]
 
 
-def simulate_drives(rig: Rig, drives: Sequence[Drive], *, ride: bool = False) -> list[dict[str, FloatArray]]:
+def simulate_drives(
+    rig: Rig, drives: Sequence[Drive], *, on_angle: bool = False
+) -> list[dict[str, FloatArray]]:
     """Return the channels of several drives of one rig, which is prepared once."""
     machines: dict[tuple[float, float, bool], Machine] = {}
     results = []
@@ -92,13 +94,13 @@ def simulate_drives(rig: Rig, drives: Sequence[Drive], *, ride: bool = False) ->
         kind = (drive.step, drive.drift_time, len(drive.reference) > 0 or rig.loop is not None)
         if kind not in machines:
             machines[kind] = build(rig, kind[0], kind[1], in_loop=kind[2])
-        results.append(_drive_outputs(machines[kind], rig, drive, ride))
+        results.append(_drive_outputs(machines[kind], rig, drive, on_angle))
     return results
 
 
-def _drive_outputs(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, FloatArray]:
+def _drive_outputs(machine: Machine, rig: Rig, drive: Drive, on_angle: bool) -> dict[str, FloatArray]:
     """Return the channels of a drive at their sampling instants, from its own beginning."""
-    ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
+    ridden = _middles(drive.angle) * rig["gear.ratio"] if on_angle else np.empty(0)
     channels = [n for n in drive.at if rig.measures(n)]
     at = {n: _instants(rig, drive, n) for n in channels}
     sampled = {n: np.empty(len(at[n])) for n in channels}
@@ -239,7 +241,7 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     period = float(command.t[-1] - command.t[0]) / (len(command) - 1)
     stamps, blank = command.t + period, np.zeros(len(command))
     names = _logged_channels(rig)
-    asked = Record(
+    blank_record = Record(
         {
             "command" if rig.loop is None else "reference": command,
             **{n: Channel(stamps, blank) for n in names},
@@ -247,10 +249,10 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
         source=rig.name,
     )
     rng = np.random.default_rng([seed, _SENSORS])
-    true = simulate(rig, asked)
+    true = simulate(rig, blank_record)
     _check_bounded(rig, true)
     measured = {n: Channel(stamps, measure(rig, n, true[n], rng) if noise else true[n]) for n in names}
-    return asked.with_channels(**measured)
+    return blank_record.with_channels(**measured)
 
 
 def _check_bounded(rig: Rig, true: Mapping[str, FloatArray]) -> None:

@@ -65,11 +65,11 @@ class Diagnosing:
         self._pool.shutdown()
 
     def _diagnose(self, record: Record) -> Diagnosis:
-        from rsea_ros.checks.carried import held_against
+        from rsea_ros.checks.carried import with_check_faults
         from rsea_ros.diagnosis.diagnose import diagnose
         from rsea_ros.report.diagnosis.files import write_diagnosis
 
-        result = diagnose([held_against(record, self._rig, masks=True)], self._rig, progress=self._tell)
+        result = diagnose([with_check_faults(record, self._rig, masks=True)], self._rig, progress=self._tell)
         self._report = write_diagnosis(result, record, Destination(self._out, fresh=True), write_overlay)
         return result
 

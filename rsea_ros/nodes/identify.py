@@ -119,7 +119,7 @@ class IdentifyNode:
 
     def conclude(self) -> None:
         """Identify and write the results, or do nothing when stopped before."""
-        from rsea_ros.checks.carried import held_against
+        from rsea_ros.checks.carried import with_check_faults
         from rsea_ros.identification.identify import identify
         from rsea_ros.report.identification.files import write_results
 
@@ -127,7 +127,7 @@ class IdentifyNode:
             return
         log = self._node.get_logger()
         log.info(f"identifying from {self._progress_text()}")
-        record = held_against(self._record(), self._rig, self._values["axis"], masks=False)
+        record = with_check_faults(self._record(), self._rig, self._values["axis"], masks=False)
         result = identify([record], self._rig, self._progress)
         report = write_results(result, self._out)
         self._identified = report_of(result, report)

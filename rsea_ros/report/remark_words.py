@@ -24,7 +24,7 @@ _ON_MEASURED_ANGLE = (
 )
 _FIXES = "A measured spring stiffness, the encoder (position), or a known inertia would fix it."
 _FIXES_LOOP = "A measured motor torque, a gain known from the firmware, or a known inertia would fix it."
-_MEASURE = "Measure it apart, or excite it more."
+_MEASURE = "Measure it separately, or excite it more."
 _REMEDY = {
     "spring.damping": "Excitation above the resonance, or F/T sensor with encoder, would determine it.",
     "housing_end.damping": "A free swing of the housing would determine it.",
@@ -57,8 +57,8 @@ def _even_clocks(remark: Remark) -> str:
 
 def _clocks_taken_as_right(remark: Remark) -> str:
     return (
-        "The sensors' clocks are taken as right where the data ask for no correction: each unknown by "
-        f"{1e6 * CLOCK_DOUBT:.0f} µs, they would make the interval of {remark.names[0]} "
+        "The sensors' clocks are taken as right unless the data demand a correction. If each were "
+        f"uncertain by {1e6 * CLOCK_DOUBT:.0f} µs, the interval of {remark.names[0]} would be "
         f"{remark.values[0]:.1f} times as wide."
     )
 

@@ -12,7 +12,7 @@ from independent.excitations import chirp_noise
 from independent.hidden import hide
 from scipy.signal import lfilter
 
-from rsea_ros.checks.carried import held_against
+from rsea_ros.checks.carried import with_check_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side
@@ -133,5 +133,5 @@ def test_where_the_driver_had_a_fault_it_is_named_before_the_dead_sensors():
     fault = Fault("device_fault", "/rsea/driver", np.nan, "no_reply: 3 cycles")
     record = replace(good().with_channels(**still), faults=(fault,))
     with pytest.raises(IdentificationError, match="driver latched a fault, no_reply: 3 cycles; ") as refused:
-        held_against(record, RIG, masks=True)
+        with_check_faults(record, RIG, masks=True)
     assert str(refused.value).count("noise that has nothing to do with the command") == 1

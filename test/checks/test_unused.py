@@ -7,7 +7,7 @@ import pytest
 
 import rsea_ros as rsea
 from msg_adapters import write_record
-from rsea_ros.checks.carried import held_against
+from rsea_ros.checks.carried import with_check_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.cli.main import main
 from rsea_ros.model.rig_file import load_rig
@@ -25,7 +25,7 @@ def run():
 def test_the_check_and_the_record_of_a_fit_say_it(run):
     rig = load_rig("bare_drive")
     assert SENTENCE in check_record(run, rig).of("topics")[0].detail
-    assert held_against(run, rig, masks=False).notes == (SENTENCE,)
+    assert with_check_faults(run, rig, masks=False).notes == (SENTENCE,)
     assert check_record(run, load_rig("paper_high_impedance")).of("topics")[0].detail.count("no use") == 0
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rsea_ros.checks.faults import check
-from rsea_ros.diagnosis.diagnose import nominal_problem
-from rsea_ros.diagnosis.evaluation import HeldOut
+from rsea_ros.diagnosis.diagnose import diagnose, nominal_problem
+from rsea_ros.diagnosis.evaluation import HeldOut, fitted_noise
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig
@@ -18,11 +21,17 @@ from rsea_ros.signals import Channel
 RIG = load_rig("paper_high_impedance")
 
 
-def checked_record(stiffer=1.0, seed=1):
-    """Return a short record of the rig with its stiffness times a factor."""
+def record_of(stiffer=1.0, seed=1, channels=None):
+    """Return a short record of the rig with its stiffness times a factor. channels: all by default."""
     bench = RIG.with_values({"spring.stiffness": stiffer * RIG["spring.stiffness"]})
     u = excitation("chirp", ExcitationSettings(rate=280.0, duration=8.0))
-    return check(synthesize(bench, Channel(np.arange(len(u)) / 280.0, u), seed=seed), RIG)
+    record = synthesize(bench, Channel(np.arange(len(u)) / 280.0, u), seed=seed)
+    kept = channels and {n: record[n] for n in ("command", *channels)}
+    return record if channels is None else replace(record, channels=kept)
+
+
+def checked_record(*args, **more):
+    return check(record_of(*args, **more), RIG)
 
 
 def test_a_held_out_record_takes_the_place_of_the_test_blocks():
@@ -43,3 +52,25 @@ def test_a_simulation_of_the_cases_is_reused_for_their_test_blocks():
     held_out = HeldOut(nominal.cases, RIG, None, DEFAULT)
     again = held_out.score(nominal, theta, nominal.outputs(theta))
     assert again.sums["ft"] == pytest.approx(held_out.score(nominal, theta).sums["ft"])
+
+
+def test_a_channel_that_no_fitted_record_has_is_not_tested():
+    """A held-out run with a velocity, beside one without, ended in a traceback."""
+    nominal = nominal_problem([checked_record(channels=("ft", "position"))], RIG)
+    held_out = HeldOut(nominal.cases, RIG, checked_record(seed=2), DEFAULT)
+    tested = held_out.score(nominal, start_vector(nominal.unknowns))
+    assert set(tested.sums) == {"ft", "position"}
+    assert tested.ratio("position") == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_noise_of_a_channel_is_that_of_the_first_record_with_it():
+    records = [checked_record(channels=("ft",)), checked_record(channels=("ft", "velocity"), seed=2)]
+    cases = nominal_problem(records, RIG).cases
+    noise = fitted_noise(cases)
+    assert noise == {"ft": cases[0].noise["ft"], "velocity": cases[1].noise["velocity"]}
+
+
+def test_a_held_out_record_without_a_fitted_channel_is_refused():
+    fitted, other = record_of(channels=("ft",)), record_of(channels=("position",), seed=2)
+    with pytest.raises(IdentificationError, match=r"has only position; expected one of .* fitted to: ft$"):
+        diagnose([fitted], RIG, other)

@@ -89,7 +89,7 @@ def test_a_simulation_says_which_limits_do_not_apply_to_it():
     device = Device(PROCESS)
     joint = GuardedDevice(device, Limits(64.0, voltage=20.0, current=12.0), 64.0)
     joint.open()
-    assert joint.lifted == ["current", "voltage"]
+    assert joint.lifted == ["current", "voltage"] and joint.guard.limits == Limits(64.0)
     device.reading |= {"voltage": 24.0, "current": 1.0}
     joint.open()
     assert joint.lifted == [], "the limits that were lifted for it are back"
@@ -104,6 +104,12 @@ def test_a_device_that_does_not_answer_is_not_opened(device):
     with pytest.raises(DeviceError):
         GuardedDevice(device, Limits(64.0), 64.0).open()
     assert device.log[-1] == "close"
+
+
+def test_two_lost_answers_do_not_keep_a_device_from_being_opened(device):
+    device.broken = {"read": [LOST] * 2}
+    GuardedDevice(device, Limits(64.0), 64.0).open()
+    assert device.log == ["open", "read", "read", "read"]
 
 
 def test_a_cycle_writes_then_reads_and_beats_before_each(joint, device):
@@ -243,3 +249,14 @@ def test_a_deflection_that_was_measured_must_go_on(device, before, now, fault):
     device.reading = now
     joint.read()
     assert (None if joint.fault is None else str(joint.fault)) == fault
+
+
+@pytest.mark.parametrize("before", [{}, {"deflection": 0.01}])
+def test_opening_forgets_where_the_wrench_came_from(device, before):
+    """A device that was opened again with its F/T sensor would be a fault from its first reading."""
+    joint = GuardedDevice(device, Limits(64.0, temperature=math.inf), 64.0, SPRING)
+    device.reading = before
+    joint.read()
+    device.reading = {"wrench": WRENCH}
+    joint.open()
+    assert joint.read().wrench == WRENCH and joint.fault is None

@@ -109,8 +109,9 @@ def test_a_torque_that_is_being_ramped_down_ends_before_a_fault_is_cleared(joint
     joint.write(9.0, 0.0)
     joint.guard.trip(DeviceFault("command_timeout"))
     device.log.clear()
-    device.broken = {"disable": [refusal]}
-    assert joint.clear() is True
+    device.broken, seen = {"disable": [refusal]}, []
+    device.during = {"recover": lambda: seen.append(joint.guard.torque)}
+    assert joint.clear() is True and seen == [0.0]
     assert [each for each in device.log if "beat" not in each] == ["disable", "recover", "read", "enable"]
     assert "beat False" in device.log or refusal
 

@@ -8,7 +8,14 @@ import pytest
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.limits import DeviceFault, Limits, check_limits, complaint
+from rsea_ros.hardware.limits import (
+    DeviceFault,
+    Limits,
+    check_limits,
+    complaint,
+    unmeasured_quantities,
+    without,
+)
 
 ALL = Limits(68.0, deflection=0.25, temperature=60.0, current=12.0, voltage=20.0, velocity=2.0, position=0.5,
              ft=50.0, power=100.0)  # fmt: skip
@@ -84,6 +91,38 @@ def test_spring_and_motor_are_guarded_by_default(inside, outside, cause):
 )
 def test_a_limit_of_the_machine_that_nobody_states_trips_nothing(far):
     assert complaint(Limits(68.0), far) is None
+
+
+MEASURED = {"temperature": 30.0, "current": 1.0, "voltage": 24.0}
+
+
+@pytest.mark.parametrize(
+    ("limits", "measured", "lacking"),
+    [
+        (ALL, MEASURED, []),
+        (ALL, {}, ["temperature", "current", "voltage"]),
+        (ALL, {"temperature": 30.0, "voltage": 24.0}, ["current"]),
+        (Limits(68.0), {}, ["temperature"]),  # current and voltage have no limit by default
+        (WIDE, {}, []),
+    ],
+)
+def test_a_limited_quantity_that_a_reading_lacks_is_listed(limits, measured, lacking):
+    assert unmeasured_quantities(limits, reading(**measured)) == lacking
+
+
+@pytest.mark.parametrize(
+    ("names", "far"),
+    [
+        (["temperature"], {"temperature": 1e9}),
+        (["current"], {"current": 1e9}),
+        (["voltage"], {"voltage": 0.0}),
+        (["current", "voltage"], {"current": 1e9, "voltage": 0.0}),
+    ],
+)
+def test_a_limit_that_is_lifted_trips_nothing_and_the_others_stay(names, far):
+    lifted = without(ALL, names)
+    assert complaint(lifted, reading(**(MEASURED | far))) is None
+    assert {name for name, limit in vars(ALL).items() if getattr(lifted, name) != limit} == set(names)
 
 
 @pytest.mark.parametrize("axis", range(6))

@@ -14,7 +14,6 @@ from rsea_ros.hardware.protection import NONE, Protection
 
 PERIOD = 0.01
 ROOT = Path(__file__).resolve().parents[2]
-FELT, UNFELT = State(0, 0.0, 0.0, 0.0, wrench=(0.0,) * 6), State(0, 0.0, 0.0, 0.0)
 
 
 def guard(**limits):
@@ -183,53 +182,6 @@ def test_limits_hold_for_every_rig(limits, reading, told):
     seen = guard(**limits)
     seen.look(State(0, **({"position": 0.0, "velocity": 0.0, "motor_torque": 0.0} | reading)))
     assert str(seen.fault) == told
-
-
-@pytest.mark.parametrize(("readings", "fault"), [
-    ([FELT] * 50, None),
-    ([FELT, *[UNFELT] * 99] * 3, None),  # a sensor that is slower than the cycle
-    ([FELT, *[UNFELT] * 101], "ft: no torque measured for 1 s, expected one for ft_limit"),
-    ([UNFELT] * 101, "ft: no torque measured for 1 s, expected one for ft_limit"),
-])  # fmt: skip
-def test_an_ft_limit_needs_a_torque_that_is_measured(readings, fault):
-    """A device whose wrench ceased went on without the limit, and nobody was told."""
-    limiter = Guard(Limits(68.0, ft=60.0), 0.01)
-    for reading in readings:
-        limiter.look(reading)
-    assert (limiter.fault and str(limiter.fault)) == fault
-    limiter.clear()
-    limiter.look(readings[-1])
-    assert (limiter.fault and str(limiter.fault)) == fault, "clear_fault changes nothing of it"
-    limiter.clear()
-    limiter.look(FELT)
-    assert limiter.fault is None
-
-
-@pytest.mark.parametrize("name", ["temperature", "current", "voltage"])
-def test_a_limited_quantity_must_go_on_being_measured(name):
-    good = {"temperature": 30.0, "current": 1.0, "voltage": 24.0}
-    limiter = Guard(Limits(68.0, temperature=70.0, current=12.0, voltage=20.0), 0.01)
-    read = lambda **values: limiter.look(State(0, 0.0, 0.0, 0.0, **(good | values)))  # noqa: E731
-    for _ in range(3):
-        read()
-        for _ in range(100):
-            read(**{name: math.nan})
-    assert limiter.fault is None
-    read(**{name: math.nan})
-    assert str(limiter.fault) == f"{name}: no {name} measured for 1 s, expected one for {name}_limit"
-    limiter.clear()
-    read(**{name: math.nan})
-    assert limiter.fault.cause == name, "clear_fault changes nothing of it"
-    limiter.clear()
-    read()
-    assert limiter.fault is None
-
-
-def test_without_an_ft_limit_no_torque_need_be_measured():
-    limiter = Guard(Limits(68.0), 0.01)
-    for _ in range(150):
-        limiter.look(UNFELT)
-    assert limiter.fault is None
 
 
 def test_the_ramp_after_the_last_command_takes_its_time_not_cycles():

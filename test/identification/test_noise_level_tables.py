@@ -178,10 +178,10 @@ def test_coloured_noise_has_an_allowance_for_its_doubt(world, left, first, gone,
 
 
 def test_seams_are_the_samples_that_follow_a_span_of_the_drive():
-    spans = replace(DRIVE, spans=((0, 512), (1024, 2048)))
+    spans = replace(DRIVE, spans=((0, 512), (1024, 1536), (2048, 2560)))
+    kept = START + np.concatenate([np.arange(first, end) for first, end in spans.spans]) / RATE
     one = case({"ft": 1.0}, drive=spans, ft=np.zeros(1536))
-    kept = {"ft": START + np.concatenate([np.arange(512), np.arange(1024, 2048)]) / RATE}
-    one = Case(spans, kept, one.measured, one.noise, one.mask)
-    assert noise_level._seams(one, "ft").tolist() == [512]
+    one = Case(spans, {"ft": kept}, one.measured, one.noise, one.mask)
+    assert noise_level._seams(one, "ft").tolist() == [512, 1024]
     assert noise_level._seams(case({"ft": 1.0}, ft=np.zeros(64)), "ft").tolist() == []
     assert noise_level._seams(case({"ft": 1.0}, drive=MOTION, ft=np.zeros(64)), "ft").tolist() == []

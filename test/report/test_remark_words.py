@@ -11,11 +11,12 @@ from rsea_ros.report.remark_words import remark_sentences
 
 SAID = {
     Remark("even_clocks", ("command", "ft"), (1.7e-4, 2.5e-3)): "by 0.17 ms RMS and ft by 2.5 ms RMS.",
-    Remark("clocks_taken_as_right", ("spring.stiffness",), (3.04,)): "of spring.stiffness 3.0 times as wide.",
+    Remark("clocks_taken_as_right", ("spring.stiffness",), (3.04,)): "the interval of spring.stiffness would "
+    "be 3.0 times as wide.",
     Remark("torque_by_motor_constant"): "only through the motor constant:",
     Remark("torque_by_loop_gains"): "only through the loop's gains,",
     Remark("at_bound", ("backlash.gap",), (0.05,), "rad"): "backlash.gap ran to its bound, 0.05 rad:",
-    Remark("not_shown", ("torque_saturation.limit",)): "data: they do not show it. Measure it apart",
+    Remark("not_shown", ("torque_saturation.limit",)): "data: they do not show it. Measure it separately",
     Remark("only_prior", ("spring.damping",)): "the rig's prior. Excitation above the resonance,",
     Remark("only_ratios", ("a", "b")): "Only ratios of a and b are identifiable",
     Remark("only_together", ("a", "b", "c")): "a, b and c are identifiable from these data only together",

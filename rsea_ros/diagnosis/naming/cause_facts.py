@@ -123,13 +123,13 @@ def latest(trials: Sequence[Trial]) -> list[Trial]:
     return list(best.values())
 
 
-def rejected_of(trial: Trial, held_out: HeldOut, channel: str) -> Rejected:
+def rejected_trial(trial: Trial, held_out: HeldOut, channel: str) -> Rejected:
     """Return a trial with its gain over the model that it was tried beside."""
     size = gain(held_out.score(trial.problem, trial.theta), held_out.score_of(trial.beside), channel)[0]
     return Rejected(trial.name, size, trial.reason, trial.rival, trial.is_full)
 
 
-def dropped_of(
+def dropped_cause(
     without: Evaluated, with_it: Evaluated, naming: Mapping[str, Named], channel: str
 ) -> Rejected:
     """Return an accepted effect that may not be named, with its gain in the channel that it helps most."""

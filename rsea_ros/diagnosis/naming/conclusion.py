@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 from rsea_ros.diagnosis.coherence import lost_above
 from rsea_ros.diagnosis.criteria import is_at_floor
-from rsea_ros.diagnosis.evaluation import Evaluated, Examined, held_out_of
-from rsea_ros.diagnosis.naming.cause_facts import alternative_of, latest, rejected_of, undetermined_play
+from rsea_ros.diagnosis.evaluation import Evaluated, Examined, held_out_data
+from rsea_ros.diagnosis.naming.cause_facts import alternative_of, latest, rejected_trial, undetermined_play
 from rsea_ros.diagnosis.naming.outcome import Outcome, outcome_of
 from rsea_ros.diagnosis.naming.weighing import Weighed, weigh
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating_run
@@ -36,7 +36,7 @@ def conclude(
     settings: DiagnosisSettings,
 ) -> Diagnosis:
     """Weigh and name the causes of a selection. stages: its models, evaluated."""
-    weighing = weigh(selection, stages, held_out_of(selection, examined.holdout), pools, settings)
+    weighing = weigh(selection, stages, held_out_data(selection, examined.holdout), pools, settings)
     outcome = outcome_of(weighing, examined, settings)
     return _diagnosis(weighing.selection, outcome, examined, pools, settings)
 
@@ -100,8 +100,8 @@ def _rejections(selection: Selection, outcome: Outcome, pools: Pools) -> tuple[R
     """Return the accepted effects that may not be named, then all others that were tried."""
     decided = {c.name for c in outcome.causes} | {r.name for r in outcome.dropped}
     others = [t for t in latest(selection.trials) if t.name not in decided]
-    test_blocks = held_out_of(selection, None)
-    rejected = pools.fits.map(lambda t: rejected_of(t, test_blocks, outcome.channel), others)
+    test_blocks = held_out_data(selection, None)
+    rejected = pools.fits.map(lambda t: rejected_trial(t, test_blocks, outcome.channel), others)
     return (*outcome.dropped, *rejected)
 
 
@@ -115,7 +115,7 @@ def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
         *([Remark("also_in_model", unnamed)] if unnamed else []),
         *undetermined_remarks(last.unknowns, outcome.stages[-1].confidence),
         *([Remark("coherence_lost", (channel,), (lost,), "Hz")] if lost is not None else []),
-        *([Remark("on_measured_angle")] if last.ride else []),
+        *([Remark("on_measured_angle")] if last.on_angle else []),
         *([Remark("coloured_noise", tuple(sorted(case.coloured)))] if case.coloured else []),
     ]
 

@@ -89,8 +89,8 @@ def _responses(
         if s is not None
     ]
     zero = problem.residual_of(base)
-    made = ([make() for make in alike] for alike in zip(*parts, strict=False))
-    return [problem.residual_of(_with_part(problem, theta, base, effect, p)) - zero for p in made]
+    contributions = ([make() for make in alike] for alike in zip(*parts, strict=False))
+    return [problem.residual_of(_with_part(problem, theta, base, effect, p)) - zero for p in contributions]
 
 
 def _hold(case: Case) -> int:

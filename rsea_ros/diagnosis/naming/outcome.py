@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.diagnosis.criteria import is_at_floor, takes_most, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined
-from rsea_ros.diagnosis.naming.cause_facts import cause_of, dropped_of, is_known, size_of
+from rsea_ros.diagnosis.naming.cause_facts import cause_of, dropped_cause, is_known, size_of
 from rsea_ros.diagnosis.naming.status import Named, name_causes
 from rsea_ros.diagnosis.naming.weighing import Weighing
 from rsea_ros.diagnosis.result import Cause, Rejected, Verdict
@@ -44,7 +44,7 @@ def outcome_of(weighing: Weighing, examined: Examined, settings: DiagnosisSettin
         raise IdentificationError(f"{source}: no sample is left to test on, expected a longer record")
     naming = naming_of(weighing, settings)
     steps = itertools.pairwise(stages)
-    dropped = tuple(dropped_of(a, b, naming, channel) for a, b in steps if not is_named(b, naming))
+    dropped = tuple(dropped_cause(a, b, naming, channel) for a, b in steps if not is_named(b, naming))
     stages = without_unnamed_end(stages, naming)
     naming = with_sizes_known(naming, stages, settings)
     statuses = [naming[s.added].status if s.added in naming else None for s in stages[1:]]

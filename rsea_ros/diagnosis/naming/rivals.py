@@ -128,8 +128,8 @@ def _fit_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Trial:
     settings = selection.last.settings
     blocks, gain = (*TRAIN, *VALIDATION), settings.fits.final_gain
     setup = FitSetup(selection.cases, settings, pools.run, blocks=blocks, gain=gain)
-    begun = fit_candidate(replace(setup, iterations=0), trial.problem, trial.theta)
-    model = refit(begun, setup)
+    initial = fit_candidate(replace(setup, iterations=0), trial.problem, trial.theta)
+    model = refit(initial, setup)
     return replace(trial, problem=model.problem, theta=model.solution.theta)
 
 

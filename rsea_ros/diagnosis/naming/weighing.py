@@ -13,7 +13,7 @@ from functools import partial
 
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.criteria import is_at_floor, preference
-from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, evaluate, held_out_of
+from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, evaluate, held_out_data
 from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for
 from rsea_ros.diagnosis.naming.rivals import beside, contests
 from rsea_ros.diagnosis.score import Score
@@ -83,7 +83,7 @@ def promote_best(
     settings: DiagnosisSettings,
 ) -> tuple[Selection, list[Evaluated]]:
     """Return the selection and its stages with the effect that helps most, if one surely does."""
-    test_blocks, last = held_out_of(selection, None), selection.last
+    test_blocks, last = held_out_data(selection, None), selection.last
     tried = [t for t in beside(selection, last) if t.name not in last.causes]
     scores = list(pools.fits.map(lambda t: test_blocks.score(t.problem, t.theta), tried))
     helpful = [(t, s) for t, s in zip(tried, scores, strict=True) if _helps(t, s, test_blocks)]
