@@ -18,10 +18,11 @@ from scipy.signal import cont2discrete, lsim
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rsea_ros.model.drive import drive_from
+from rsea_ros.model.plant import Plant
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import Plant, simulate_drive, synthesize
+from rsea_ros.model.simulation import simulate_drive, synthesize
 from rsea_ros.signals import Channel, Record
 
 DURATION, RATE = 160.0, 280.0

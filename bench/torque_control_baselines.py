@@ -35,8 +35,8 @@ from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.trials import amplitude_of, disturbed_rig
 from rsea_ros.control.uncertainty import BenchVariant, variant_rig
+from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.simulation import Plant
 from rsea_ros.signals import FloatArray
 
 Step = Callable[[float, float, float], float]

@@ -176,7 +176,7 @@ def test_a_module_imports_only_what_its_layer_may(path):
         ("rsea_ros/effects/backlash.py", "from ..model import rig"),
         ("rsea_ros/effects/backlash.py", "from rsea_ros import model"),
         ("rsea_ros/identification/fit.py", "import plotly.graph_objects as go"),
-        ("rsea_ros/hardware/dynamixel.py", "from rsea_ros.model.simulation import Plant"),
+        ("rsea_ros/hardware/dynamixel.py", "from rsea_ros.model.plant import Plant"),
         ("rsea_ros/nodes/plant.py", "from sensor_msgs.msg import JointState"),
         ("rsea_ros/cli/identify.py", "from rosbags.highlevel import AnyReader"),
         ("rsea_ros/cli/identify.py", "import plotly"),
@@ -192,7 +192,7 @@ def test_an_offence_is_found(place, source):
     ("place", "source"),
     [
         ("rsea_ros/model/rig.py", "import numpy as np\nfrom rsea_ros.effects.effect import Effect"),
-        ("rsea_ros/hardware/simulated.py", "from rsea_ros.model.simulation import Plant"),
+        ("rsea_ros/hardware/simulated.py", "from rsea_ros.model.plant import Plant"),
         ("rsea_ros/nodes/plant.py", "import rclpy\nfrom msg_adapters.ros import JointState"),
         ("msg_adapters/ros.py", "from sensor_msgs.msg import JointState"),
         ("rsea_ros/report/figures/bode.py", "import plotly\nfrom ...identification import result"),

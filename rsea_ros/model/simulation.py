@@ -1,6 +1,6 @@
-"""Simulation of a rig with its effects: whole records, or one sample at a time for the plant.
+"""Simulation of a rig with its effects: whole records, with and without the noise of the sensors.
 
-Fixed step, deterministic; the same compiled step (step.py) serves both.
+Fixed step, deterministic. The same compiled step (step.py) serves the plant, one sample at a time (plant.py).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
-from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
+from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.firmware_loop import STATES, control
@@ -34,7 +34,7 @@ from rsea_ros.signals import Channel, FloatArray, Record
 _AFTER_DELAY = 1
 """Order of a position loop at its port: its targets come late, and what it asks is limited and lags."""
 _SENSORS = 1
-"""Stream of the random numbers of sensor noise: other numbers than an excitation of the same seed."""
+"""Stream of the random numbers of sensor noise."""
 
 
 @dataclass(frozen=True)
@@ -248,7 +248,7 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
         },
         source=rig.name,
     )
-    rng = np.random.default_rng([seed, _SENSORS])
+    rng = sensor_noise(seed)
     true = simulate(rig, blank_record)
     _check_bounded(rig, true)
     measured = {n: Channel(stamps, measure(rig, n, true[n], rng) if noise else true[n]) for n in names}
@@ -267,6 +267,11 @@ def _check_bounded(rig: Rig, true: Mapping[str, FloatArray]) -> None:
             )
 
 
+def sensor_noise(seed: int) -> np.random.Generator:
+    """Return the source of the noise of sensors: not the numbers of an excitation of the same seed."""
+    return np.random.default_rng([seed, _SENSORS])
+
+
 def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return the readings of the rig's sensor for true values: noise added, rounded to its quantum."""
     sensor = rig.sensors.get(channel)
@@ -274,45 +279,3 @@ def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator)
         return value
     noisy = value + sensor.noise * rng.standard_normal(np.shape(value))
     return np.round(noisy / sensor.quantum) * sensor.quantum if sensor.quantum > SMALLEST else noisy
-
-
-@dataclass(frozen=True)
-class PlantSample:
-    """One measurement of the plant: rad, rad/s, N m, N m (nan without a spring to measure), rad."""
-
-    position: float
-    velocity: float
-    motor_torque: float
-    ft: float
-    deflection: float
-
-
-class Plant:
-    """A bench that is stepped one sample at a time, with the noise and the quantum of its sensors."""
-
-    def __init__(
-        self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0
-    ) -> None:
-        """rate: samples a second. duration: over which drifts reach their full size, s."""
-        self._rig, self._noise, self._duration = rig, noise, duration
-        self._count = steps_per_sample(1.0 / rate)
-        self._step = 1.0 / rate / self._count
-        self._out = np.empty((self._count, len(OUTPUTS)))
-        self._rng = np.random.default_rng([seed, _SENSORS])
-        self.reset()
-
-    def reset(self) -> None:
-        """Go back to rest, at time zero."""
-        self._machine = build(self._rig, self._step, self._duration)
-        self._time = 0.0
-
-    def step(self, command: float) -> PlantSample:
-        """Hold a command (N m) for one sample period and return the measurement at its end."""
-        run(self._machine, np.full(self._count, command), self._out, start=self._time)
-        self._time += self._count * self._step
-        values = dict(zip(OUTPUTS, self._out[-1], strict=True))
-        if self._noise:
-            values = {n: float(measure(self._rig, n, v, self._rng)) for n, v in values.items()}
-        ft = math.nan if self._rig.rigid_spring else float(values["ft"])
-        position, velocity, torque = (float(values[n]) for n in ("position", "velocity", "motor_torque"))
-        return PlantSample(position, velocity, torque, ft, float(values["deflection"]))

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from random_rigs import RIG_NAMES
 
+from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import Plant, synthesize
+from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 
 FRICTION = EffectSetting("coulomb_friction", {"torque": 0.5})
