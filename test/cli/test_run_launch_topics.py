@@ -180,3 +180,10 @@ class SlowGraph:
 def test_topics_that_are_discovered_late_are_listed(looks, seen, monkeypatch):
     monkeypatch.setattr(_listener, "DISCOVERY", 0.5)
     assert len(_listener.Listener(SlowGraph(looks)).topics(0.0)) == seen
+
+
+def test_a_visitor_does_not_propose_itself(visitor, monkeypatch):
+    monkeypatch.setattr(_caller, "_SEARCH", 0.1)
+    with pytest.raises(ParameterError) as error:
+        _caller.Caller(visitor).full_name("visitr")
+    assert "did you mean /rsea/visitor" not in str(error.value)

@@ -1,4 +1,4 @@
-"""Recommended runs of every ready rig, with several causes: within the limits of the rig and of the driver."""
+"""Recommended runs of every ready rig, with several causes, stay within the limits of rig and driver."""
 
 import math
 
