@@ -48,10 +48,10 @@ def words_on_steps(record: Record) -> dict[str, str]:
             words[name] = f"{len(channel)} messages, one for each change; each value is held until the next"
         elif len(pauses := np.flatnonzero(paused_steps(record, channel))):
             lasts = np.diff(channel.t)[pauses]
-            longest = int(np.argmax(lasts))
+            longest, many = int(np.argmax(lasts)), "pauses" if len(pauses) > 1 else "pause"
             words[name] = (
-                f"{len(pauses)} {'pauses' if pauses[1:].size else 'pause'} of the commands alone, the longest "
-                f"{lasts[longest]:.3g} s at {channel.t[pauses[longest]]:.4g} s; the last value is held"
+                f"{len(pauses)} {many} of the commands alone, the longest {lasts[longest]:.3g} s at "
+                f"{channel.t[pauses[longest]]:.4g} s; the last value is held"
             )
     return words
 

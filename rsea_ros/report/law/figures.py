@@ -68,7 +68,7 @@ def _slider(t: FloatArray, windows: Sequence[IntArray]) -> Json:
 def _points(
     x: FloatArray, y: FloatArray, colour: str, size: float, name: str, *, visible: bool = True
 ) -> Json:
-    return {"type": "scattergl", "mode": "markers", "x": numbers(x), "y": numbers(y), "name": name,
+    return {"type": "scatter", "mode": "markers", "x": numbers(x), "y": numbers(y), "name": name,
             "marker": {"size": size, "color": colour}, "visible": visible, "hoverinfo": "skip"}  # fmt: skip
 
 

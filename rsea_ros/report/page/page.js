@@ -115,11 +115,12 @@ function save(name, text) {
 }
 
 /* A piece of a curve, with which its switch is its legend as well. */
-function swatch({ line, marker, fillcolor, fill }) {
+function swatch({ line, marker, mode, fillcolor, fill }) {
   const made = document.createElement("i");
   const colour = fill && fillcolor || line && line.color || marker && marker.color;
   const dash = { dot: "dotted", dash: "dashed" }[line && line.dash] || "solid";
-  made.style.borderTop = `${fill ? 8 : 2}px ${dash} ${typeof colour === "string" ? colour : "transparent"}`;
+  made.className = mode === "markers" ? "dot" : "";
+  made.style.borderTop = `${fill || made.className ? 7 : 2}px ${dash} ${typeof colour === "string" ? colour : "transparent"}`;
   return made;
 }
 
@@ -138,7 +139,7 @@ function fitted(figure) {
 
 /* A scene seen from further away: its labels do not get smaller with the screen. */
 function further(scene) {
-  const eye = Object.fromEntries(Object.entries(scene.camera.eye).map(([axis, value]) => [axis, 1.5 * value]));
+  const eye = Object.fromEntries(Object.entries(scene.camera.eye).map(([axis, value]) => [axis, 1.9 * value]));
   return { ...scene, camera: { ...scene.camera, eye } };
 }
 
