@@ -40,8 +40,8 @@ SETTINGS: Mapping[str, Any] = {
     "distributed.deploy.lost-worker-timeout": "5s",
     "distributed.admin.system-monitor.log-length": 600,
 }
-"""Tasks wait at the scheduler, so that a worker that ends takes along what it ran and hardly more. Workers start
-without Dask's MALLOC_TRIM_THRESHOLD_: with it glibc maps every array of 128 kB anew, and the identification of a
+"""Tasks wait at the scheduler, so that a worker that ends takes along what it ran and hardly more. Workers
+start without Dask's MALLOC_TRIM_THRESHOLD_: with it glibc maps every array of 128 kB anew, and identifying a
 minute takes 0.65 s of processor time instead of 0.39 s. The log of the dashboard's load curves covers five
 minutes: an hour of it, Dask's default, looks like a leak."""
 PER_WORKER = 3

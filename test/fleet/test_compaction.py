@@ -11,7 +11,7 @@ from rsea_ros.fleet.task import Task
 
 
 def test_new_rows_are_merged_without_reading_those_merged_before(store, monkeypatch):
-    """A merge that read its whole partition grew the memory of a run, and its time with the square of its rows."""
+    """A merge that read its whole partition grew the memory of a run, and its time as n²."""
     monkeypatch.setattr("rsea_ros.fleet.store.LOOSE", 4)
     opened, read = [], compaction.read
     monkeypatch.setattr(compaction, "read", lambda file: opened.append(file.name) or read(file))
