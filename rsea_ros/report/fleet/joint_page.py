@@ -123,7 +123,7 @@ def _quiet(fleet: FleetTrends, joint: str) -> str:
     return (
         f"steady in all {len(determined)} parameters that its recordings determine"
         if determined
-        else "too few recordings yet"
+        else "too few dated recordings yet"
     )
 
 

@@ -68,7 +68,8 @@ def joint_table(
             (
                 links.joint(joint),
                 escape(_state(alarmed.get(joint, ()), determined, latest.get(joint, "")))
-                + ("" if np.any(dated & rows_of_joint) else "<small>no recording has a date</small>"),
+                if np.any(dated & rows_of_joint)
+                else "no recording has a date",
                 str(int(np.sum(rows_of_joint))),
                 str(int(np.sum(rows_of_joint & ~done))),
                 f"{len(determined)} of {len(trends)}",
@@ -81,7 +82,7 @@ def joint_table(
 def _state(alarms: Sequence[Alarm], determined: Sequence[Trend], latest: str) -> str:
     """Return the changes; without any, the causes in the latest recording, or whether anything is known."""
     kinds = ", ".join(dict.fromkeys(a.kind for a in alarms))
-    return kinds or (f"now {latest}" if latest else "steady" if determined else "too few recordings")
+    return kinds or (f"now {latest}" if latest else "steady" if determined else "too few dated recordings")
 
 
 def parameter_rows(trends: Sequence[Trend]) -> str:

@@ -147,6 +147,7 @@ def test_a_joint_without_a_date_has_its_row_and_its_page(tmp_path):
     assert "Fleet of 2 joints" in index and "no recording has a date" in index
     rail = (tmp_path / "out" / "joint-rail.html").read_text(encoding="utf-8")
     assert "No recording has a date" in rail and "“date” in joints.yaml" in rail
+    assert "latest recording" not in rail.split("</h1>")[0], "without dates none is the latest"
 
 
 def test_a_joint_with_few_days_shows_what_its_latest_recording_says(tmp_path):
