@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rsea_ros.errors import BagError, ParameterError
-from rsea_ros.wording import quote
+from rsea_ros.wording import did_you_mean, quote
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
@@ -79,6 +79,7 @@ class TopicMap:
         if self.axis.removeprefix("-") not in AXES:
             raise ParameterError(
                 f"axis {self.axis!r}: expected one of {', '.join(AXES)}, with or without a minus"
+                f"{did_you_mean(self.axis.removeprefix('-'), AXES)}"
             )
 
     def topic(self, role: str) -> str:
@@ -95,7 +96,8 @@ class TopicMap:
         for assignment in assignments:
             role, equals, topic = assignment.partition("=")
             if role not in ROLES or not equals or not topic:
-                expected = f"ROLE=TOPIC with ROLE one of {', '.join(ROLES)}"
+                near = did_you_mean(role, ROLES) if role not in ROLES else ""
+                expected = f"ROLE=TOPIC with ROLE one of {', '.join(ROLES)}{near}"
                 raise ParameterError(f"topic {assignment!r}: expected {expected}")
             names[role] = topic
         renamed = replace(self, **names)  # type: ignore[arg-type]  # names of str fields

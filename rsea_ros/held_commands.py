@@ -1,7 +1,7 @@
-"""Commands that are published only when they change: each holds until the next one.
+"""Commands that are published only when they change, always or at times: each holds until the next one.
 
-A log of such a publisher has one message for each step, which may last for seconds. What reads a record
-expects the commands of a control loop, one for each of its cycles.
+A log of such a publisher has one message for each step, which may last for seconds, or pauses between spans
+at the rate of a loop. What reads a record expects the commands of a control loop, one for each of its cycles.
 """
 
 from __future__ import annotations
@@ -10,39 +10,85 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.signals import MEASURED, Channel, Fault, FloatArray, Record
+from rsea_ros.signals import MEASURED, BoolArray, Channel, Fault, FloatArray, Record
+
+COMMANDS = ("command", "reference")
 
 _LONG = 32.0
 """Sample periods of the sensors that a value lasts, at the median: a step, no sample of a signal (a loop at
 20 Hz beside sensors at 500 Hz is none)."""
 _FEWEST = 2
+_THROUGHOUT = 0.25
+"""Of a pause: without a sample for no longer than that, a sensor shows that the recorder went on."""
 
 
 def with_held_commands(record: Record) -> tuple[Record, list[Fault]]:
     """Return the record with a command in each sample period of its sensors, where each command is a step.
 
-    A note says so; no fault comes with it. The stamps of the steps are kept exactly, and the last one is held
-    to the end of the sensors.
+    In a pause of the commands alone, the last one is repeated at their usual rate. A note says so; no fault
+    comes with it. The stamps of the steps are kept exactly, and the last one is held to the end of the
+    sensors.
     """
     words = words_on_steps(record)
     if not words:
         return record, []
-    period = _sensor_period(record)
-    last = max(float(c.t[-1]) for c in record.channels.values() if len(c))
-    held = {name: _repeat_values(record[name], period, last) for name in words}
+    held = {name: _hold_commands(record, record[name]) for name in words}
     notes = (f"{name}: {sentence}" for name, sentence in words.items())
     return replace(record.with_channels(**held), notes=(*record.notes, *notes)), []
 
 
 def words_on_steps(record: Record) -> dict[str, str]:
     """Return, for each channel of commands that are steps, how it is read."""
+    words = {}
+    for name in COMMANDS:
+        channel = record.channels.get(name)
+        if channel is None:
+            continue
+        if _is_steps(channel, _sensor_period(record)):
+            words[name] = f"{len(channel)} messages, one for each change; each value is held until the next"
+        elif len(pauses := np.flatnonzero(paused_steps(record, channel))):
+            lasts = np.diff(channel.t)[pauses]
+            longest, many = int(np.argmax(lasts)), "pauses" if len(pauses) > 1 else "pause"
+            words[name] = (
+                f"{len(pauses)} {many} of the commands alone, the longest {lasts[longest]:.3g} s at "
+                f"{channel.t[pauses[longest]]:.4g} s; the last value is held"
+            )
+    return words
+
+
+def paused_steps(record: Record, channel: Channel) -> BoolArray:
+    """Return which steps between commands are pauses of their publisher, shape (n - 1,).
+
+    A pause lasts for many of the commands' usual steps and of the sensors' sample periods, while a sensor
+    goes on: the recorder lost nothing. Commands of a log that stops as a whole are lost.
+    """
+    step = np.diff(channel.t)
+    if len(step) < _FEWEST or not np.isfinite(channel.y).all() or np.any(step <= 0.0):
+        return np.zeros(len(step), np.bool_)
+    usual = max(_sensor_period(record), float(np.median(step)))
+    pauses: BoolArray = step >= _LONG * usual
+    sensors = [record[name].t for name in MEASURED if name in record]
+    for k in np.flatnonzero(pauses):
+        pauses[k] = any(_goes_on(t, float(channel.t[k]), float(channel.t[k + 1])) for t in sensors)
+    return pauses
+
+
+def _goes_on(t: FloatArray, start: float, stop: float) -> bool:
+    """Return whether stamps lie all over a span, s."""
+    inside = t[(t > start) & (t < stop)]
+    return float(np.max(np.diff(inside, prepend=start, append=stop))) <= _THROUGHOUT * (stop - start)
+
+
+def _hold_commands(record: Record, channel: Channel) -> Channel:
+    """Return the commands with each step, or each pause, filled."""
     period = _sensor_period(record)
-    commands = {name: record[name] for name in ("command", "reference") if name in record}
-    return {
-        name: f"{len(channel)} messages, one for each change; each value is held until the next"
-        for name, channel in commands.items()
-        if _is_steps(channel, period)
-    }
+    if _is_steps(channel, period):
+        last = max(float(c.t[-1]) for c in record.channels.values() if len(c))
+        ends = np.append(channel.t[1:], max(last, float(channel.t[-1])))
+        return _repeat_values(channel, ends, period, np.ones(len(channel), np.bool_))
+    ends = np.append(channel.t[1:], channel.t[-1])
+    pauses = np.append(paused_steps(record, channel), False)
+    return _repeat_values(channel, ends, float(np.median(np.diff(channel.t))), pauses)
 
 
 def _sensor_period(record: Record) -> float:
@@ -60,11 +106,10 @@ def _is_steps(channel: Channel, period: float) -> bool:
     return changes and float(np.median(np.diff(channel.t))) >= _LONG * period
 
 
-def _repeat_values(channel: Channel, period: float, last: float) -> Channel:
-    """Return the channel with each step repeated evenly until the next, the last one until `last`, s."""
-    ends = np.append(channel.t[1:], max(last, float(channel.t[-1])))
+def _repeat_values(channel: Channel, ends: FloatArray, period: float, which: BoolArray) -> Channel:
+    """Return the channel with some samples repeated evenly until their ends, s. period: of the repeats, s."""
     lasts: FloatArray = ends - channel.t
-    counts = np.maximum(1, np.rint(lasts / period)).astype(np.int64)
+    counts = np.where(which, np.maximum(1, np.rint(lasts / period)), 1).astype(np.int64)
     place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     t = np.repeat(channel.t, counts) + place * np.repeat(lasts / counts, counts)
     return Channel(t, np.repeat(channel.y, counts))

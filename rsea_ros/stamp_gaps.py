@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.signals import Channel, Fault, FloatArray
+from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray
 from rsea_ros.stamp_order import AROUND
 
 _GAP = 1.6
@@ -18,10 +18,16 @@ _NO_MULTIPLE, _TIMES = 0.15, 3.0
 typical long step is no multiple."""
 
 
-def dropped_samples(channel: Channel, name: str, taken_out: int) -> list[Fault]:
-    """Return the fault of missing samples. taken_out: how many had a stamp that was not theirs."""
+def dropped_samples(
+    channel: Channel, name: str, taken_out: int, pauses: BoolArray | None = None
+) -> list[Fault]:
+    """Return the fault of missing samples.
+
+    taken_out: how many had a stamp that was not theirs. pauses: steps, shape (n - 1,), without lost samples.
+    """
     step = np.diff(channel.t)
     period = float(np.median(step)) if len(step) else 0.0
+    step = step if pauses is None else np.where(pauses, period, step)
     if not np.any(step > _GAP * period) or polls_unevenly(step, period):
         return []
     ticks = _ticks(step, period)

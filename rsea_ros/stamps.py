@@ -11,7 +11,7 @@ import numpy as np
 from rsea_ros.coarse_clock import even_behind_ticks
 from rsea_ros.coverage import absent_spans
 from rsea_ros.errors import ChannelError
-from rsea_ros.held_commands import with_held_commands
+from rsea_ros.held_commands import COMMANDS, paused_steps, with_held_commands
 from rsea_ros.held_samples import without_held_samples
 from rsea_ros.mixed_rows import without_mixed_rows
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
@@ -55,7 +55,8 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         channel, repeats = _without_repeats(channel, name)
         faults += [*jumps, *disorder, *repeats]
         _check_even(channel, f"{record.source}: {name}")
-        faults += dropped_samples(channel, name, count - len(channel))
+        pauses = paused_steps(record, channel) if name in COMMANDS else None
+        faults += dropped_samples(channel, name, count - len(channel), pauses)
         channels[name] = channel
     repaired, held = without_held_samples(record.with_channels(**channels))
     repaired, _ = with_held_commands(repaired)

@@ -10,6 +10,8 @@ _CONTROLS = r"[\x00-\x08\x0b-\x1a\x1c-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u20
 _COLOUR = r"\x1b(?!\[[\d;]*m)"
 _PLAIN, _COLOURED = re.compile(f"{_CONTROLS}|\x1b"), re.compile(f"{_CONTROLS}|{_COLOUR}")
 _LONGEST = 60
+_SHORTEST = 3
+"""Letters of the beginning of a name that say which one may be meant."""
 
 
 def list_names(names: Sequence[str], last: str = "and") -> str:
@@ -18,8 +20,13 @@ def list_names(names: Sequence[str], last: str = "and") -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return `, did you mean X?` with the known name nearest to a wrong one, or nothing."""
-    near = difflib.get_close_matches(name, list(names), n=1, cutoff=0.6)
+    """Return `, did you mean X?` with the known name nearest to a wrong one, or nothing.
+
+    A beginning of a name counts as near: `paper_hi`.
+    """
+    known = list(names)
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+    near = near or [one for one in known if len(name) >= _SHORTEST and one.startswith(name)]
     return f", did you mean {near[0]}?" if near else ""
 
 

@@ -94,3 +94,51 @@ def test_targets_of_a_position_loop_are_held_too(run):
 def test_commands_without_a_sensor_are_left_as_they_are(run):
     alone = rsea.Record({"command": on_change(run)["command"]})
     assert with_held_commands(alone)[0] is alone
+
+
+def mixed(seed: int = 6) -> np.ndarray:
+    """Commands of a loop: noise, then a level for some seconds, and again."""
+    rng = np.random.default_rng(seed)
+    parts = [(10.0 * rng.standard_normal(900), np.full(840, level)) for level in (3.0, -2.0, 0.0)]
+    return np.concatenate([part for pair in parts for part in pair] + [10.0 * rng.standard_normal(900)])
+
+
+@pytest.fixture(scope="module")
+def paused():
+    """The record of a publisher at the rate of its loop, which is silent while its command stays."""
+    whole = rsea.simulate(load_rig(RIG), mixed(), RATE)
+    return whole, on_change(whole)
+
+
+def test_a_pause_of_the_commands_alone_is_no_loss(paused):
+    """2517 of 6000 samples were called dropped, from a publisher that had nothing new to say."""
+    whole, silent = paused
+    repaired, faults = repair_stamps(silent)
+    assert not [fault for fault in faults if fault.channel == "command"]
+    assert repaired["command"].t == pytest.approx(whole["command"].t, abs=1e-6)
+    assert np.array_equal(repaired["command"].y, whole["command"].y)
+    assert any("3 pauses of the commands alone, the longest 3 s" in note for note in repaired.notes)
+
+
+def test_the_pauses_change_no_result(paused):
+    fits = [rsea.identify(record, RIG) for record in paused]
+    assert [fit.verdict for fit in fits] == ["adequate", "adequate"]
+    for name, parameter in fits[0].parameters.items():
+        assert fits[1].parameters[name].value == pytest.approx(parameter.value, rel=1e-6)
+
+
+def test_commands_that_stop_with_the_sensors_are_lost(run):
+    on = {n: (c.t < 4.0) | (c.t > 5.0) for n, c in run.channels.items()}
+    kept = {n: Channel(c.t[on[n]], c.y[on[n]]) for n, c in run.channels.items()}
+    _, faults = repair_stamps(run.with_channels(**kept))
+    (lost,) = [f.size for f in faults if (f.kind, f.channel) == ("dropped_samples", "command")]
+    assert lost == pytest.approx(RATE, abs=2)
+
+
+def test_commands_lost_one_by_one_are_lost_beside_a_pause(paused):
+    _, silent = paused
+    keep = np.arange(len(silent["command"])) % 50 != 7
+    t, y = silent["command"].t[keep], silent["command"].y[keep]
+    _, faults = repair_stamps(silent.with_channels(command=Channel(t, y)))
+    (lost,) = [f.size for f in faults if (f.kind, f.channel) == ("dropped_samples", "command")]
+    assert lost == pytest.approx(np.count_nonzero(~keep), abs=2)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rsea_ros.signals import FloatArray
-from rsea_ros.wording import quote
+from rsea_ros.wording import did_you_mean, quote
 
 LARGEST = 100_000_000
 """Numbers in all columns that are asked for: 0.8 GB."""
@@ -36,7 +36,9 @@ def index_of(column: str, names: Sequence[str]) -> int:
     if column not in names:
         more = f" and {len(names) - _LONGEST_LIST} more" if len(names) > _LONGEST_LIST else ""
         listed = ", ".join(quote(name)[1:-1] for name in names[:_LONGEST_LIST])
-        raise ValueError(f"no column {column!r}, expected one of {listed}{more}")
+        joint = " (--index puts the number of a joint in the place of #)" if "#" in column else ""
+        near = did_you_mean(column, names)
+        raise ValueError(f"no column {column!r}{joint}, expected one of {listed}{more}{near}")
     if list(names).count(column) > 1:
         places = ", ".join(str(i + 1) for i, name in enumerate(names) if name == column)
         raise ValueError(

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 CHOSEN = "#"
-"""In the place of a number: the one that is chosen on import. Twice in a name: the number with two digits."""
+"""In the place of a number: the one chosen on import. Twice in a name: the number with two digits."""
 _ELEMENT = re.compile(r"(?P<base>.+)\[(?:(?P<row>[0-9]{1,4}),:|(?::,)?(?P<column>[0-9]{1,4}))\]")
 _MATLAB = re.compile(r"(?P<base>.+)\((?:(?P<row>[0-9]{1,4}),:|:,(?P<column>[0-9]{1,4}))\)")
 
@@ -64,13 +64,19 @@ def number_in(cell: str, index: int) -> str:
 
 
 def choose_element(column: str, index: int | None) -> str:
-    """Return a column, or an expression, with the chosen number in the place of each `[#]` and `##`."""
+    """Return a column, or an expression, with the chosen number in the place of each `##` and `#`.
+
+    A `#` before a digit or a letter, as in `motor #1`, is a part of the name.
+    """
     if index is None:
         return column
     column = column.replace(2 * CHOSEN, f"{index:02d}")
-    return re.sub(r"(?<=[\[,:])#(?=[\],])", str(index), column)
+    return re.sub(r"#(?!\w)", str(index), column)
 
 
 def is_open(text: str) -> bool:
-    """Return whether a column or an expression still waits for a number in the place of `#`."""
-    return choose_element(text, 0) != text
+    """Return whether a column or an expression still waits for a number in the place of `[#]` or `##`.
+
+    A lone `#` may be a part of the name.
+    """
+    return 2 * CHOSEN in text or re.search(r"[\[,:]#[\],]", text) is not None

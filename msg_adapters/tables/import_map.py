@@ -29,7 +29,7 @@ from msg_adapters.tables.map_keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
 from msg_adapters.tables.map_terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
 from rsea_ros import strict_yaml
 from rsea_ros.errors import FieldError, ImportMapError
-from rsea_ros.wording import quote
+from rsea_ros.wording import list_names, quote
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,12 @@ class ImportMap:
                 "(--index)"
             )
         for name, terms in channels.items():
-            if lists := [term.by_joint for term in terms if term.by_joint]:
-                count = len(lists[0])
+            for joints in [list(term.by_joint) for term in terms if term.by_joint]:
                 asked = "no joint is chosen" if index is None else f"joint {index} is chosen"
                 raise ImportMapError(
-                    f"{self.path}: channels.{name} has a sign, scale or constant for each of {count} joints "
-                    f"and {asked}, expected --index 0 to {count - 1}"
+                    f"{self.path}: channels.{name} has a sign, scale or constant for each of the joints "
+                    f"{list_names([str(joint) for joint in joints])}, and {asked}, expected --index with one "
+                    "of them; a list counts from 0, {1: 4.2, 2: 3.1} states the numbers"
                 )
         return replace(self, channels=channels, where=where)
 

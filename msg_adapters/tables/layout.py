@@ -67,8 +67,9 @@ def layout_of(
 
     header: whether that line names the columns; None: if no delimiter makes numbers of all of it. It is the
     first line, or below a preamble the first that names all requested columns. Without a delimiter it is the
-    first of several with which the line has the requested columns; otherwise the one that makes most cells. A
-    comma between cells of decimal commas, which are quoted then, comes last.
+    first of several with which the line has the requested columns; otherwise the one that yields most of
+    them, and of these the one that makes most cells. A comma between cells of decimal commas, which are
+    quoted then, comes last.
     """
     usual = "\t" if ".tsv" in path.suffixes else ","
     known = sorted(dict.fromkeys((usual, "\t", ";", ",", "|", BLANKS)), key=lambda one: one == decimal)
@@ -79,9 +80,13 @@ def layout_of(
             return 0, layout
     for at, line in enumerate(lines[1:] if header is not False else (), 1):
         for layout in (_layout(line, one, header) for one in tried):
-            if layout.headed and all(base_and_index(c, layout.names)[0] in layout.names for c in columns):
+            if layout.headed and all(_names(layout, column) for column in columns):
                 return at, layout
-    return 0, max(layouts, key=lambda layout: len(layout.names))
+    return 0, max(layouts, key=lambda one: (sum(_names(one, column) for column in columns), len(one.names)))
+
+
+def _names(layout: TextLayout, column: str) -> bool:
+    return base_and_index(column, layout.names)[0] in layout.names
 
 
 def _has(layout: TextLayout, column: str) -> bool:

@@ -46,9 +46,9 @@ TERM = (
     Key("expression", "expression", "a column", "computed from columns, in place of one column"),
     Key("file", "name of a file", "FILE itself", "the file that holds the column, in the directory FILE"),
     Key("unit", "unit", NEEDED, "unit of the column; another dimension needs a scale"),
-    Key("sign", "1 or -1, or a list", "1", "-1 reverses the axis; a list has a value for each joint"),
-    Key("scale", "number other than 0, or a list", "1", "SI units of the channel per SI unit of the column"),
-    Key("constant", "number or a list, SI unit", "0", "added after scale and sign"),
+    Key("sign", "1 or -1, or one each joint", "1", "-1 reverses the axis; `[1, -1]`, `{2: -1}`: by joint"),
+    Key("scale", "not 0, or one each joint", "1", "SI units of the channel per SI unit of the column"),
+    Key("constant", "number, or one each joint, SI unit", "0", "added after scale and sign"),
     Key("held", "`true`, `false`", "false", "rows repeat a value until the next one arrives: keep the first"),
 )
 _MEANINGS = {

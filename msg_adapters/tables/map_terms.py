@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from msg_adapters.tables.column_units import CHANNELS, LINEAR, unit
+from msg_adapters.tables.column_units import CHANNELS, FACTORS, LINEAR, unit
 from msg_adapters.tables.elements import choose_element
 from msg_adapters.tables.expression import Expression, parse
 from msg_adapters.tables.map_keys import TERM
 from rsea_ros.errors import FieldError
 from rsea_ros.keys import NEEDED, Key
-from rsea_ros.wording import quote
+from rsea_ros.wording import list_names, quote
 
 PER_JOINT = {"sign": 1, "scale": 1, "constant": 0}
-"""Keys that may be a list with a number for each joint, and their values where they are left out."""
+"""Keys that may have a number for each joint, and their values where they are left out."""
 LARGEST = 1e300
 """Of the numbers in a map: products of two of them and a unit stay finite."""
 
@@ -26,8 +26,8 @@ class ChannelTerm:
     """A part of a channel, in SI: sign · scale · column · (SI factor of its unit) + constant.
 
     expression: of columns, in the place of the column. file: in the directory that is read; empty for the one
-    file that is. held: the log repeats a value until the next one arrives. by_joint: gain and constant of
-    each joint, where the map has a list of them and none is chosen yet.
+    file that is. held: the log repeats a value until the next one arrives. by_joint: gain and constant by the
+    number of the joint, where the map has several of them and none is chosen yet.
     """
 
     column: str
@@ -37,7 +37,7 @@ class ChannelTerm:
     file: str = ""
     expression: Expression | None = None
     held: bool = False
-    by_joint: tuple[tuple[float, float], ...] = ()
+    by_joint: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -47,9 +47,9 @@ class ChannelTerm:
     def at(self, index: int | None) -> ChannelTerm:
         """Return the term for one number of lists in cells, and in the map."""
         term = self
-        if self.by_joint and index is not None and index < len(self.by_joint):
+        if index is not None and index in self.by_joint:
             gain, constant = self.by_joint[index]
-            term = replace(self, gain=gain, constant=constant, by_joint=())
+            term = replace(self, gain=gain, constant=constant, by_joint={})
         if term.expression is None:
             return replace(term, column=choose_element(term.column, index))
         text = choose_element(term.expression.text, index)
@@ -71,62 +71,94 @@ def terms_of(channel: str, value: object) -> tuple[ChannelTerm, ...]:
     return terms
 
 
-def term_of(field: str, value: object, dimension: str) -> ChannelTerm:
+def term_of(where: str, value: object, dimension: str) -> ChannelTerm:
     """Return a term. A unit of another dimension than the channel's needs a scale that converts it."""
-    body = checked_keys(value, field, TERM)
+    _require_unit(value, where, dimension)
+    body = checked_keys(value, where, TERM)
     try:
         stated_dimension, factor = unit(body["unit"])
     except ValueError as error:
-        raise FieldError(f"{field}: {error}", f"{field}.unit") from None
+        raise FieldError(f"{where}: {error}", f"{where}.unit") from None
     if LINEAR.get(stated_dimension, stated_dimension) != dimension and "scale" not in body:
         raise FieldError(
-            f"{field}: unit {body['unit']!r} is a {stated_dimension}, expected a {dimension}, "
+            f"{where}: unit {body['unit']!r} is a {stated_dimension}, expected a {dimension}, "
             "or a scale to it",
-            f"{field}.unit",
+            f"{where}.unit",
         )
-    expression = _expression(body, field)
-    column = expression.text if expression else column_name(body["column"], f"{field}.column")
-    file = _file(body.get("file", ""), f"{field}.file")
-    held = _flag(body.get("held", False), f"{field}.held")
-    joints = _gains_and_constants(body, field, factor)
-    listed = any(isinstance(body.get(name), list) for name in PER_JOINT)
-    return ChannelTerm(
-        column, str(body["unit"]), *joints[0], file, expression, held, joints if listed else ()
-    )
+    expression = _expression(body, where)
+    column = expression.text if expression else column_name(body["column"], f"{where}.column")
+    file = _file(body.get("file", ""), f"{where}.file")
+    held = _flag(body.get("held", False), f"{where}.held")
+    joints = _gains_and_constants(body, where, factor)
+    gain, constant = next(iter(joints.values()))
+    by_joint = {number: both for number, both in joints.items() if number is not None}
+    return ChannelTerm(column, str(body["unit"]), gain, constant, file, expression, held, by_joint)
+
+
+def _require_unit(value: object, where: str, dimension: str) -> None:
+    """Raise FieldError for a term without a unit: a file seldom states it, only its user can."""
+    if isinstance(value, Mapping) and "unit" not in value:
+        units = list(FACTORS[dimension])
+        scaled = "" if dimension == "time" else ", or unit: 1 with a scale to SI units"
+        raise FieldError(
+            f"{where}: no unit, expected `unit: {units[0]}`, or {list_names(units[1:], 'or')} in its place"
+            f"{scaled}; the file does not state it",
+            where,
+        )
 
 
 def _gains_and_constants(
-    body: Mapping[str, Any], field: str, factor: float
-) -> tuple[tuple[float, float], ...]:
-    """Return gain and constant of each joint; one of both where the map has no list. factor: to SI."""
-    signs, scales, constants = (_numbers(body, field, name) for name in PER_JOINT)
-    for sign in signs:
+    body: Mapping[str, Any], where: str, factor: float
+) -> dict[int | None, tuple[float, float]]:
+    """Return gain and constant by the number of the joint; of None where the map has one for all.
+
+    factor: to SI.
+    """
+    signs, scales, constants = (_numbers(body, where, name) for name in PER_JOINT)
+    for sign in signs.values():
         if sign not in (1, -1):
-            raise FieldError(f"{field}.sign is {sign}, expected 1 or -1", f"{field}.sign")
-    if 0.0 in scales:
+            raise FieldError(f"{where}.sign is {sign}, expected 1 or -1", f"{where}.sign")
+    if 0.0 in scales.values():
         raise FieldError(
-            f"{field}.scale is 0, expected another number: the channel would be lost", f"{field}.scale"
+            f"{where}.scale is 0, expected another number: the channel would be lost", f"{where}.scale"
         )
-    count = max(map(len, (signs, scales, constants)))
-    for name, values in zip(PER_JOINT, (signs, scales, constants), strict=True):
-        if len(values) not in (1, count):
-            where = f"{field}.{name}"
-            raise FieldError(f"{where} has {len(values)} numbers, expected one, or {count} as others", where)
-    signs, scales, constants = (v * count if len(v) == 1 else v for v in (signs, scales, constants))
-    return tuple(
-        (sign * factor * scale, constant)
-        for sign, scale, constant in zip(signs, scales, constants, strict=True)
+    joints: list[int | None] = max(
+        [[None], *(list(v) for v in (signs, scales, constants) if None not in v)], key=_numbered
     )
+    for name, values in zip(PER_JOINT, (signs, scales, constants), strict=True):
+        if None not in values and list(values) != joints:
+            key = f"{where}.{name}"
+            raise FieldError(f"{key} has numbers for {_named(values)}, expected {_named(joints)}", key)
+    return {
+        joint: (_of(signs, joint) * factor * _of(scales, joint), _of(constants, joint)) for joint in joints
+    }
 
 
-def _numbers(body: Mapping[str, Any], field: str, name: str) -> tuple[float, ...]:
-    """Return a number of a map, or the list of them, one for each joint."""
-    value, where = body.get(name, PER_JOINT[name]), f"{field}.{name}"
-    if not isinstance(value, list):
-        return (number(value, where),)
+def _numbered(joints: Iterable[int | None]) -> int:
+    return sum(joint is not None for joint in joints)
+
+
+def _of(values: Mapping[int | None, float], joint: int | None) -> float:
+    return values[joint] if joint in values else values[None]
+
+
+def _named(joints: Iterable[int | None]) -> str:
+    return f"the joints {list_names([str(joint) for joint in joints])}"
+
+
+def _numbers(body: Mapping[str, Any], where: str, name: str) -> dict[int | None, float]:
+    """Return the numbers of a map by joint: one for all of them (None), a list from joint 0, or a mapping."""
+    value, key = body.get(name, PER_JOINT[name]), f"{where}.{name}"
+    if not isinstance(value, (list, Mapping)):
+        return {None: number(value, key)}
     if not value:
-        raise FieldError(f"{where} is an empty list, expected a number for each joint", where)
-    return tuple(number(item, where) for item in value)
+        kind = "list" if isinstance(value, list) else "mapping"
+        raise FieldError(f"{key} is an empty {kind}, expected a number for each joint", key)
+    given = value if isinstance(value, Mapping) else dict(enumerate(value))
+    for joint in given:
+        if not isinstance(joint, int) or isinstance(joint, bool) or joint < 0:
+            raise FieldError(f"{key} has the joint {quote(joint)}, expected its number", key)
+    return {joint: number(given[joint], key) for joint in sorted(given)}
 
 
 def _expression(body: Mapping[str, Any], field: str) -> Expression | None:

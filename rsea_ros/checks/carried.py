@@ -12,13 +12,10 @@ from rsea_ros.checks.running_clock import at_rates
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
-from rsea_ros.held_commands import with_held_commands
-from rsea_ros.held_samples import without_held_samples
-from rsea_ros.mixed_rows import without_mixed_rows
 from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Record
-from rsea_ros.torque_edge import behind_the_edge
+from rsea_ros.stamps import repair_stamps
 from rsea_ros.wording import list_names
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
@@ -63,7 +60,7 @@ def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     kept = (*record.faults, *(f for f in findings.faults if f.kind not in again and f not in record.faults))
     record = replace(record, channels=channels, faults=kept)
     record = _with_even_clocks(record, findings) if masks else record
-    return record if masks else _sound(_repair(record), findings)
+    return record if masks else _sound(repair_stamps(record)[0], findings)
 
 
 def _with_even_clocks(record: Record, findings: Findings) -> Record:
@@ -77,13 +74,6 @@ def _with_even_clocks(record: Record, findings: Findings) -> Record:
         for f in record.faults
     )
     return at_rates(replace(record, faults=faults), rates)
-
-
-def _repair(record: Record) -> Record:
-    """Return the record as the check used it, with its reported faults repaired."""
-    for repair in (without_mixed_rows, without_held_samples, with_held_commands, behind_the_edge):
-        record, _ = repair(record)
-    return record
 
 
 def _sound(record: Record, findings: Findings) -> Record:

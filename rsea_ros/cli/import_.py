@@ -33,7 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", required=True, help=out)
     which = (
-        "numbers of the joints, from 0, in columns that hold several (name[#] in a map): 2, or 0,1,2, or 0-5"
+        "numbers of the joints in the place of # in the map's columns (q[#], from 0; J# torque): 2, "
+        "or 0,1,2, or 0-5"
     )
     parser.add_argument("--index", type=whole_numbers, default=(None,), metavar="N", help=which)
     add_force(parser)

@@ -24,6 +24,7 @@ from rsea_ros.report.wrapped_lines import wrap
 from rsea_ros.wording import did_you_mean, printable
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
+_OPTIONS = ("-h", "--help", "--version")
 FAULT = "this is a bug in rsea, please report it"
 
 
@@ -91,20 +92,28 @@ def summary(path: Path) -> str:
 
 def _call(name: str, arguments: Sequence[str]) -> int:
     """Run a verb, or print the overview. Raises ParameterError for an unknown verb."""
-    if name in ("-h", "--help"):
+    if name in _OPTIONS[:2]:
         print(overview())
         return SUCCESS
-    if name == "--version":
+    if name == _OPTIONS[2]:
         from rsea_ros.version import version
 
         print(f"rsea_ros {version()}")
         return SUCCESS
     if name not in verbs():
-        near = did_you_mean(name, verbs())
-        raise ParameterError(f"no verb {name!r}, expected one of: {', '.join(verbs())}{near}")
+        raise ParameterError(f"no verb {name!r}, expected one of: {', '.join(verbs())}{_meant(name)}")
     if effects := os.environ.get("RSEA_EFFECTS"):
         _fail(f"rsea {name}", f"RSEA_EFFECTS={effects}: code from there runs as part of this program")
     return _run(name, arguments)
+
+
+def _meant(name: str) -> str:
+    """Return what may be meant by an unknown verb: the name of a node, a verb, an option."""
+    from rsea_ros.cli.run import node_names
+
+    if name in node_names():
+        return f", did you mean run {name}?"
+    return did_you_mean(name, [*verbs(), *_OPTIONS])
 
 
 def _run(name: str, arguments: Sequence[str]) -> int:

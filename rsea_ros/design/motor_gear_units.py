@@ -18,7 +18,7 @@ from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.model.rig_file import rig_folders
 from rsea_ros.model.train import TRAINS, Train, rotor_turns, spin_inertia
 from rsea_ros.units import plain
-from rsea_ros.wording import quote
+from rsea_ros.wording import did_you_mean, quote
 
 FILE = "motor_gear_units.yaml"
 UNITS: Mapping[str, str] = {
@@ -101,7 +101,7 @@ def unit_named(name: str, path: Path | None = None) -> MotorGear:
     """Return a unit. Raises ParameterError for a name that the catalogue does not have."""
     units = catalogue(path)
     if name not in units:
-        raise ParameterError(f"unit {name!r}, expected one of {', '.join(units)}")
+        raise ParameterError(f"unit {name!r}, expected one of {', '.join(units)}{did_you_mean(name, units)}")
     return units[name]
 
 

@@ -140,13 +140,12 @@ def amplitude_series(
     the amplitude would show it, within the limits; None where neither would.
     """
     case, rig = model.problem.cases[0], _model(model)
-    if not isinstance(case.drive, Drive):  # it drifts: no simulation predicts how far another run would go
-        return Experiment("amplitude_series", amplitude=0.5)
-    present = float(np.max(np.abs(case.drive.command)))
     excess = math.sqrt(max(times_noise**2 - 1.0, 0.0))
-    for factor in (0.5, 2.0):
-        if math.hypot(1.0, factor * excess) < rule.visible:
-            continue
+    factors = [f for f in (0.5, 2.0) if math.hypot(1.0, f * excess) >= rule.visible]
+    if not isinstance(case.drive, Drive):  # it drifts: no simulation predicts how far another run would go
+        return Experiment("amplitude_series", amplitude=0.5) if 0.5 in factors else None
+    present = float(np.max(np.abs(case.drive.command)))
+    for factor in factors:
         run = allowed_run(rig, case, "multisine", _series(rig, playable_rate(rate), rule), factor * present)
         if run is not None and run.peak >= rule.nearly * factor * present:
             return Experiment("amplitude_series", amplitude=factor, excitation=_as_excited(run, rig))

@@ -25,9 +25,15 @@ _KEY = ("recording", "model_version", "settings")
 
 def compact(folder: Path) -> None:
     """Make one file of a partition's rows, duplicates counted once. Raises OSError."""
-    files = sorted(folder.glob("*.parquet"))
-    if len(files) > 1:
-        _replace(folder, files, _once(pa.concat_tables([read(file) for file in files])))
+    _merge(folder, sorted(folder.glob("*.parquet")))
+
+
+def compact_loose(folder: Path) -> None:
+    """Make one file of a partition's files of one row, and read no other: any number of rows costs the same.
+
+    Raises OSError.
+    """
+    _merge(folder, sorted(file for file in folder.glob("*.parquet") if not file.name.startswith(_PART)))
 
 
 def take_out(rows: Path, outcomes: Collection[str]) -> None:
@@ -51,6 +57,12 @@ def finish(rows: Path) -> None:
     for folder in rows.glob("joint=*/month=*"):
         for part in folder.glob(f"{_PART}*.parquet"):
             _remove(folder, json.loads(metadata(part).get(_REPLACES, b"[]")))
+
+
+def _merge(folder: Path, files: Sequence[Path]) -> None:
+    """Make one file of some files of a partition."""
+    if len(files) > 1:
+        _replace(folder, files, _once(pa.concat_tables([read(file) for file in files])))
 
 
 def _replace(folder: Path, files: Sequence[Path], table: pa.Table) -> None:

@@ -21,7 +21,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from rsea_ros.files import make_folder
-from rsea_ros.fleet.compaction import compact, finish, take_out
+from rsea_ros.fleet.compaction import compact, compact_loose, finish, take_out
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.row import SCHEMA, Row, analysis_of, month_of, write
 from rsea_ros.fleet.store_keys import known_rows
@@ -76,7 +76,7 @@ class Store:
         self._loose[folder] += 1
         if self._loose[folder] >= LOOSE:
             self._loose[folder] = 0
-            compact(folder)
+            compact_loose(folder)
 
     def finish(self) -> None:
         """Complete or remove what a killed writer has left."""

@@ -87,7 +87,8 @@ class Caller:
         """Return the full name of a node. Raises ParameterError when it does not run or offers nothing."""
         name = absolute(name)
         if not _await(lambda: name in self._nodes() and bool(self.actions(name)), _SEARCH):
-            near = did_you_mean(name, self._nodes())
+            visitor = absolute(self._node.get_name())
+            near = did_you_mean(name, [other for other in self._nodes() if other != visitor])
             raise ParameterError(f"node {name}: it does not run{near} (rsea call lists what does)")
         return name
 

@@ -25,8 +25,17 @@ class Listener:
         self._node = node
 
     def topics(self, seconds: float) -> list[tuple[str, str, str, str]]:
-        """Return name, type, numbers of publishers and subscribers of topics found within some seconds."""
+        """Return name, type, numbers of publishers and subscribers of topics discovered within some seconds.
+
+        While there is none, keep looking: on a busy machine a discovery takes longer.
+        """
+        deadline = time.monotonic() + max(seconds, DISCOVERY)
         time.sleep(seconds)
+        while not (topics := self._seen()) and time.monotonic() < deadline:
+            time.sleep(POLL)
+        return topics
+
+    def _seen(self) -> list[tuple[str, str, str, str]]:
         return [
             (name, ", ".join(types), *self._counts(name))
             for name, types in self._node.get_topic_names_and_types()

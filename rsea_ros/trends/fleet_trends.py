@@ -46,6 +46,7 @@ def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DE
         settings.false_discovery,
         sum(t.state != "undetermined" for t in trends.values()),
         priors,
+        tuple(sorted({str(j) for j in (*recordings["joint"], *history["joint"])})),
     )
 
 
@@ -83,7 +84,8 @@ def _trend(series: Series, test: Tested, q: float, settings: TrendSettings) -> T
 
 def _undetermined_trend(series: Series, days: int, settings: TrendSettings) -> Trend:
     many = len(series.identifiable)
-    determined = f"{int(np.sum(series.identifiable))} of {many} recordings determine it, on {days} days"
+    on = "1 day" if days == 1 else f"{days} days"
+    determined = f"{int(np.sum(series.identifiable))} of {many} recordings determine it, on {on}"
     reason = f"{determined}; {settings.fewest_days} days are needed"
     return Trend(series, "undetermined", days, reason=reason)
 

@@ -153,7 +153,8 @@ class FleetTrends:
     trends: by joint and parameter, in the order of the history. sizes: of causes by joint and
     `cause.parameter`, from the recordings that name them. namings: which recordings name a cause or a fault.
     false_discovery: rate that the findings keep, over `tests` tests. per_kelvin: mean and sd of each
-    parameter's temperature slope over the joints, relative.
+    parameter's temperature slope over the joints, relative. joints: every joint that has a recording,
+    by name, also where no recording has a date or a result.
     """
 
     trends: Mapping[tuple[str, str], Trend]
@@ -164,8 +165,4 @@ class FleetTrends:
     false_discovery: float
     tests: int
     per_kelvin: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Return the names of the joints, in order."""
-        return tuple(dict.fromkeys(joint for joint, _ in self.trends))
+    joints: tuple[str, ...] = ()

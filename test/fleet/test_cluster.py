@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from types import SimpleNamespace
 
 import pytest
@@ -117,3 +118,12 @@ def test_the_scheduler_keeps_no_list_of_tasks_that_are_over(executor):
     run_jobs(executor, 25)
     spans = executor._client.cluster.scheduler.extensions["spans"].spans.values()
     assert spans and all(len(span.metadata["collections"] if span.metadata else []) < 20 for span in spans)
+
+
+def test_a_worker_allocates_memory_as_a_serial_run_does(monkeypatch):
+    """Dask's MALLOC_TRIM_THRESHOLD_ maps each array of 128 kB anew: a bag took 0.65 s instead of 0.39 s."""
+    monkeypatch.delenv("MALLOC_TRIM_THRESHOLD_", raising=False)
+    with on_this_machine(1, 4_000_000_000, "127.0.0.1:0") as (workers, _):
+        workers.submit(Job(os.getenv, "MALLOC_TRIM_THRESHOLD_"))
+        done = workers.next(10.0)
+    assert done is not None and done.error is None and done.value is None

@@ -275,3 +275,21 @@ def test_a_check_says_what_is_wrong_and_a_fit_carries_it(record):
     assert rsea.check(record, "paper_high_impedance").light == "green"
     fit = rsea.identify(dead, "paper_high_impedance")
     assert [fault.kind for fault in fit.result.faults if fault.channel == "ft"] == ["dead_channel"]
+
+
+def test_every_door_dates_stamps_that_repeat():
+    """identify refused them (expected rising stamps); bags, check and diagnose left the repeats out."""
+    rig = rsea.load_rig("paper_high_impedance")
+    run = rsea.simulate(rig, 15.0 * np.random.default_rng(1).standard_normal(2800), 280.0)
+
+    def repeating(channel):
+        t = channel.t.copy()
+        t[5::40] = t[4::40]
+        return Channel(t, channel.y)
+
+    record = run.with_channels(**{n: repeating(run[n]) for n in ("ft", "position", "velocity")})
+    fit = rsea.identify(record, rig)
+    assert fit.verdict == "adequate"
+    repeats = {f.channel for f in fit.result.faults if f.kind == "duplicate_stamps"}
+    assert repeats == {"ft", "position", "velocity"}
+    assert rsea.diagnose(record, rig).verdict == "nothing_wrong"

@@ -145,9 +145,12 @@ def _impedance_figure(study: Study) -> Figure:
         for at, c in zip(study.rates, _COLOURS, strict=False)
     ]
     data += [
-        line(hz, np.abs(z), name, colour, line={"color": colour, "width": 1.8, "dash": dash})
+        line(
+            hz, np.abs(z), name, colour, line={"color": colour, "width": 1.8, "dash": dash},
+            hovertemplate="%{y:.3g} N·m per rad/s",
+        )
         for name, hz, z, colour, dash in items
-    ]
+    ]  # fmt: skip
     names = [
         label(name, 1.015, 1.0 - 0.08 * i, colour, xref="paper", yref="paper", yanchor="top")
         for i, (name, _, _, colour, _) in enumerate(items)

@@ -88,14 +88,15 @@ def slices(title: str, points: Sequence[Point], caption: str = "") -> Figure:
     k, j = _grid(points)
     data: list[Json] = []
     names: list[Json] = []
+    second: Json = {"xaxis": "x2", "yaxis": "y2", "hovertemplate": "%{y:.1f} Hz"}
     shades = ["#9db9d6", "#5f8fbf", "#1864ab"]
     for value, shade in zip((200.0, 600.0, 1800.0), shades, strict=True):
         y = undamped_band(value, j)
-        data.append(line(1e3 * j, y, f"{value:.0f} N·m/rad", shade))
+        data.append(line(1e3 * j, y, f"{value:.0f} N·m/rad", shade, hovertemplate="%{y:.1f} Hz"))
         names.append(_end(f"{value:.0f} N·m/rad", 1e3 * j[-1], y[-1], shade, ""))
     for value, shade in zip((1e-2, 3e-3, 1e-3), shades, strict=True):
         y = undamped_band(k, value)
-        data.append(line(k, y, f"{1e3 * value:g} g·m²", shade, xaxis="x2", yaxis="y2"))
+        data.append(line(k, y, f"{1e3 * value:g} g·m²", shade, **second))
         names.append(_end(f"{1e3 * value:g} g·m²", k[-1], y[-1], shade, "2"))
     for p in points:
         z = float(undamped_band(p.stiffness, p.inertia))

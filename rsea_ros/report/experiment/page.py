@@ -10,6 +10,7 @@ from rsea_ros.experiment.advice import Advice
 from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.report.experiment.words import (
     LEVEL_WORDS,
+    decided_words,
     limit_rows,
     plain_name,
     proof_words,
@@ -56,7 +57,7 @@ def _keys(p: Proposal) -> list[tuple[str, str]]:
         keys.append(
             (f"{worst[2]:.3g}", f"S of {plain_name(worst[0])} over {plain_name(worst[1])}, the worst pair")
         )
-    return keys if len(p.names) == 1 else [*keys, (f"{p.decided:.0%}", "expected to be decided")]
+    return keys if len(p.names) == 1 else [*keys, (decided_words(p), "expected to be decided")]
 
 
 def _causes(advice: Advice) -> str:
@@ -98,7 +99,7 @@ def command_figure(p: Proposal) -> Figure:
     return Figure(
         f"The run: {shape_words(p)}",
         "Commanded motor torque at the gear output; it begins and ends at zero under a raised cosine.",
-        [line(t, p.command, "command", AFTER, 1.0)],
+        [line(t, p.command, "command", AFTER, 1.0, hovertemplate="%{y:.3g} N·m")],
         layout(xaxis=axis("time, s"), yaxis=axis("torque, N·m")),
         height=300,
     )
@@ -112,7 +113,10 @@ def spectrum_figure(runs: Sequence[tuple[str, Proposal]]) -> Figure:
         f, density = density_of(p.command, p.rate)
         colour = (AFTER, BEFORE, QUIET)[k % 3]
         traces.append(
-            line(f, density, name, colour, 1.4, line={"color": colour, "width": 1.4, "dash": _DASH[k % 4]})
+            line(
+                f, density, name, colour, line={"color": colour, "width": 1.4, "dash": _DASH[k % 4]},
+                hovertemplate="%{y:.3g} N·m/√Hz",
+            )
         )
         at = int(np.argmax(density))
         notes.append(label(name, float(np.log10(f[at])), float(np.log10(density[at])) + 0.12, colour))

@@ -10,6 +10,7 @@ from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.experiment.run_limits import UNITS
 from rsea_ros.report import words
+from rsea_ros.units import plain
 from rsea_ros.wording import list_names
 
 
@@ -34,9 +35,13 @@ def verdict(advice: Advice) -> str:
         return f"No run within the limits separates {list_names(names)}"
     if len(names) == 1:
         return f"{_narrowing(advice.hypotheses[0], p)}: {shape_words(p)}"
-    share = f"{100.0 * p.decided:.0f} %"
-    between = list_names(names)
+    between, share = list_names(names), decided_words(p)
     return f"The next run is expected to decide between {between} in {share} of cases: {shape_words(p)}"
+
+
+def decided_words(p: Proposal) -> str:
+    """Return the share of the cases that a run is expected to decide."""
+    return f"{100.0 * p.decided:.0f} %"
 
 
 def _narrowing(hypothesis: Hypothesis, p: Proposal) -> str:
@@ -71,7 +76,7 @@ def limit_rows(p: Proposal, stated: dict[str, float]) -> list[tuple[str, str, st
             f"{p.peaks.expected[n]:.4g}",
             f"{p.peaks.at_level[n]:.4g}",
             f"{stated[n]:.4g}" if n in stated else "none",
-            UNITS[n],
+            plain(UNITS[n]),
         )
         for n in names
     ]

@@ -82,7 +82,12 @@ def frequency_axis(low: float, high: float, **parts: Any) -> Json:
 
 
 def line(x: FloatArray, y: FloatArray, name: str, colour: str, width: float = 1.6, **parts: Any) -> Json:
-    """Return a line trace."""
+    """Return a line trace.
+
+    Raises ValueError without a hovertemplate (the value with its unit) and without a hoverinfo.
+    """
+    if not {"hovertemplate", "hoverinfo"} & parts.keys():
+        raise ValueError(f"line {name!r} has no hovertemplate, expected one with the unit of its values")
     trace: Json = {
         "type": "scatter",
         "mode": "lines",

@@ -19,6 +19,8 @@ ABOVE_FLOOR = 2.0
 _TINY = 1e-300
 _LABEL = 0.06
 """Height of a label, of the figure's."""
+_NEAR_AN_END = 0.1
+"""Share of the frequency axis within which a centred label would reach beyond its end, on a phone."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ def residual_figure(
     ends = np.array([frequency[0], frequency[-1]])
     drawn = [(c, *in_bands(frequency, c.density)) for c in curves]
     data: list[Json] = [line(ends, floor, "noise floor", NOISE, 6.0, hoverinfo="skip")]
-    data += [line(f, d, c.name, c.colour, 1.8, hovertemplate="%{y:.3g}") for c, f, d in drawn]
+    data += [line(f, d, c.name, c.colour, 1.8, hovertemplate=f"%{{y:.3g}} {unit}/√Hz") for c, f, d in drawn]
     reach = _range([*(d for _, _, d in drawn), floor])
     top = max(range(len(drawn)), key=lambda i: float(drawn[i][2].max()))
     items = [(f"<b>{c.name}</b>", c.colour, float(d[-1])) for i, (c, _, d) in enumerate(drawn) if i != top]
@@ -110,10 +112,15 @@ def _range(values: Sequence[FloatArray]) -> list[float]:
 
 
 def _at_peak(curve: SpectrumLine, frequency: FloatArray, values: FloatArray) -> Json:
-    """Return the label of the highest curve, above its peak; lower ones have theirs at their right end."""
+    """Return the label of the highest curve, above its peak; lower ones have theirs at their right end.
+
+    Near an end of the axis it begins or ends at the peak: centred, it would lie on the marks of the axis.
+    """
     k = int(np.argmax(values))
     x, y = float(np.log10(frequency[k])), _exponent(values[k])
-    return label(f"<b>{curve.name}</b>", x, y, curve.colour, xanchor="center", yanchor="bottom", yshift=4)
+    share = (x - np.log10(frequency[0])) / np.log10(frequency[-1] / frequency[0])
+    anchor = "left" if share < _NEAR_AN_END else "right" if share > 1.0 - _NEAR_AN_END else "center"
+    return label(f"<b>{curve.name}</b>", x, y, curve.colour, xanchor=anchor, yanchor="bottom", yshift=4)
 
 
 def _apart(items: Sequence[tuple[str, str, float]], gap: float) -> list[Json]:

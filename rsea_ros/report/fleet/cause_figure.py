@@ -13,6 +13,9 @@ from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance
 from rsea_ros.trends.weeks import Steps
 
+_BAR = 0.9 * 86_400_000.0
+"""Width of a bar, ms for each day of its step: plotly draws a single bar without one as a hairline."""
+
 
 def cause_figure(naming: Naming, appearance: Appearance | None, steps: Steps) -> Figure:
     """Return the figure of a cause that has a size."""
@@ -49,6 +52,7 @@ def share_figure(naming: Naming, appearance: Appearance | None, steps: Steps) ->
     bars = {
         "type": "bar",
         "name": "recordings",
+        "width": _BAR * steps.days,
         **{k: v for k, v in points(steps.middle[some], numbers(100.0 * named[some] / asked[some]), "").items()
            if k in ("x", "y")},
         "marker": {"color": faint(BEFORE if naming.kind == "cause" else MEASURED, 0.8)},
@@ -73,7 +77,7 @@ def _title(naming: Naming, appearance: Appearance | None) -> str:
     plain = name(naming.about) + (" in the data" if naming.kind == "fault" else "")
     often = f"{int(np.sum(naming.named))} of {len(naming.named)} recordings"
     if appearance is None:
-        return f"{plain} is named in {often}"
+        return f"{plain}{' is named' if naming.kind == 'cause' else ''} in {often}"
     size = f", now {value(appearance.size, appearance.unit)}" if appearance.size is not None else ""
     since = (
         "from the first recording on" if appearance.from_first else f"since about {day(appearance.since_s)}"

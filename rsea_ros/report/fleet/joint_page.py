@@ -30,6 +30,11 @@ _RARE = 0.02
 _USUAL = 0.8
 """Share from which a cause's size is drawn as a parameter."""
 
+_UNDATED = (
+    "The stamps of these recordings count from the start of a machine. If their paths hold the date, state "
+    "its form as “date” in joints.yaml (for example %Y-%m-%d). Until then, rsea fleet sql shows their values."
+)
+
 
 def joint_page(
     joint: str, fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
@@ -54,7 +59,10 @@ def _blocks(
     if alarms:
         yield section("Findings", alarm_table(alarms, links, with_joint=False))
     yield from _pictures(joint, trends, fleet, steps)
-    yield section("All parameters", parameter_rows(trends))
+    if not np.any(np.isfinite(np.asarray(recordings["time_s"], float)[rows])):
+        yield section("No recording has a date, so no trend can be estimated", paragraph(_UNDATED))
+    if trends:
+        yield section("All parameters", parameter_rows(trends))
     yield fold("The latest recordings", _recordings(recordings, rows, links))
 
 
@@ -115,7 +123,7 @@ def _quiet(fleet: FleetTrends, joint: str) -> str:
     return (
         f"steady in all {len(determined)} parameters that its recordings determine"
         if determined
-        else "too few recordings yet"
+        else "too few dated recordings yet"
     )
 
 

@@ -14,15 +14,18 @@ _SURE = ("confirmed", "leading")
 
 
 def latest_causes(joints: Sequence[str], recordings: Table) -> Mapping[str, str]:
-    """Return the causes in each joint's latest finished recording as text, for joints with any."""
+    """Return the causes in each joint's latest finished recording as text, for joints with any.
+
+    A joint whose recordings have no date has no latest one.
+    """
     of, outcome = np.asarray(recordings["joint"], str), np.asarray(recordings["outcome"], str)
     time_s = np.asarray(recordings["time_s"], float)
     named = {}
     for joint in joints:
-        done = np.flatnonzero((of == joint) & (outcome == "done"))
+        done = np.flatnonzero((of == joint) & (outcome == "done") & np.isfinite(time_s))
         if not done.size:
             continue
-        last = done[np.argmax(np.nan_to_num(time_s[done]))]
+        last = done[np.argmax(time_s[done])]
         if causes := _sure(recordings["causes"][last]):
             named[joint] = list_names(causes)
     return named

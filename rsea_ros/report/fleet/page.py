@@ -67,7 +67,10 @@ def _blocks(
 
 
 def _parameters_with_map(fleet: FleetTrends) -> list[str]:
-    """Return the parameters that have a map, those that moved most first; of causes the usual ones."""
+    """Return the parameters that have a map, those that moved most first; of causes the usual ones.
+
+    A parameter that no joint has a course of has none: the table of the undetermined ones says why.
+    """
     sized = [p for _, p in fleet.sizes]
     usual = [p for p in dict.fromkeys(sized) if 2 * sized.count(p) > len(fleet.joints)]
     courses = {**fleet.trends, **fleet.sizes}
@@ -76,7 +79,9 @@ def _parameters_with_map(fleet: FleetTrends) -> list[str]:
         changed = [t for (_, p), t in courses.items() if p == parameter and t.changes]
         return -max((abs(t.relative) for t in changed), default=0.0)
 
-    return sorted([*dict.fromkeys(p for _, p in fleet.trends), *usual], key=movement)
+    with_course = {p for (_, p), t in courses.items() if t.state != "undetermined"}
+    every = dict.fromkeys([*(p for _, p in fleet.trends), *usual])
+    return sorted((p for p in every if p in with_course), key=movement)
 
 
 def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:

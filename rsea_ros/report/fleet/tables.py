@@ -8,12 +8,13 @@ from html import escape
 
 import numpy as np
 
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import day, doubt_of_date, name, percent, sentence, value
 from rsea_ros.report.page.html_table import table_of_cells
 from rsea_ros.trends.alarms import Alarm
-from rsea_ros.trends.result import FleetTrends, Trend
+from rsea_ros.trends.result import FleetTrends, Interval, Trend
 from rsea_ros.trends.series import Table
 
 _STATES = {
@@ -56,6 +57,7 @@ def joint_table(
     ]  # fmt: skip
     of = np.asarray(recordings["joint"], str)
     done = np.asarray(recordings["outcome"], str) == "done"
+    dated = np.isfinite(np.asarray(recordings["time_s"], float))
     rows = []
     for joint in joints:
         trends = [t for (j, _), t in fleet.trends.items() if j == joint]
@@ -65,7 +67,9 @@ def joint_table(
         rows.append(
             (
                 links.joint(joint),
-                escape(_state(alarmed.get(joint, ()), determined, latest.get(joint, ""))),
+                escape(_state(alarmed.get(joint, ()), determined, latest.get(joint, "")))
+                if np.any(dated & rows_of_joint)
+                else "no recording has a date",
                 str(int(np.sum(rows_of_joint))),
                 str(int(np.sum(rows_of_joint & ~done))),
                 f"{len(determined)} of {len(trends)}",
@@ -78,7 +82,7 @@ def joint_table(
 def _state(alarms: Sequence[Alarm], determined: Sequence[Trend], latest: str) -> str:
     """Return the changes; without any, the causes in the latest recording, or whether anything is known."""
     kinds = ", ".join(dict.fromkeys(a.kind for a in alarms))
-    return kinds or (f"now {latest}" if latest else "steady" if determined else "too few recordings")
+    return kinds or (f"now {latest}" if latest else "steady" if determined else "too few dated recordings")
 
 
 def parameter_rows(trends: Sequence[Trend]) -> str:
@@ -89,7 +93,7 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
     ]  # fmt: skip
     rows = []
     for t in trends:
-        unit, s = t.series.unit, t.series
+        s = t.series
         level = abs(t.now.value) if t.now is not None and t.now.value else float("nan")
         shares = [percent(v / level) if v == v and level == level else "–" for v in
                   (t.per_year.value if t.per_year else float("nan"), t.day_sd, t.detectable)]  # fmt: skip
@@ -97,7 +101,7 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
             (
                 f"{escape(name(s.parameter))}<small>{escape(s.parameter)}</small>",
                 _STATES[t.state],
-                escape(value(t.now, unit)) if t.now is not None else "–",
+                _level(t),
                 shares[0],
                 shares[1].lstrip("+") if t.day_sd else "–",
                 shares[2].lstrip("+"),
@@ -105,6 +109,18 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
             )
         )
     return table_of_cells(head, rows)
+
+
+def _level(trend: Trend) -> str:
+    """Return the level now; without a course, the value of the latest recording that determines it."""
+    s, unit = trend.series, trend.series.unit
+    if trend.now is not None:
+        return escape(value(trend.now, unit))
+    if not np.any(s.identifiable):
+        return "–"
+    last = int(np.flatnonzero(s.identifiable)[-1])
+    v, half = float(s.value[last]), float(Z95 * s.sd[last])
+    return f"{escape(value(Interval(v, v - half, v + half), unit))}<small>latest recording</small>"
 
 
 def undetermined_trends(fleet: FleetTrends) -> list[Trend]:

@@ -31,7 +31,7 @@ def over_figure(written: WrittenLaw) -> Figure:
           for i, k in enumerate(windows)),
         band(centre, low, high, faint(AFTER, 0.16)),
         _bars(centre, middle, error),
-        line(centre, 0.5 * (low + high), "law", AFTER, 2.6),
+        line(centre, 0.5 * (low + high), "law", AFTER, 2.6, hovertemplate=f"%{{y:.3g}} {words.unit(unit)}"),
     ]  # fmt: skip
     top = float(np.quantile(np.abs(y), 0.995))
     quantity = "angle" if unit == "rad" else "torque"
@@ -68,7 +68,7 @@ def _slider(t: FloatArray, windows: Sequence[IntArray]) -> Json:
 def _points(
     x: FloatArray, y: FloatArray, colour: str, size: float, name: str, *, visible: bool = True
 ) -> Json:
-    return {"type": "scattergl", "mode": "markers", "x": numbers(x), "y": numbers(y), "name": name,
+    return {"type": "scatter", "mode": "markers", "x": numbers(x), "y": numbers(y), "name": name,
             "marker": {"size": size, "color": colour}, "visible": visible, "hoverinfo": "skip"}  # fmt: skip
 
 
@@ -120,9 +120,10 @@ def _bin_means(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatA
 def time_figure(written: WrittenLaw) -> Figure:
     """Return the missing torque and the law over time."""
     shown, unit = written.shown, "rad" if written.law.place == "encoder" else "N m"
+    hover = f"%{{y:.3g}} {words.unit(unit)}"
     data = [
-        line(shown.t, shown.values, "missing", MEASURED, 1.0),
-        line(shown.t, shown.law, "law", AFTER, 1.4),
+        line(shown.t, shown.values, "missing", MEASURED, 1.0, hovertemplate=hover),
+        line(shown.t, shown.law, "law", AFTER, 1.4, hovertemplate=hover),
     ]
     ends = [label("missing", 1.0, 0.85, MEASURED, xref="paper", yref="paper", xshift=6),
             label("law", 1.0, 0.72, AFTER, xref="paper", yref="paper", xshift=6)]  # fmt: skip

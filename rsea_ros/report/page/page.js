@@ -114,6 +114,35 @@ function save(name, text) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
+/* A piece of a curve, with which its switch is its legend as well. */
+function swatch({ line, marker, mode, fillcolor, fill }) {
+  const made = document.createElement("i");
+  const colour = fill && fillcolor || line && line.color || marker && marker.color;
+  const dash = { dot: "dotted", dash: "dashed" }[line && line.dash] || "solid";
+  made.className = mode === "markers" ? "dot" : "";
+  made.style.borderTop = `${fill || made.className ? 7 : 2}px ${dash} ${typeof colour === "string" ? colour : "transparent"}`;
+  return made;
+}
+
+/* On a narrow screen a figure has the whole width; names beside the curves give way to the switches below. */
+function fitted(figure) {
+  if (!LOOKS[2].matches) return figure;
+  const { margin, annotations = [], scene } = figure.layout;
+  const names = new Set((figure.data || []).map((d) => d.name).filter(Boolean));
+  const switched = figure.kind === "overlay" || names.size > 1;
+  const beside = (a) => a.xref === "paper" && a.x >= 1 && a.xanchor === "left";
+  const kept = annotations.filter((a) => !(switched && beside(a)));
+  const wide = kept.some(beside) ? {} : { r: Math.min(margin.r, 14) };
+  const layout = { ...figure.layout, annotations: kept, margin: { ...margin, ...wide } };
+  return { ...figure, layout: scene ? { ...layout, scene: further(scene) } : layout };
+}
+
+/* A scene seen from further away: its labels do not get smaller with the screen. */
+function further(scene) {
+  const eye = Object.fromEntries(Object.entries(scene.camera.eye).map(([axis, value]) => [axis, 1.9 * value]));
+  return { ...scene, camera: { ...scene.camera, eye } };
+}
+
 /* Under a figure: a switch for each named curve, the picture, the numbers. */
 function tools(node, figure) {
   const bar = document.createElement("div");
@@ -127,6 +156,7 @@ function tools(node, figure) {
       Plotly.restyle(node, { visible: !hide }, curves);
     });
     toggle.setAttribute("aria-pressed", "true");
+    toggle.prepend(swatch(node.data[curves[0]]));
     bar.append(toggle);
   }
   bar.append(
@@ -136,18 +166,18 @@ function tools(node, figure) {
   node.after(bar);
 }
 
-const LOOKS = [matchMedia("(prefers-color-scheme: dark)"), matchMedia("print")];
+const LOOKS = [matchMedia("(prefers-color-scheme: dark)"), matchMedia("print"), matchMedia("(max-width: 640px)")];
 
 function inTheDark(text) {
   const [dark, print] = LOOKS;
   return dark.matches && !print.matches ? text.replace(/#[0-9a-f]{6}/g, (colour) => DARK[colour] || colour) : text;
 }
 
-/* Draws all figures; once more in other colours when the scheme changes, or the page is printed in the dark. */
+/* Draws all figures; once more when the colours or the width class of the screen change, or the page is printed. */
 function draw() {
   for (const node of document.querySelectorAll(".figure")) {
     if (node.dataset.drawn) { Plotly.purge(node); node.nextElementSibling.remove(); delete node.dataset.drawn; }
-    const figure = JSON.parse(inTheDark(document.getElementById(node.id + "-data").textContent));
+    const figure = fitted(JSON.parse(inTheDark(document.getElementById(node.id + "-data").textContent)));
     const done = figure.kind === "overlay" ? overlay(node, figure) : Plotly.newPlot(node, figure.data, figure.layout, CONFIG);
     done.then(() => { tools(node, figure); node.dataset.drawn = "yes"; });
   }

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+from pathlib import Path
 
 import pytest
 from map_files import CSV, MAP
@@ -10,6 +12,7 @@ from map_files import CSV, MAP
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.errors import ImportMapError
 
+MAPS = Path(__file__).resolve().parents[3] / "config" / "imports"
 BAD_MAPS = {
     "{": "not YAML",
     "channels: 3\ntime: {rate: 1}": "channels is 3, expected a mapping",
@@ -157,3 +160,21 @@ def test_a_table_with_too_many_numbers_is_refused(files, monkeypatch):
     monkeypatch.setattr("msg_adapters.tables.column_table.LARGEST", 300)
     with pytest.raises(ImportMapError, match=r"more than 75 rows of 4 columns, expected a shorter record"):
         files(MAP, CSV + "1.5,0,0,6\n" * 97)
+
+
+@pytest.mark.parametrize(
+    ("map_file", "text"),
+    [
+        ("lerobot", "position: no unit, expected `unit: rad`, or mrad, deg, arcmin or rev in its place, or"),
+        ("joint_states_echo", "time: no unit, expected `unit: s`, or ms, us, ns or min in its place; the"),
+    ],
+)
+def test_a_missing_unit_says_what_to_type(map_file, text, tmp_path):
+    """A LeRobot file holds degrees or per cent of the travel, and does not say which."""
+    part = "position" if map_file == "lerobot" else "time"
+    lines = (MAPS / f"{map_file}.yaml").read_text(encoding="utf-8").splitlines()
+    cut = [re.sub(r", unit: [^,}]+", "", line) if line.strip().startswith(part) else line for line in lines]
+    (tmp_path / "map.yaml").write_text("\n".join(cut), encoding="utf-8")
+    with pytest.raises(ImportMapError) as error:
+        load_map(tmp_path / "map.yaml")
+    assert text in str(error.value)

@@ -84,15 +84,17 @@ def test_a_map_may_have_a_sign_and_a_constant_for_each_joint(joints, index, sign
 @pytest.mark.parametrize("index", [None, 3])
 def test_values_for_each_joint_need_one_of_the_joints(joints, index):
     text = PER_JOINT.replace('"q[#]"', '"q[0]"')
-    with pytest.raises(ImportMapError, match=r"map.yaml: channels.position .* expected --index 0 to 2"):
+    with pytest.raises(ImportMapError, match=r"position has a sign, .* joints 0, 1 and 2, .* --index"):
         import_record(*joints(text), index)
 
 
 @pytest.mark.parametrize(
     ("was", "put", "words"),
     [
-        ("[1, -1, 1]", "[1, -1]", r"sign has 2 numbers, expected one, or 3 as others"),
+        ("[1, -1, 1]", "[1, -1]", r"sign has numbers for .* 0 and 1, expected the joints 0, 1 and 2"),
         ("[1, -1, 1]", "[1, 2, 1]", r"sign is 2\.0, expected 1 or -1"),
+        ("scale: 2", "scale: {}", "scale is an empty mapping, expected a number for each joint"),
+        ("scale: 2", "scale: {left: 1}", "scale has the joint 'left', expected its number"),
         ("scale: 2", "scale: []", "scale is an empty list, expected a number for each joint"),
         ("scale: 2", "scale: [1, 0, 1]", "scale is 0, expected another number"),
         ("scale: 2", "scale: [1, x, 1]", "scale is 'x', expected a number"),
@@ -101,6 +103,59 @@ def test_values_for_each_joint_need_one_of_the_joints(joints, index):
 def test_wrong_values_for_joints_are_refused(joints, was, put, words):
     with pytest.raises(ImportMapError, match=words):
         joints(PER_JOINT.replace(was, put))
+
+
+STRANGE = "Zeit [ms];J1 Iq(A);J1 phi [°];J2 Iq(A);J2 phi [°];Pumpe #1\n" + "".join(
+    f"{2 * k},0;{k},5;{k}; -{k},25;{3 * k};1\n" for k in range(20)
+)
+NUMBERED = """time: {column: "Zeit [ms]", unit: ms}
+decimal: ","
+channels:
+  command: {column: "J# Iq(A)", unit: A, scale: {1: 4, 2: 3}}
+  position: {column: "J# phi [°]", unit: rad, sign: {1: 1, 2: -1}}
+"""
+
+
+@pytest.fixture
+def bench(tmp_path):
+    """Return a function that gives the path of a log with two numbered joints, and a map."""
+    (tmp_path / "bench.csv").write_text(STRANGE, encoding="latin-1")
+
+    def made(text):
+        (tmp_path / "map.yaml").write_text(text, encoding="utf-8")
+        return tmp_path / "bench.csv", load_map(tmp_path / "map.yaml")
+
+    return made
+
+
+def test_the_number_of_a_joint_may_stand_anywhere_in_a_name(bench):
+    k = np.arange(20.0)
+    first, second = (import_record(*bench(NUMBERED), index) for index in (1, 2))
+    assert np.allclose(first["command"].y, 4.0 * (k + 0.5))
+    assert np.allclose(second["command"].y, -3.0 * (k + 0.25))
+    assert np.allclose(second["position"].y, -3.0 * k)
+
+
+def test_a_number_sign_before_a_number_is_a_part_of_the_name(bench):
+    text = NUMBERED.replace('"J# phi [°]"', '"Pumpe #1"')
+    assert np.allclose(import_record(*bench(text), 2)["position"].y, -1.0)
+
+
+def test_a_name_with_a_number_sign_and_no_joint_says_what_is_missing(bench):
+    text = NUMBERED.replace(", scale: {1: 4, 2: 3}", ", scale: 4").replace(", sign: {1: 1, 2: -1}", "")
+    with pytest.raises(ImportMapError, match=r"no column 'J# Iq\(A\)' \(--index puts the number"):
+        import_record(*bench(text))
+
+
+def test_a_list_that_lacks_the_joint_says_how_to_number_it(bench):
+    with pytest.raises(ImportMapError, match=r"joint 2 is chosen, expected .* \{1: 4\.2, 2: 3\.1\} states"):
+        import_record(*bench(NUMBERED.replace("{1: 4, 2: 3}", "[4, 3]")), 2)
+
+
+def test_one_wrong_name_does_not_hide_the_others(bench):
+    text = NUMBERED.replace("J# phi [°]", "J# phi[°]")
+    with pytest.raises(ImportMapError, match=r"no column 'J1 phi\[°\]', .* did you mean J1 phi \[°\]\?"):
+        import_record(*bench(text), 1)
 
 
 def test_a_file_in_place_of_a_directory_is_refused(motion):

@@ -10,7 +10,7 @@ import pytest
 
 from rsea_ros.identification.result import Identification
 from rsea_ros.report.figures.bode import bode_figure
-from rsea_ros.report.figures.figure import Figure
+from rsea_ros.report.figures.figure import Figure, line
 from rsea_ros.report.figures.overlay import (
     MOST_SAMPLES,
     Simulated,
@@ -107,3 +107,22 @@ def test_a_pause_of_the_samples_is_not_drawn_and_keeps_its_length() -> None:
     figure = overlay_figure("Paused", "ft", t, np.sin(t), [Simulated("simulated", BEFORE, 0.9 * np.sin(t))])
     assert figure.extra["pauses"] == [(at, seconds)]
     assert figure.extra["t"]["step"] < 2e-6
+
+
+def test_a_curve_without_a_unit_under_the_pointer_is_refused() -> None:
+    """Control, design and experiment showed pairs of bare numbers there."""
+    ones = np.ones(3)
+    with pytest.raises(ValueError, match="line 'run' has no hovertemplate"):
+        line(ones, ones, "run", AFTER)
+    assert line(ones, ones, "run", AFTER, hovertemplate="%{y:.3g} N·m")["hovertemplate"].endswith("N·m")
+
+
+@pytest.mark.parametrize(("peak", "anchor"), [(0.12, "left"), (6.0, "center"), (138.0, "right")])
+def test_the_name_of_the_highest_curve_stays_in_the_figure(peak: float, anchor: str) -> None:
+    """Centred above a peak at 0.4 Hz it lay on the marks of the axis, on a phone."""
+    frequency = np.linspace(0.1, 139.0, 5000)
+    curve = SpectrumLine("measured", AFTER, 1.0 + np.exp(-((frequency - peak) ** 2)))
+    drawn = residual_figure("t", "ft", frequency, [curve], 1e-2)
+    (name,) = [a for a in drawn.layout["annotations"] if "measured" in a["text"]]
+    assert name["xanchor"] == anchor
+    assert "N·m/√Hz" in drawn.data[1]["hovertemplate"]

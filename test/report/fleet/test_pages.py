@@ -135,3 +135,25 @@ def test_names_and_dates_are_plain():
 def test_the_doubt_of_a_date_says_month_and_year_once(tables):
     (wear,) = (a for a in alarms(*tables) if a.joint == WORN)
     assert re.fullmatch(r"\d+ (\w{3} )?to \d+ \w{3} 2025", doubt_of_date(wear))
+
+
+def test_a_joint_without_a_date_has_its_row_and_its_page(tmp_path):
+    """Of six public machines the two without a date were missing on the page, and nothing said so."""
+    names = recordings(("hip", "rail"), 3, causes=lambda j, d: [cause("backlash", 2e-3)])
+    names["time_s"] = np.where(names["joint"] == "rail", np.nan, names["time_s"])
+    made = history(np.random.default_rng(1), joints=("hip", "rail"), days=3)
+    made["time_s"] = np.where(made["joint"] == "rail", np.nan, made["time_s"])
+    index = write_fleet_report(made, names, tmp_path / "out").read_text(encoding="utf-8")
+    assert "Fleet of 2 joints" in index and "no recording has a date" in index
+    rail = (tmp_path / "out" / "joint-rail.html").read_text(encoding="utf-8")
+    assert "No recording has a date" in rail and "“date” in joints.yaml" in rail
+    assert "latest recording" not in rail.split("</h1>")[0], "without dates none is the latest"
+
+
+def test_a_joint_with_few_days_shows_what_its_latest_recording_says(tmp_path):
+    """A table of dashes and grey maps hid values that the store has."""
+    made = history(np.random.default_rng(1), joints=("hip",), days=3, told=1.0)
+    index = write_fleet_report(made, recordings(("hip",), 3), tmp_path / "out")
+    assert "Spring stiffness cannot be determined in any joint" not in index.read_text(encoding="utf-8")
+    hip = (tmp_path / "out" / "joint-hip.html").read_text(encoding="utf-8")
+    assert re.search(r"\d+ ± [\d.]+ N·m/rad<small>latest recording</small>", hip)

@@ -3,9 +3,12 @@
 import base64
 import gzip
 import hashlib
+import re
+from pathlib import Path
 
 from plotly.offline import get_plotlyjs_version
 
+from rsea_ros import report
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.page.bundle import SHA256, VENDOR, VERSION, plotly_for
 
@@ -27,3 +30,11 @@ def test_the_licence_of_the_bundle_is_shipped():
 
 def test_only_pages_with_3d_carry_the_whole_bundle():
     assert len(script("scatter", "surface")) > 3 * len(script("scatter"))
+
+
+def test_no_figure_without_3d_needs_the_whole_bundle():
+    """The points of a law were drawn by WebGL: its page had 2.3 MB."""
+    files = Path(report.__file__).parent.rglob("*.py")
+    sources = {path.stem: path.read_text(encoding="utf-8") for path in files}
+    drawn = {name for name, text in sources.items() if re.search(r'"type": "\w*(gl|3d|surface)"', text)}
+    assert drawn == {"surface"}

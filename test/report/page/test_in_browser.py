@@ -5,16 +5,29 @@ from __future__ import annotations
 import json
 from contextlib import closing
 
+import numpy as np
 import pytest
 
 from rsea_ros.report.diagnosis.sketch import sketch, upright_sketch
-from rsea_ros.report.figures.figure import Figure, layout
-from rsea_ros.report.figures.palette import INK
+from rsea_ros.report.figures.figure import Figure, label, layout, line
+from rsea_ros.report.figures.palette import BEFORE, INK
 from rsea_ros.report.page.frame import page
+from rsea_ros.report.page.html_table import table
 from test.watch.browser import Browser
 
 CAUSE = ["ft_gain_error"]
 CURVE = Figure("Rising", "", [{"type": "scatter", "x": [0, 1], "y": [0, 1], "name": "y"}], layout())
+BESIDE = [label(name, 1.01, y, INK, xref="paper", yref="paper") for name, y in (("y", 0.9), ("z", 0.5))]
+_X = np.linspace(0.0, 1.0, 9)
+TWO = Figure(
+    "Two", "",
+    [line(_X, _X, "y", INK, hoverinfo="skip"),
+     line(_X, -_X, "z", BEFORE, line={"color": BEFORE, "dash": "dot"}, hoverinfo="skip")],
+    layout(annotations=BESIDE, margin={"l": 64, "r": 190, "t": 12, "b": 48}),
+)  # fmt: skip
+PLOTTED = """[...document.querySelectorAll('.figure')].map((f) => f._fullLayout._size.w / f.clientWidth)"""
+SWITCHES = """[...document.querySelectorAll('.tools i')].map((i) => getComputedStyle(i))
+  .map((s) => [s.borderTopColor, s.borderTopStyle])"""
 SHOWN = """[...document.querySelectorAll('.sketch .culprit .cause')].map((e) => e.getBoundingClientRect())
   .filter((r) => r.width > 0).map((r) => [r.left, r.right, r.height])"""
 COLOUR = "document.querySelector('.figure').layout.font.color"
@@ -46,3 +59,34 @@ def test_figures_follow_the_colours_of_the_system(browser):
         browser.until(f"({COLOUR}) === {json.dumps(expected)}", seconds=5.0)
     browser.until("document.querySelectorAll('.tools').length === 1")
     assert browser.errors == []
+
+
+@pytest.fixture(scope="module")
+def two_curves(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("two")
+    rows = table(["trial", "asked", "measured"], [["crossover", "", "13.7 Hz"]])
+    (folder / "page.html").write_text(page("t", "k", [TWO, CURVE, rows], []))
+    with closing(Browser(folder)) as made:
+        made.open((folder / "page.html").as_uri())
+        made.until("document.querySelectorAll('[data-drawn]').length === 2")
+        yield made
+
+
+def test_a_figure_has_the_width_of_a_phone(two_curves):
+    """Names beside the curves left them a quarter of the screen."""
+    two_curves.size(1400, 900)
+    two_curves.until("document.querySelectorAll('.figure')[0].layout.annotations.length === 2")
+    two_curves.size(400, 900)
+    two_curves.until("document.querySelectorAll('.figure')[0].layout.annotations.length === 0")
+    two_curves.until(f"Math.min(...{PLOTTED}) > 0.7")
+    assert two_curves.errors == []
+
+
+def test_a_switch_shows_the_colour_and_the_dashes_of_its_curve(two_curves):
+    assert two_curves.value(SWITCHES) == [["rgb(31, 41, 51)", "solid"], ["rgb(217, 115, 13)", "dotted"]]
+
+
+def test_an_empty_cell_takes_no_line_on_a_phone(two_curves):
+    two_curves.size(400, 900)
+    shown = "[...document.querySelectorAll('td')].map((c) => c.getBoundingClientRect().height > 0)"
+    assert two_curves.value(shown) == [True, False, True]
