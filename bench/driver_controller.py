@@ -131,7 +131,7 @@ def _trial(
     with ExitStack() as kept, ExitStack() as nodes:
         bench = kept.enter_context(RemoteBench(path, "--rig", kind.rig))
         bench.hurry(priority + 1 if priority else 50)
-        kept.enter_context(hurried_wire(priority and priority + 2))
+        kept.enter_context(hurried_wire(priority and priority - 1))
         first, last = _processors(priority)
         parameters = {**bench.parameters(), "baud": 4_000_000, "autostart": "true", "rig": kind.rig}
         both = {"rate": rate, "realtime_priority": priority}

@@ -1,8 +1,8 @@
-"""The kernel's workers that carry the bytes of a pseudo-terminal, at SCHED_FIFO as the simulated bench is.
+"""The kernel's workers that carry the bytes of a pseudo-terminal, at SCHED_FIFO just below the nodes.
 
-Both stand for hardware that has processors of its own. At normal priority beside processes that compute, a
-worker waits for tens to hundreds of ms, and so does whoever polls the terminal: Linux lets a poll of a
-terminal wait for its worker (tty_buffer_flush_work in n_tty_poll).
+They are the wire, which no process can hold up. At normal priority beside processes that compute, a worker
+waits for tens to hundreds of ms, and so does whoever polls the terminal: Linux lets a poll of a terminal wait
+for its worker (tty_buffer_flush_work in n_tty_poll). Above the nodes, workers of the disk would delay them.
 """
 
 from __future__ import annotations
