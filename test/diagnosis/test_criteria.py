@@ -153,6 +153,6 @@ def test_the_settings_steer_the_decision():
 
 
 def test_every_setting_has_meaning_unit_and_reason():
-    settings = list(DEFAULT.listed())
+    settings = list(DEFAULT.numbers())
     assert len({s.name for s in settings}) == len(settings) > 35
     assert all(s.meaning and s.unit and s.reason for s in settings)
