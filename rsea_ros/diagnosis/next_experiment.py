@@ -63,10 +63,10 @@ def separating_run(
     )
     if not isinstance(case.drive, Drive):
         return undecided
-    peak = float(np.max(np.abs(case.drive.command)))
+    present = float(np.max(np.abs(case.drive.command)))
     rig, most = _model(accepted), 0.0
     for option in sorted(EXCITATIONS, key=lambda c: c.cost):
-        run = allowed_run(rig, case, option.kind, _settings(option, rate, rule), option.relative * peak)
+        run = allowed_run(rig, case, option.kind, _settings(option, rate, rule), option.relative * present)
         if run is None:
             continue
         separation = min(_separation(rival, run.case) for rival in rivals)
@@ -142,13 +142,13 @@ def amplitude_series(
     case, rig = model.problem.cases[0], _model(model)
     if not isinstance(case.drive, Drive):  # it drifts: no simulation predicts how far another run would go
         return Experiment("amplitude_series", amplitude=0.5)
-    peak = float(np.max(np.abs(case.drive.command)))
+    present = float(np.max(np.abs(case.drive.command)))
     excess = math.sqrt(max(times_noise**2 - 1.0, 0.0))
     for factor in (0.5, 2.0):
         if math.hypot(1.0, factor * excess) < rule.visible:
             continue
-        run = allowed_run(rig, case, "multisine", _series(rig, playable_rate(rate), rule), factor * peak)
-        if run is not None and run.peak >= rule.nearly * factor * peak:
+        run = allowed_run(rig, case, "multisine", _series(rig, playable_rate(rate), rule), factor * present)
+        if run is not None and run.peak >= rule.nearly * factor * present:
             return Experiment("amplitude_series", amplitude=factor, excitation=_as_excited(run, rig))
     return None
 
