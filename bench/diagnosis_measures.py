@@ -31,7 +31,7 @@ class Measure:
 
     def __str__(self) -> str:
         mark = "ok  " if self.met else "LESS"
-        return f"{mark} {self.what:<66}{self.value:8.2f}   asked {self.asked:<10} ({self.cases} values)"
+        return f"{mark} {self.what:<66}{self.value:8.2f}   required {self.asked:<10} ({self.cases} values)"
 
 
 def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
@@ -170,7 +170,7 @@ def markdown(outcomes: Sequence[Outcome]) -> str:
     matrix = confusion(outcomes)
     columns = [*NAMES, UNEXPLAINED, NOTHING]
     columns += ["error"] * any("error" in row for row in matrix.values())
-    lines = ["| measure | value | asked | values |", "|---|--:|--:|--:|"]
+    lines = ["| measure | value | required | values |", "|---|--:|--:|--:|"]
     lines += [f"| {m.what} | {m.value:.2f} | {m.asked} | {m.cases} |" for m in measures(outcomes)]
     heads = [str(k + 1) if name in NAMES else name for k, name in enumerate(columns)]
     lines += ["", f"| truth (rows), first cause named (columns) | {' | '.join(heads)} |"]

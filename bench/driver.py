@@ -47,7 +47,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of `random`")
     parser.add_argument("--patient", action="store_true", help="`controller`: late replies are no fault")
     args, sections = choose(parser, SECTIONS)
-    print(f"{'what':58} {'asked':22} measured")
+    print(f"{'what':58} {'required':22} measured")
     for _, section in sections:
         with tempfile.TemporaryDirectory() as folder:
             for row in section(args, Path(folder)):

@@ -72,7 +72,7 @@ def noise(args: argparse.Namespace) -> Iterator[str]:
         channels = [measure(rig, n, still, rng) for n in ("position", "motor_torque", "ft")]
         alarms += _changes(observer, flag, chunk * CHUNK, *channels)
     spent, simulated = time.monotonic() - begin, chunks * CHUNK / 280.0
-    yield (f"noise alone, {simulated / 3600.0:g} h: {alarms} changes of the flag (asked < 1 an hour), "
+    yield (f"noise alone, {simulated / 3600.0:g} h: {alarms} changes of the flag (required: < 1 an hour), "
            f"{simulated / spent:.0f} times faster than real time")  # fmt: skip
     for amplitude in (0.05, 0.2, 1.0):
         t = np.arange(CHUNK) / 280.0

@@ -36,7 +36,7 @@ def timing(args: argparse.Namespace) -> Iterator[str]:
     """Measure each rate with each priority."""
     os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    yield f"{'what':58} {'asked':18} p50, p99"
+    yield f"{'what':58} {'required':18} p50, p99"
     for rate, priority in product(args.rate, filter(may_have, args.priority)):
         with tempfile.TemporaryDirectory() as folder:
             yield from _at(rate, priority, args.seconds, Path(folder))

@@ -19,7 +19,7 @@ from bench.public_fit import DATA, Score
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "public.md"
 MARK = "<!-- table -->\n"
-HEAD = "| test | error here | published | asked |  | s |\n|---|---|---|---|---|---|\n"
+HEAD = "| test | error here | published | required |  | s |\n|---|---|---|---|---|---|\n"
 
 
 def main(arguments: Sequence[str]) -> int:

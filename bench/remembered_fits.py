@@ -32,13 +32,13 @@ class Remembered:
         key = self._key("solve", problem, theta, sorted(limits.items()), matrix)
         return self._result(key, partial(_SOLVE, problem, theta, run=run, matrix=matrix, **limits))
 
-    def screen(self, present, effect, guesses, rule):
+    def screen(self, current, effect, guesses, rule):
         """Return what screening.screen returns."""
         limits = (rule.smaller_guess, rule.screening_steps, rule.screening_part)
         key = self._key(
-            "screen", present.problem, present.theta, effect.name, guesses, present.jacobian, limits
+            "screen", current.problem, current.theta, effect.name, guesses, current.jacobian, limits
         )
-        return self._result(key, lambda: _SCREEN(present, effect, guesses, rule))
+        return self._result(key, lambda: _SCREEN(current, effect, guesses, rule))
 
     def evidence_for(self, claim, cases, settings, run):
         """Return what evidence.evidence_for returns."""

@@ -22,7 +22,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Print a line for each value: cases right, wrong causes, missed causes, seconds."""
     args = _parser().parse_args(argv)
     if args.list or args.setting is None:
-        for s in DEFAULT.listed():
+        for s in DEFAULT.numbers():
             print(f"{s.name:<30}{value_text(s.value):>8} {s.unit:<3} {s.meaning}: {s.reason}")
         return 0
     plans = [p for p in plan(args.seed) if args.select in f"{p.name} {p.group}"]
@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def with_value(settings: DiagnosisSettings, name: str, value: float) -> DiagnosisSettings:
     """Return the settings with one number changed, `group.field`. Raises SystemExit for any other name."""
-    known = {s.name: s.value for s in settings.listed() if not isinstance(s.value, tuple)}
+    known = {s.name: s.value for s in settings.numbers() if not isinstance(s.value, tuple)}
     if name not in known:
         raise SystemExit(f"{name}: no such setting, expected one of {', '.join(known)}")
     group, field = name.split(".")

@@ -117,7 +117,7 @@ def read(log: Path) -> list[Played]:
 
 def page(played: Sequence[Played]) -> str:
     """Return docs/settings.md: for each setting the outcomes over its values, and whether they change."""
-    in_use = {s.name: s for s in DEFAULT.listed()}
+    in_use = {s.name: s for s in DEFAULT.numbers()}
     done = {(p.case, p.setting, p.value) for p in played}
     whole = [name for name in CASES if all((name, s, v) in done for s, v in _values())]
     names = ", ".join(f"`{name}`" for name in whole)

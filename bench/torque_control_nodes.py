@@ -176,7 +176,7 @@ def main() -> None:
     os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     rclpy.init()
-    head = f"{'':18}{'sine of 5 Hz':34}{'asked %':>8}{'error %':>9}{'worst %':>9}"
+    head = f"{'':18}{'sine of 5 Hz':34}{'required':>8}{'error %':>9}{'worst %':>9}"
     print(f"{head}{'ahead ms':>10}{'late':>7}")
     for rate, priority in product(args.rate, filter(may_have, args.priority)):
         setup = f"{rate:g} Hz" + (f", FIFO {priority}" if priority else "")

@@ -28,22 +28,25 @@ def generate_launch_description() -> LaunchDescription:
                 DeclareLaunchArgument(name, default_value=default.format(config=CONFIG), description=about)
                 for name, (default, about) in GRAPH["arguments"].items()
             ),
-            *(node(name, own, EqualsSubstitution(first, name)) for name, own in GRAPH["first"].items()),
-            *(node(name, own, LaunchConfiguration(name)) for name, own in GRAPH["others"].items()),
+            *(node(name, sets, EqualsSubstitution(first, name)) for name, sets in GRAPH["first"].items()),
+            *(node(name, sets, LaunchConfiguration(name)) for name, sets in GRAPH["others"].items()),
         ]
     )
 
 
-def node(name: str, own: dict[str, str], wanted: Substitution) -> Node:
-    """Return a node of the package with its parameter file, started if `wanted` is true."""
+def node(name: str, sets: dict[str, str], condition: Substitution) -> Node:
+    """Return a node of the package with its parameter file, started if `condition` is true.
+
+    sets: by parameter the launch argument that sets it.
+    """
     return Node(
         package="rsea_ros",
         executable=name,
         namespace=LaunchConfiguration("namespace"),
         parameters=[
             LaunchConfiguration("params") if name == "driver" else str(CONFIG / f"{name}.yaml"),
-            {parameter: LaunchConfiguration(argument) for parameter, argument in own.items()},
+            {parameter: LaunchConfiguration(argument) for parameter, argument in sets.items()},
         ],
-        condition=IfCondition(wanted),
+        condition=IfCondition(condition),
         output="screen",
     )

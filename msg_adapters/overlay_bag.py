@@ -1,4 +1,4 @@
-"""Records side by side in one bag, each with the contract's topics in a namespace of its own."""
+"""Records side by side in one bag, each under the usual topics in a namespace of its own."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def check_topic(topic: str) -> None:
 
 @dataclass(frozen=True)
 class TopicMap:
-    """Names of the topics of one bench; the defaults are the contract's.
+    """Names of the topics of one bench; the defaults are those of README.md.
 
     A name that starts with a slash is absolute, any other lies in the namespace.
     desired_position is a JointState whose position is the reference of the controller that ran during

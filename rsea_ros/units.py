@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 
+STANDARD_GRAVITY = 9.80665
+"""m/s^2, by definition (3rd CGPM, 1901)."""
+
 _SEPARATOR = re.compile(r"[\s·⋅∙*.]+|-(?=[A-Za-z])")
 _RAISED = str.maketrans("²³µ", "23μ")
 _SAME = {

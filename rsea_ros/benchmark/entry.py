@@ -29,9 +29,9 @@ def largest_gain(record: Record, rig: Rig) -> Answer:
     """
     problem = nominal_problem([check(record, rig)], rig)
     with worker_pools() as pools:
-        present = fit_candidate(FitSetup(problem.cases, DEFAULT, pools.run), problem)
+        current = fit_candidate(FitSetup(problem.cases, DEFAULT, pools.run), problem)
         effects = searched_effects(problem, ())
-        fits = StepFits(present, effects, pools, DEFAULT, lambda step, share: None)
+        fits = StepFits(current, effects, pools, DEFAULT, lambda step, share: None)
         pieces = fits.fit_pieces(fits.screen(fits.on_pieces)[: DEFAULT.forward.piece_fits])
     best = min(pieces, key=lambda s: s.cost, default=None)
     return Answer({best.name: 1.0} if best else {})

@@ -17,15 +17,13 @@ from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.checks.linear_findings import JOINT, SURE, drift_finding
 from rsea_ros.checks.linearised_rig import LinearisedFit, Number
-from rsea_ros.identification.lag_line import BLOCK, LagLine, lag_line
+from rsea_ros.identification.lag_line import BLOCK, LEAST_RISE, SCATTER, LagLine, lag_line
 from rsea_ros.signals import SENSED, Channel, Record
 
 _STEEPEST = 1.8e-3
 """s/s. The lag is followed from block to block up to 2 ms/s; no line near that is trusted."""
-_LEAST_RISE = 1e-3
-"""s over the record: less turns no phase far, and a linear fit sees it."""
-_SCATTER, _STRAIGHT = 0.25, 0.2
-"""Of the rise of a line: lags that scatter more do not follow a clock, or not beside a misfit."""
+_STRAIGHT = 0.2
+"""As SCATTER, beside a misfit of the rig."""
 
 
 def lag_lines(compared: Mapping[str, Side], start: float) -> dict[str, LagLine]:
@@ -36,12 +34,12 @@ def lag_lines(compared: Mapping[str, Side], start: float) -> dict[str, LagLine]:
 
 def clock_rates(lines: Mapping[str, LagLine]) -> dict[str, float]:
     """Return the rate (s/s) at which channels come later and later than predicted, where a line shows it."""
-    return {n: line.rate for n, line in lines.items() if _rises(line, _SCATTER)}
+    return {n: line.rate for n, line in lines.items() if _rises(line, SCATTER)}
 
 
 def _rises(line: LagLine, scatter: float) -> bool:
     """Return whether a line rises too far for a linear fit, and its lags scatter less than a part of that."""
-    steep = abs(line.rise) > _LEAST_RISE and abs(line.rate) < _STEEPEST
+    steep = abs(line.rise) > LEAST_RISE and abs(line.rate) < _STEEPEST
     return steep and line.scatter < scatter * abs(line.rise)
 
 

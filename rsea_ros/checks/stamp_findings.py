@@ -83,10 +83,10 @@ def rates(record: Record, rig: Rig) -> list[Finding]:
     return [replace(f, detail=words[f.channel]) if f.channel in words else f for f in findings]
 
 
-def _other_unit(name: str, channel: Channel, expected: str, else_: str) -> Finding:
-    """Return the finding of a rate that speaks of stamps in another unit. else_: what helps otherwise."""
+def _other_unit(name: str, channel: Channel, expected: str, otherwise: str) -> Finding:
+    """Return the finding of a rate that speaks of stamps in another unit. otherwise: remedy if it is not."""
     lasts = f"{float(np.ptp(channel.t)):.3g} s of it"
-    remedy = f"{AS_SECONDS}{f' If so, {else_}' if else_ else ''}"
+    remedy = f"{AS_SECONDS}{f' If so, {otherwise}' if otherwise else ''}"
     return Finding("red", "rate", name, channel.rate, "Hz", expected=expected, detail=lasts, remedy=remedy)
 
 

@@ -115,7 +115,7 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
         value = "not possible" if math.isnan(check.value) else f"{check.value:.4g} {words.unit(check.unit)}"
         sign = ">=" if check.least else "<="
         say(
-            f"  {'yes' if check.met else 'NO '}  {check.name}: {value}, asked {sign} {check.limit:.4g} "
+            f"  {'yes' if check.met else 'NO '}  {check.name}: {value}, required {sign} {check.limit:.4g} "
             f"{words.unit(check.unit)}",
             indent=7,
         )

@@ -250,12 +250,13 @@ def restlessness(rig: Rig, design: ControllerDesign, gap: float = 5.0 * ARCMIN) 
     worn = rig.with_effects(EffectSetting("backlash", {"gap": gap}))
     ratios = []
     for torque in (0.0, 2.0):
-        noise, with_gap = (_held(true, rig, design, torque) for true in (rig, worn))
+        noise, with_gap = (_torque_scatter(true, rig, design, torque) for true in (rig, worn))
         ratios.append(with_gap / noise)
     return max(ratios)
 
 
-def _held(true: Rig, model: Rig, design: ControllerDesign, torque: float) -> float:
+def _torque_scatter(true: Rig, model: Rig, design: ControllerDesign, torque: float) -> float:
+    """Return the standard deviation of ft while a controller holds a torque, N m."""
     t = np.arange(round(LEARNED.seconds * design.rate)) / design.rate
     wanted = np.where(t < BRIEF.counted_from, AMPLITUDE * np.sin(2.0 * np.pi * HZ * t), torque)
     settings = ControllerSettings(compensate=())

@@ -13,9 +13,8 @@ from rsea_ros.design.requirement import Requirement
 from rsea_ros.design.spring_design import least_for_band, least_stiffness, spring_design
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.model.train import Train
+from rsea_ros.normal import Z90
 
-NINETY_PERCENT = 1.6449
-"""Sigmas either way of the mean that hold 90 % of a normal quantity."""
 _STEPS = 201
 
 
@@ -61,7 +60,7 @@ def band_range(stiffness: float, chassis: float, spin: float, spread: float) -> 
     stiffness: N m/rad. chassis: J_sc, spin: n J_r, kg m^2. spread: of J_m, relative, one sigma. The band is
     without limit where the range holds a J_m whose spin cancels J_sc.
     """
-    inner = chassis + spin * np.exp(NINETY_PERCENT * spread * np.linspace(-1.0, 1.0, _STEPS))
+    inner = chassis + spin * np.exp(Z90 * spread * np.linspace(-1.0, 1.0, _STEPS))
     bands = undamped_band(stiffness, inner)
     cancels = bool(inner.min() < 0.0 < inner.max())
     return float(bands.min()), math.inf if cancels else float(bands.max())

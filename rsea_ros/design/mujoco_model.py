@@ -26,8 +26,8 @@ from rsea_ros.design.mesh import Mesh, mesh_of
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia
 from rsea_ros.model.rig import Rig
+from rsea_ros.units import STANDARD_GRAVITY
 
-GRAVITY = 9.80665
 STEP = 5e-5
 """s, fixed step of the engine."""
 SOLREF, SOLIMP = f"{2.0 * STEP:g} 1", "0.9999 0.9999 0.001"
@@ -62,8 +62,9 @@ def model_element(rig: Rig, play: float = 0.0) -> xml.Element:
     mesh = mesh_of(rig)
     root = xml.Element("mujoco", model=rig.name)
     xml.SubElement(root, "compiler", angle="radian")
+    gravity = f"0 {-STANDARD_GRAVITY} 0"
     xml.SubElement(
-        root, "option", timestep=f"{STEP:g}", integrator="RK4", gravity=f"0 {-GRAVITY} 0", tolerance="1e-12"
+        root, "option", timestep=f"{STEP:g}", integrator="RK4", gravity=gravity, tolerance="1e-12"
     )
     is_stiff = math.isinf(rig["gear.stiffness"]) and not play
     parents = _bodies(rig, mesh, xml.SubElement(root, "worldbody"), is_stiff)
@@ -137,8 +138,8 @@ def _body(
     """
     if not inertia > 0.0:
         raise RigError(f"mjcf: {name} has inertia {inertia:g} kg·m², expected a value > 0 kg·m²")
-    arm = 0.5 * inertia * GRAVITY / weight if weight else 0.0
-    mass = weight / (GRAVITY * arm) if weight else 1.0
+    arm = 0.5 * inertia * STANDARD_GRAVITY / weight if weight else 0.0
+    mass = weight / (STANDARD_GRAVITY * arm) if weight else 1.0
     about_mass = inertia - mass * arm**2
     body = xml.SubElement(world, "body", name=name)
     xml.SubElement(body, "joint", name=name, type="hinge", axis="0 0 1")

@@ -80,13 +80,13 @@ def falls(model: Score, other: Score) -> list[float]:
     return [1.0 - model.ratio(n) / max(other.ratio(n), 1e-12) for n in model.sums]
 
 
-def is_acceptable(model: Scored, present: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Return whether a model may take the place of the present one."""
-    return refusal(model, present, settings) is None
+def is_acceptable(model: Scored, current: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+    """Return whether a model may take the place of the current one."""
+    return refusal(model, current, settings) is None
 
 
-def refusal(model: Scored, present: Scored, settings: DiagnosisSettings = DEFAULT) -> Reason | None:
-    """Return why a model may not take the place of the present one; None where it may.
+def refusal(model: Scored, current: Scored, settings: DiagnosisSettings = DEFAULT) -> Reason | None:
+    """Return why a model may not take the place of the current one; None where it may.
 
     An effect at a bound imitates another one. A pair, a replacement, and one more cause
     beside several that leave much are in doubt: they must take away more, and from the worst channel.
@@ -94,26 +94,26 @@ def refusal(model: Scored, present: Scored, settings: DiagnosisSettings = DEFAUL
     rule = settings.acceptance
     if model.is_at_bound:
         return "at_bound"
-    over_present = preference(
-        model.validation, present.validation, model.parameters - present.parameters, rule
+    over_current = preference(
+        model.validation, current.validation, model.parameters - current.parameters, rule
     )
-    if not over_present.better:
-        return "too_small" if over_present.sure else "not_sure"
-    if likelier_by(model, present, settings.floor.far) < 0.0:
+    if not over_current.better:
+        return "too_small" if over_current.sure else "not_sure"
+    if likelier_by(model, current, settings.floor.far) < 0.0:
         return "leaves_priors"
     if worst_ratio(model) < settings.floor.only_noise:
         return None
-    is_one_more = len(model.causes) == len(present.causes) + 1
-    is_late = len(present.causes) >= rule.causes_in_doubt and is_far_from_floor(model, settings)
+    is_one_more = len(model.causes) == len(current.causes) + 1
+    is_late = len(current.causes) >= rule.causes_in_doubt and is_far_from_floor(model, settings)
     if not is_one_more or is_late:
-        is_enough = worst_ratio(model) < (1.0 - rule.fall_in_doubt) * worst_ratio(present)
+        is_enough = worst_ratio(model) < (1.0 - rule.fall_in_doubt) * worst_ratio(current)
     else:
-        is_enough = max(falls(model.validation, present.validation)) > rule.fall
+        is_enough = max(falls(model.validation, current.validation)) > rule.fall
     return None if is_enough else "too_small"
 
 
 def break_tie(
-    models: Sequence[M], present: Score, settings: DiagnosisSettings = DEFAULT
+    models: Sequence[M], current: Score, settings: DiagnosisSettings = DEFAULT
 ) -> tuple[M | None, tuple[M, ...]]:
     """Return the model to accept and those that do as well with no more parameters.
 
@@ -124,7 +124,7 @@ def break_tie(
     if not models:
         return None, ()
     far = settings.floor.far
-    least = min(models, key=lambda m: float(m.validation.loss(present).sum()))
+    least = min(models, key=lambda m: float(m.validation.loss(current).sum()))
     best = max(models, key=lambda m: likelier_by(m, least, far))
 
     def contends(m: M) -> bool:

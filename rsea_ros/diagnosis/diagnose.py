@@ -49,9 +49,9 @@ def diagnose(
 
     rig: effects that it states belong to the nominal model; their unknown parameters are fitted with the rig.
     Effects that it only guesses do not: the search treats them as all others.
-    holdout: a record on which the models are tested; without it, the test blocks of the records.
+    holdout: a record on which the models are tested; without it, the test blocks of the records. Channels of
+    it that no record has are not tested.
     settings: the effects to try and the numbers that steer the verdict, DiagnosisSettings() by default.
-    Its channels that no record has are not tested.
     Raises IdentificationError when the records are too short or lack a channel that the rig needs, or the
     held-out record lacks all of theirs.
     """

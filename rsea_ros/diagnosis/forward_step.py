@@ -1,4 +1,4 @@
-"""A forward step: every effect tried beside the present model, more thoroughly as fewer remain.
+"""A forward step: every effect tried beside the current model, more thoroughly as fewer remain.
 
 All are screened and the promising fitted on short pieces of the data; the best of those are fitted to all
 training blocks. Where none is acceptable, effects that the pieces overlooked are tried, then effects on the
@@ -38,9 +38,9 @@ NO_STEP = StepResult(None, [], ())
 
 @dataclass(frozen=True)
 class ForwardStep:
-    """The input of a step: the present model, the effects to try, and the number of earlier steps."""
+    """The input of a step: the current model, the effects to try, and the number of earlier steps."""
 
-    present: Candidate
+    current: Candidate
     effects: Sequence[Effect]
     number: int
     pools: Pools
@@ -71,18 +71,18 @@ class ForwardStep:
 
     @cached_property
     def fits(self) -> StepFits:
-        """The fits beside the present model."""
-        return StepFits(self.present, self.effects, self.pools, self.settings, self._say)
+        """The fits beside the current model."""
+        return StepFits(self.current, self.effects, self.pools, self.settings, self._say)
 
     def _acceptable(self, models: Sequence[Candidate]) -> list[Candidate]:
-        return [m for m in models if is_acceptable(m, self.present, self.settings)]
+        return [m for m in models if is_acceptable(m, self.current, self.settings)]
 
     def _is_far(self, model: Candidate) -> bool:
         return is_far_from_floor(model, self.settings)
 
     def _choose(self, models: Sequence[Candidate]) -> tuple[Candidate | None, tuple[Candidate, ...]]:
         """Return the model to accept and those that do as well."""
-        return break_tie(models, self.present.validation, self.settings)
+        return break_tie(models, self.current.validation, self.settings)
 
     def _fit_to_pieces(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
         """Return the best of the screening fitted to the pieces, best first.
@@ -96,12 +96,12 @@ class ForwardStep:
         self, screened: Sequence[ScreenedEffect], close: Sequence[ScreenedEffect]
     ) -> list[ScreenedEffect]:
         """Return the best on the pieces, and the listed look-alikes of the very best."""
-        rule, present = self.settings.forward, self.fits.on_pieces.cost
+        rule, cost = self.settings.forward, self.fits.on_pieces.cost
         if not close:
             return []
         best, alike = close[0].cost, _look_alikes(close[0].effect, self.effects)
         if self.fits.is_far:
-            close = [s for s in close if s.cost < rule.hope_one * present] or close[:1]
+            close = [s for s in close if s.cost < rule.hope_one * cost] or close[:1]
         first, following = close[: rule.full_fits], close[rule.full_fits : 2 * rule.full_fits]
         near = [s for s in first if s.cost < rule.behind_first * best]
         near += [s for s in following if s.cost < rule.behind_next * best]
@@ -116,7 +116,7 @@ class ForwardStep:
     def _pairs(self, firsts: Sequence[ScreenedEffect]) -> list[Candidate]:
         """Return acceptable models with two more effects, for where none helps alone and much is left."""
         rule, fits = self.settings.forward, self.fits
-        if len(self.present.causes) > rule.causes_beside_a_pair or not fits.is_far:
+        if len(self.current.causes) > rule.causes_beside_a_pair or not fits.is_far:
             return []
         pairs: list[ScreenedEffect] = []
         for first in firsts[: rule.paired]:
@@ -129,23 +129,23 @@ class ForwardStep:
 
     def _far_behind(self, screened: ScreenedEffect) -> Trial:
         problem, theta = self.fits.complete(screened)
-        return Trial(screened.name, self.present, problem, theta, is_full=False, reason="far_behind")
+        return Trial(screened.name, self.current, problem, theta, is_full=False, reason="far_behind")
 
     def _refusal(self, model: Candidate, chosen: Candidate | None) -> Trial:
         """Return the trial of a model that was not accepted, with the reason."""
-        refused = refusal(model, self.present, self.settings)
+        refused = refusal(model, self.current, self.settings)
         if refused is not None or chosen is None:
-            return trial_of(model, model.newest, self.present, refused or "not_sure")
+            return trial_of(model, model.newest, self.current, refused or "not_sure")
         loss = float(chosen.validation.loss(chosen.validation).sum())
         is_alike = loss_excess(model, chosen) < self.settings.forward.alike * loss
         is_larger = model.parameters > chosen.parameters and is_alike
         reason: Reason = "no_better_than_simpler" if is_larger else "explains_less"
         if loss_excess(model, chosen) < 0.0 and model.prior_cost > chosen.prior_cost:
             reason = "no_better_than_likelier"
-        return trial_of(model, model.newest, self.present, reason, chosen.newest)
+        return trial_of(model, model.newest, self.current, reason, chosen.newest)
 
     def _say(self, what: str, within: float) -> None:
-        """Report the present trial; each step counts as half of the remaining work."""
+        """Report the current trial; each step counts as half of the remaining work."""
         share = 1.0 - 0.5**self.number * (1.0 - 0.5 * within)
         self.tell(f"step {self.number + 1}: {what}", share)
 

@@ -29,7 +29,7 @@ _DAMPING = 1e-6
 
 @dataclass(frozen=True)
 class ScreenedEffect:
-    """An effect beside the present model, with the start of a full fit and the cost already reached.
+    """An effect beside the current model, with the start of a full fit and the cost already reached.
 
     unsure: the best of its guesses whose derivatives change on the way, as far as two steps led, which does
     not show where a fit leads.
@@ -48,15 +48,15 @@ class ScreenedEffect:
 
 
 def screen(
-    present: Solution, effect: Effect, guesses: Sequence[dict[str, float]], rule: ForwardSettings
+    current: Solution, effect: Effect, guesses: Sequence[dict[str, float]], rule: ForwardSettings
 ) -> ScreenedEffect | None:
     """Return the best of an effect's guesses after two cheap steps; None for an effect the rig cannot have.
 
     A guess may also name values of the rig: these then differ from where the derivatives were taken.
     """
-    best = _best_of(present, effect, guesses, rule)
-    if best is None or best.cost >= present.cost:
-        second = _best_of(present, effect, _other_guesses(effect, guesses, rule.smaller_guess), rule)
+    best = _best_of(current, effect, guesses, rule)
+    if best is None or best.cost >= current.cost:
+        second = _best_of(current, effect, _other_guesses(effect, guesses, rule.smaller_guess), rule)
         best = min((b for b in (best, second) if b is not None), key=lambda b: b.cost, default=None)
     return best
 
@@ -79,14 +79,14 @@ def _other_guesses(
 
 
 def _best_of(
-    present: Solution, effect: Effect, guesses: Iterable[Mapping[str, float]], rule: ForwardSettings
+    current: Solution, effect: Effect, guesses: Iterable[Mapping[str, float]], rule: ForwardSettings
 ) -> ScreenedEffect | None:
     """Return the best of some guesses."""
     tried_all, unsure = [], []
     for guess in guesses:
         parameters = {name: value for name, value in guess.items() if "." not in name}
-        base = with_values(present, {name: value for name, value in guess.items() if "." in name})
-        is_bent = "mode" in effect.tags or base is not present
+        base = with_values(current, {name: value for name, value in guess.items() if "." in name})
+        is_bent = "mode" in effect.tags or base is not current
         try_guess = _with_new_derivatives if is_bent else _with_present_derivatives
         try:
             tried = try_guess(base, effect, parameters, rule)
@@ -108,35 +108,35 @@ def continue_fit(screened: ScreenedEffect, rule: ForwardSettings) -> ScreenedEff
     return min([screened, *ends], key=lambda s: s.cost)
 
 
-def with_values(present: Solution, values: Mapping[str, float]) -> Solution:
+def with_values(current: Solution, values: Mapping[str, float]) -> Solution:
     """Return a solution with some of its unknowns at other values; itself when none of them differs."""
-    theta = present.theta.copy()
-    for i, unknown in enumerate(present.problem.unknowns):
+    theta = current.theta.copy()
+    for i, unknown in enumerate(current.problem.unknowns):
         if unknown.name in values:
             theta[i] = unknown.inner(values[unknown.name])
-    return present if (theta == present.theta).all() else replace(present, theta=theta)
+    return current if (theta == current.theta).all() else replace(current, theta=theta)
 
 
 def _with_new_derivatives(
-    present: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
+    current: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
 ) -> ScreenedEffect:
-    problem, theta = add_effect(present.problem, present.theta, effect, guess)
+    problem, theta = add_effect(current.problem, current.theta, effect, guess)
     solution = solve(problem, theta, iterations=rule.screening_steps)
     return ScreenedEffect(effect, solution.problem, solution.theta, solution.cost)
 
 
 def _with_present_derivatives(
-    present: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
+    current: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
 ) -> ScreenedEffect | None:
     """Return where two steps lead; None for an effect that shows in no channel, or that runs away."""
-    problem, theta = add_effect(present.problem, present.theta, effect, guess)
+    problem, theta = add_effect(current.problem, current.theta, effect, guess)
     residual = problem.residual(theta)
     if power(residual) == np.inf:
         return None
-    columns = jacobian_columns(problem, theta, residual, range(len(present.theta), len(theta)))
+    columns = jacobian_columns(problem, theta, residual, range(len(current.theta), len(theta)))
     if not columns.any():
         return None
-    step = _Step(problem, np.column_stack([present.jacobian, columns]))
+    step = _Step(problem, np.column_stack([current.jacobian, columns]))
     best = ScreenedEffect(effect, problem, theta, step.cost(theta, residual))
     for _ in range(rule.screening_steps):
         better = step.take(best, residual, (1.0, rule.screening_part))

@@ -41,12 +41,12 @@ from rsea_ros.signals import FloatArray
 
 @dataclass(frozen=True)
 class StepFits:
-    """Fits effects beside the present model, as cheaply as each stage of a forward step allows.
+    """Fits effects beside the current model, as cheaply as each stage of a forward step allows.
 
-    say: called with the present fit and the share of the step that is done.
+    say: called with the current fit and the share of the step that is done.
     """
 
-    present: Candidate
+    current: Candidate
     effects: Sequence[Effect]
     pools: Pools
     settings: DiagnosisSettings
@@ -54,19 +54,19 @@ class StepFits:
 
     @property
     def is_far(self) -> bool:
-        """Whether the present model is far from the noise floor."""
-        return is_far_from_floor(self.present, self.settings)
+        """Whether the current model is far from the noise floor."""
+        return is_far_from_floor(self.current, self.settings)
 
     @cached_property
     def on_pieces(self) -> Solution:
-        """The present model fitted to short pieces; far from the floor with clocks taken as right.
+        """The current model fitted to short pieces; far from the floor with clocks taken as right.
 
         Near it the clocks stay: without them whatever shifts the response beats the effect that is missing.
         """
-        runs = zip(self.present.cases, self.present.outputs, strict=True)
+        runs = zip(self.current.cases, self.current.outputs, strict=True)
         pieces = (p for case, out in runs for p in short_pieces_of(case, out, self.settings))
-        cases = tuple(with_misfit_as_noise(p, self.present.validation.ratios) for p in pieces)
-        solution = self.present.solution
+        cases = tuple(with_misfit_as_noise(p, self.current.validation.ratios) for p in pieces)
+        solution = self.current.solution
         problem, theta = replace(solution.problem, cases=cases), solution.theta
         if self.is_far:
             problem, theta = without_clocks(with_doubled_step(problem), theta)
@@ -75,9 +75,9 @@ class StepFits:
     @cached_property
     def guesses(self) -> dict[str, list[Guess]]:
         """The initial guesses of every effect that is not in the model."""
-        solution = self.present.solution
+        solution = self.current.solution
         rig, _ = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
-        view = RecordView(self.present.cases[0], rig, self.present.outputs[0])
+        view = RecordView(self.current.cases[0], rig, self.current.outputs[0])
         effects = [e for e in self.effects if e.name not in solution.problem.acting]
         guesses = self.pools.fits.map(lambda e: initial_guesses(e, view), effects)
         return {e.name: g for e, g in zip(effects, guesses, strict=True)}
@@ -98,7 +98,7 @@ class StepFits:
         return sorted(screened, key=lambda s: s.cost)
 
     def with_typical(self, effect: Effect) -> Solution:
-        """Return the present model on the pieces with an effect of typical size, not fitted."""
+        """Return the current model on the pieces with an effect of typical size, not fitted."""
         base = self.on_pieces
         return solve(*add_effect(base.problem, base.theta, effect, dict(effect.typical)), iterations=0)
 
@@ -124,7 +124,7 @@ class StepFits:
         On the validation blocks, as fitted so far. In a part of the band many laws are one; which of them was
         fitted on is then chance.
         """
-        gained = loss_excess(self.present, chosen)
+        gained = loss_excess(self.current, chosen)
         least = self.settings.forward.undecided * gained
         excesses = self.pools.fits.map(lambda s: self._least_loss(s, chosen), left_out)
         return [s for s, excess in zip(left_out, excesses, strict=True) if excess < least]
@@ -146,10 +146,10 @@ class StepFits:
 
     def complete(self, screened: ScreenedEffect) -> tuple[Problem, FloatArray]:
         """Return the problem of a screened effect on every sample, clocks included, and its theta."""
-        problem = replace(screened.problem, cases=self.present.cases)
+        problem = replace(screened.problem, cases=self.current.cases)
         theta = screened.theta
         if self.is_far:
-            problem, theta = with_clocks(problem, theta, self.present.problem)
+            problem, theta = with_clocks(problem, theta, self.current.problem)
         return _free_all_parameters(problem, theta, screened.effect)
 
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
@@ -160,9 +160,9 @@ class StepFits:
 
     def _fit_all(self, screened: ScreenedEffect) -> Candidate:
         self.say(f"fitting {screened.name} to all training blocks", 0.8)
-        present, fits = self.present, self.settings.fits
+        current, fits = self.current, self.settings.fits
         setup = FitSetup(
-            present.cases, self.settings, self.pools.run, present.validation, iterations=fits.full_iterations,
+            current.cases, self.settings, self.pools.run, current.validation, iterations=fits.full_iterations,
             is_quick=self.is_far,
         )  # fmt: skip
         problem, theta = self.complete(screened)
@@ -181,8 +181,8 @@ class StepFits:
         """Return whether an effect with its fit to the pieces does better on the validation blocks."""
         scores = self._scores(screened)
         _, theta = self.complete(screened)
-        extra, rule = len(theta) - self.present.parameters, self.settings.acceptance
-        return any(preference(s, self.present.validation, extra, rule).sure for s in scores)
+        extra, rule = len(theta) - self.current.parameters, self.settings.acceptance
+        return any(preference(s, self.current.validation, extra, rule).sure for s in scores)
 
     def _least_loss(self, screened: ScreenedEffect, chosen: Candidate) -> float:
         """Return how much more an effect with its fit to the pieces loses than the chosen model."""
@@ -194,22 +194,22 @@ class StepFits:
         """Return the scores on the validation blocks of an effect with its fit to the pieces."""
         problem, theta = self.complete(screened)
         outputs = [problem.outputs(start) for start in self._starts(problem, theta)]
-        cases, blocks = self.present.cases, self.settings.blocks
+        cases, blocks = self.current.cases, self.settings.blocks
         return [score_on(problem, cases, VALIDATION, simulated, blocks) for simulated in outputs]
 
     def _starts(self, problem: Problem, theta: FloatArray) -> list[FloatArray]:
-        """Return the starts of a full fit: from the pieces, or from the present model beside the effect.
+        """Return the starts of a full fit: from the pieces, or from the current model beside the effect.
 
         The pieces were fitted without clocks, whose part other values have taken on the pieces.
         """
-        names = [u.name for u in self.present.problem.unknowns]
-        present = dict(zip(names, self.present.solution.theta, strict=True))
-        mixed = [present.get(u.name, float(t)) for u, t in zip(problem.unknowns, theta, strict=True)]
+        names = [u.name for u in self.current.problem.unknowns]
+        values = dict(zip(names, self.current.solution.theta, strict=True))
+        mixed = [values.get(u.name, float(t)) for u, t in zip(problem.unknowns, theta, strict=True)]
         return [theta, np.array(mixed)]
 
     def _has_moved(self, model: Candidate) -> bool:
-        """Return whether a model leaves much more or less of a channel than the present one, its weight."""
-        scores, channels = (model.validation, self.present.validation), model.validation.sums
+        """Return whether a model leaves much more or less of a channel than the current one, its weight."""
+        scores, channels = (model.validation, self.current.validation), model.validation.sums
         now, before = (np.array([max(s.ratio(n), 1.0) for n in channels]) for s in scores)
         return bool(np.any(np.abs(now / before - 1.0) > self.settings.forward.moved))
 

@@ -55,18 +55,18 @@ def select_stepwise(
     trials: list[Trial] = []
     rivals: dict[str, tuple[Candidate, ...]] = {}
     for number in range(settings.max_causes + settings.forward.replacements):
-        present = models[-1]
-        if _is_finished(present):
+        current = models[-1]
+        if _is_finished(current):
             break
-        forward = ForwardStep(present, effects, number, pools, tell, settings)
-        step = forward.run() if len(present.causes) < settings.max_causes else NO_STEP
+        forward = ForwardStep(current, effects, number, pools, tell, settings)
+        step = forward.run() if len(current.causes) < settings.max_causes else NO_STEP
         trials += step.trials
         if step.accepted is None:
             step = replacement_step(forward)
         if step.accepted is None:
             break
         rivals[step.accepted.newest] = step.equals
-        trials.append(trial_of(step.accepted, step.accepted.newest, present, "replaced"))
+        trials.append(trial_of(step.accepted, step.accepted.newest, current, "replaced"))
         models.append(refit(with_noise_reestimated(step.accepted), setup))
     cases = models[-1].cases
     return Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)
@@ -74,18 +74,18 @@ def select_stepwise(
 
 def replacement_step(step: ForwardStep) -> StepResult:
     """Return the step to a model with another effect in the place of one cause, where it is acceptable."""
-    present, settings = step.present, step.settings
-    for name in present.causes if is_far_from_floor(present, settings) else ():
-        alike = [e for e in look_alikes(name, step.effects) if e.name not in present.problem.acting]
+    current, settings = step.current, step.settings
+    for name in current.causes if is_far_from_floor(current, settings) else ():
+        alike = [e for e in look_alikes(name, step.effects) if e.name not in current.problem.acting]
         rivals = [e for e in alike if effect_size(e.name) > effect_size(name)]
         if not rivals:
             continue
         setup = FitSetup(
-            present.cases, settings, step.pools.run, weights=present.validation, is_quick=True
+            current.cases, settings, step.pools.run, weights=current.validation, is_quick=True
         )
-        rest = fit_candidate(setup, *without_effect(present.problem, present.solution.theta, name))
-        result = replace(step, present=rest, effects=rivals).run()
-        if result.accepted is not None and is_acceptable(result.accepted, present, settings):
+        rest = fit_candidate(setup, *without_effect(current.problem, current.solution.theta, name))
+        result = replace(step, current=rest, effects=rivals).run()
+        if result.accepted is not None and is_acceptable(result.accepted, current, settings):
             return result
     return NO_STEP
 

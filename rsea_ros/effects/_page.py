@@ -21,7 +21,7 @@ class EffectPage:
 
     @property
     def name(self) -> str:
-        """The name in the contract."""
+        """The name in rigs, results and `rsea.effects`."""
         return self.effect.name
 
     @property

@@ -19,9 +19,8 @@ from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.structure import with_structure
-from rsea_ros.units import plain
+from rsea_ros.units import STANDARD_GRAVITY, plain
 
-GRAVITY = 9.80665
 WORLD = "world"
 
 
@@ -37,12 +36,12 @@ class Link:
     @property
     def mass(self) -> float:
         """Return the mass, kg: half of a pendulum's inertia is in its point mass; others are 1 kg."""
-        return self.weight**2 / (0.5 * self.inertia * GRAVITY**2) if self.weight else 1.0
+        return self.weight**2 / (0.5 * self.inertia * STANDARD_GRAVITY**2) if self.weight else 1.0
 
     @property
     def centre(self) -> tuple[float, float]:
         """Return where the mass is, m, y and z."""
-        arm = self.weight / (self.mass * GRAVITY) if self.weight else 0.0
+        arm = self.weight / (self.mass * STANDARD_GRAVITY) if self.weight else 0.0
         return arm * math.sin(self.turned), 0.0 - arm * math.cos(self.turned)
 
     @property

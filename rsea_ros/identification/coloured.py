@@ -15,7 +15,7 @@ import numpy as np
 
 from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.problem import Case
-from rsea_ros.identification.spectra import HANN, OVERLAP, SpectralShape, segment_spectra, shape_of
+from rsea_ros.identification.spectra import HANN, OVERLAP, TOP, SpectralShape, segment_spectra, shape_of
 from rsea_ros.identification.witnesses import witnesses
 from rsea_ros.signals import ComplexArray, FloatArray
 
@@ -23,7 +23,6 @@ _LONG, _SHORT = 1024, 512
 _STEADY_BANDS = (0.4, 3.0, 10.0, 40.0)
 _SHARED_BANDS = (0.4, 4.0, 14.0, 50.0)
 """Hz, lower ends; the last band ends below the Nyquist frequency."""
-_TOP = 0.96
 
 
 def is_noise(
@@ -111,7 +110,7 @@ def _lines(spectra: ComplexArray, rate: float) -> FloatArray:
 
 def _bands(frequency: FloatArray, lows: tuple[float, ...]) -> list[FloatArray]:
     """Return which lines lie in each band that has some."""
-    top = _TOP * frequency[-1]
+    top = TOP * frequency[-1]
     ends = zip(lows, (*lows[1:], np.inf), strict=True)
     inside = [(frequency >= low) & (frequency < min(high, top)) for low, high in ends]
     return [which for which in inside if np.count_nonzero(which) > 1]

@@ -9,6 +9,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.scale import Scale
 from rsea_ros.identification.clocks import (
+    MISFIT,
     RequiredClocks,
     free_clocks,
     required_clocks,
@@ -33,7 +34,6 @@ from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import MEASURED, FloatArray
 
-_MISFIT = 1.3
 _REWEIGHTINGS = 3
 _OTHER_NOISE = 1.1
 """Ratio of a channel's noise after a fit to that before, from which the fit is repeated."""
@@ -73,7 +73,7 @@ def fit(
         known = _with_noise_of(problem, outputs)
     for _ in range(_REWEIGHTINGS):
         ratios = ratios_of(problem, solution.problem.cases, outputs)
-        if max(ratios.values()) < _MISFIT:
+        if max(ratios.values()) < MISFIT:
             break
         cases = tuple(reweight(c, ratios) for c in solution.problem.cases)
         solution = solve(replace(problem, cases=cases), solution.theta, run=run)

@@ -29,9 +29,9 @@ _STEPS, _FARTHEST = 4, 2e-3
 """Steps in a block, and how far all of them together may lead, s for each block since the last."""
 _ALIKE = 0.7
 """Of a block's power: what the simulation must explain at its best lag."""
-_LEAST_RISE = 1e-3
+LEAST_RISE = 1e-3
 """s over the record: less turns no phase far, and a linear fit sees it."""
-_SCATTER = 0.25
+SCATTER = 0.25
 """Of the rise of a line: lags that scatter more about it do not follow a clock."""
 
 
@@ -47,8 +47,8 @@ class LagLine(NamedTuple):
     @property
     def is_clear(self) -> bool:
         """Whether the lags follow a clock's line: too far for a linear fit, no faster than clocks run."""
-        steep = abs(self.rise) > _LEAST_RISE and abs(self.rate) < 1e-6 * FASTEST
-        return steep and self.scatter < _SCATTER * abs(self.rise)
+        steep = abs(self.rise) > LEAST_RISE and abs(self.rate) < 1e-6 * FASTEST
+        return steep and self.scatter < SCATTER * abs(self.rise)
 
 
 def lag_line(t: FloatArray, y: FloatArray, p: FloatArray, start: float) -> LagLine | None:

@@ -15,7 +15,7 @@ OVERLAP = 1.056
 HANN = 1.5
 """Lines that share what one independent line would have, behind a Hann window."""
 _BANDS = 20
-_TOP = 0.96
+TOP = 0.96
 """Of the Nyquist frequency: the highest line of all bands."""
 
 
@@ -61,7 +61,7 @@ class SpectralShape:
 def shape_of(spectra: ComplexArray) -> SpectralShape:
     """Return the falling spectrum nearest to the mean of some segments', in bands of equal ratio."""
     lines = spectra.shape[1]
-    edges = np.unique(np.append(1, np.round(np.geomspace(2, _TOP * lines, _BANDS)).astype(np.int64)))
+    edges = np.unique(np.append(1, np.round(np.geomspace(2, TOP * lines, _BANDS)).astype(np.int64)))
     mean, count = np.mean(np.abs(spectra) ** 2, axis=0), np.diff(edges)
     measured = np.maximum(np.add.reduceat(mean[: edges[-1]], edges[:-1]) / count, 1e-300)
     freedom = 1.8 * count * len(spectra) / OVERLAP / np.where(count > 2, HANN, 1.0)

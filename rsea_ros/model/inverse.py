@@ -24,7 +24,7 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.extent import check_extent
 from rsea_ros.model.pace import SKIPPED_START, check_slow
-from rsea_ros.model.restarts import gaps
+from rsea_ros.model.restarts import AT_EDGE, gaps
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
@@ -40,8 +40,6 @@ FINE = 5e-4
 FEWEST = 64
 """Samples of a position, from which the filter has settled somewhere in the middle."""
 
-_AT_EDGE = 0.01
-"""Of a command's period: stamps so near are one, rounded to nanoseconds in one of the two channels."""
 
 _SIGN = 1e-5
 """rad/s. Along a measured motion the sign of the speed needs no smoothing."""
@@ -151,7 +149,7 @@ def _torque_at(record: Record, t: FloatArray) -> FloatArray:
     two holds their mean counts: with either of them the torque is half a sample early or late.
     """
     command = record["command"]
-    edge = _AT_EDGE / command.rate
+    edge = AT_EDGE / command.rate
     holds = np.array([np.searchsorted(command.t, t + side * edge) - 1 for side in (-1.0, 1.0)])
     if "motor_torque" not in record:
         return np.asarray(command.y[np.maximum(holds, 0)].mean(axis=0), np.float64)

@@ -48,11 +48,10 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_structure import check_two_torques
 from rsea_ros.model.structure import with_structure
 from rsea_ros.model.transfer import Fraction
+from rsea_ros.normal import Z90
 from rsea_ros.signals import FloatArray
 
 ROTOR = "rotor.reflected_inertia"
-NINETY_PERCENT = 1.6449
-"""Sigmas either way that hold 90 % of a normal quantity."""
 
 __all__ = ["BEYOND", "NOTHING", "PURE", "ErrorFlag", "ErrorSettings", "edge_of"]
 
@@ -152,7 +151,7 @@ def _possible(rig: Rig) -> Iterator[Rig]:
 
 def _range(rig: Rig, name: str) -> tuple[float, float, float]:
     """Return both ends and the middle of 90 % of a value."""
-    wide = math.exp(NINETY_PERCENT * rig.spread(name))
+    wide = math.exp(Z90 * rig.spread(name))
     return rig[name] / wide, rig[name], rig[name] * wide
 
 

@@ -14,8 +14,8 @@ from rsea_ros.signals import BoolArray, Channel, FloatArray, IntArray, Record
 SHORTEST, PERIODS = 0.1, 10.0
 """s, and sample periods of the fastest channel: a shorter gap leaves the last command a good guess."""
 
-_AT_EDGE = 0.01
-"""Of a command's period: stamps so near are one."""
+AT_EDGE = 0.01
+"""Of a command's period: stamps so near are one, rounded to nanoseconds in one of two channels."""
 _LOST = 3.0
 """Times what the motor torque is off the commands elsewhere: in a pause that is further off others acted."""
 
@@ -60,7 +60,7 @@ def _lost_commands(record: Record) -> list[tuple[float, float]]:
 
 def _shown_commands(command: Channel, torque: Channel) -> IntArray:
     """Return the number of the command that each motor torque shows: the one at its stamp, or before it."""
-    edge = _AT_EDGE / command.rate
+    edge = AT_EDGE / command.rate
     ended, begun = (np.searchsorted(command.t, torque.t + side * edge) - 1 for side in (-1.0, 1.0))
     either = [np.maximum(k, 0) for k in (ended, begun)]
     return np.asarray(min(either, key=lambda k: np.nanmedian(np.abs(torque.y - command.y[k]))), np.int64)

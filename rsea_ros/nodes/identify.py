@@ -52,7 +52,7 @@ TABLE = (
 
 
 class IdentifyNode:
-    """Records the contract's topics; the identification begins when the commands are over.
+    """Records the topics of a bench; the identification begins when the commands are over.
 
     They are over when some have come, none has for `quiet` seconds, and torque_command has no publisher any
     more (the replay or the excitation has ended), or when ~/finish is called; with `stay` only then. A

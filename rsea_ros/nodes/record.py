@@ -1,4 +1,4 @@
-"""record: writes the messages on the contract's topics into a bag."""
+"""record: writes the messages on the topics of a bench into a bag."""
 
 from __future__ import annotations
 

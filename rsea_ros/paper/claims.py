@@ -16,6 +16,7 @@ from typing import Literal
 from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.train import Train
 from rsea_ros.paper import formulas
+from rsea_ros.units import STANDARD_GRAVITY
 
 TABLE_2: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
@@ -40,7 +41,7 @@ SPRING_RATE, ARM = 207350.0, 0.0635
 """N/m of one spring, nominal, and half of the 127 mm between two (section 3.2.1)."""
 NO_LOAD_CURRENT, NO_LOAD_SPEED, TORQUE_CONSTANT = 1.65, 33.1 * 2.0 * math.pi / 60.0, 6.826
 """A, rad/s and N m/A of the motor without load (maker's data): what all drag together can be."""
-PENDULUM_MASS, PENDULUM_LENGTH, GRAVITY = 5.8, 0.114, 9.80665
+PENDULUM_MASS, PENDULUM_LENGTH = 5.8, 0.114
 PROTOTYPE_RATE, PROTOTYPE_ARM = 185185.0, 0.0254
 PROTOTYPE_STIFFNESS, PROTOTYPE_INERTIA = 260.0, 6.169e-4
 KNEE_TORQUE = 150.0
@@ -123,7 +124,7 @@ def _from_the_springs() -> Iterator[PaperClaim]:
 
 def _from_the_parts() -> Iterator[PaperClaim]:
     inertia = PENDULUM_MASS * PENDULUM_LENGTH**2
-    stiffness = PENDULUM_MASS * GRAVITY * PENDULUM_LENGTH
+    stiffness = PENDULUM_MASS * STANDARD_GRAVITY * PENDULUM_LENGTH
     drag = TORQUE_CONSTANT * NO_LOAD_CURRENT / NO_LOAD_SPEED
     for what, name, ours, unit, how in (
         ("J_ld, pendulum", "J_ld", inertia, "kg m^2", "at least: m l² of 5.8 kg at 0.114 m"),

@@ -18,6 +18,7 @@ from rsea_ros.model.spring import spring_radius
 from rsea_ros.paper import claims, formulas
 from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
 from rsea_ros.paper.paper_finding import PaperFinding
+from rsea_ros.units import STANDARD_GRAVITY
 
 
 def identification() -> Iterator[PaperFinding]:
@@ -83,7 +84,7 @@ def moving_output() -> Iterator[PaperFinding]:
     gains = 20.0 * np.log10(np.abs(frequency_response(rig, outputs.end_torque(rig, "spring_end"), at)))
     _, moving, grounded = readings(rig).values()
     gap_hz, gap = largest_gap(rig, grounded)
-    stiffness = claims.PENDULUM_MASS * claims.GRAVITY * claims.PENDULUM_LENGTH
+    stiffness = claims.PENDULUM_MASS * STANDARD_GRAVITY * claims.PENDULUM_LENGTH
     yield PaperFinding(
         "unclear",
         "3.2.2, Figs. 16 and 18",

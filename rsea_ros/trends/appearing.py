@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.normal import Z95
+from rsea_ros.normal import MAD_TO_SD, Z95
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Interval
@@ -142,6 +142,6 @@ def _size_now(n: Naming, last: int = 9) -> Interval | None:
         return None
     size, sd = n.size[usable], n.sd[usable]
     middle = float(np.median(size))
-    spread = 1.4826 * float(np.median(np.abs(size - middle)))
+    spread = MAD_TO_SD * float(np.median(np.abs(size - middle)))
     half = Z95 * 1.25 * float(np.hypot(spread, np.median(sd))) / np.sqrt(len(usable))
     return Interval(middle, middle - half, middle + half)

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
+from rsea_ros.normal import MAD_TO_SD
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.series import BoolArray, Series
 from rsea_ros.trends.settings import DAY, TrendSettings
 
 _NEIGHBOURS = 9
 """Recordings of the running median: three alike at an end outvote the others."""
-_TO_SD = 1.4826
-"""From a median absolute deviation to the standard deviation of normal values."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ def outliers(value: FloatArray, sd: FloatArray, most: float) -> BoolArray:
     if len(value) < _NEIGHBOURS:
         return np.zeros(len(value), bool)
     off = value - median_filter(value, _NEIGHBOURS, mode="mirror")
-    spread = _TO_SD * float(np.median(np.abs(off)))
+    spread = MAD_TO_SD * float(np.median(np.abs(off)))
     far: BoolArray = np.abs(off) > most * np.sqrt(spread**2 + sd**2)
     return far
 

@@ -6,12 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rsea_ros.normal import Z95
+from rsea_ros.normal import MAD_TO_SD, Z95
 from rsea_ros.trends.result import Outlier, Trend
 from rsea_ros.trends.settings import TrendSettings
 from rsea_ros.trends.significance import adjust, two_sided_p
-
-_TO_SD = 1.4826
 
 
 def outliers(trends: Iterable[Trend], settings: TrendSettings) -> tuple[Outlier, ...]:
@@ -38,6 +36,6 @@ def _score(group: list[Trend]) -> list[tuple[Trend, float, float, int]]:
     levels = np.array([t.now.value for t in group if t.now is not None])
     half = np.array([t.now.high - t.now.low for t in group if t.now is not None]) / (2.0 * Z95)
     median = float(np.median(levels))
-    spread = _TO_SD * float(np.median(np.abs(levels - median)))
+    spread = MAD_TO_SD * float(np.median(np.abs(levels - median)))
     scores = (levels - median) / np.sqrt(spread**2 + half**2 + 1e-300)
     return [(t, median, float(s), len(group)) for t, s in zip(group, scores, strict=True)]

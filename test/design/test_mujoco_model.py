@@ -14,12 +14,13 @@ from hypothesis import assume, given, settings
 from rsea_ros.cli.main import main
 from rsea_ros.design import mesh
 from rsea_ros.design import mujoco_model as mjcf_module
-from rsea_ros.design.mujoco_model import GRAVITY, mjcf
+from rsea_ros.design.mujoco_model import mjcf
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS
+from rsea_ros.units import STANDARD_GRAVITY
 
 sys.path.append(str(Path(__file__).parents[1] / "model"))
 from random_rigs import rigs
@@ -60,7 +61,7 @@ def matrices(text):
         mass += (floats(inertial, "diaginertia")[2] + weight * arm**2) * np.outer(row, row)
         damping[i, i] += floats(joint, "damping")[0]
         stiffness[i, i] += floats(joint, "stiffness")[0]
-        stiffness += weight * GRAVITY * arm * np.outer(row, row)
+        stiffness += weight * STANDARD_GRAVITY * arm * np.outer(row, row)
     rows = {}
     for tendon in root.iter("fixed"):
         row = np.zeros(len(joints))

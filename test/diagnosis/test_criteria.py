@@ -76,7 +76,7 @@ FRICTION, GAP = "coulomb_friction", "backlash"
 
 
 @pytest.mark.parametrize(
-    ("candidate", "present", "reason"),
+    ("candidate", "current", "reason"),
     [
         (model(GAP, ft=1.0), model(ft=20.0), None),
         (model(GAP, ft=1.0, at_bound=True), model(ft=20.0), "at_bound"),
@@ -100,27 +100,27 @@ FRICTION, GAP = "coulomb_friction", "backlash"
         (model(FRICTION, GAP, "hard_stop", ft=5.0), model(FRICTION, GAP, ft=5.6), "too_small"),
     ],
 )
-def test_a_candidate_is_refused_for_a_reason(candidate, present, reason):
-    assert refusal(candidate, present) == reason
+def test_a_candidate_is_refused_for_a_reason(candidate, current, reason):
+    assert refusal(candidate, current) == reason
 
 
 def test_of_equal_models_the_simplest_is_accepted_and_those_as_simple_are_its_rivals():
-    present = score(ft=20.0)
+    current = score(ft=20.0)
     simple = model(FRICTION, ft=1.0, prior_cost=3.0)
     likelier = model(GAP, ft=1.0, prior_cost=1.0)
     larger = model("stribeck_friction", size=3, ft=1.0)
     worse = model("hard_stop", ft=1.5)
-    assert break_tie([simple, larger, likelier, worse], present) == (likelier, (simple,))
-    assert break_tie([larger], present) == (larger, ())
-    assert break_tie([], present) == (None, ())
+    assert break_tie([simple, larger, likelier, worse], current) == (likelier, (simple,))
+    assert break_tie([larger], current) == (larger, ())
+    assert break_tie([], current) == (None, ())
 
 
 @pytest.mark.parametrize(("prior_cost", "accepted"), [(1.0, "ft_bias"), (1.9, "ft_bias"), (2.1, "ft_drift")])
 def test_of_models_as_simple_an_optional_unknown_is_paid_for(prior_cost, accepted):
-    present = score(ft=20.0)
+    current = score(ft=20.0)
     bias = model("ft_bias", parameters=7, prior_cost=prior_cost, ft=1.0)
     settling = model("ft_drift", parameters=8, ft=1.0)
-    assert break_tie([settling, bias], present)[0].causes == (accepted,)
+    assert break_tie([settling, bias], current)[0].causes == (accepted,)
 
 
 def test_far_from_the_floor_a_simpler_model_may_leave_a_tenth_more_for_each_number_it_saves():
@@ -153,6 +153,6 @@ def test_the_settings_steer_the_decision():
 
 
 def test_every_setting_has_meaning_unit_and_reason():
-    settings = list(DEFAULT.listed())
+    settings = list(DEFAULT.numbers())
     assert len({s.name for s in settings}) == len(settings) > 35
     assert all(s.meaning and s.unit and s.reason for s in settings)

@@ -60,7 +60,7 @@ def test_models_with_as_many_parameters_pay_nothing():
 
 
 @pytest.mark.parametrize(
-    ("candidate", "present", "reason"),
+    ("candidate", "current", "reason"),
     [
         (model(A, ft=10.0), model(ft=20.0), "too_small"),  # half of a channel, and more is asked
         (model(A, ft=9.9375), model(ft=20.0), None),
@@ -74,9 +74,9 @@ def test_models_with_as_many_parameters_pay_nothing():
         (model(A, ft=40.0), model(ft=20.0), "not_sure"),
     ],
 )
-def test_a_candidate_must_take_away_enough(candidate, present, reason):
-    assert refusal(candidate, present, RULE) == reason
-    assert is_acceptable(candidate, present, RULE) is (reason is None)
+def test_a_candidate_must_take_away_enough(candidate, current, reason):
+    assert refusal(candidate, current, RULE) == reason
+    assert is_acceptable(candidate, current, RULE) is (reason is None)
 
 
 def test_a_model_at_the_noise_is_enough_whatever_it_gains():
@@ -96,8 +96,8 @@ def test_a_cause_pays_for_its_own_parameters_alone():
 def test_far_from_the_floor_the_simplest_of_the_nearly_equal_is_accepted():
     best = model(A, size=3, ft=8.0)
     nearly, worse = model(B, ft=11.875), model(C, ft=12.0)
-    present = score(ft=40.0)
-    assert break_tie([worse, best, nearly], present, RULE) == (nearly, ())
+    current = score(ft=40.0)
+    assert break_tie([worse, best, nearly], current, RULE) == (nearly, ())
 
 
 def test_among_equally_simple_models_loss_and_prior_count_alike():

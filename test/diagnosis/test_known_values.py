@@ -23,6 +23,6 @@ def test_a_cause_is_refused_once_its_values_are_less_likely_than_its_gain_is_wor
 def test_a_third_model_that_fits_badly_does_not_change_the_choice_between_two():
     """A loss in units of a large residual is small: known values would outweigh it."""
     better, likelier = model(FRICTION, ft=1.0, prior_cost=2000.0), model(GAP, ft=2.0)
-    present, poor = model(ft=8.0), model(STOP, ft=4.0)
-    assert break_tie([better, likelier], present.validation) == (better, ())
-    assert break_tie([better, likelier, poor], present.validation) == (better, ())
+    current, poor = model(ft=8.0), model(STOP, ft=4.0)
+    assert break_tie([better, likelier], current.validation) == (better, ())
+    assert break_tie([better, likelier, poor], current.validation) == (better, ())

@@ -38,11 +38,11 @@ def screen_effect(name: str, times: float):
     """Return the screening of an effect on a machine with the torque scaled by a factor."""
     record, rig = record_with(RIG, effect_named(name), times, duration=5.0), similar(RIG, times)
     case = case_from(record, rig)
-    present = solve(Problem((case,), rig, unknowns_of(rig, (case,)), MEASURED), iterations=3)
-    (effect,) = (e for e in searched_effects(present.problem, ()) if e.name == name)
-    fitted, _ = apply(present.problem.rig, present.problem.unknowns, present.theta)
-    view = RecordView(case, fitted, present.problem.outputs(present.theta)[0])
-    return screen(present, effect, initial_guesses(effect, view), DEFAULT.forward)
+    current = solve(Problem((case,), rig, unknowns_of(rig, (case,)), MEASURED), iterations=3)
+    (effect,) = (e for e in searched_effects(current.problem, ()) if e.name == name)
+    fitted, _ = apply(current.problem.rig, current.problem.unknowns, current.theta)
+    view = RecordView(case, fitted, current.problem.outputs(current.theta)[0])
+    return screen(current, effect, initial_guesses(effect, view), DEFAULT.forward)
 
 
 @pytest.mark.parametrize("times", [4.0**-5, 16.0])

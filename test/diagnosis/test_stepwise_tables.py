@@ -26,9 +26,9 @@ OTHERS = [effect_named(n) for n in (FRICTION, STRIBECK, LUGRE, GAP, STOP, DELAY)
 
 @dataclass(frozen=True)
 class Step:
-    """A forward step by a script. steps: by present causes the causes that it accepts, None for none."""
+    """A forward step by a script. steps: by current causes the causes that it accepts, None for none."""
 
-    present: object
+    current: object
     effects: object
     number: int
     pools: object
@@ -37,9 +37,9 @@ class Step:
 
     def run(self):
         world = World.now
-        world.runs.append((self.number, self.present.causes, tuple(e.name for e in self.effects)))
-        accepted = world.steps.get(self.present.causes)
-        tried = [trial_of(self.present, "dead_zone", self.present, "not_sure")]
+        world.runs.append((self.number, self.current.causes, tuple(e.name for e in self.effects)))
+        accepted = world.steps.get(self.current.causes)
+        tried = [trial_of(self.current, "dead_zone", self.current, "not_sure")]
         if accepted is None:
             return StepResult(None, tried, ())
         return StepResult(world.fits.candidate(*accepted), tried, (world.fits.candidate(LAG),))
@@ -143,7 +143,7 @@ def test_no_more_replacements_are_made_than_allowed(world, monkeypatch, replacem
     following = {(FRICTION,): (STRIBECK,), (STRIBECK,): (LUGRE,), (LUGRE,): (FRICTION,)}
 
     def replace_step(step):
-        name = following[step.present.causes]
+        name = following[step.current.causes]
         return StepResult(search.fits.candidate(*name), [], (search.fits.candidate(FRICTION),))
 
     monkeypatch.setattr(stepwise, "replacement_step", replace_step)
@@ -182,9 +182,9 @@ def test_the_first_fit_has_more_iterations_and_begins_at_the_given_values(world,
     assert theta == (None if start is None else (search.nominal.unknowns, RIG))
 
 
-def replacement(search, *present, effects=OTHERS):
+def replacement(search, *current, effects=OTHERS):
     """The causes of the model that a replacement leads to; None for none."""
-    step = Step(search.fits.candidate(*present), effects, 7, POOLS, None, DEFAULT)
+    step = Step(search.fits.candidate(*current), effects, 7, POOLS, None, DEFAULT)
     result = replacement_step(step)
     return None if result is NO_STEP else result.accepted.causes
 
@@ -223,6 +223,6 @@ def test_the_next_place_is_tried_where_one_brings_nothing(world, first):
     steps = {(DELAY, GAP): first, (DELAY, FRICTION): (DELAY, FRICTION, STOP)}
     search = world(script(ratios), steps)
     assert replacement(search, DELAY, FRICTION, GAP) == (DELAY, FRICTION, STOP)
-    assert [(present, names) for _, present, names in search.runs] == [
+    assert [(current, names) for _, current, names in search.runs] == [
         ((DELAY, GAP), (STRIBECK, LUGRE)), ((DELAY, FRICTION), (STOP,))
     ]  # fmt: skip

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import RigError
-from rsea_ros.exports.chain import GRAVITY
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.sdf import export_sdf
 from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.units import STANDARD_GRAVITY
 
 S = 2j * np.pi * np.array([0.3, 2.0, 11.0, 70.0])
 LEFT_OUT = {"housing_end.stiffness": 0.0, "housing_end.damping": 0.0}
@@ -29,7 +29,7 @@ def tree(text):
         _, y, z, *_ = map(float, link.find("inertial/pose").text.split())
         mass = float(link.find("inertial/mass").text)
         about = float(link.find("inertial/inertia/ixx").text)
-        links[link.get("name")] = (about + mass * (y**2 + z**2), -mass * GRAVITY * z)
+        links[link.get("name")] = (about + mass * (y**2 + z**2), -mass * STANDARD_GRAVITY * z)
     return links, model.findall("joint")
 
 

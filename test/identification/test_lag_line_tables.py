@@ -26,7 +26,7 @@ def delayed(t, lag):
 
 
 def line_of(lag, seconds=12.0, keep=slice(None), amplitude=1.0, start=START):
-    """The line that is found of a lag that is given since the start of the record."""
+    """The line that is has_line of a lag that is given since the start of the record."""
     t = instants(seconds)[keep]
     return lag_line(t, amplitude * delayed(t, lag(t - START)), wave(t)[0], start)
 
@@ -46,16 +46,16 @@ def test_time_counts_from_the_start_of_the_record():
     assert line.at_start == pytest.approx(-3.0 * 400e-6, rel=5e-2)
 
 
-@pytest.mark.parametrize(("seconds", "found"), [(6.9, False), (7.9, True)])
-def test_a_line_needs_eight_blocks_of_a_second(seconds, found):
-    assert (line_of(lambda since: 400e-6 * since, seconds) is not None) is found
+@pytest.mark.parametrize(("seconds", "has_line"), [(6.9, False), (7.9, True)])
+def test_a_line_needs_eight_blocks_of_a_second(seconds, has_line):
+    assert (line_of(lambda since: 400e-6 * since, seconds) is not None) is has_line
 
 
-@pytest.mark.parametrize(("samples", "found"), [(7, False), (8, True)])
-def test_a_block_needs_eight_samples(samples, found):
+@pytest.mark.parametrize(("samples", "has_line"), [(7, False), (8, True)])
+def test_a_block_needs_eight_samples(samples, has_line):
     keep = np.flatnonzero(np.arange(12 * 200) % 200 < 20 * samples)[::20]
     line = line_of(lambda since: 400e-6 * since, keep=keep)
-    assert (line is not None) is found
+    assert (line is not None) is has_line
 
 
 def test_a_lag_that_jumps_scatters_about_its_line():

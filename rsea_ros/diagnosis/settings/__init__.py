@@ -77,7 +77,7 @@ class DiagnosisSettings:
             raise ParameterError(f"max_causes = {self.max_causes}, expected 1 or more")
         object.__setattr__(self, "without", tuple(self.without))
 
-    def listed(self) -> Iterator[Setting]:
+    def numbers(self) -> Iterator[Setting]:
         """Yield every number of the groups with its meaning, unit and reason."""
         for group in (f.name for f in fields(self) if f.name not in ("max_causes", "without")):
             values = getattr(self, group)

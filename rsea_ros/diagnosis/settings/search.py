@@ -64,7 +64,7 @@ class ForwardSettings:
         "as `room`: so much a simpler law may lose beside a larger one",
     )  # fmt: skip
     hope_one: float = number(
-        0.98, "1", "of the present cost on pieces: no hope above it, while far", flat("0.8", "1")
+        0.98, "1", "of the current cost on pieces: no hope above it, while far", flat("0.8", "1")
     )
     hope_two: float = number(0.9, "1", "the same for two effects")
     hope_on_angle: float = number(0.5, "1", "the same for an effect simulated on the measured rotor angle")
@@ -86,7 +86,7 @@ class ForwardSettings:
     )  # fmt: skip
     bent_steps: int = number(4, "1", "steps of that fit")
     clear: float = number(
-        0.5, "1", "of the present cost on pieces: where an effect leaves less, none is fitted on"
+        0.5, "1", "of the current cost on pieces: where an effect leaves less, none is fitted on"
     )
     causes_beside_a_pair: int = number(
         1, "1", "causes beside which pairs are tried", "beside more of them, a pair fits whatever is left"

@@ -27,7 +27,7 @@ def trial_rows(study: Study) -> Rows:
 
 def trial_head(study: Study) -> list[str]:
     """Return the heading of `trial_rows`."""
-    return ["trial", "asked", *(f"{at.design.rate:g} Hz" for at in study.rates)]
+    return ["trial", "required", *(f"{at.design.rate:g} Hz" for at in study.rates)]
 
 
 def demand_text(trial: TrialResult) -> str:

@@ -6,9 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rsea_ros.design.by_train import NINETY_PERCENT, WithTrain, sense_unknown
+from rsea_ros.design.by_train import WithTrain, sense_unknown
 from rsea_ros.design.spring_design import Check, SpringDesign, spring_design
 from rsea_ros.design.tolerance import Margin, margins, spreads_of
+from rsea_ros.normal import Z90
 from rsea_ros.report import words
 from rsea_ros.report.page.html import section
 from rsea_ros.report.page.html_table import table
@@ -60,7 +61,7 @@ def trains_table(rows: Sequence[WithTrain], d: SpringDesign) -> str:
         ]
         for row in rows
     ]
-    spread, factor = 100.0 * d.unit.rotor_spread, math.exp(NINETY_PERCENT * d.unit.rotor_spread)
+    spread, factor = 100.0 * d.unit.rotor_spread, math.exp(Z90 * d.unit.rotor_spread)
     caption = (
         f"J_m = {d.unit['reflected_inertia']:g} kg·m² within {spread:.0f} % (one sigma, log-normal: 90 % "
         f"from 1/{factor:.2f} to {factor:.2f} times). A rotor that turns against the output takes its spin "

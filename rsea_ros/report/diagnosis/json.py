@@ -61,13 +61,13 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": _experiment(d.next_experiment),
         "statements": list(remark_sentences(d.remarks)),
         "settings": _settings(d.settings),
-        "noise_numbers": {s.name: s.value for s in d.settings.listed() if s.name.startswith("noise.")},
+        "noise_numbers": {s.name: s.value for s in d.settings.numbers() if s.name.startswith("noise.")},
     }
 
 
 def _settings(settings: DiagnosisSettings) -> dict[str, Any]:
     """Return every number that steered the verdict, `group.name`: value."""
-    values = ((s.name, s.value) for s in settings.listed())
+    values = ((s.name, s.value) for s in settings.numbers())
     numbers = {name: list(v) if isinstance(v, tuple) else v for name, v in values}
     return {"max_causes": settings.max_causes, "without": list(settings.without), **numbers}
 

@@ -9,7 +9,7 @@ from rsea_ros.identification.result import Overlay
 from rsea_ros.signals import Channel, Record
 
 MEASURED, BEFORE, AFTER = "/rsea", "/rsea/simulated_before", "/rsea/simulated_after"
-"""Namespaces of the contract's topics in overlay.mcap."""
+"""Namespaces of the three sets of topics in overlay.mcap."""
 
 
 def overlay_records(diagnosis: Diagnosis, record: Record) -> Mapping[str, Record]:

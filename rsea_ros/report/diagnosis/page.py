@@ -66,8 +66,8 @@ def _keys(d: Diagnosis, main: str) -> list[tuple[str, str]]:
     """Return the numbers of the first screen."""
     channel = words.channel(main)
     if d.causes:
-        gone = (num.percent(num.gain(d, main)), f"of the {channel} residual removed, on held-out data")
-        return [gone, (num.residual_change(d, main), "times the noise, before and after")]
+        removed = (num.percent(num.gain(d, main)), f"of the {channel} residual removed, on held-out data")
+        return [removed, (num.residual_change(d, main), "times the noise, before and after")]
     keys = [(num.residual_change(d, main), f"times the noise is the {channel} residual")]
     if d.rejected:
         keys.append((str(len(d.rejected)), "causes tried, none accepted"))

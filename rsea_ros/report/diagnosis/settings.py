@@ -9,12 +9,12 @@ from rsea_ros.report import words
 from rsea_ros.report.page.html import fold, paragraph
 from rsea_ros.report.page.html_table import table_of_rows
 
-_DEFAULTS = {s.name: s.value for s in DEFAULT.listed()}
+_DEFAULTS = {s.name: s.value for s in DEFAULT.numbers()}
 
 
 def settings_section(settings: DiagnosisSettings) -> str:
     """Return the settings, folded; those that are not the default stand out."""
-    rows = [_row(s) for s in settings.listed()]
+    rows = [_row(s) for s in settings.numbers()]
     limits = f"At most {settings.max_causes} causes."
     if settings.without:
         limits += f" Not tried: {', '.join(settings.without)}."

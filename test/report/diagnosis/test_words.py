@@ -62,7 +62,7 @@ def test_the_terminal_lists_faults_rivals_and_rejected_effects(diagnosed):
 
 def test_the_terminal_lists_the_fitted_rivals_with_the_largest_gains(diagnosed):
     """Effects that were only screened came first, because their gain was not exactly zero."""
-    screened = [Rejected(n, 0.001, "far_behind", is_fitted=False) for n in ("hard_stop", "ft_drift")]
+    screened = [Rejected(n, 0.9, "far_behind", is_fitted=False) for n in ("hard_stop", "ft_drift")]
     fitted = [Rejected(n, g, "explains_less", "coulomb_friction") for n, g in (("backlash", 0.25),
               ("command_delay", 0.1), ("nonlinear_spring", 0.8), ("ft_bias", 0.0))]  # fmt: skip
     lines = terminal(replace(diagnosed.diagnosis, rejected=(*screened, *fitted)))
