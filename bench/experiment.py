@@ -11,9 +11,9 @@ run: designed; a piece of the paper's chirp, 20 s long, of the same peak as the 
 the designed run's power in 0.5 to 100 Hz. Causes are those that a
 session weighs (experiment/weighed_causes.py).
 
-Limits `full`: the bench near its rating (the paper's chirp has 20 N m). Limits `lab`: 3 N m, six times the slow
-work, as for the first runs on a machine with a suspected fault. seconds: of all runs played. until: the same
-with the shortest last run that decides: stopped early, at rest after it, by bisection, for all policies.
+Limits `full`: the bench near its rating (the paper's chirp has 20 N m). Limits `lab`: 3 N m, six times the
+slow work, as for the first runs on a machine with a suspected fault. seconds: of all runs played. until: the
+same with the shortest last run that decides: stopped early, then rest, by bisection, for all policies.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from __future__ import annotations
 import json
 import sys
 import time
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +32,7 @@ from independent.bench import drawn_bench, record_command  # noqa: E402
 from independent.hidden import hide  # noqa: E402
 from independent.severities import SEVERITIES, drawn_parameters  # noqa: E402
 
+from bench.experiment_figures import SECONDS, print_figures  # noqa: E402
 from bench.json_log import append_to_log, read_log  # noqa: E402
 from bench.sections import parser_of  # noqa: E402
 from msg_adapters import write_record  # noqa: E402
@@ -54,8 +54,6 @@ from rsea_ros.model.simulation import synthesize  # noqa: E402
 from rsea_ros.signals import Channel  # noqa: E402
 
 RATE, CHIRP = 280.0, 20.0
-ALIKE = {"torque_constant_error", "ft_gain_error"}
-"""No run separates these without another measurement: proved by experiment/bound.py on each bench."""
 LIMITS = {
     "full": RunLimits(torque=25.0, velocity=2.0, deflection=0.04),
     "lab": RunLimits(torque=3.0, velocity=2.0, deflection=0.04),
@@ -64,8 +62,8 @@ BISECTIONS = 4
 """Of the last run, for the seconds until the decision: to a sixteenth of its length."""
 DESIGNS = 5
 """Benches whose designed runs are repeated for the limits."""
-SECONDS, SHORTEST = 20.0, 0.1
-"""s of excitation that a policy has, and of its first run at least."""
+SHORTEST = 0.1
+"""s of the first run of a policy, at least."""
 
 
 def hidden_case(k):
@@ -217,47 +215,9 @@ def causes(log, first, count, limits):
                 continue
             line = one(k, pools, limits)
             append_to_log(log, line)
-            short = {
-                p: (line[p]["end"], line[p]["cause"], round(line[p]["seconds"], 2), round(line[p]["until"], 3))
-                for p in ("designed", "chirp", "random")
-                if p in line
-            }
+            played = {p: line[p] for p in ("designed", "chirp", "random") if p in line}
+            short = {p: [e[n] for n in ("end", "cause", "seconds", "until")] for p, e in played.items()}
             print(k, line["cause"], line["severity"], short, f"{line['cpu']:.0f} s", flush=True)
-
-
-def summary(log):
-    """Print the figures of a log."""
-    lines = read_log(log)
-    apart = [x for x in lines if x["shown"] and x["cause"] not in ALIKE]
-    right = [x for x in apart if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] == x["cause"]]
-    alike = [x for x in lines if x["cause"] in ALIKE]
-    proved = [x for x in alike if x["designed"]["end"] == "undecidable" and x["designed"]["cause"] in ALIKE]
-    wrong = [x for x in lines if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] != x["cause"]]
-    print(f"benches {len(lines)}, of which a run within the limits can tell {len(apart)}")
-    print(
-        f"right unique cause {len(right)} of {len(apart)}; wrong name confirmed {len(wrong)} of {len(lines)}"
-    )
-    print(f"torque constant or F/T gain: {len(proved)} of {len(alike)} said to be undecidable, with proof")
-    for x in apart:
-        if x not in right:
-            print("  not:", x["bench"], x["cause"], x["severity"], x["designed"])
-    pairs = [x for x in right if x["designed"]["seconds"] > 0]
-    print(f"decided by the log alone: {len(right) - len(pairs)}; the others by policy:")
-    for measure, policy in product(("seconds", "until"), ("chirp", "random") if pairs else ()):
-        # a policy that did not get as far as the right name has used all its seconds and would need more
-        other = [x[policy][measure] if good(x, policy) else SECONDS for x in pairs]
-        ours = [x["designed"][measure] for x in pairs]
-        ratio = np.median(np.divide(ours, other))
-        failed = sum(not good(x, policy) for x in pairs)
-        print(
-            f"  {measure}, {policy}: median {np.median(other):.3f} s, designed {np.median(ours):.3f} s, "
-            f"paired median ratio {ratio:.2f}, {failed} of {len(pairs)} not decided by it"
-        )
-
-
-def good(x, policy):
-    """Return whether a policy confirmed the right cause."""
-    return x[policy]["end"] == "confirmed" and x[policy]["cause"] == x["cause"]
 
 
 def limits(runs):
@@ -332,7 +292,7 @@ def main() -> None:
     elif args.command == "wire":
         wire(args.out)
     elif args.command == "summary":
-        summary(args.log)
+        print_figures(read_log(args.log))
     else:
         causes(args.log, args.first, args.count, LIMITS[args.limits])
 
