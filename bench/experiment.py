@@ -1,6 +1,6 @@
 """Designed experiments against fixed ones: python bench/experiment.py COMMAND LOG …
 
-    causes LOG [FIRST COUNT]   hidden-cause benches, each line of LOG one of them; goes on where it stopped
+    causes LOG [FIRST COUNT] [--limits full|lab]   hidden-cause benches, one a line of LOG; resumes
     summary LOG                the figures of those lines
     wire OUT                   the real driver on a simulated bench, an overload in the middle of a run
     limits RUNS                limit violations in RUNS simulated runs, true values drawn from their intervals
@@ -10,6 +10,10 @@ at 0.5 N m, weighs the same causes by the same rule, and stops at the same proba
 run: designed; a piece of the paper's chirp, 20 s long, of the same peak as the limit; a random multisine of
 the designed run's power in 0.5 to 100 Hz. Causes are those that a
 session weighs (experiment/weighed_causes.py).
+
+Limits `full`: the bench near its rating (the paper's chirp has 20 N m). Limits `lab`: 3 N m, six times the
+slow work, as for the first runs on a machine with a suspected fault. seconds: of all runs played. until: the
+same with the shortest last run that decides: stopped early, then rest, by bisection, for all policies.
 """
 
 from __future__ import annotations
@@ -28,6 +32,7 @@ from independent.bench import drawn_bench, record_command  # noqa: E402
 from independent.hidden import hide  # noqa: E402
 from independent.severities import SEVERITIES, drawn_parameters  # noqa: E402
 
+from bench.experiment_figures import SECONDS, print_figures  # noqa: E402
 from bench.json_log import append_to_log, read_log  # noqa: E402
 from bench.sections import parser_of  # noqa: E402
 from msg_adapters import write_record  # noqa: E402
@@ -39,7 +44,7 @@ from rsea_ros.experiment.joint_weighing import weigh  # noqa: E402
 from rsea_ros.experiment.proposal import DesignRequest  # noqa: E402
 from rsea_ros.experiment.run_design import propose  # noqa: E402
 from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response  # noqa: E402
-from rsea_ros.experiment.run_shape import at_rest_around  # noqa: E402
+from rsea_ros.experiment.run_shape import LEAD, at_rest_around  # noqa: E402
 from rsea_ros.experiment.weighed_causes import USUAL  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
 from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramp_ends  # noqa: E402
@@ -49,13 +54,16 @@ from rsea_ros.model.simulation import synthesize  # noqa: E402
 from rsea_ros.signals import Channel  # noqa: E402
 
 RATE, CHIRP = 280.0, 20.0
-ALIKE = {"torque_constant_error", "ft_gain_error"}
-"""No run separates these without another measurement: proved by experiment/bound.py on each bench."""
-LIMITS = RunLimits(torque=25.0, velocity=2.0, deflection=0.04)
+LIMITS = {
+    "full": RunLimits(torque=25.0, velocity=2.0, deflection=0.04),
+    "lab": RunLimits(torque=3.0, velocity=2.0, deflection=0.04),
+}
+BISECTIONS = 4
+"""Of the last run, for the seconds until the decision: to a sixteenth of its length."""
 DESIGNS = 5
 """Benches whose designed runs are repeated for the limits."""
-SECONDS, SHORTEST = 20.0, 0.1
-"""s of excitation that a policy has, and of its first run at least."""
+SHORTEST = 0.1
+"""s of the first run of a policy, at least."""
 
 
 def hidden_case(k):
@@ -74,19 +82,19 @@ def slow_work(seconds=10.0, amplitude=0.5):
     return amplitude * np.sin(2.0 * np.pi * 0.25 * t) * (1.0 + 0.3 * np.sin(2.0 * np.pi * 0.07 * t))
 
 
-def is_shown(plain, bench):
+def is_shown(plain, bench, limits):
     """Return whether the cause shows within the limits: in 20 s of chirp, beside the same noise."""
-    command = fixed_chirp()
+    command = fixed_chirp(limits)
     with_it, without = (record_command(b, command, np.random.default_rng(5)) for b in (bench, plain))
     sizes = {"ft": 0.03, "position": 6e-6}
     away = [np.sqrt(np.mean((with_it[n].y - without[n].y) ** 2)) / s for n, s in sizes.items()]
     return bool(max(away) > 0.3)
 
 
-def fixed_chirp():
+def fixed_chirp(limits):
     """Return the paper's chirp without its noise, at the torque limit, N m."""
     return chirp(
-        ExcitationSettings(rate=RATE, duration=CHIRP, amplitude=LIMITS.torque * 0.98, noise=0.0, low=0.05)
+        ExcitationSettings(rate=RATE, duration=CHIRP, amplitude=limits.torque * 0.98, noise=0.0, low=0.05)
     )
 
 
@@ -112,7 +120,7 @@ class _Played:
         self.decided, self.hopeless, self.energy = 1.0, (), float(np.sum(command**2) / RATE)
 
 
-def random_multisine(rms, seed):
+def random_multisine(rms, seed, torque):
     """Return a multisine of random phases and equal lines in 0.5 to 100 Hz of some RMS, 20 s, N m."""
     rng = np.random.default_rng(seed)
     n = round(CHIRP * RATE)
@@ -120,12 +128,12 @@ def random_multisine(rms, seed):
     lines = np.arange(round(0.5 * CHIRP), round(100.0 * CHIRP))
     spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
     signal = np.fft.irfft(spectrum, n)
-    return np.clip(signal * rms / signal.std(), -LIMITS.torque, LIMITS.torque)
+    return np.clip(signal * rms / signal.std(), -torque, torque)
 
 
-def play_policy(policy, first, weighing, bench, rig, rng, pools):
-    """Return the outcome of a policy on a bench."""
-    asked = DesignRequest(LIMITS, RATE, SHORTEST, probe=1.0, refine=8)
+def play_policy(policy, first, weighing, bench, rig, rng, pools, limits):
+    """Return the entry of a policy on a bench."""
+    asked = DesignRequest(limits, RATE, SHORTEST, probe=1.0, refine=8)
 
     def play(proposal):
         return record_command(bench, proposal.command, rng)
@@ -133,28 +141,54 @@ def play_policy(policy, first, weighing, bench, rig, rng, pools):
     campaign = Campaign(
         rig, USUAL, asked, play, Budget(seconds=SECONDS, runs=10), run=pools.run, choose=policy
     )
-    return campaign.go([first], weighing)
+    outcome = campaign.go([first], weighing)
+    return outcome, outcome_entry(outcome) | {"until": seconds_until_decision(outcome, campaign, bench)}
 
 
-def one(k, pools):
+def seconds_until_decision(outcome, campaign, bench):
+    """Return the excitation (s) of the runs, the last one stopped as early as it still decides."""
+    played = [r for r in outcome.rounds if r.proposal is not None]
+    if outcome.end != "confirmed" or not played:
+        return outcome.seconds
+    last = played[-1]
+    low, high = 0.0, last.proposal.duration
+    for seed in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        command = stopped(last.proposal.command, middle)
+        record = record_command(bench, command, np.random.default_rng([19, seed]))
+        weighing = weigh(
+            [*outcome.records[:-1], record], campaign.rig, campaign.causes, last.weighing, campaign.run
+        )
+        confirmed = campaign.known_end(weighing) == "confirmed" and weighing.best == outcome.cause
+        low, high = (low, middle) if confirmed else (middle, high)
+    return outcome.seconds - last.proposal.duration + high
+
+
+def stopped(command, seconds):
+    """Return a run stopped after some seconds of its excitation: a soft end, then its rest."""
+    lead, n = round(LEAD * RATE), round(seconds * RATE)
+    width = n // 4
+    run = command[lead : lead + n].copy()
+    run[n - width :] *= ramp_ends(np.ones(2 * width), width)[width:]
+    return at_rest_around(run, RATE)
+
+
+def one(k, pools, limits):
     """Return the line of bench k."""
     plain, bench, name, severity, parameters = hidden_case(k)
     rig, begun = load_rig("paper_high_impedance"), time.process_time()
     rng = np.random.default_rng([18, k])
     first = record_command(bench, slow_work(), rng)
     weighing = weigh([first], rig, USUAL, run=pools.run)
-    designed = play_policy(propose, first, weighing, bench, rig, rng, pools)
+    same = (first, weighing, bench, rig, rng, pools, limits)
+    designed, entry = play_policy(propose, *same)
     runs = [r.proposal.command for r in designed.rounds if r.proposal is not None]
     rms = float(np.sqrt(np.mean(np.concatenate([np.trim_zeros(u) for u in runs]) ** 2))) if runs else 0.0
     line = {"bench": k, "cause": name, "severity": severity, "parameters": parameters}
-    line |= {"shown": is_shown(plain, bench), "designed": outcome_entry(designed), "rms": rms}
+    line |= {"shown": is_shown(plain, bench, limits), "designed": entry, "rms": rms}
     if runs and designed.end == "confirmed":
-        line["chirp"] = outcome_entry(
-            play_policy(Fixed(fixed_chirp(), SHORTEST), first, weighing, bench, rig, rng, pools)
-        )
-        noise = random_multisine(rms, k)
-        at_random = play_policy(Fixed(noise, SHORTEST), first, weighing, bench, rig, rng, pools)
-        line["random"] = outcome_entry(at_random)
+        commands = {"chirp": fixed_chirp(limits), "random": random_multisine(rms, k, limits.torque)}
+        line |= {n: play_policy(Fixed(u, SHORTEST), *same)[1] for n, u in commands.items()}
     return line | {"cpu": time.process_time() - begun}
 
 
@@ -172,57 +206,18 @@ def outcome_entry(outcome):
     }
 
 
-def causes(log, first, count):
+def causes(log, first, count, limits):
     """Play benches and append their lines."""
     done = {entry["bench"] for entry in read_log(log)}
     with worker_pools() as pools:
         for k in range(first, first + count):
             if k in done:
                 continue
-            line = one(k, pools)
+            line = one(k, pools, limits)
             append_to_log(log, line)
-            short = {
-                p: (line[p]["end"], line[p]["cause"], round(line[p]["seconds"], 2))
-                for p in ("designed", "chirp", "random")
-                if p in line
-            }
+            played = {p: line[p] for p in ("designed", "chirp", "random") if p in line}
+            short = {p: [e[n] for n in ("end", "cause", "seconds", "until")] for p, e in played.items()}
             print(k, line["cause"], line["severity"], short, f"{line['cpu']:.0f} s", flush=True)
-
-
-def summary(log):
-    """Print the figures of a log."""
-    lines = read_log(log)
-    apart = [x for x in lines if x["shown"] and x["cause"] not in ALIKE]
-    right = [x for x in apart if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] == x["cause"]]
-    alike = [x for x in lines if x["cause"] in ALIKE]
-    proved = [x for x in alike if x["designed"]["end"] == "undecidable" and x["designed"]["cause"] in ALIKE]
-    wrong = [x for x in lines if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] != x["cause"]]
-    print(f"benches {len(lines)}, of which a run within the limits can tell {len(apart)}")
-    print(
-        f"right unique cause {len(right)} of {len(apart)}; wrong name confirmed {len(wrong)} of {len(lines)}"
-    )
-    print(f"torque constant or F/T gain: {len(proved)} of {len(alike)} said to be undecidable, with proof")
-    for x in apart:
-        if x not in right:
-            print("  not:", x["bench"], x["cause"], x["severity"], x["designed"])
-    pairs = [x for x in right if x["designed"]["seconds"] > 0]
-    print(f"decided by the log alone: {len(right) - len(pairs)}; the others by policy:")
-    for policy in ("chirp", "random"):
-        # a policy that did not get as far as the right name has used all its seconds and would need more
-        other = [x[policy]["seconds"] if good(x, policy) else SECONDS for x in pairs]
-        ratios = [x["designed"]["seconds"] / max(s, SHORTEST) for x, s in zip(pairs, other, strict=True)]
-        if ratios:
-            ours = np.median([x["designed"]["seconds"] for x in pairs])
-            failed = sum(not good(x, policy) for x in pairs)
-            print(
-                f"  {policy}: median {np.median(other):.2f} s, designed {ours:.2f} s, paired median ratio "
-                f"{np.median(ratios):.2f}, {failed} of {len(pairs)} not decided by it"
-            )
-
-
-def good(x, policy):
-    """Return whether a policy confirmed the right cause."""
-    return x[policy]["end"] == "confirmed" and x[policy]["cause"] == x["cause"]
 
 
 def limits(runs):
@@ -287,6 +282,7 @@ def main() -> None:
     played.add_argument("log", type=Path)
     played.add_argument("first", type=int, nargs="?", default=0)
     played.add_argument("count", type=int, nargs="?", default=60)
+    played.add_argument("--limits", choices=LIMITS, default="full")
     commands.add_parser("summary").add_argument("log", type=Path)
     commands.add_parser("wire").add_argument("out", type=Path)
     commands.add_parser("limits").add_argument("runs", type=int, nargs="?", default=10_000)
@@ -296,9 +292,9 @@ def main() -> None:
     elif args.command == "wire":
         wire(args.out)
     elif args.command == "summary":
-        summary(args.log)
+        print_figures(read_log(args.log))
     else:
-        causes(args.log, args.first, args.count)
+        causes(args.log, args.first, args.count, LIMITS[args.limits])
 
 
 if __name__ == "__main__":

@@ -157,7 +157,7 @@ class Campaign:
     def _round(self, session: _Session) -> CampaignOutcome | None:
         """Design a run and have it played; return the outcome, None where the loop continues."""
         weighing = session.weighing
-        if end := self._known_end(weighing) or self._budget_end(session.rounds):
+        if end := self.known_end(weighing) or self._budget_end(session.rounds):
             return session.conclude(end)
         possible, noise = self.possible(weighing), weighing.cases[0].noise
         try:
@@ -178,7 +178,7 @@ class Campaign:
         session.records.append(record)
         return None
 
-    def _known_end(self, weighing: RunWeighing) -> End | None:
+    def known_end(self, weighing: RunWeighing) -> End | None:
         """Return the outcome by present knowledge, None where the loop continues."""
         if weighing.probability[weighing.best] < self.rules.confirmed:
             return None

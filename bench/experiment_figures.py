@@ -1,0 +1,46 @@
+"""Figures of a log of bench/experiment.py: causes right, and excitation of each policy in pairs."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+ALIKE = {"torque_constant_error", "ft_gain_error"}
+"""No run separates these without another measurement: proved by experiment/bound.py on each bench."""
+SECONDS = 20.0
+"""s of excitation that a policy has."""
+
+
+def print_figures(lines):
+    """Print the figures of the lines of a log."""
+    apart = [x for x in lines if x["shown"] and x["cause"] not in ALIKE]
+    right = [x for x in apart if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] == x["cause"]]
+    alike = [x for x in lines if x["cause"] in ALIKE]
+    proved = [x for x in alike if x["designed"]["end"] == "undecidable" and x["designed"]["cause"] in ALIKE]
+    wrong = [x for x in lines if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] != x["cause"]]
+    print(f"benches {len(lines)}, of which a run within the limits can tell {len(apart)}")
+    print(
+        f"right unique cause {len(right)} of {len(apart)}; wrong name confirmed {len(wrong)} of {len(lines)}"
+    )
+    print(f"torque constant or F/T gain: {len(proved)} of {len(alike)} said to be undecidable, with proof")
+    for x in apart:
+        if x not in right:
+            print("  not:", x["bench"], x["cause"], x["severity"], x["designed"])
+    pairs = [x for x in right if x["designed"]["seconds"] > 0]
+    print(f"decided by the log alone: {len(right) - len(pairs)}; the others by policy:")
+    for measure, policy in product(("seconds", "until"), ("chirp", "random") if pairs else ()):
+        # a policy that did not get as far as the right name has used all its seconds and would need more
+        other = [x[policy][measure] if good(x, policy) else SECONDS for x in pairs]
+        ours = [x["designed"][measure] for x in pairs]
+        ratio = np.median(np.divide(ours, other))
+        failed = sum(not good(x, policy) for x in pairs)
+        print(
+            f"  {measure}, {policy}: median {np.median(other):.3f} s, designed {np.median(ours):.3f} s, "
+            f"paired median ratio {ratio:.2f}, {failed} of {len(pairs)} not decided by it"
+        )
+
+
+def good(x, policy):
+    """Return whether a policy confirmed the right cause."""
+    return x[policy]["end"] == "confirmed" and x[policy]["cause"] == x["cause"]
