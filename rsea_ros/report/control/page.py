@@ -13,7 +13,8 @@ from rsea_ros.control.study import AtRate, Study
 from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
-from rsea_ros.report.control.tables import control_tables, gains_words
+from rsea_ros.report import words
+from rsea_ros.report.control.tables import control_tables, gains_words, times
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
 from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
@@ -47,7 +48,12 @@ def control_report(study: Study) -> str:
 
 def verdict(study: Study) -> str:
     """Return the verdict in a sentence."""
-    missed = [f"{t.what} at {at.design.rate:g} Hz" for at in study.rates for t in at.trials if t.met is False]
+    missed = [
+        f"{times(t.what)} at {at.design.rate:g} Hz"
+        for at in study.rates
+        for t in at.trials
+        if t.met is False
+    ]
     slowest = study.rates[0]
     reached = f"Stable on all {slowest.swept.cases} benches of the set, from locked to free"
     if any(at.swept.unstable for at in study.rates):
@@ -66,8 +72,8 @@ def _keys(study: Study) -> list[tuple[str, str]]:
     return [
         (f"{study.resonance:.1f} Hz", "open-loop resonance"),
         (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz"),
-        (f"{at.design.margins['locked'].phase:.0f}°", "phase margin, locked"),
-        (f"{at.swept.margins.phase:.0f}°", "phase margin, worst"),
+        (words.minus(f"{at.design.margins['locked'].phase:.0f}°"), "phase margin, locked"),
+        (words.minus(f"{at.swept.margins.phase:.0f}°"), "phase margin, worst"),
         *errors,
     ]
 
