@@ -231,8 +231,8 @@ function labelCells() {
 function keepOptions() {
   const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT), texts = [];
   while (walker.nextNode()) if (walker.currentNode.data.includes("--") && !walker.currentNode.parentElement.closest("script, svg")) texts.push(walker.currentNode);
-  for (const text of texts) text.replaceWith(...text.data.split(/(--[a-z][\w-]*)/).map((piece, i) => {
-    if (i % 2 === 0) return piece;
+  for (const text of texts) text.replaceWith(...text.data.split(/(--[a-z][\w-]*)/).filter(Boolean).map((piece) => {
+    if (!/^--[a-z]/.test(piece)) return piece;
     const option = document.createElement("span");
     option.className = "option"; option.textContent = piece;
     return option;
