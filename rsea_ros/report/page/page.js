@@ -113,8 +113,9 @@ function cell(value) {
 
 /* All samples of an overlay, the drawn points of any other figure: a column pair for each curve, with units. */
 function csv(node, figure) {
+  const times = figure.traces?.t.map((t) => Math.round(1e7 * t) / 1e7); /* without what the packing adds */
   const curves = figure.kind === "overlay"
-    ? figure.traces.all.map((s) => ({ name: s.name, x: figure.traces.t, y: s.y, yaxis: s.axis }))
+    ? figure.traces.all.map((s) => ({ name: s.name, x: times, y: s.y, yaxis: s.axis }))
     : node.data.filter((d) => d.x && d.y && d.name);
   const quoted = (s) => '"' + plain(s).replace(/"/g, '""') + '"';
   const title = (c, letter) => quoted(`${c.name}: ${quantity(figure.layout, c[letter + "axis"] || letter)}`);
@@ -129,8 +130,9 @@ function picture(node, figure) {
   const { annotations = [], margin } = figure.printed;
   const names = annotations.filter(beside);
   const narrow = names.length > (node.layout.annotations || []).filter(beside).length;
-  const layout = { ...node.layout, annotations, margin, autosize: false };
-  return Plotly.downloadImage(narrow ? { data: node.data, layout } : node, {
+  const paper = { paper_bgcolor: getComputedStyle(document.body).backgroundColor };
+  const layout = { ...node.layout, ...paper, ...(narrow ? { annotations, margin, autosize: false } : {}) };
+  return Plotly.downloadImage({ data: node.data, layout }, {
     format: "png", scale: 2, width: narrow ? PRINTED : node.clientWidth, height: node.clientHeight, filename: node.id });
 }
 
@@ -202,13 +204,18 @@ function inTheDark(text) {
 }
 
 /* Draws all figures; once more when the colours or the width class of the screen change, or the page is printed. */
+let drawings = 0;
 function draw() {
+  const drawing = ++drawings;
   for (const node of document.querySelectorAll(".figure")) {
     if (node.dataset.drawn) { Plotly.purge(node); node.nextElementSibling.remove(); delete node.dataset.drawn; }
     const whole = JSON.parse(inTheDark(document.getElementById(node.id + "-data").textContent));
     const figure = { ...fitted(whole), printed: whole.layout };
     const done = figure.kind === "overlay" ? overlay(node, figure) : Plotly.newPlot(node, figure.data, figure.layout, CONFIG);
-    done.then(() => { tools(node, figure); node.dataset.drawn = "yes"; });
+    done.then(() => {
+      if (drawing !== drawings) return; /* a later one draws its tools */
+      tools(node, figure); node.dataset.drawn = "yes";
+    });
   }
 }
 

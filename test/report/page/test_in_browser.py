@@ -83,6 +83,14 @@ def test_a_figure_has_the_width_of_a_phone(two_curves):
     assert two_curves.errors == []
 
 
+def test_a_figure_drawn_anew_before_it_is_done_has_one_row_of_switches(two_curves):
+    """The colours or the width changed while long curves were being unpacked: each drawing made a row."""
+    two_curves.value("draw(); draw()")
+    two_curves.until("document.querySelectorAll('[data-drawn]').length === 2")
+    two_curves.value("new Promise((done) => setTimeout(done, 300))")
+    assert two_curves.value("document.querySelectorAll('.tools').length") == 2
+
+
 def test_a_switch_shows_the_colour_and_the_dashes_of_its_curve(two_curves):
     assert two_curves.value(SWITCHES) == [["rgb(31, 41, 51)", "solid"], ["rgb(217, 115, 13)", "dotted"]]
 
@@ -95,7 +103,8 @@ def test_an_empty_cell_takes_no_line_on_a_phone(two_curves):
 
 PRESS = "[...document.querySelectorAll('.tools button')].find((b) => b.textContent === '%s').click()"
 SEEN = """Plotly.downloadImage = (figure) => {
-  window.names = figure.layout.annotations.map((a) => a.text); }"""
+  window.names = figure.layout.annotations.map((a) => a.text);
+  window.paper = figure.layout.paper_bgcolor; }"""
 
 
 @pytest.mark.parametrize("width", [1400, 400])
@@ -118,6 +127,7 @@ def test_the_picture_names_its_curves(two_curves, width):
     two_curves.value(SEEN)
     two_curves.value(PRESS % "PNG")
     assert two_curves.value("window.names") == ["y", "z"]
+    assert two_curves.value("window.paper") == "rgb(255, 255, 255)", "readable on any ground"
 
 
 LONG = "The fit holds only if what the model lacks does not move its values."
