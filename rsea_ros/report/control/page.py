@@ -20,6 +20,7 @@ from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUT
 from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
+from rsea_ros.report.provenance import Provenance
 
 _COLOURS = (AFTER, BEFORE, TRUTH)
 
@@ -33,7 +34,7 @@ LEARNING = (
 )
 
 
-def control_report(study: Study) -> str:
+def control_report(study: Study, provenance: Provenance | None = None) -> str:
     """Return the page."""
     blocks: list[Block] = [
         key_numbers(_keys(study)),
@@ -43,7 +44,7 @@ def control_report(study: Study) -> str:
         _impedance_figure(study),
         *control_tables(study),
     ]
-    return page(verdict(study), f"Torque control · {study.rig.name}", blocks, _footer(study))
+    return page(verdict(study), f"Torque control · {study.rig.name}", blocks, _footer(study, provenance))
 
 
 def verdict(study: Study) -> str:
@@ -179,9 +180,10 @@ def _impedance_figure(study: Study) -> Figure:
     )
 
 
-def _footer(study: Study) -> list[str]:
+def _footer(study: Study, provenance: Provenance | None) -> list[str]:
     motors = [f"{m.name}: {m.torque:g} N·m, {_speed(m.speed)} ({m.source})" for m in study.reaches]
-    return [*motors, "rsea control. All in SI. One sample of delay and the hold are in every number."]
+    about = "rsea control. All in SI. One sample of delay and the hold are in every number."
+    return [*motors, about, *(provenance.lines if provenance else ())]
 
 
 def _speed(speed: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 from rsea_ros.control.large_signal import Reach
@@ -31,8 +32,8 @@ def trial_head(study: Study) -> list[str]:
 
 
 def times(name: str) -> str:
-    """Return the name of a trial or of a load with its factor as a sign, `free x 0.5` as `free × 0.5`."""
-    return name.replace(" x ", " × ")
+    """Return the name of a trial or of a load with proper signs, `free x 0.5` as `free × 0.5`."""
+    return re.sub(r"(?<!\w)-(?=\d)", "−", name.replace(" x ", " × "))
 
 
 def demand_text(trial: TrialResult) -> str:
@@ -69,7 +70,7 @@ def compensation_rows(study: Study) -> Rows:
 
 
 def _compensation(c: Compensated) -> str:
-    return f"{100 * c.without:.2f} → {100 * c.with_model:.2f} %, gain {c.gain:.2f}"
+    return f"{100 * c.without:.2f} → {100 * c.with_model:.2f} %, gain {round(c.gain, 2) + 0.0:.2f}"
 
 
 def margin_rows(study: Study) -> Rows:
