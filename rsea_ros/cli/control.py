@@ -43,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Design the controller, run the trials, write the results."""
+    from rsea_ros.cli._provenance import provenance
     from rsea_ros.control.loads import lightest
     from rsea_ros.control.study import study
     from rsea_ros.model.rig_file import load_rig
@@ -55,9 +56,10 @@ def run(args: argparse.Namespace) -> int:
     rig = load_rig(args.rig)
     with progress("control") as report_progress:
         result = study(rig, lightest(rig, args.free or ""), args.rate, motors(rig), progress=report_progress)
+    source = provenance("control", [], args.rig)
     with NewFiles(place) as new:
         path = new.write(CONTROL_JSON, json_text(control_json(result)))
-        report = new.write(REPORT, control_report(result))
+        report = new.write(REPORT, control_report(result, source))
     if args.json:
         print_file(path)
     else:

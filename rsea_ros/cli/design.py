@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.report.design.json import design_json
     from rsea_ros.report.design.page import design_report
     from rsea_ros.report.json_values import json_text
+    from rsea_ros.report.provenance import provenance_of
 
     place = results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
     check_magnitude("stiffness", args.stiffness, "N m/rad")
@@ -90,9 +92,10 @@ def run(args: argparse.Namespace) -> int:
     least = spring_design(requirement, unit, least_stiffness(requirement, unit))
     enough = robust_stiffness(requirement, unit)
     robust = spring_design(requirement, unit, enough) if math.isfinite(enough) else None
+    source = provenance_of(["rsea", "design", *sys.argv[2:]], [args.catalogue] if args.catalogue else [])
     with NewFiles(place) as new:
         path = new.write(DESIGN_JSON, json_text(design_json(asked, least, robust)))
-        report = new.write(REPORT, design_report(asked, least, robust))
+        report = new.write(REPORT, design_report(asked, least, robust, source))
     if args.json:
         print_file(path)
     else:

@@ -7,6 +7,7 @@ import json
 import pytest
 
 from rsea_ros.cli.main import main
+from rsea_ros.version import version
 
 
 @pytest.fixture
@@ -24,6 +25,7 @@ def test_design_without_arguments_computes_the_papers_example(directory, capsys)
     assert not result["asked"]["feasible"]
     assert result["least"]["feasible"]
     page = (directory / "out/design/report.html").read_text(encoding="utf-8")
+    assert f"rsea_ros {version()}, 20" in page and ": rsea design" in page, "the footer has no provenance"
     for said in ("55.8 Hz by Eq. (7)", "130 N·m at 45°", "33°", "1728", "2759", "n = −160"):
         assert said in page
 

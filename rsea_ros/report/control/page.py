@@ -13,12 +13,14 @@ from rsea_ros.control.study import AtRate, Study
 from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
-from rsea_ros.report.control.tables import control_tables, gains_words
+from rsea_ros.report import words
+from rsea_ros.report.control.tables import control_tables, gains_words, times
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
 from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
+from rsea_ros.report.provenance import Provenance
 
 _COLOURS = (AFTER, BEFORE, TRUTH)
 
@@ -32,7 +34,7 @@ LEARNING = (
 )
 
 
-def control_report(study: Study) -> str:
+def control_report(study: Study, provenance: Provenance | None = None) -> str:
     """Return the page."""
     blocks: list[Block] = [
         key_numbers(_keys(study)),
@@ -42,12 +44,17 @@ def control_report(study: Study) -> str:
         _impedance_figure(study),
         *control_tables(study),
     ]
-    return page(verdict(study), f"Torque control · {study.rig.name}", blocks, _footer(study))
+    return page(verdict(study), f"Torque control · {study.rig.name}", blocks, _footer(study, provenance))
 
 
 def verdict(study: Study) -> str:
     """Return the verdict in a sentence."""
-    missed = [f"{t.what} at {at.design.rate:g} Hz" for at in study.rates for t in at.trials if t.met is False]
+    missed = [
+        f"{times(t.what)} at {at.design.rate:g} Hz"
+        for at in study.rates
+        for t in at.trials
+        if t.met is False
+    ]
     slowest = study.rates[0]
     reached = f"Stable on all {slowest.swept.cases} benches of the set, from locked to free"
     if any(at.swept.unstable for at in study.rates):
@@ -66,8 +73,8 @@ def _keys(study: Study) -> list[tuple[str, str]]:
     return [
         (f"{study.resonance:.1f} Hz", "open-loop resonance"),
         (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz"),
-        (f"{at.design.margins['locked'].phase:.0f}°", "phase margin, locked"),
-        (f"{at.swept.margins.phase:.0f}°", "phase margin, worst"),
+        (words.minus(f"{at.design.margins['locked'].phase:.0f}°"), "phase margin, locked"),
+        (words.minus(f"{at.swept.margins.phase:.0f}°"), "phase margin, worst"),
         *errors,
     ]
 
@@ -173,9 +180,10 @@ def _impedance_figure(study: Study) -> Figure:
     )
 
 
-def _footer(study: Study) -> list[str]:
+def _footer(study: Study, provenance: Provenance | None) -> list[str]:
     motors = [f"{m.name}: {m.torque:g} N·m, {_speed(m.speed)} ({m.source})" for m in study.reaches]
-    return [*motors, "rsea control. All in SI. One sample of delay and the hold are in every number."]
+    about = "rsea control. All in SI. One sample of delay and the hold are in every number."
+    return [*motors, about, *(provenance.lines if provenance else ())]
 
 
 def _speed(speed: float) -> str:

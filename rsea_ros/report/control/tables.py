@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 from rsea_ros.control.large_signal import Reach
 from rsea_ros.control.study import Study
-from rsea_ros.control.trials import TrialResult
+from rsea_ros.control.trials import Compensated, TrialResult
 from rsea_ros.report import words
 from rsea_ros.report.page.html import section
 from rsea_ros.report.page.html_table import table
@@ -20,7 +21,7 @@ _SIGNS = {True: "≥", False: "≤"}
 def trial_rows(study: Study) -> Rows:
     """Return each trial with its demand and its value at every rate; a value that misses it is marked."""
     return [
-        [trials[0].what, demand_text(trials[0]), *(value(trial) for trial in trials)]
+        [times(trials[0].what), demand_text(trials[0]), *(value(trial) for trial in trials)]
         for trials in zip(*(at.trials for at in study.rates), strict=True)
     ]
 
@@ -28,6 +29,11 @@ def trial_rows(study: Study) -> Rows:
 def trial_head(study: Study) -> list[str]:
     """Return the heading of `trial_rows`."""
     return ["trial", "required", *(f"{at.design.rate:g} Hz" for at in study.rates)]
+
+
+def times(name: str) -> str:
+    """Return the name of a trial or of a load with proper signs, `free x 0.5` as `free × 0.5`."""
+    return re.sub(r"(?<!\w)-(?=\d)", "−", name.replace(" x ", " × "))
 
 
 def demand_text(trial: TrialResult) -> str:
@@ -57,10 +63,14 @@ def compensation_rows(study: Study) -> Rows:
         [
             words.sentence(words.effect(cells[0].effect.name)),
             f"{cells[0].hz:g} Hz",
-            *(f"{100 * c.without:.2f} → {100 * c.with_model:.2f} %, gain {c.gain:.2f}" for c in cells),
+            *(words.minus(_compensation(c)) for c in cells),
         ]
         for cells in zip(*(at.compensations for at in study.rates), strict=True)
     ]
+
+
+def _compensation(c: Compensated) -> str:
+    return f"{100 * c.without:.2f} → {100 * c.with_model:.2f} %, gain {round(c.gain, 2) + 0.0:.2f}"
 
 
 def margin_rows(study: Study) -> Rows:
@@ -68,10 +78,10 @@ def margin_rows(study: Study) -> Rows:
     return [
         [
             f"{at.design.rate:g} Hz",
-            name,
+            times(name),
             f"{m.crossover:.1f} Hz",
-            f"{m.phase:.1f}°",
-            f"{m.gain:.1f} dB",
+            words.minus(f"{m.phase:.1f}°"),
+            words.minus(f"{m.gain:.1f} dB"),
             f"{m.delay:.2f}",
             f"{m.sensitivity:.2f}",
         ]
@@ -107,8 +117,10 @@ def gains_words(study: Study) -> Sequence[str]:
     """Return the gains of each rate, a line each."""
     gains = [(at.design, at.design.gains) for at in study.rates]
     return [
-        f"{design.rate:g} Hz: k_p = {g.k_p:.3f}, k_d = {1e3 * g.k_d:.2f} ms, k_i = {g.k_i:.2f}, "
-        f"Q {g.q_frequency:.1f} Hz, k_w = {g.k_w:.1f} N·m·s/rad"
+        words.minus(
+            f"{design.rate:g} Hz: k_p = {g.k_p:.3f}, k_d = {1e3 * g.k_d:.2f} ms, k_i = {g.k_i:.2f}, "
+            f"Q {g.q_frequency:.1f} Hz, k_w = {g.k_w:.1f} N·m·s/rad"
+        )
         for design, g in gains
     ]
 

@@ -28,12 +28,18 @@ from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, QUIET, TRUTH
 from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import equation, key_numbers, section
+from rsea_ros.report.provenance import Provenance
 from rsea_ros.signals import FloatArray
 
 _COLOURS = (BEFORE, AFTER, TRUTH)
 
 
-def design_report(asked: SpringDesign, least: SpringDesign, robust: SpringDesign | None) -> str:
+def design_report(
+    asked: SpringDesign,
+    least: SpringDesign,
+    robust: SpringDesign | None,
+    provenance: Provenance | None = None,
+) -> str:
     """Return the page. asked: the stiffness judged; least: meets all demands; robust: under tolerance too."""
     designs = [asked, least, *([robust] if robust else [])]
     blocks: list[Block] = [
@@ -47,7 +53,8 @@ def design_report(asked: SpringDesign, least: SpringDesign, robust: SpringDesign
         springs_table(designs),
         margins_table(asked if robust is None else robust),
     ]
-    return page(verdict(asked), _kicker(asked), blocks, _footer(asked))
+    footer = [*_footer(asked), *(provenance.lines if provenance else ())]
+    return page(verdict(asked), _kicker(asked), blocks, footer)
 
 
 def verdict(d: SpringDesign) -> str:
@@ -150,10 +157,10 @@ def _map_title(d: SpringDesign) -> str:
 
 
 def _surface(designs: Sequence[SpringDesign]) -> tuple[str, list[Point], str]:
-    d = designs[0]
+    d, side = designs[0], "middle right"  # away from the marks of the axis, one name above the other
     points = [
-        Point(f"{d.stiffness:.0f} N·m/rad, chassis", d.stiffness, d.requirement.inertia, AFTER),
-        Point("the same with the rotor's spin", d.stiffness, d.inner, BEFORE),
+        Point(f"{d.stiffness:.0f} N·m/rad, chassis", d.stiffness, d.requirement.inertia, AFTER, 240.0, side),
+        Point("the same with the rotor's spin", d.stiffness, d.inner, BEFORE, 160.0, side),
     ]
     title = "Bandwidth by Eq. (7) over stiffness and inertia (Fig. 9): drag to turn"
     return title, points, "Both horizontal axes are logarithmic; lines of equal bandwidth every 20 Hz."

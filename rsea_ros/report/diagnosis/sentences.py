@@ -87,7 +87,7 @@ def evidence(cause: Cause) -> str:
     return (
         f"With {effect_named(cause.name).about}, the {words.channel(cause.channel)} residual of data "
         f"that took no part falls from {before:.2f} to {after:.2f} times the noise "
-        f"(gain {cause.gain_holdout:.1%})."
+        f"(gain {words.minus(f'{100.0 * cause.gain_holdout:.1f}')} %)."
     )
 
 

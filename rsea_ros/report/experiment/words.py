@@ -23,7 +23,7 @@ def shape_words(p: Proposal) -> str:
     """Return the shape of a run in words: `multisine 0.5 to 42 Hz, 0.5 s, up to 18 N·m`."""
     s = p.shape
     band = f" {s.low:.2g} to {s.high:.3g} Hz" if s.kind in ("multisine", "chirp") else f" of {s.hold:.2g} s"
-    bias = f" around {p.command.mean():.2g} N·m" if abs(s.bias) > 0.02 else ""
+    bias = f" around {words.number(float(p.command.mean()), 2)} N·m" if abs(s.bias) > 0.02 else ""
     return f"{s.kind}{band}{bias}, {p.duration:.3g} s, up to {p.peaks.at_level['torque']:.3g} N·m"
 
 

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from rsea_ros.identification.lost_cycles import explained_by_lost_cycles
 from rsea_ros.identification.result import Identification
 from rsea_ros.report import words
 from rsea_ros.report.remark_words import coloured_noise
 from rsea_ros.report.rig.words import command, rig_in_brackets, values_off
 from rsea_ros.wording import list_names
+
+_LOST = (
+    "Behind the lost cycles the motor torque is further from its commands than elsewhere: the computer was "
+    "too busy. Record again on an idle computer, or run the driver with realtime_priority (docs/hardware.md)."
+)
 
 
 def verdict_sentence(identification: Identification) -> str:
@@ -29,6 +35,8 @@ def _verdict(identification: Identification) -> str:
         return f"No channel to test the model with ({rig})"
     worst = max(ratios, key=lambda n: ratios[n])
     size = f"{words.channel(worst)} {times(ratios[worst])} times the noise ({rig})"
+    if lost := explained_by_lost_cycles(identification):
+        return f"The model does not fit: {size}; {lost} lost cycles of the driver are the likely cause"
     if not identification.at_noise:
         return f"The model does not fit: {size}"
     if identification.silent:
@@ -45,8 +53,8 @@ def times(ratio: float) -> str:
 
 
 def next_command(identification: Identification) -> str:
-    """Return the command that diagnoses a model that does not fit; empty if it fits."""
-    if identification.at_noise:
+    """Return the command that diagnoses a model that does not fit; empty if it fits, or the run was bad."""
+    if identification.at_noise or explained_by_lost_cycles(identification):
         return ""
     i = identification
     return command("diagnose", i.sources, i.rig.name, i.rig_choice)
@@ -57,7 +65,9 @@ def doubt_sentences(identification: Identification) -> tuple[str, ...]:
     sentences = []
     if identification.coloured:
         sentences.append(coloured_noise(identification.coloured))
-    if not identification.at_noise:
+    if explained_by_lost_cycles(identification):
+        sentences.append(_LOST)
+    elif not identification.at_noise:
         sentences.append(_misfit_sentence(identification))
     return tuple(sentences)
 

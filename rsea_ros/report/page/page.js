@@ -3,6 +3,8 @@
 
 const CONFIG = { responsive: true, displaylogo: false, displayModeBar: false };
 const MOST_POINTS = 3000;
+const LONGEST_CELL = 36; /* characters: a longer text of a card is prose, below the title of its column */
+const PRINTED = 900; /* px: width of a picture whose names have no room on the screen */
 
 async function gunzipped(text) {
   const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -95,16 +97,43 @@ function button(text, about, act) {
 /* A name without its marks; a break between two lines is a space. */
 function plain(name) { return String(name).replace(/<br>/g, " ").replace(/<[^>]*>/g, ""); }
 
-/* All samples of an overlay, the drawn points of any other figure: a column pair for each curve. */
+/* The title of the axis of a curve, which ends in the unit: of "x2" that of xaxis2, or of the next one with a title. */
+function quantity(layout, axis) {
+  const [letter, number = ""] = [axis[0], axis.slice(1)];
+  const title = (name) => layout[name]?.title?.text;
+  const any = () => Object.keys(layout).filter((name) => name.startsWith(letter + "axis")).map(title).find(Boolean);
+  return title(`${letter}axis${number}`) || title(`${letter}axis`) || any() || letter;
+}
+
+/* A value with seven digits; a date as it is, nothing for a gap. */
+function cell(value) {
+  if (value === null || value === undefined || Number.isNaN(value)) return "";
+  return Number.isNaN(+value) ? `"${String(value).replace(/"/g, '""')}"` : String(+(+value).toPrecision(7));
+}
+
+/* All samples of an overlay, the drawn points of any other figure: a column pair for each curve, with units. */
 function csv(node, figure) {
+  const times = figure.traces?.t.map((t) => Math.round(1e7 * t) / 1e7); /* without what the packing adds */
   const curves = figure.kind === "overlay"
-    ? figure.traces.all.map((s) => ({ name: s.name, x: figure.traces.t, y: s.y }))
+    ? figure.traces.all.map((s) => ({ name: s.name, x: times, y: s.y, yaxis: s.axis }))
     : node.data.filter((d) => d.x && d.y && d.name);
   const quoted = (s) => '"' + plain(s).replace(/"/g, '""') + '"';
-  const head = curves.flatMap((c) => [quoted(c.name + ", x"), quoted(c.name)]).join(",");
+  const title = (c, letter) => quoted(`${c.name}: ${quantity(figure.layout, c[letter + "axis"] || letter)}`);
+  const head = curves.flatMap((c) => [title(c, "x"), title(c, "y")]).join(",");
   const rows = Array.from({ length: Math.max(0, ...curves.map((c) => c.x.length)) }, (_, i) =>
-    curves.flatMap((c) => (i < c.x.length ? [+(+c.x[i]).toPrecision(7), +(+c.y[i]).toPrecision(7)] : ["", ""])).join(","));
+    curves.flatMap((c) => (i < c.x.length ? [cell(c.x[i]), cell(c.y[i])] : ["", ""])).join(","));
   return [head, ...rows].join("\n") + "\n";
+}
+
+/* The figure as it is zoomed and switched, with the names that a narrow screen leaves out beside it. */
+function picture(node, figure) {
+  const { annotations = [], margin } = figure.printed;
+  const names = annotations.filter(beside);
+  const narrow = names.length > (node.layout.annotations || []).filter(beside).length;
+  const paper = { paper_bgcolor: getComputedStyle(document.body).backgroundColor };
+  const layout = { ...node.layout, ...paper, ...(narrow ? { annotations, margin, autosize: false } : {}) };
+  return Plotly.downloadImage({ data: node.data, layout }, {
+    format: "png", scale: 2, width: narrow ? PRINTED : node.clientWidth, height: node.clientHeight, filename: node.id });
 }
 
 function save(name, text) {
@@ -124,13 +153,15 @@ function swatch({ line, marker, mode, fillcolor, fill }) {
   return made;
 }
 
+/* Whether an annotation is a name beside the curves. */
+function beside(a) { return a.xref === "paper" && a.x >= 1 && a.xanchor === "left"; }
+
 /* On a narrow screen a figure has the whole width; names beside the curves give way to the switches below. */
 function fitted(figure) {
   if (!LOOKS[2].matches) return figure;
   const { margin, annotations = [], scene } = figure.layout;
   const names = new Set((figure.data || []).map((d) => d.name).filter(Boolean));
   const switched = figure.kind === "overlay" || names.size > 1;
-  const beside = (a) => a.xref === "paper" && a.x >= 1 && a.xanchor === "left";
   const kept = annotations.filter((a) => !(switched && beside(a)));
   const wide = kept.some(beside) ? {} : { r: Math.min(margin.r, 14) };
   const layout = { ...figure.layout, annotations: kept, margin: { ...margin, ...wide } };
@@ -160,8 +191,7 @@ function tools(node, figure) {
     bar.append(toggle);
   }
   bar.append(
-    button("PNG", "this figure as a picture", () => Plotly.downloadImage(node, {
-      format: "png", scale: 2, width: node.clientWidth, height: node.clientHeight, filename: node.id })),
+    button("PNG", "this figure as a picture", () => picture(node, figure)),
     button("CSV", "the numbers of this figure", () => save(node.id + ".csv", csv(node, figure))));
   node.after(bar);
 }
@@ -174,21 +204,46 @@ function inTheDark(text) {
 }
 
 /* Draws all figures; once more when the colours or the width class of the screen change, or the page is printed. */
+let drawings = 0;
 function draw() {
+  const drawing = ++drawings;
   for (const node of document.querySelectorAll(".figure")) {
     if (node.dataset.drawn) { Plotly.purge(node); node.nextElementSibling.remove(); delete node.dataset.drawn; }
-    const figure = fitted(JSON.parse(inTheDark(document.getElementById(node.id + "-data").textContent)));
+    const whole = JSON.parse(inTheDark(document.getElementById(node.id + "-data").textContent));
+    const figure = { ...fitted(whole), printed: whole.layout };
     const done = figure.kind === "overlay" ? overlay(node, figure) : Plotly.newPlot(node, figure.data, figure.layout, CONFIG);
-    done.then(() => { tools(node, figure); node.dataset.drawn = "yes"; });
+    done.then(() => {
+      if (drawing !== drawings) return; /* a later one draws its tools */
+      tools(node, figure); node.dataset.drawn = "yes";
+    });
   }
 }
 
-/* On a narrow screen each row of a table is a card; its cells say of which column they are. */
+/* On a narrow screen each row of a table is a card; its cells say of which column they are. What a cell holds is
+   one box beside that, or below it where it is prose. */
 function labelCells() {
   for (const table of document.querySelectorAll("table")) {
     const heads = [...table.querySelectorAll("thead th")].map((th) => th.textContent);
-    for (const row of table.tBodies[0]?.rows || []) [...row.cells].forEach((cell, i) => { cell.dataset.label = heads[i] || ""; });
+    for (const row of table.tBodies[0]?.rows || []) [...row.cells].forEach((cell, i) => {
+      cell.dataset.label = heads[i] || "";
+      if (!cell.childNodes.length) return;
+      const held = document.createElement("div");
+      held.append(...cell.childNodes); cell.append(held);
+      cell.classList.toggle("prose", !cell.matches(".number") && held.textContent.length > LONGEST_CELL);
+    });
   }
+}
+
+/* An option such as --rig stays in one piece: browsers break lines behind its hyphens. */
+function keepOptions() {
+  const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT), texts = [];
+  while (walker.nextNode()) if (walker.currentNode.data.includes("--") && !walker.currentNode.parentElement.closest("script, svg")) texts.push(walker.currentNode);
+  for (const text of texts) text.replaceWith(...text.data.split(/(--[a-z][\w-]*)/).filter(Boolean).map((piece) => {
+    if (!/^--[a-z]/.test(piece)) return piece;
+    const option = document.createElement("span");
+    option.className = "option"; option.textContent = piece;
+    return option;
+  }));
 }
 
 /* plotly.js lies in the page compressed: a third of its size. */
@@ -199,6 +254,7 @@ async function unpackPlotly() {
 }
 
 labelCells();
+keepOptions();
 addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
 if (document.querySelector(".figure")) unpackPlotly().then(() => {
   draw();

@@ -56,7 +56,7 @@ function draw() {
   strip($("flag"), PURE, end, span, colours);
   for (const trace of [...TORQUES, DEFLECTION]) {
     const value = read === undefined ? (now && trace.count && now - trace.t[(trace.count - 1) % trace.size] < 1 ? trace.last : NaN) : trace.at(read);
-    trace.label.textContent = Number.isNaN(value) ? "–" : value.toFixed(2).replace("-", "−");
+    trace.label.textContent = Number.isNaN(value) ? "–" : value.toFixed(2).replace(/^-0\.00$/, "0.00").replace("-", "−");
   }
 }
 

@@ -9,21 +9,22 @@ import numpy as np
 import pytest
 
 from rsea_ros.report.diagnosis.sketch import sketch, upright_sketch
-from rsea_ros.report.figures.figure import Figure, label, layout, line
+from rsea_ros.report.figures.figure import Figure, axis, label, layout, line
 from rsea_ros.report.figures.palette import BEFORE, INK
 from rsea_ros.report.page.frame import page
-from rsea_ros.report.page.html_table import table
+from rsea_ros.report.page.html_table import table, table_of_cells
 from test.watch.browser import Browser
 
 CAUSE = ["ft_gain_error"]
 CURVE = Figure("Rising", "", [{"type": "scatter", "x": [0, 1], "y": [0, 1], "name": "y"}], layout())
+UNITS = {"xaxis": axis("time, s"), "yaxis": axis("torque, N·m")}
 BESIDE = [label(name, 1.01, y, INK, xref="paper", yref="paper") for name, y in (("y", 0.9), ("z", 0.5))]
 _X = np.linspace(0.0, 1.0, 9)
 TWO = Figure(
     "Two", "",
     [line(_X, _X, "y", INK, hoverinfo="skip"),
      line(_X, -_X, "z", BEFORE, line={"color": BEFORE, "dash": "dot"}, hoverinfo="skip")],
-    layout(annotations=BESIDE, margin={"l": 64, "r": 190, "t": 12, "b": 48}),
+    layout(annotations=BESIDE, margin={"l": 64, "r": 190, "t": 12, "b": 48}, **UNITS),
 )  # fmt: skip
 PLOTTED = """[...document.querySelectorAll('.figure')].map((f) => f._fullLayout._size.w / f.clientWidth)"""
 SWITCHES = """[...document.querySelectorAll('.tools i')].map((i) => getComputedStyle(i))
@@ -82,6 +83,14 @@ def test_a_figure_has_the_width_of_a_phone(two_curves):
     assert two_curves.errors == []
 
 
+def test_a_figure_drawn_anew_before_it_is_done_has_one_row_of_switches(two_curves):
+    """The colours or the width changed while long curves were being unpacked: each drawing made a row."""
+    two_curves.value("draw(); draw()")
+    two_curves.until("document.querySelectorAll('[data-drawn]').length === 2")
+    two_curves.value("new Promise((done) => setTimeout(done, 300))")
+    assert two_curves.value("document.querySelectorAll('.tools').length") == 2
+
+
 def test_a_switch_shows_the_colour_and_the_dashes_of_its_curve(two_curves):
     assert two_curves.value(SWITCHES) == [["rgb(31, 41, 51)", "solid"], ["rgb(217, 115, 13)", "dotted"]]
 
@@ -90,3 +99,71 @@ def test_an_empty_cell_takes_no_line_on_a_phone(two_curves):
     two_curves.size(400, 900)
     shown = "[...document.querySelectorAll('td')].map((c) => c.getBoundingClientRect().height > 0)"
     assert two_curves.value(shown) == [True, False, True]
+
+
+PRESS = "[...document.querySelectorAll('.tools button')].find((b) => b.textContent === '%s').click()"
+SEEN = """Plotly.downloadImage = (figure) => {
+  window.names = figure.layout.annotations.map((a) => a.text);
+  window.paper = figure.layout.paper_bgcolor; }"""
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+def test_the_columns_of_the_numbers_have_units(two_curves, width):
+    two_curves.size(width, 900)
+    two_curves.until("document.querySelectorAll('.tools').length === 2")
+    two_curves.value("save = (name, text) => { window.saved = text; }")
+    two_curves.value(PRESS % "CSV")
+    head, first, *_ = two_curves.value("window.saved").splitlines()
+    assert head == '"y: time, s","y: torque, N·m","z: time, s","z: torque, N·m"' and first == "0,0,0,0"
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+def test_the_picture_names_its_curves(two_curves, width):
+    """On a phone only the switches below named them, and a picture has no switches."""
+    two_curves.size(width, 900)
+    beside = 2 if width > 640 else 0
+    two_curves.until(f"document.querySelectorAll('.figure')[0].layout.annotations.length === {beside}")
+    two_curves.until("document.querySelectorAll('.tools').length === 2")
+    two_curves.value(SEEN)
+    two_curves.value(PRESS % "PNG")
+    assert two_curves.value("window.names") == ["y", "z"]
+    assert two_curves.value("window.paper") == "rgb(255, 255, 255)", "readable on any ground"
+
+
+LONG = "The fit holds only if what the model lacks does not move its values."
+OPTION = """(() => { let n = document.querySelector('code'); while (n.lastChild) n = n.lastChild;
+  const r = document.createRange(); r.setStart(n, n.length - 5); r.setEnd(n, n.length);
+  return [r.toString(), new Set([...r.getClientRects()].map((box) => box.top)).size]; })()"""
+BOXES = """[...document.querySelectorAll('tbody td')].slice(1).map((cell) => {
+  const of = (node) => { const r = document.createRange(); r.selectNodeContents(node);
+    const box = r.getBoundingClientRect(); return [box.left, box.right, box.top]; };
+  return [of(cell), cell.querySelector('small') ? of(cell.querySelector('small')) : null]; })"""
+
+
+@pytest.fixture(scope="module")
+def cards(tmp_path_factory):
+    """A table on a phone: a short value with a note, and a sentence."""
+    folder = tmp_path_factory.mktemp("cards")
+    value = "1500 <sub>r</sub><small>noted</small>"
+    rows = table_of_cells(["name", "value", "about"], [["K_s", value, LONG]])
+    code = "<code style='display: block; width: 10ch'>1234567 --rig</code>"
+    (folder / "page.html").write_text(page("t", "k", [rows, code], []))
+    with closing(Browser(folder)) as made:
+        made.open((folder / "page.html").as_uri(), width=400)
+        made.until("document.querySelector('[data-label]')")
+        yield made
+
+
+def test_an_option_is_not_broken_behind_its_hyphens(cards):
+    assert cards.value(OPTION) == ["--rig", 1]
+
+
+def test_a_sentence_of_a_card_begins_at_its_left(cards):
+    _, (sentence, _) = cards.value(BOXES)
+    assert sentence[0] < 20.0
+
+
+def test_a_note_of_a_card_stands_below_its_value(cards):
+    """Both were columns, the note in the middle of the card."""
+    (whole, note), _ = cards.value(BOXES)
+    assert note[1] == pytest.approx(whole[1], abs=1.0) and note[2] > whole[2] + 10.0

@@ -1,0 +1,50 @@
+"""Lost cycles of a driver as the cause of a misfit: the motor went on with an old torque meanwhile.
+
+A record has the commands as they were published. Where the computer was too busy for a cycle, the motor got
+none; the measured motor torque then differs from the simulated one behind the gap, and less elsewhere.
+Any fault of the machine is as large elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rsea_ros.identification.result import Identification, Overlay
+from rsea_ros.signals import Fault
+
+KIND = "lost_cycles"
+_GAP = 1.6
+"""In sample periods: a longer step of the stamps is a gap, as in stamp_gaps."""
+_FEWEST = 10
+"""Gaps: the RMS behind fewer is known to worse than a quarter."""
+_TIMES = 1.5
+"""RMS behind gaps over that elsewhere, from which the gaps made it: twice what chance makes of ten gaps."""
+
+
+def explained_by_lost_cycles(identification: Identification) -> int:
+    """Return how many lost cycles are the likely cause of a misfit; 0 for another, and without misfit."""
+    lost = count_of(identification.faults)
+    if not lost or identification.at_noise:
+        return 0
+    torque = next((o for o in identification.overlays if o.channel == "motor_torque"), None)
+    return lost if torque is not None and rises_behind_gaps(torque) else 0
+
+
+def count_of(faults: Sequence[Fault]) -> int:
+    """Return how many cycles the nodes of the run reported as lost."""
+    return round(sum(f.size or 0.0 for f in faults if f.kind == KIND))
+
+
+def rises_behind_gaps(overlay: Overlay) -> bool:
+    """Return whether the residual is larger in the first sample behind a gap than in the others."""
+    if len(overlay.t) < 2:
+        return False
+    step = np.diff(overlay.t)
+    behind = np.concatenate([[False], step > _GAP * float(np.median(step))])
+    off = np.square(overlay.measured - overlay.simulated)
+    known = np.isfinite(off)
+    if np.count_nonzero(behind & known) < _FEWEST or not np.any(known & ~behind):
+        return False
+    return bool(np.mean(off[behind & known]) > _TIMES**2 * np.mean(off[known & ~behind]))
