@@ -157,7 +157,8 @@ def _node_share(rate: float, seconds: float) -> float:
     def arguments(**values: object) -> list[str]:
         return ["--ros-args", *(w for n, v in values.items() for w in ("-p", f"{n}:={v}"))]
 
-    work = {"kind": "multisine", "low": 0.2, "high": 6.0, "amplitude": 6.0, "duration": seconds + LEARNED + 5.0}
+    length = seconds + LEARNED + 5.0
+    work = {"kind": "multisine", "low": 0.2, "high": 6.0, "amplitude": 6.0, "duration": length}
     excite = arguments(**work, subscribers=2, rate=rate)
     options = {"stdout": -3, "stderr": -3}  # subprocess.DEVNULL
     nodes = [start("plant", arguments(rate=rate), **options), start("excite", excite, **options)]
