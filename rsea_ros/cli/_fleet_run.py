@@ -38,6 +38,7 @@ def add_work(parser: argparse.ArgumentParser) -> None:
     add("sources", nargs="+", metavar="SOURCE", help="folder, bag, pattern in quotes, URL, or @FILE: a list")
     add("--map", required=True, metavar="joints.yaml", help="joint map: rig and topics of each joint")
     add("--diagnose", choices=get_args(Diagnose), help="recordings to diagnose (default: as in the map)")
+    add("--pages", action="store_true", help="keep the page of each new diagnosis, for links of the report")
     add("--again", action="store_true", help="retry quarantined recordings")
     limit = "quarantine a recording whose joint takes longer than this (default %(default)g)"
     add("--time-limit", type=float, default=TIME_LIMIT / MINUTE, metavar="MIN", help=limit)
@@ -89,7 +90,7 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
         if args.again:
             store.take_out({"quarantined"})
         memory = None if args.serial or args.scheduler else _memory(args)
-        limits = EngineLimits(memory, time=args.time_limit * MINUTE)
+        limits = EngineLimits(memory, time=args.time_limit * MINUTE, pages=args.pages)
         place = executor(args, memory) if is_anything_new(store, held) else serial()
         with place as places, progress("fleet") as tell:
             return Engine(store, places, work, tell, limits).run(held)

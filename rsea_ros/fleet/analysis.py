@@ -28,7 +28,7 @@ from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.report.file_names import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODEL
+from rsea_ros.report.file_names import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODEL, REPORT
 from rsea_ros.report.identification.json import identification_json
 from rsea_ros.report.json_values import finite, json_text
 from rsea_ros.signals import UNITS, Fault, Record
@@ -38,8 +38,8 @@ _MAIN = ("ft", "deflection", "position", "velocity")
 """Channels that show how well a fit is; the first that a recording has stands in the row."""
 
 
-def analyse(row: Row, path: Path, url: str, joint: MappedJoint) -> dict[str, str]:
-    """Fill a row from a recording, and return the artefacts by file name.
+def analyse(row: Row, path: Path, url: str, joint: MappedJoint, *, page: bool = False) -> dict[str, str]:
+    """Fill a row from a recording, and return the artefacts by file name. page: with that of a diagnosis.
 
     The row keeps the results before an error. Raises RseaError for a recording that cannot be used.
     """
@@ -59,7 +59,7 @@ def analyse(row: Row, path: Path, url: str, joint: MappedJoint) -> dict[str, str
         MODEL: rig_text(result.rig),
     }
     if joint.diagnose == "always" or (joint.diagnose == "misfit" and result.verdict == "misfit"):
-        files |= _diagnose(row, with_faults(record, findings, masks=True), rig)
+        files |= _diagnose(row, with_faults(record, findings, masks=True), rig, page)
     return files
 
 
@@ -74,7 +74,7 @@ def _fit_for_fit(run: JointRecording, rig: Rig) -> Record:
     return replace(checked.record, channels=kept)
 
 
-def _diagnose(row: Row, record: Record, rig: Rig) -> dict[str, str]:
+def _diagnose(row: Row, record: Record, rig: Rig, page: bool) -> dict[str, str]:
     """Fill in the diagnosis, and return its artefacts; a failed one leaves its reason.
 
     The parameters become those beside the causes: a fit without them takes dry friction for damping and
@@ -82,6 +82,7 @@ def _diagnose(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     """
     from rsea_ros.diagnosis.diagnose import diagnose
     from rsea_ros.report.diagnosis.json import diagnosis_json
+    from rsea_ros.report.diagnosis.page import diagnosis_report
 
     try:
         check_diagnosable(record)
@@ -92,10 +93,11 @@ def _diagnose(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     parameters = [_parameter(p) for p in result.final]
     causes = [_cause(c) for c in result.causes]
     row |= {"diagnosis": result.verdict, "causes": causes, "parameters": parameters}
-    return {
+    files = {
         DIAGNOSIS_JSON: json_text(diagnosis_json(result)),
         "extended.yaml": rig_text(result.extended_rig),
     }
+    return files | ({REPORT: diagnosis_report(result)} if page else {})
 
 
 def identification_columns(result: Identification) -> dict[str, Any]:

@@ -38,12 +38,13 @@ class EngineLimits:
     """memory: bytes that a worker may have, None for no limit.
 
     back_off: s before the second attempt of a task whose worker was lost; twice as long before each further.
-    time: s that a task may take.
+    time: s that a task may take. pages: whether each diagnosis leaves its page.
     """
 
     memory: int | None = None
     back_off: float = 0.5
     time: float = TIME_LIMIT
+    pages: bool = False
 
 
 class Engine:
@@ -118,7 +119,7 @@ class Engine:
     def _plan(self, bag: Bag, recording: str) -> None:
         """Make the tasks of a recording that are new; one too large for any worker is a row at once."""
         for joint in self._joints[bag.url]:
-            task = Task(bag, joint, recording, version(), self._limits.time)
+            task = Task(bag, joint, recording, version(), self._limits.time, self._limits.pages)
             if task.key in self._keys:
                 self._summary.before += 1
                 self._rate.over(1, worked=False)

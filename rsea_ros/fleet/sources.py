@@ -124,6 +124,8 @@ def _is_local(files: Any) -> bool:
 
 def _files(source: str) -> dict[str, Mapping[str, Any]]:
     """Return the file system's entry of every file under a source, by path or URL."""
+    if "::" in source:
+        raise FleetError(f"{source}: a chained URL, expected a folder or one URL: unpack the archive first")
     files, inner = _file_system(source)
     try:
         roots = [inner] if files.exists(inner) else files.glob(inner)

@@ -35,7 +35,7 @@ class Changed(Exception):
 class Task:
     """A recording of one joint. recording: the hash of its content. model_version: of this software.
 
-    time_limit: s that it may take.
+    time_limit: s that it may take. page: whether a diagnosis leaves its page, too.
     """
 
     bag: Bag
@@ -43,6 +43,7 @@ class Task:
     recording: str
     model_version: str
     time_limit: float = math.inf
+    page: bool = False
 
     @property
     def key(self) -> str:
@@ -89,7 +90,7 @@ def work(task: Task) -> TaskOutcome:
     with on_cores(1):
         try:
             with limit_time(task.time_limit), local_copy(task.bag) as path:
-                files = analyse(row, path, task.bag.url, task.joint)
+                files = analyse(row, path, task.bag.url, task.joint, page=task.page)
             row["outcome"] = "done"
         except RseaError as error:
             row |= {"outcome": "refused", "reason": reason(str(error))}

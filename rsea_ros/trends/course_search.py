@@ -21,20 +21,42 @@ _MOST_TERMS = 12
 
 @dataclass(frozen=True)
 class Tested:
-    """A series before anything is looked for: its largest score over all days and kinds, and its p."""
+    """A series without a change, its largest score over all days and kinds, and its p.
+
+    effect: the day effect without a change. beside: the one beside the step or ramp of that score.
+    """
 
     course: Course
     effect: DayEffect
+    beside: DayEffect
     prior: tuple[float, float]
     largest: float
     p: float
 
 
 def change_test(days: Days, effect: DayEffect, prior: tuple[float, float], settings: TrendSettings) -> Tested:
-    """Return how surely a series is more than noise."""
+    """Return how surely a series is more than noise.
+
+    The day effect counts beside the step or ramp that is tested (Student's t, the largest of all days).
+    In a series of few days a step inside a block would hide in the scatter that it makes.
+    """
     course = course_of(days, effect.variance, prior)
-    _, z = _best(course, settings.fewest_beside)
-    return Tested(course, effect, prior, z, scan_p(z, _share(days, settings), effect.freedom))
+    best, _ = _best(course, settings.fewest_beside)
+    beside = _effect_beside(course, best, settings)
+    z = _score(course_of(days, beside.variance, prior), best)
+    return Tested(course, effect, beside, prior, z, scan_p(z, _share(days, settings), beside.freedom))
+
+
+def _effect_beside(course: Course, change: StepOrRamp, settings: TrendSettings) -> DayEffect:
+    """Return the day effect beside a step or ramp, whose size takes one degree of freedom."""
+    changed = replace(course, terms=(change,))
+    effect = day_effect(course.days, settings, changed.fit_values())
+    freedom = max(1, effect.freedom - 1)
+    return replace(effect, variance=effect.variance * effect.freedom / freedom, freedom=freedom)
+
+
+def _score(course: Course, change: StepOrRamp) -> float:
+    return float(abs(scan(course.regression(), course.t, change.kind)[change.index]))
 
 
 def describe(test: Tested, settings: TrendSettings) -> Course:
@@ -44,8 +66,9 @@ def describe(test: Tested, settings: TrendSettings) -> Course:
     """
     days = test.course.days
     rate = settings.false_discovery
-    price = scan_threshold(rate, _share(days, settings), test.effect.freedom) ** 2
-    best = min(_candidates(test.course, price, settings), key=lambda c: cost(c, price))
+    price = scan_threshold(rate, _share(days, settings), test.beside.freedom) ** 2
+    course = course_of(days, test.beside.variance, test.prior)
+    best = min(_candidates(course, price, settings), key=lambda c: cost(c, price))
     days = _at_level(best)
     effect = day_effect(days, settings, best.fit_values())
     anew = replace(course_of(days, effect.variance, test.prior), slope=best.slope, terms=best.terms)

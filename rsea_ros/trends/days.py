@@ -48,7 +48,7 @@ def day_means(series: Series, settings: TrendSettings) -> Days:
         return np.add.reduceat(weight * values, starts) / total if len(starts) else values
 
     return Days(
-        average(s.time_s) / DAY,
+        day[starts] + average(s.time_s / DAY - day),
         average(y),
         1.0 / total,
         None if warmth is None else average(warmth),

@@ -84,3 +84,9 @@ def test_a_source_without_recordings_is_named(source, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(FleetError, match=r"nowhere|no-such-protocol"):
         bags_of([source], [KNEE])
+
+
+def test_a_chained_url_is_refused_at_once(folder):
+    """Recordings in a zip were listed by names that no worker could open again."""
+    with pytest.raises(FleetError, match="chained URL, expected a folder or one URL"):
+        bags_of([f"zip://::file://{folder}/recs.zip"], ())

@@ -151,3 +151,15 @@ def test_a_date_stands_in_the_path(path, pattern, date):
 def test_senseless_options_are_refused(lab, option, capsys):
     assert main([*run_node_process(lab), "--out", str(lab / "no"), *option]) == 2
     assert option[0] in capsys.readouterr().err and not (lab / "no").exists()
+
+
+def test_a_run_keeps_the_page_of_a_diagnosis_only_on_request(lab: Path, tmp_path: Path) -> None:
+    """The pages of a joint linked the raw diagnosis.json, because no run wrote a page."""
+    call = ["fleet", "run", str(lab / "knee1.mcap"), "--map", str(lab / "joints.yaml"), "--serial"]
+    assert main([*call, "--diagnose", "always", "--pages", "--out", str(tmp_path / "with")]) == 0
+    assert main([*call, "--out", str(tmp_path / "without")]) == 0
+    (page,) = (tmp_path / "with").rglob("report.html")
+    assert "rsea diagnose" in page.read_text(encoding="utf-8")
+    assert not list((tmp_path / "without").rglob("report.html"))
+    assert main(["fleet", "report", str(tmp_path / "with"), "--out", str(tmp_path / "pages")]) == 0
+    assert "/report.html" in (tmp_path / "pages" / "joint-knee.html").read_text(encoding="utf-8")

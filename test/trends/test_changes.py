@@ -8,6 +8,7 @@ from fleet_histories import DAY, START, history, recordings
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.trends import alarms, fleet_trends
+from rsea_ros.trends.weeks import bin_days, steps_over
 
 STIFFNESS = ("a", "spring.stiffness")
 NOTHING = recordings(days=1)
@@ -120,3 +121,31 @@ def test_an_empty_store_has_no_trends():
     made = {n: c[:0] for n, c in history(np.random.default_rng(0), days=2).items()}
     result = fleet_trends(made, {n: c[:0] for n, c in NOTHING.items()})
     assert (dict(result.trends), result.appearances, result.outliers) == ({}, (), ())
+
+
+@pytest.mark.parametrize("since", [4, 5, 6, 7, 8])
+def test_a_step_of_a_short_series_is_found_wherever_it_lies(since):
+    """Of 12 weekly recordings the last six had 60 % more friction: the page called the joint steady."""
+    result = trend(7, days=12, each=1, day_sd=0.0, course=lambda joint, d: 0.6 * (d >= since))
+    (change,) = result.changes
+    assert (result.state, change.kind) == ("changed", "step")
+    assert change.size.low < 0.6 * 1500.0 < change.size.high
+
+
+@pytest.mark.parametrize("days", [8, 12, 20])
+def test_noise_of_a_short_series_is_called_a_change_no_oftener_than_stated(days):
+    result = fleet_trends(
+        history(np.random.default_rng(6), joints=[f"j{k:03d}" for k in range(300)], days=days), NOTHING
+    )
+    assert sum(t.state not in ("steady", "undetermined") for t in result.trends.values()) <= 2
+
+
+def test_dates_at_midnight_on_a_monday_lie_in_their_own_week():
+    """A date from a path has no time of day: rounding put it into the week before, and its cell was grey."""
+    rng = np.random.default_rng(0)
+    made = history(rng, days=12, each=1)
+    made["high"] = made["value"] + (made["value"] - made["low"]) * rng.uniform(0.5, 2.0, 12)
+    made["time_s"] = (20458.0 + 7.0 * np.arange(12)) * DAY  # Monday, 5 January 2026
+    result = fleet_trends(made, NOTHING).trends[STIFFNESS]
+    bins = bin_days(result, steps_over(float(made["time_s"][0]), float(made["time_s"][-1])))
+    assert len(bins.value) == 12 and np.all(np.isfinite(bins.value))

@@ -40,7 +40,8 @@ def write_fleet_report(
     with NewFiles(out) as new:
         links = Links(new.folder, Path(store) if store is not None else new.folder, page_names(fleet.joints))
         for joint, name in links.pages.items():
-            new.write(name, joint_page(joint, fleet, groups.get(joint, []), recordings, steps, links))
+            findings = groups.get(joint, [])
+            new.write(name, joint_page(joint, fleet, findings, history, recordings, steps, links))
         return new.write(INDEX, fleet_page(fleet, alarms, recordings, steps, links))
 
 

@@ -11,7 +11,7 @@ from rsea_ros.report.fleet.cause_figure import cause_figure, share_figure
 from rsea_ros.report.fleet.latest import latest_causes
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.parameter_figure import parameter_figure
-from rsea_ros.report.fleet.tables import alarm_table, parameter_rows
+from rsea_ros.report.fleet.tables import alarm_table, parameter_rows, undated_rows
 from rsea_ros.report.fleet.words import finding, sentence, short_day
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import fold, key_numbers, paragraph, section
@@ -32,38 +32,41 @@ _USUAL = 0.8
 
 _UNDATED = (
     "The stamps of these recordings count from the start of a machine. If their paths hold the date, state "
-    "its form as “date” in joints.yaml (for example %Y-%m-%d). Until then, rsea fleet sql shows their values."
+    "its form as “date” in joints.yaml (for example %Y-%m-%d). The table shows their values without an order."
 )
 
 
 def joint_page(
-    joint: str, fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
-) -> str:
+    joint: str, fleet: FleetTrends, alarms: Sequence[Alarm], history: Table, recordings: Table, steps: Steps,
+    links: Links,
+) -> str:  # fmt: skip
     """Return the page as HTML that opens without a network. alarms: of this joint, the most urgent first."""
     rows = np.flatnonzero(np.asarray(recordings["joint"], str) == joint)
     latest = latest_causes([joint], recordings).get(joint, "")
     quiet = f"{latest} in its latest recording" if latest else _quiet(fleet, joint)
     title = f"{joint}: {sentence(alarms[0]) if alarms else quiet}"
-    blocks = list(_blocks(joint, fleet, alarms, recordings, rows, steps, links))
+    blocks = list(_blocks(joint, fleet, alarms, history, recordings, rows, steps, links))
     footer = ["rsea fleet report. All values in SI, all times UTC."]
     return page(title, f"Joint {joint} · {len(rows)} recordings", blocks, footer)
 
 
 def _blocks(
-    joint: str, fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, rows: np.ndarray,
-    steps: Steps, links: Links,
+    joint: str, fleet: FleetTrends, alarms: Sequence[Alarm], history: Table, recordings: Table,
+    rows: np.ndarray, steps: Steps, links: Links,
 ) -> Iterator[Block]:  # fmt: skip
     trends = [t for (j, _), t in fleet.trends.items() if j == joint]
     yield '<p class="next"><a href="index.html">All joints</a></p>'
-    yield key_numbers(_keys(trends, recordings, rows))
+    dated = bool(np.any(np.isfinite(np.asarray(recordings["time_s"], float)[rows])))
+    yield key_numbers(_keys(trends, recordings, rows, dated))
     if alarms:
         yield section("Findings", alarm_table(alarms, links, with_joint=False))
     yield from _pictures(joint, trends, fleet, steps)
-    if not np.any(np.isfinite(np.asarray(recordings["time_s"], float)[rows])):
-        yield section("No recording has a date, so no trend can be estimated", paragraph(_UNDATED))
+    if not dated:
+        values = undated_rows(joint, history)
+        yield section("No recording has a date, so no trend can be estimated", paragraph(_UNDATED), values)
     if trends:
         yield section("All parameters", parameter_rows(trends))
-    yield fold("The latest recordings", _recordings(recordings, rows, links))
+    yield fold("The latest recordings" if dated else "Recordings", _recordings(recordings, rows, links))
 
 
 def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: Steps) -> Iterator[Block]:
@@ -106,12 +109,14 @@ def _has_size(naming: Naming) -> bool:
     return naming.size is not None and bool(np.any(np.isfinite(naming.size)))
 
 
-def _keys(trends: Sequence[Trend], recordings: Table, rows: np.ndarray) -> list[tuple[str, str]]:
+def _keys(
+    trends: Sequence[Trend], recordings: Table, rows: np.ndarray, dated: bool
+) -> list[tuple[str, str]]:
     determined = sum(t.state != "undetermined" for t in trends)
     done = int(np.sum(np.asarray(recordings["outcome"], str)[rows] == "done"))
     faulty = sum(bool(len(recordings["faults"][i])) for i in rows if recordings["faults"][i] is not None)
     return [
-        (f"{determined} of {len(trends)}", "parameters determined by the recordings"),
+        *([(f"{determined} of {len(trends)}", "parameters have a trend")] if dated else []),
         (str(done), f"recordings used, of {len(rows)}"),
         (str(faulty), "recordings with faults in the data"),
     ]

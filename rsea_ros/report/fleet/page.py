@@ -69,19 +69,19 @@ def _blocks(
 def _parameters_with_map(fleet: FleetTrends) -> list[str]:
     """Return the parameters that have a map, those that moved most first; of causes the usual ones.
 
-    A parameter that no joint has a course of has none: the table of the undetermined ones says why.
+    A parameter without a trend in any joint has none: the table of the undetermined ones says why.
     """
     sized = [p for _, p in fleet.sizes]
     usual = [p for p in dict.fromkeys(sized) if 2 * sized.count(p) > len(fleet.joints)]
-    courses = {**fleet.trends, **fleet.sizes}
+    trends = {**fleet.trends, **fleet.sizes}
 
     def movement(parameter: str) -> float:
-        changed = [t for (_, p), t in courses.items() if p == parameter and t.changes]
+        changed = [t for (_, p), t in trends.items() if p == parameter and t.changes]
         return -max((abs(t.relative) for t in changed), default=0.0)
 
-    with_course = {p for (_, p), t in courses.items() if t.state != "undetermined"}
+    with_trend = {p for (_, p), t in trends.items() if t.state != "undetermined"}
     every = dict.fromkeys([*(p for _, p in fleet.trends), *usual])
-    return sorted((p for p in every if p in with_course), key=movement)
+    return sorted((p for p in every if p in with_trend), key=movement)
 
 
 def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:
@@ -107,7 +107,7 @@ def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table)
         (_group_digits(done), f"recordings used, of {_group_digits(len(recordings['joint']))}"),
         (
             str(len(undetermined_trends(fleet))),
-            f"of {len(fleet.trends)} courses cannot be determined, or no more",
+            f"of {len(fleet.trends)} trends not determined, or no more",
         ),
     ]
 
@@ -128,8 +128,8 @@ def _undetermined_text(fleet: FleetTrends, links: Links) -> str:
         return section(
             "Nothing was left undetermined", paragraph("All recordings determine all parameters.")
         )
-    number = "One course" if len(undetermined) == 1 else f"{len(undetermined)} courses"
-    title = f"{number} cannot be determined"
+    number = "One trend" if len(undetermined) == 1 else f"{len(undetermined)} trends"
+    title = f"{number} not determined"
     return section(title, undetermined_table(undetermined, links))
 
 
@@ -137,7 +137,7 @@ def _sure(fleet: FleetTrends) -> list[str]:
     rate = f"{100.0 * fleet.false_discovery:g}"
     warm = [f"{name(p)} {percent(m)} (± {200.0 * s:.2f} %)" for p, (m, s) in fleet.per_kelvin.items() if m]
     lines = [
-        f"{fleet.tests} courses were tested for any step or ramp, and every cause and fault for the day from "
+        f"{fleet.tests} series were tested for any step or ramp, and every cause and fault for the day from "
         f"which on it is named. At most {rate} in 100 of the findings are expected to be false (Benjamini "
         f"and Hochberg, over all joints and parameters of this look).",
         "Recordings of one day count as one draw: the effect of a day (mounting, grease, zeros) is "

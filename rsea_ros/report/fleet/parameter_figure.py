@@ -92,7 +92,7 @@ def _course(trend: Trend, factor: float) -> list[Json]:
         "y": numbers(np.concatenate([c.high, c.low[::-1]]) * factor), "line": {"width": 0},
         "fillcolor": faint(AFTER, 0.16),
     }  # fmt: skip
-    stroke = points(c.time_s, numbers(c.value * factor), "course", mode="lines", hoverinfo="skip",
+    stroke = points(c.time_s, numbers(c.value * factor), "trend", mode="lines", hoverinfo="skip",
                     line={"color": AFTER, "width": 2})  # fmt: skip
     return [band, stroke]
 

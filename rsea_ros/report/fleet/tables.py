@@ -11,17 +11,25 @@ import numpy as np
 from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.fleet.links import Links
-from rsea_ros.report.fleet.words import day, doubt_of_date, name, percent, sentence, value
+from rsea_ros.report.fleet.words import (
+    day,
+    doubt_of_date,
+    name,
+    percent,
+    sentence,
+    undetermined_state,
+    value,
+)
 from rsea_ros.report.page.html_table import table_of_cells
+from rsea_ros.signals import FloatArray
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Interval, Trend
-from rsea_ros.trends.series import Table
+from rsea_ros.trends.series import CLOCKS, Table
 
 _STATES = {
     "steady": "steady",
     "changed": "changed",
     "trending": "going on",
-    "undetermined": "cannot be determined",
 }
 
 
@@ -53,7 +61,7 @@ def joint_table(
 ) -> str:
     """Return a row for each joint. latest: causes that its latest recording names."""
     head = [
-        "Joint", "State", "#Recordings", "#Refused or broken", "#Parameters determined", "#Largest change",
+        "Joint", "State", "#Recordings", "#Refused or broken", "#Parameters with a trend", "#Largest change",
     ]  # fmt: skip
     of = np.asarray(recordings["joint"], str)
     done = np.asarray(recordings["outcome"], str) == "done"
@@ -100,7 +108,7 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
         rows.append(
             (
                 f"{escape(name(s.parameter))}<small>{escape(s.parameter)}</small>",
-                _STATES[t.state],
+                _STATES.get(t.state) or undetermined_state(t),
                 _level(t),
                 shares[0],
                 shares[1].lstrip("+") if t.day_sd else "–",
@@ -111,8 +119,36 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
     return table_of_cells(head, rows)
 
 
+def undated_rows(joint: str, history: Table) -> str:
+    """Return the median and the range of each parameter over a joint's recordings, whose order is unknown."""
+    head = ["Parameter", "#Median", "#Least", "#Most", "#Determined by"]
+    of = np.asarray(history["joint"], str) == joint
+    names = np.asarray(history["parameter"], str)
+    rows = []
+    for parameter in dict.fromkeys(n for n in names[of].tolist() if not n.startswith(CLOCKS)):
+        at = np.flatnonzero(of & (names == parameter))
+        values = np.asarray(history["value"], float)[at]
+        sure = np.asarray(history["identifiable"], bool)[at] & np.isfinite(values)
+        rows.append(
+            (
+                f"{escape(name(parameter))}<small>{escape(parameter)}</small>",
+                *_median_and_ends(values[sure], str(history["unit"][at[0]])),
+                f"{int(np.sum(sure))} of {len(at)}",
+            )
+        )
+    return table_of_cells(head, rows)
+
+
+def _median_and_ends(values: FloatArray, unit: str) -> list[str]:
+    if not len(values):
+        return ["–", "–", "–"]
+    figures = (float(np.median(values)), float(np.min(values)), float(np.max(values)))
+    factor, shown = (100.0, "%") if unit == "1" else words.unit_factor(figures[0], unit)
+    return [escape(f"{words.number(v * factor, 4)} {shown}") for v in figures]
+
+
 def _level(trend: Trend) -> str:
-    """Return the level now; without a course, the value of the latest recording that determines it."""
+    """Return the level now; without a trend, the value of the latest recording that determines it."""
     s, unit = trend.series, trend.series.unit
     if trend.now is not None:
         return escape(value(trend.now, unit))
@@ -124,17 +160,22 @@ def _level(trend: Trend) -> str:
 
 
 def undetermined_trends(fleet: FleetTrends) -> list[Trend]:
-    """Return the courses of which nothing can be determined, or no more."""
+    """Return the trends of which nothing can be determined, or no more."""
     return [t for t in fleet.trends.values() if t.state == "undetermined" or math.isfinite(t.silent_since_s)]
 
 
 def undetermined_table(undetermined: Sequence[Trend], links: Links) -> str:
-    """Return the undetermined parameters with reasons."""
-    head = ["Joint", "Parameter", "Why"]
+    """Return the parameters without a trend, with reasons."""
+    head = ["Joint", "Parameter", "State", "Why"]
     rows = [
-        (links.joint(t.series.joint), escape(name(t.series.parameter)), escape(_why(t))) for t in undetermined
+        (links.joint(t.series.joint), escape(name(t.series.parameter)), _undetermined(t), escape(_why(t)))
+        for t in undetermined
     ]
     return table_of_cells(head, rows)
+
+
+def _undetermined(trend: Trend) -> str:
+    return undetermined_state(trend) if trend.state == "undetermined" else "silent"
 
 
 def _why(trend: Trend) -> str:

@@ -121,11 +121,17 @@ def finding(trend: Trend) -> str:
     return _finding(trend) + (f"; cannot be determined since {day(silent)}" if math.isfinite(silent) else "")
 
 
+def undetermined_state(trend: Trend) -> str:
+    """Return why a parameter has no trend, in a few words."""
+    if not np.mean(trend.series.identifiable) > 0.5:
+        return "not enough excitation"
+    return "intervals too wide" if math.isfinite(trend.detectable) else "too few days"
+
+
 def _finding(trend: Trend) -> str:
     plain, unit = name(trend.series.parameter), trend.series.unit
     if trend.state == "undetermined":
-        enough = bool(np.mean(trend.series.identifiable) > 0.5)
-        return f"{plain}: {'too few recordings' if enough else 'not enough excitation'} to tell"
+        return f"{plain}: {undetermined_state(trend)} to tell"
     if trend.state == "steady":
         factor, shown = words.unit_factor(trend.detectable, unit)
         level = trend.now.value if trend.now is not None else 0.0
