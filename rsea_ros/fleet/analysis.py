@@ -59,7 +59,7 @@ def analyse(row: Row, path: Path, url: str, joint: MappedJoint, *, page: bool = 
         MODEL: rig_text(result.rig),
     }
     if joint.diagnose == "always" or (joint.diagnose == "misfit" and result.verdict == "misfit"):
-        files |= _diagnose(row, with_faults(record, findings, masks=True), rig, page)
+        files |= _diagnose(row, with_faults(record, findings, masks=True), rig, page=page)
     return files
 
 
@@ -74,7 +74,7 @@ def _fit_for_fit(run: JointRecording, rig: Rig) -> Record:
     return replace(checked.record, channels=kept)
 
 
-def _diagnose(row: Row, record: Record, rig: Rig, page: bool) -> dict[str, str]:
+def _diagnose(row: Row, record: Record, rig: Rig, *, page: bool) -> dict[str, str]:
     """Fill in the diagnosis, and return its artefacts; a failed one leaves its reason.
 
     The parameters become those beside the causes: a fit without them takes dry friction for damping and

@@ -28,7 +28,7 @@ def test_a_row_has_the_parameters_of_the_fit_with_causes(monkeypatch: pytest.Mon
     short = partial(engine.diagnose, settings=DiagnosisSettings(without=others))
     monkeypatch.setattr(engine, "diagnose", short)
     row = empty("knee", parameters=[{"name": "spring.stiffness", "value": 1340.0}])
-    assert "diagnosis.json" in _diagnose(row, record, rig)
+    assert "diagnosis.json" in _diagnose(row, record, rig, page=False)
     assert [c["name"] for c in row["causes"]] == ["backlash"]
     values = {p["name"]: p for p in row["parameters"]}
     assert values["spring.stiffness"]["value"] == pytest.approx(rig["spring.stiffness"], rel=0.005)

@@ -23,7 +23,7 @@ from rsea_ros.fleet.time_limit import TIME_LIMIT, OutOfTime, limit_time
 MAP = "joints:\n  knee: {rig: paper_high_impedance}\n"
 
 
-def endless(*_: object) -> dict[str, str]:
+def endless(*_: object, **__: object) -> dict[str, str]:
     """Work for ever, and let no ordinary error end it."""
     while True:
         try:
@@ -78,12 +78,12 @@ def test_an_endless_recording_is_quarantined_and_tried_again(folder, tmp_path, m
     said = capsys.readouterr().out
     assert "run0.mcap: took more than 0.001 min: a larger --time-limit, then --again" in said
     assert main(run) == 0 and "nothing new, 1 in the store before" in capsys.readouterr().out
-    monkeypatch.setattr(analysis, "analyse", lambda *_: {})
+    monkeypatch.setattr(analysis, "analyse", lambda *_, **__: {})
     assert main([*run, "--again"]) == 0 and "1 done" in capsys.readouterr().out
 
 
 def test_the_others_of_a_run_go_on(store, folder, monkeypatch):
-    def stub(row: object, path: Path, *_: object) -> dict[str, str]:
+    def stub(row: object, path: Path, *_: object, **__: object) -> dict[str, str]:
         return endless() if path.name == "run2.mcap" else {}
 
     monkeypatch.setattr(analysis, "analyse", stub)
