@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.lost_commands import lost_commands
 from rsea_ros.signals import MEASURED, BoolArray, Channel, Fault, FloatArray, Record
 
 COMMANDS = ("command", "reference")
@@ -32,7 +33,7 @@ def with_held_commands(record: Record) -> tuple[Record, list[Fault]]:
     words = words_on_steps(record)
     if not words:
         return record, []
-    held = {name: _hold_commands(record, record[name]) for name in words}
+    held = {name: _hold_commands(record, name) for name in words}
     notes = (f"{name}: {sentence}" for name, sentence in words.items())
     return replace(record.with_channels(**held), notes=(*record.notes, *notes)), []
 
@@ -46,7 +47,7 @@ def words_on_steps(record: Record) -> dict[str, str]:
             continue
         if _is_steps(channel, _sensor_period(record)):
             words[name] = f"{len(channel)} messages, one for each change; each value is held until the next"
-        elif len(pauses := np.flatnonzero(paused_steps(record, channel))):
+        elif len(pauses := np.flatnonzero(paused_steps(record, name))):
             lasts = np.diff(channel.t)[pauses]
             longest, many = int(np.argmax(lasts)), "pauses" if len(pauses) > 1 else "pause"
             words[name] = (
@@ -56,20 +57,24 @@ def words_on_steps(record: Record) -> dict[str, str]:
     return words
 
 
-def paused_steps(record: Record, channel: Channel) -> BoolArray:
+def paused_steps(record: Record, name: str) -> BoolArray:
     """Return which steps between commands are pauses of their publisher, shape (n - 1,).
 
     A pause lasts for many of the commands' usual steps and of the sensors' sample periods, while a sensor
-    goes on: the recorder lost nothing. Commands of a log that stops as a whole are lost.
+    goes on: the recorder lost nothing. Commands of a log that stops as a whole are lost, and those in whose
+    place the motor torque shows others.
     """
+    channel = record[name]
     step = np.diff(channel.t)
     if len(step) < _FEWEST or not np.isfinite(channel.y).all() or np.any(step <= 0.0):
         return np.zeros(len(step), np.bool_)
     usual = max(_sensor_period(record), float(np.median(step)))
     pauses: BoolArray = step >= _LONG * usual
-    sensors = [record[name].t for name in MEASURED if name in record]
+    sensors = [record[n].t for n in MEASURED if n in record]
     for k in np.flatnonzero(pauses):
         pauses[k] = any(_goes_on(t, float(channel.t[k]), float(channel.t[k + 1])) for t in sensors)
+    if name == "command" and pauses.any():
+        pauses &= ~np.isin(channel.t[:-1], [begin for begin, _ in lost_commands(record)])
     return pauses
 
 
@@ -79,15 +84,16 @@ def _goes_on(t: FloatArray, start: float, stop: float) -> bool:
     return float(np.max(np.diff(inside, prepend=start, append=stop))) <= _THROUGHOUT * (stop - start)
 
 
-def _hold_commands(record: Record, channel: Channel) -> Channel:
-    """Return the commands with each step, or each pause, filled."""
+def _hold_commands(record: Record, name: str) -> Channel:
+    """Return a channel of commands with each step, or each pause, filled."""
+    channel = record[name]
     period = _sensor_period(record)
     if _is_steps(channel, period):
         last = max(float(c.t[-1]) for c in record.channels.values() if len(c))
         ends = np.append(channel.t[1:], max(last, float(channel.t[-1])))
         return _repeat_values(channel, ends, period, np.ones(len(channel), np.bool_))
     ends = np.append(channel.t[1:], channel.t[-1])
-    pauses = np.append(paused_steps(record, channel), False)
+    pauses = np.append(paused_steps(record, name), False)
     return _repeat_values(channel, ends, float(np.median(np.diff(channel.t))), pauses)
 
 

@@ -55,7 +55,7 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         channel, repeats = _without_repeats(channel, name)
         faults += [*jumps, *disorder, *repeats]
         _check_even(channel, f"{record.source}: {name}")
-        pauses = paused_steps(record, channel) if name in COMMANDS else None
+        pauses = paused_steps(record.with_channels(**{name: channel}), name) if name in COMMANDS else None
         faults += dropped_samples(channel, name, count - len(channel), pauses)
         channels[name] = channel
     repaired, held = without_held_samples(record.with_channels(**channels))

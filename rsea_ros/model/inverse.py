@@ -21,10 +21,11 @@ import numpy as np
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
+from rsea_ros.lost_commands import AT_EDGE
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.extent import check_extent
 from rsea_ros.model.pace import SKIPPED_START, check_slow
-from rsea_ros.model.restarts import AT_EDGE, gaps
+from rsea_ros.model.restarts import gaps
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
