@@ -11,8 +11,8 @@ from import_graph import MODULES, ROOT, imports, name_of
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
 STAMPS = {
-    "coarse_clock", "coverage", "held_commands", "held_samples", "mixed_rows", "stamps", "stamp_gaps",
-    "stamp_order", "torque_edge",
+    "coarse_clock", "coverage", "held_commands", "held_samples", "lost_commands", "mixed_rows", "stamps",
+    "stamp_gaps", "stamp_order", "torque_edge",
 }  # fmt: skip
 FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
 BASE = FACTS | {"progress", "setting", "wording", "plugins"} | FILES | YAML
@@ -23,7 +23,8 @@ OWN = {
     "signals": {"errors", "arrays"},
     "coarse_clock": {"signals"},
     "coverage": {"signals"},
-    "held_commands": {"signals"},
+    "held_commands": {"signals", "lost_commands"},
+    "lost_commands": {"signals"},
     "held_samples": {"signals"},
     "mixed_rows": {"signals"},
     "stamps": {"errors", "signals", *(STAMPS - {"stamps"})},
@@ -124,6 +125,7 @@ FOREIGN = {
     "stamps": {"numpy"},
     "stamp_gaps": {"numpy"},
     "held_commands": {"numpy"},
+    "lost_commands": {"numpy"},
     "held_samples": {"numpy"},
     "mixed_rows": {"numpy"},
     "stamp_order": {"numpy"},
