@@ -26,6 +26,7 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.joint_start import joint_start
+from rsea_ros.identification.lost_cycles import lost_behind
 from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.remark import Remark
@@ -76,7 +77,14 @@ def diagnose(
         tell("weighing the causes", 0.97)
         result = conclude(selection, stages, examined, pools, settings)
     cut = stretches_of(used, nominal, settings)
-    return replace(result, remarks=(*remarks, *cut, *torque_scale(nominal), *result.remarks))
+    lost = _lost_cycles(result)
+    return replace(result, remarks=(*lost, *remarks, *cut, *torque_scale(nominal), *result.remarks))
+
+
+def _lost_cycles(result: Diagnosis) -> tuple[Remark, ...]:
+    """Return the remark that cycles lost by the driver are a likely cause of the misfit, if they are."""
+    lost = 0 if result.verdict == "nothing_wrong" else lost_behind(result.faults, result.before)
+    return (Remark("lost_cycles", values=(float(lost),)),) if lost else ()
 
 
 def nominal_problem(

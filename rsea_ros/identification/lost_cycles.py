@@ -25,11 +25,14 @@ _TIMES = 1.5
 
 def explained_by_lost_cycles(identification: Identification) -> int:
     """Return how many lost cycles are the likely cause of a misfit; 0 for another, and without misfit."""
-    lost = count_of(identification.faults)
-    if not lost or identification.at_noise:
-        return 0
-    torque = next((o for o in identification.overlays if o.channel == "motor_torque"), None)
-    return lost if torque is not None and rises_behind_gaps(torque) else 0
+    return 0 if identification.at_noise else lost_behind(identification.faults, identification.overlays)
+
+
+def lost_behind(faults: Sequence[Fault], overlays: Sequence[Overlay]) -> int:
+    """Return how many cycles were lost, if the motor torque of a misfit shows them; otherwise 0."""
+    lost = count_of(faults)
+    torque = next((o for o in overlays if o.channel == "motor_torque"), None)
+    return lost if lost and torque is not None and rises_behind_gaps(torque) else 0
 
 
 def count_of(faults: Sequence[Fault]) -> int:

@@ -22,6 +22,7 @@ Code = Literal[
     "coloured_noise",
     "off_rig",
     "stretches",
+    "lost_cycles",
 ]
 """What a remark says.
 
@@ -39,6 +40,7 @@ on_measured_angle: an effect was simulated on the measured rotor angle.
 coloured_noise: of channels, taken from the residual.
 off_rig: the rig states a value, the data another (that, 95 % interval), so many of its stated spreads away.
 stretches: of long records so many s were used, of so many.
+lost_cycles: so many cycles of the driver were lost, and the motor torque shows them.
 """
 
 

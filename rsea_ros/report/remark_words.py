@@ -129,6 +129,14 @@ def _stretches(remark: Remark) -> str:
     )
 
 
+def _lost_cycles(remark: Remark) -> str:
+    return (
+        f"{remark.values[0]:.0f} lost cycles of the driver are a likely cause of the misfit: behind them the "
+        "motor torque is further from its commands than elsewhere. What is named here may stand in for them: "
+        "record again on an idle computer."
+    )
+
+
 _WORDS: Mapping[Code, Callable[[Remark], str]] = {
     "even_clocks": _even_clocks,
     "clocks_taken_as_right": _clocks_taken_as_right,
@@ -146,4 +154,5 @@ _WORDS: Mapping[Code, Callable[[Remark], str]] = {
     "coloured_noise": lambda remark: coloured_noise(remark.names),
     "off_rig": _off_rig,
     "stretches": _stretches,
+    "lost_cycles": _lost_cycles,
 }

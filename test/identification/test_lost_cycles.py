@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from benches import bench, record_bench
 
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.lost_cycles import explained_by_lost_cycles
 from rsea_ros.model.rig import EffectSetting
@@ -53,6 +56,13 @@ def test_lost_cycles_are_named_as_the_likely_cause(busy):
     assert not result.at_noise and explained_by_lost_cycles(result) == LOST
     assert f"{LOST} lost cycles of the driver are the likely cause" in verdict_sentence(result)
     assert next_command(result) == "", "a diagnosis would seek the cause in the machine"
+
+
+def test_a_diagnosis_warns_that_its_causes_may_stand_in_for_lost_cycles(busy):
+    nominal, record = busy
+    others = tuple(name for name in catalogue() if name != "current_loop_lag")
+    codes = [r.code for r in diagnose([record], nominal, settings=DiagnosisSettings(without=others)).remarks]
+    assert codes[0] == "lost_cycles"
 
 
 def test_lost_cycles_beside_a_fault_of_the_machine_are_not_named():
