@@ -107,11 +107,13 @@ def exact_timers() -> None:
     ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)
 
 
-def as_any_process() -> None:
-    """Let all threads run at normal priority, on any processor, again."""
-    _bind(PROCESSORS)
-    for thread in _threads():
-        _schedule(thread, os.SCHED_OTHER, 0)
+def stop_keeping_time(values: Mapping[str, Any]) -> None:
+    """Undo what the parameters REALTIME have set, for all threads; what others have set stays."""
+    if values["cpu_affinity"] >= 0:
+        _bind(PROCESSORS)
+    if values["realtime_priority"]:
+        for thread in _threads():
+            _schedule(thread, os.SCHED_OTHER, 0)
 
 
 def _bind(processors: Set[int]) -> None:

@@ -31,7 +31,7 @@ from rsea_ros.nodes._jobs import Jobs
 from rsea_ros.nodes._joint import DrivenJoint, offer
 from rsea_ros.nodes._joints import JOINTS, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter
-from rsea_ros.nodes._realtime import REALTIME, as_any_process, keep_time
+from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
 from rsea_ros.nodes._run import run_node
 from rsea_ros.wording import printable
 
@@ -160,7 +160,7 @@ class DriverNode(ManagedEntity):
         finally:
             self._close_devices()
         if self._cycle is not None:
-            as_any_process()
+            stop_keeping_time(self._values)
             self._node.get_logger().info("torque zero, device closed")
         self._take_topics_away()
 

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
 import os, subprocess, sys, threading
 from rsea_ros.errors import ParameterError
-from rsea_ros.nodes._realtime import as_any_process, raise_priority
+from rsea_ros.nodes._realtime import raise_priority, stop_keeping_time
 
 def priorities():
     own = [os.sched_getparam(thread).sched_priority for thread in (first.native_id, 0)]
@@ -27,7 +27,7 @@ first.start()
 try:
     raise_priority(first, 20)
     raised = priorities()
-    as_any_process()
+    stop_keeping_time({"realtime_priority": 20, "cpu_affinity": -1})
     print(*raised, *priorities())
 except ParameterError as error:
     print(error)
@@ -45,7 +45,7 @@ def test_one_thread_gets_the_priority_the_others_one_below_and_children_none():
 AFFINITY = """
 import os, subprocess, sys, threading
 from types import SimpleNamespace
-from rsea_ros.nodes._realtime import PROCESSORS, as_any_process, keep_time
+from rsea_ros.nodes._realtime import PROCESSORS, keep_time, stop_keeping_time
 
 def processors():
     threads = [os.sched_getaffinity(thread) for thread in (worker.thread.native_id, 0)]
@@ -58,9 +58,12 @@ node = SimpleNamespace(get_logger=lambda: logger)
 stop = threading.Event()
 thread = threading.Thread(target=stop.wait)
 worker = SimpleNamespace(thread=thread, start=thread.start)
-keep_time(node, worker, {"realtime_priority": 0, "cpu_affinity": max(PROCESSORS)})
+bound = {"realtime_priority": 0, "cpu_affinity": max(PROCESSORS)}
+keep_time(node, worker, bound)
 assert processors() == ({max(PROCESSORS)}, {max(PROCESSORS)}, PROCESSORS), processors()
-as_any_process()
+stop_keeping_time({"realtime_priority": 0, "cpu_affinity": -1})
+assert processors()[0] == {max(PROCESSORS)}, "bound by others: it stays"
+stop_keeping_time(bound)
 assert processors() == (PROCESSORS,) * 3, processors()
 worker.start = lambda: None
 keep_time(node, worker, {"realtime_priority": 0, "cpu_affinity": max(PROCESSORS) + 1})
