@@ -30,31 +30,38 @@ def with_held_commands(record: Record) -> tuple[Record, list[Fault]]:
     comes with it. The stamps of the steps are kept exactly, and the last one is held to the end of the
     sensors.
     """
-    words = words_on_steps(record)
-    if not words:
+    held = _held_steps(record)
+    if not held:
         return record, []
-    held = {name: _hold_commands(record, name) for name in words}
-    notes = (f"{name}: {sentence}" for name, sentence in words.items())
-    return replace(record.with_channels(**held), notes=(*record.notes, *notes)), []
+    commands = {name: _hold_commands(record, name, steps) for name, steps in held.items()}
+    notes = (f"{name}: {_words(record[name], steps)}" for name, steps in held.items())
+    return replace(record.with_channels(**commands), notes=(*record.notes, *notes)), []
 
 
 def words_on_steps(record: Record) -> dict[str, str]:
     """Return, for each channel of commands that are steps, how it is read."""
-    words = {}
+    return {name: _words(record[name], steps) for name, steps in _held_steps(record).items()}
+
+
+def _words(channel: Channel, held: BoolArray) -> str:
+    if held.all():
+        return f"{len(channel)} messages, one for each change; each value is held until the next"
+    lasts = np.where(held, np.diff(channel.t), 0.0)
+    longest, count = int(np.argmax(lasts)), np.count_nonzero(held)
+    return (
+        f"{count} {'pauses' if count > 1 else 'pause'} of the commands alone, the longest "
+        f"{lasts[longest]:.3g} s at {channel.t[longest]:.4g} s; the last value is held"
+    )
+
+
+def _held_steps(record: Record) -> dict[str, BoolArray]:
+    """Return which steps to the next command a value is held over, shape (n - 1,), of channels with any."""
+    held = {}
     for name in COMMANDS:
-        channel = record.channels.get(name)
-        if channel is None:
-            continue
-        if _is_steps(channel, _sensor_period(record)):
-            words[name] = f"{len(channel)} messages, one for each change; each value is held until the next"
-        elif len(pauses := np.flatnonzero(paused_steps(record, name))):
-            lasts = np.diff(channel.t)[pauses]
-            longest, many = int(np.argmax(lasts)), "pauses" if len(pauses) > 1 else "pause"
-            words[name] = (
-                f"{len(pauses)} {many} of the commands alone, the longest {lasts[longest]:.3g} s at "
-                f"{channel.t[pauses[longest]]:.4g} s; the last value is held"
-            )
-    return words
+        if name in record:
+            is_steps = _is_steps(record[name], _sensor_period(record))
+            held[name] = np.ones(len(record[name]) - 1, np.bool_) if is_steps else paused_steps(record, name)
+    return {name: steps for name, steps in held.items() if steps.any()}
 
 
 def paused_steps(record: Record, name: str) -> BoolArray:
@@ -84,17 +91,13 @@ def _goes_on(t: FloatArray, start: float, stop: float) -> bool:
     return float(np.max(np.diff(inside, prepend=start, append=stop))) <= _THROUGHOUT * (stop - start)
 
 
-def _hold_commands(record: Record, name: str) -> Channel:
-    """Return a channel of commands with each step, or each pause, filled."""
-    channel = record[name]
-    period = _sensor_period(record)
-    if _is_steps(channel, period):
-        last = max(float(c.t[-1]) for c in record.channels.values() if len(c))
-        ends = np.append(channel.t[1:], max(last, float(channel.t[-1])))
-        return _repeat_values(channel, ends, period, np.ones(len(channel), np.bool_))
-    ends = np.append(channel.t[1:], channel.t[-1])
-    pauses = np.append(paused_steps(record, name), False)
-    return _repeat_values(channel, ends, float(np.median(np.diff(channel.t))), pauses)
+def _hold_commands(record: Record, name: str, held: BoolArray) -> Channel:
+    """Return a channel of commands with the values of its held steps repeated; steps alone to the end."""
+    channel, last = record[name], float(record[name].t[-1])
+    is_steps = bool(held.all())
+    period = _sensor_period(record) if is_steps else float(np.median(np.diff(channel.t)))
+    end = max(float(c.t[-1]) for c in record.channels.values() if len(c)) if is_steps else last
+    return _repeat_values(channel, np.append(channel.t[1:], end), period, np.append(held, is_steps))
 
 
 def _sensor_period(record: Record) -> float:
