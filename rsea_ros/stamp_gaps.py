@@ -7,7 +7,7 @@ import numpy as np
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray
 from rsea_ros.stamp_order import AROUND
 
-_GAP = 1.6
+GAP = 1.6
 """In sample periods: a longer interval is a gap."""
 _FOLLOW = 0.2
 """How far the steady clock behind the stamps goes towards each of them."""
@@ -28,7 +28,7 @@ def dropped_samples(
     step = np.diff(channel.t)
     period = float(np.median(step)) if len(step) else 0.0
     step = step if pauses is None else np.where(pauses, period, step)
-    if not np.any(step > _GAP * period) or polls_unevenly(step, period):
+    if not np.any(step > GAP * period) or polls_unevenly(step, period):
         return []
     ticks = _ticks(step, period)
     lost = float(np.median(ticks[-3:] - np.arange(len(ticks))[-3:])) - taken_out
@@ -44,7 +44,7 @@ def polls_unevenly(step: FloatArray, period: float) -> bool:
 
     A steady clock that lost samples leaves steps as near to a multiple as its others are to one period.
     """
-    long = step > _GAP * period
+    long = step > GAP * period
     if np.count_nonzero(long) < max(AROUND, _OFTEN * len(step)):
         return False
     off = np.abs(step / period - np.rint(step / period))

@@ -13,10 +13,9 @@ import numpy as np
 
 from rsea_ros.identification.result import Identification, Overlay
 from rsea_ros.signals import Fault
+from rsea_ros.stamp_gaps import GAP
 
 KIND = "lost_cycles"
-_GAP = 1.6
-"""In sample periods: a longer step of the stamps is a gap, as in stamp_gaps."""
 _FEWEST = 10
 """Gaps: the RMS behind fewer is known to worse than a quarter."""
 _TIMES = 1.5
@@ -45,7 +44,7 @@ def rises_behind_gaps(overlay: Overlay) -> bool:
     if len(overlay.t) < 2:
         return False
     step = np.diff(overlay.t)
-    behind = np.concatenate([[False], step > _GAP * float(np.median(step))])
+    behind = np.concatenate([[False], step > GAP * float(np.median(step))])
     off = np.square(overlay.measured - overlay.simulated)
     known = np.isfinite(off)
     if np.count_nonzero(behind & known) < _FEWEST or not np.any(known & ~behind):
