@@ -10,6 +10,7 @@ from rsea_ros.model.rig_file import rig_path
 from rsea_ros.report.provenance import Provenance, provenance_of
 
 
-def provenance(verb: str, bags: Sequence[str], rig: str) -> Provenance:
-    """Return version, date and command line, with the hashes of some bags and a rig."""
-    return provenance_of(["rsea", verb, *sys.argv[2:]], [*map(Path, bags), rig_path(rig)])
+def provenance(verb: str, files: Sequence[str | Path], rig: str = "") -> Provenance:
+    """Return version, date and command line, with the hashes of some files and of a rig, if there is one."""
+    inputs = [*map(Path, files), *([rig_path(rig)] if rig else [])]
+    return provenance_of(["rsea", verb, *sys.argv[2:]], inputs)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -76,13 +75,13 @@ def _add_demand(parser: argparse.ArgumentParser, default: Requirement, name: str
 
 def run(args: argparse.Namespace) -> int:
     """Test the stiffness, find the stiffnesses that meet all demands, write the results."""
+    from rsea_ros.cli._provenance import provenance
     from rsea_ros.design.motor_gear_units import unit_named
     from rsea_ros.design.spring_design import least_stiffness, spring_design
     from rsea_ros.design.tolerance import robust_stiffness
     from rsea_ros.report.design.json import design_json
     from rsea_ros.report.design.page import design_report
     from rsea_ros.report.json_values import json_text
-    from rsea_ros.report.provenance import provenance_of
 
     place = results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
     check_magnitude("stiffness", args.stiffness, "N m/rad")
@@ -92,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     least = spring_design(requirement, unit, least_stiffness(requirement, unit))
     enough = robust_stiffness(requirement, unit)
     robust = spring_design(requirement, unit, enough) if math.isfinite(enough) else None
-    source = provenance_of(["rsea", "design", *sys.argv[2:]], [args.catalogue] if args.catalogue else [])
+    source = provenance("design", [args.catalogue] if args.catalogue else [])
     with NewFiles(place) as new:
         path = new.write(DESIGN_JSON, json_text(design_json(asked, least, robust)))
         report = new.write(REPORT, design_report(asked, least, robust, source))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -123,13 +122,13 @@ def _possible(
 
 def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
+    from rsea_ros.cli._provenance import provenance
     from rsea_ros.experiment.run_file import run_text
     from rsea_ros.report.experiment.json import advice_json
     from rsea_ros.report.experiment.page import advice_page
     from rsea_ros.report.json_values import json_text, with_provenance
-    from rsea_ros.report.provenance import provenance_of
 
-    source = provenance_of(["rsea", "experiment", *sys.argv[2:]], [Path(b) for b in args.bag])
+    source = provenance("experiment", args.bag)
     with NewFiles(place) as new:
         if advice.proposal is not None:
             new.write(COMMANDS, run_text(advice.proposal.command, advice.proposal.rate))

@@ -24,7 +24,7 @@ from rsea_ros.report.wrapped_lines import wrap
 from rsea_ros.wording import did_you_mean, printable
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
-_OPTIONS = ("-h", "--help", "--version")
+_HELP, _VERSION = ("-h", "--help"), "--version"
 FAULT = "this is a bug in rsea, please report it"
 
 
@@ -92,10 +92,10 @@ def summary(path: Path) -> str:
 
 def _call(name: str, arguments: Sequence[str]) -> int:
     """Run a verb, or print the overview. Raises ParameterError for an unknown verb."""
-    if name in _OPTIONS[:2]:
+    if name in _HELP:
         print(overview())
         return SUCCESS
-    if name == _OPTIONS[2]:
+    if name == _VERSION:
         from rsea_ros.version import version
 
         print(f"rsea_ros {version()}")
@@ -113,7 +113,7 @@ def _meant(name: str) -> str:
 
     if name in node_names():
         return f", did you mean run {name}?"
-    return did_you_mean(name, [*verbs(), *_OPTIONS])
+    return did_you_mean(name, [*verbs(), *_HELP, _VERSION])
 
 
 def _run(name: str, arguments: Sequence[str]) -> int:
