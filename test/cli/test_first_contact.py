@@ -47,18 +47,29 @@ def test_an_empty_name_is_no_folder(words, capsys):
         (["topics", "eco"], "echo"),
         (["rig", "nwe", "x"], "new"),
         (["export", "--mjcff", "x"], "--mjcf"),
+        (["idenfity"], "identify"),
+        (["excite"], "run excite"),
+        (["--verson"], "--version"),
+        (["control", "paper_hi"], "paper_high_impedance"),
+        (["design", "--unit", "rd85"], "rd85x13-hd_cpl-25a-160"),
+        (["identify", "run", "--axis", "torqe.z"], "torque.z"),
+        (["identify", "run", "--topic", "joint_state=/x"], "joint_states"),
+        (["simulate", "pendulum", "--efect", "backlash:gap=0.004", "--out", "x"], "--effect"),
+        (["simulate", "pendulum", "--effect", "backlsh:gap=0.004", "--out", "x"], "backlash"),
+        (["import", "a.csv", "--map", "so11", "--out", "x"], "so101"),
     ],
 )
 def test_a_name_that_is_nearly_right_is_answered_with_the_right_one(
-    arguments, suggestion, capsys, monkeypatch
+    arguments, suggestion, tmp_path, capsys, monkeypatch
 ):
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
     try:
         status = cli.main(arguments)
     except SystemExit as left:
         status = left.code
     assert status == 2
-    assert f"did you mean {suggestion}?" in capsys.readouterr().err
+    assert f", did you mean {suggestion}?" in capsys.readouterr().err
 
 
 def test_a_rig_file_with_a_mistyped_key_is_answered_too(tmp_path, capsys):

@@ -222,31 +222,6 @@ def test_an_unknown_verb_is_named_with_the_known_ones(capsys):
     assert error.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    ("words", "meant"),
-    [
-        (["idenfity"], "identify"),
-        (["excite"], "run excite"),
-        (["--verson"], "--version"),
-        (["control", "paper_hi"], "paper_high_impedance"),
-        (["design", "--unit", "rd85"], "rd85x13-hd_cpl-25a-160"),
-        (["identify", "run", "--axis", "torqe.z"], "torque.z"),
-        (["identify", "run", "--topic", "joint_state=/x"], "joint_states"),
-        (["simulate", "pendulum", "--efect", "backlash:gap=0.004", "--out", "x"], "--effect"),
-        (["simulate", "pendulum", "--effect", "backlsh:gap=0.004", "--out", "x"], "backlash"),
-        (["import", "a.csv", "--map", "so11", "--out", "x"], "so101"),
-    ],
-)
-def test_a_typing_error_is_answered_by_what_may_be_meant(words, meant, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    try:
-        status = cli.main(words)
-    except SystemExit as left:
-        status = left.code
-    assert status == 2
-    assert f", did you mean {meant}?" in capsys.readouterr().err
-
-
 def test_verbs_are_the_files_beside_main(tmp_path, monkeypatch):
     for name in ("__init__", "_table", "main", "import_", "play"):
         (tmp_path / f"{name}.py").touch()
