@@ -12,11 +12,15 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 
+from msg_adapters.ros import Trigger
 from rsea_ros.nodes import driver
+from test.nodes.stalls import every
 from test.nodes.warm import Nodes
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 60.0
+AGAIN = 15.0
+"""s without an answer, which no service takes."""
 """Seconds for what normally takes one; a cold start compiles the simulation on a busy machine."""
 
 
@@ -101,7 +105,7 @@ class Listener:
         self.node = rclpy.create_node("listener")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
-        self._subscriptions = []
+        self._subscriptions, self._clients = [], {}
 
     def serve(self, node):
         """Spin another node of this process too, until it is dropped."""
@@ -119,6 +123,29 @@ class Listener:
             assert time.monotonic() < deadline, "waited in vain"
             self._executor.spin_once(timeout_sec=0.1)
         return result
+
+    def call(self, name, kind=Trigger, request=None):
+        """Call a service; return its answer.
+
+        Called again where it does not come: the first answer to a new client is lost now and then, because
+        the node has found the client's requests before it found where the answers go.
+        """
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, name)
+        client, answers = self._clients[name], []
+        self.until(client.service_is_ready)
+
+        def ask():
+            answers.append(client.call_async(request or kind.Request()))
+
+        ask()
+        ask_again = every(AGAIN, ask)
+
+        def answered():
+            ask_again()
+            return next((answer for answer in answers if answer.done()), None)
+
+        return self.until(answered).result()
 
     def hear(self, kind, topic, qos):
         """Return a list that fills with the messages of a topic."""

@@ -69,11 +69,7 @@ class Driven:
 
     def call(self, kind, service, request):
         """Call a service of the driver; return its answer."""
-        client = self._listener.node.create_client(kind, f"/{self.name}/driver/{service}")
-        self._listener.until(client.service_is_ready)
-        future = client.call_async(request)
-        self._listener.until(future.done)
-        return future.result()
+        return self._listener.call(f"/{self.name}/driver/{service}", kind, request)
 
     def trigger(self, service):
         """Call a Trigger service."""

@@ -5,7 +5,7 @@ import signal
 import numpy as np
 import pytest
 
-from msg_adapters.ros import Trigger, effort_of, stamp_of, wrench_of
+from msg_adapters.ros import effort_of, stamp_of, wrench_of
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig, save_rig
 from test.nodes.torque_loop import PERIOD, RATE, Loop
@@ -65,10 +65,7 @@ def test_without_measurements_the_torque_ends_until_the_fault_is_cleared(loop, s
     seen = len(loop.states)
     loop.hold(20.0, lambda: len(loop.states) > seen + 50)
     assert all(effort_of(m)[1] == 0.0 for m in loop.commands[-20:])
-    client = listener.node.create_client(Trigger, "/rsea/controller/clear_fault")
-    listener.until(client.service_is_ready)
-    answer = client.call_async(Trigger.Request())
-    listener.until(answer.done)
+    listener.call("/rsea/controller/clear_fault")
     loop.hold(20.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 20.0) < 0.5)
 
 

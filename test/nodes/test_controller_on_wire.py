@@ -9,7 +9,6 @@ import pytest
 from msg_adapters.ros import (
     DiagnosticArray,
     JointState,
-    Trigger,
     WrenchStamped,
     torque_command_message,
     wrench_of,
@@ -41,11 +40,7 @@ class Wire:
 
     def clear(self, name):
         """Call clear_fault of a node."""
-        client = self.listener.node.create_client(Trigger, f"/wired/{name}/clear_fault")
-        self.listener.until(client.service_is_ready)
-        future = client.call_async(Trigger.Request())
-        self.listener.until(future.done)
-        return future.result()
+        return self.listener.call(f"/wired/{name}/clear_fault")
 
     def clear_latched(self):
         """Clear whichever node has a fault."""

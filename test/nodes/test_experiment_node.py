@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from msg_adapters import write_record
-from msg_adapters.ros import DiagnosticArray, JointState, Trigger
+from msg_adapters.ros import DiagnosticArray, JointState
 from rsea_ros.experiment.run_file import run_text
 from rsea_ros.experiment.run_shape import Shape, command_of
 from rsea_ros.model.rig_file import load_rig, save_rig
@@ -36,14 +36,7 @@ def bench(tmp_path_factory):
 def ask(listener):
     """A function that calls a service of the node and returns its answer."""
 
-    def call(name):
-        client = listener.node.create_client(Trigger, f"/rsea/experiment/{name}")
-        listener.until(client.service_is_ready)
-        answer = client.call_async(Trigger.Request())
-        listener.until(answer.done)
-        return answer.result()
-
-    return call
+    return lambda name: listener.call(f"/rsea/experiment/{name}")
 
 
 def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(bench, start, listener, ask, tmp_path):

@@ -84,7 +84,6 @@ class Leg:
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.states = {j: listener.hear(JointState, f"/leg/{j}/joint_states", MEASUREMENT) for j in JOINTS}
         self.combined = listener.hear(JointState, "/leg/joint_states", MEASUREMENT)
-        self.clients = {}
         self.clearing = {
             j: listener.node.create_client(Trigger, f"/leg/driver/{j}/clear_fault") for j in JOINTS
         }
@@ -137,24 +136,8 @@ class Leg:
         return [goal != 0 and on for _, goal, on in log]
 
     def call(self, service):
-        """Call a service of the driver; return its answer.
-
-        Called again where it does not come: the first answer to a new client is lost now and then, because
-        the driver has found the client's requests before it found where the answers go.
-        """
-        name = f"/leg/driver/{service}"
-        if name not in self.clients:
-            self.clients[name] = self.listener.node.create_client(Trigger, name)
-        client = self.clients[name]
-        self.listener.until(client.service_is_ready)
-        futures = [client.call_async(Trigger.Request())]
-        call_again = every(3.0, lambda: futures.append(client.call_async(Trigger.Request())))
-
-        def answered():
-            call_again()
-            return next((future for future in futures if future.done()), None)
-
-        return self.listener.until(answered).result()
+        """Call a service of the driver; return its answer."""
+        return self.listener.call(f"/leg/driver/{service}")
 
 
 @pytest.fixture(scope="module")
