@@ -33,6 +33,7 @@ from independent.hidden import hide  # noqa: E402
 from independent.severities import SEVERITIES, drawn_parameters  # noqa: E402
 
 from bench.experiment_figures import SECONDS, print_figures  # noqa: E402
+from bench.experiment_policies import RATE, Fixed, fixed_chirp, random_multisine  # noqa: E402
 from bench.json_log import append_to_log, read_log  # noqa: E402
 from bench.sections import parser_of  # noqa: E402
 from msg_adapters import write_record  # noqa: E402
@@ -47,13 +48,12 @@ from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command,
 from rsea_ros.experiment.run_shape import LEAD, at_rest_around  # noqa: E402
 from rsea_ros.experiment.weighed_causes import USUAL  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
-from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramp_ends  # noqa: E402
+from rsea_ros.identification.excitation import ramp_ends  # noqa: E402
 from rsea_ros.identification.workers import worker_pools  # noqa: E402
 from rsea_ros.model.rig_file import load_rig, save_rig  # noqa: E402
 from rsea_ros.model.simulation import synthesize  # noqa: E402
 from rsea_ros.signals import Channel  # noqa: E402
 
-RATE, CHIRP = 280.0, 20.0
 LIMITS = {
     "full": RunLimits(torque=25.0, velocity=2.0, deflection=0.04),
     "lab": RunLimits(torque=3.0, velocity=2.0, deflection=0.04),
@@ -89,46 +89,6 @@ def is_shown(plain, bench, limits):
     sizes = {"ft": 0.03, "position": 6e-6}
     away = [np.sqrt(np.mean((with_it[n].y - without[n].y) ** 2)) / s for n, s in sizes.items()]
     return bool(max(away) > 0.3)
-
-
-def fixed_chirp(limits):
-    """Return the paper's chirp without its noise, at the torque limit, N m."""
-    return chirp(
-        ExcitationSettings(rate=RATE, duration=CHIRP, amplitude=limits.torque * 0.98, noise=0.0, low=0.05)
-    )
-
-
-class Fixed:
-    """Plays pieces of a command one after another, each as long as all before it together."""
-
-    def __init__(self, command, shortest):
-        self._command, self._at, self._shortest = command, 0, round(shortest * RATE)
-
-    def __call__(self, hypotheses, asked, noise, run, tell):
-        size = max(self._shortest, self._at)
-        piece = self._command[self._at : self._at + size]
-        self._at += len(piece)
-        return _Played(ramp_ends(piece, min(round(0.25 * RATE), len(piece) // 4)))
-
-
-class _Played:
-    """The part of a proposal that the campaign uses."""
-
-    def __init__(self, run):
-        command = at_rest_around(run, RATE)
-        self.command, self.duration, self.rate = command, len(run) / RATE, RATE
-        self.decided, self.hopeless, self.energy = 1.0, (), float(np.sum(command**2) / RATE)
-
-
-def random_multisine(rms, seed, torque):
-    """Return a multisine of random phases and equal lines in 0.5 to 100 Hz of some RMS, 20 s, N m."""
-    rng = np.random.default_rng(seed)
-    n = round(CHIRP * RATE)
-    spectrum = np.zeros(n // 2 + 1, complex)
-    lines = np.arange(round(0.5 * CHIRP), round(100.0 * CHIRP))
-    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
-    signal = np.fft.irfft(spectrum, n)
-    return np.clip(signal * rms / signal.std(), -torque, torque)
 
 
 def play_policy(policy, first, weighing, bench, rig, rng, pools, limits):

@@ -14,7 +14,7 @@ from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
 from rsea_ros.report import words
-from rsea_ros.report.control.tables import control_tables, gains_words, times
+from rsea_ros.report.control.tables import control_tables, gains_words, typeset
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
 from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
@@ -50,7 +50,7 @@ def control_report(study: Study, provenance: Provenance | None = None) -> str:
 def verdict(study: Study) -> str:
     """Return the verdict in a sentence."""
     missed = [
-        f"{times(t.what)} at {at.design.rate:g} Hz"
+        f"{typeset(t.what)} at {at.design.rate:g} Hz"
         for at in study.rates
         for t in at.trials
         if t.met is False

@@ -21,7 +21,7 @@ _SIGNS = {True: "≥", False: "≤"}
 def trial_rows(study: Study) -> Rows:
     """Return each trial with its demand and its value at every rate; a value that misses it is marked."""
     return [
-        [times(trials[0].what), demand_text(trials[0]), *(value(trial) for trial in trials)]
+        [typeset(trials[0].what), demand_text(trials[0]), *(value(trial) for trial in trials)]
         for trials in zip(*(at.trials for at in study.rates), strict=True)
     ]
 
@@ -31,7 +31,7 @@ def trial_head(study: Study) -> list[str]:
     return ["trial", "required", *(f"{at.design.rate:g} Hz" for at in study.rates)]
 
 
-def times(name: str) -> str:
+def typeset(name: str) -> str:
     """Return the name of a trial or of a load with proper signs, `free x 0.5` as `free × 0.5`."""
     return re.sub(r"(?<!\w)-(?=\d)", "−", name.replace(" x ", " × "))
 
@@ -78,7 +78,7 @@ def margin_rows(study: Study) -> Rows:
     return [
         [
             f"{at.design.rate:g} Hz",
-            times(name),
+            typeset(name),
             f"{m.crossover:.1f} Hz",
             words.minus(f"{m.phase:.1f}°"),
             words.minus(f"{m.gain:.1f} dB"),

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rsea_ros.report.control.tables import compensation_rows, times
+from rsea_ros.report.control.tables import compensation_rows, typeset
 
 
 @pytest.mark.parametrize(
@@ -16,7 +16,7 @@ from rsea_ros.report.control.tables import compensation_rows, times
     ],
 )
 def test_names_have_proper_signs(name, shown):
-    assert times(name) == shown
+    assert typeset(name) == shown
 
 
 @pytest.mark.parametrize(("gain", "shown"), [(-0.02, "−0.02"), (-0.001, "0.00"), (0.5, "0.50")])
