@@ -9,8 +9,11 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
+
+import numpy as np
 
 from msg_adapters.definitions import definition
 from msg_adapters.mcap_records import (
@@ -33,9 +36,14 @@ from msg_adapters.mcap_records import (
 )
 from msg_adapters.remarks import NAME as REMARKS
 from rsea_ros.files import create, write_at
+from rsea_ros.signals import IntArray
 
 CHUNK_SIZE = 1 << 20
 MESSAGE_RECORD = struct.Struct("<BQHIQQ")
+MESSAGE_RECORDS = np.dtype("<u1, <u8, <u2, <u4, <u8, <u8")
+"""The same for many messages at once."""
+PLACE = struct.Struct("<QQ")
+"""Log time and offset of a message in its chunk."""
 
 
 class McapStorage:
@@ -46,7 +54,8 @@ class McapStorage:
         self._file = create(path)
         self._end = 0
         self._chunk = bytearray()
-        self._index: dict[int, list[tuple[int, int]]] = {}
+        self._index: dict[int, bytearray] = {}
+        self._span: tuple[int, int] | None = None
         self._types: dict[str, int] = {}
         self._schemas = b""
         self._channels = b""
@@ -75,32 +84,60 @@ class McapStorage:
 
     def write(self, key: int, log_time: int, raw: bytes) -> None:
         """Append a serialised message."""
-        self._index.setdefault(key, []).append((log_time, len(self._chunk)))
+        self._index.setdefault(key, bytearray()).extend(PLACE.pack(log_time, len(self._chunk)))
+        self._extend_span(log_time, log_time)
         self._chunk += MESSAGE_RECORD.pack(MESSAGE, 22 + len(raw), key, 0, log_time, log_time) + raw
         if len(self._chunk) >= CHUNK_SIZE:
             self.flush()
+
+    def write_all(self, keys: IntArray, log_times: IntArray, raws: Sequence[bytes]) -> None:
+        """Append serialised messages; keys, log_times: shape (n,)."""
+        sizes = np.fromiter(map(len, raws), np.int64, len(raws)) + MESSAGE_RECORD.size
+        ends = np.cumsum(sizes)
+        heads = _message_heads(keys, log_times, sizes)
+        first = 0
+        while first < len(raws):
+            start = len(self._chunk) - ends[first] + sizes[first]
+            stop = min(int(np.searchsorted(start + ends, CHUNK_SIZE)) + 1, len(raws))
+            part = slice(first, stop)
+            self._add_places(keys[part], log_times[part], start + ends[part] - sizes[part])
+            self._chunk += b"".join(chain.from_iterable(zip(heads[part], raws[part], strict=True)))
+            if len(self._chunk) >= CHUNK_SIZE:
+                self.flush()
+            first = stop
+
+    def _add_places(self, keys: IntArray, log_times: IntArray, offsets: IntArray) -> None:
+        """Note where messages stand in the chunk, each shape (n,)."""
+        places = np.column_stack((log_times, offsets)).astype("<u8")
+        for key in np.unique(keys):
+            self._index.setdefault(int(key), bytearray()).extend(places[keys == key].tobytes())
+        self._extend_span(int(log_times.min()), int(log_times.max()))
+
+    def _extend_span(self, first: int, last: int) -> None:
+        """Extend the log times of the chunk."""
+        known = self._span or (first, last)
+        self._span = (min(known[0], first), max(known[1], last))
 
     def flush(self) -> None:
         """Write the chunk. Interrupted before its end, it is written again at the same place."""
         if not self._chunk:
             return
-        times = [time for entries in self._index.values() for time, _ in entries] or [0]
-        head = CHUNK_HEAD.pack(min(times), max(times), len(self._chunk), zlib.crc32(self._chunk))
+        span = self._span or (0, 0)
+        head = CHUNK_HEAD.pack(*span, len(self._chunk), zlib.crc32(self._chunk))
         length = struct.pack("<Q", len(self._chunk))
         chunk = _record(CHUNK, head, _text(""), length, self._chunk)
         indices, offsets = b"", b""
-        for key, entries in self._index.items():
+        for key, places in sorted(self._index.items()):
             offsets += struct.pack("<HQ", key, self._end + len(chunk) + len(indices))
-            packed = b"".join(struct.pack("<QQ", *entry) for entry in entries)
-            indices += _record(MESSAGE_INDEX, struct.pack("<H", key), _with_size(packed))
-        place = struct.pack("<QQQQ", min(times), max(times), self._end, len(chunk))
+            indices += _record(MESSAGE_INDEX, struct.pack("<H", key), _with_size(places))
+        place = struct.pack("<QQQQ", *span, self._end, len(chunk))
         sizes = (struct.pack("<Q", len(indices)), _text(""), length, length)
         self._put(chunk + indices)
         self._chunks.append(_record(CHUNK_INDEX, place, _with_size(offsets), *sizes))
-        for key, entries in self._index.items():
-            self._counts[key] += len(entries)
-        self._times += [min(times), max(times)] if self._index else []
-        self._chunk, self._index = bytearray(), {}
+        for key, places in self._index.items():
+            self._counts[key] += len(places) // PLACE.size
+        self._times += self._span or ()
+        self._chunk, self._index, self._span = bytearray(), {}, None
 
     def remark(self, texts: Mapping[str, str], metadata: str) -> None:
         """Keep texts by name in a metadata record."""
@@ -147,7 +184,17 @@ def _record(opcode: int, *parts: bytes | bytearray) -> bytes:
     return RECORD.pack(opcode, len(content)) + content
 
 
-def _with_size(data: bytes) -> bytes:
+def _message_heads(keys: IntArray, log_times: IntArray, sizes: IntArray) -> list[bytes]:
+    """Return what precedes each message; sizes: B, with what precedes; each shape (n,)."""
+    heads = np.zeros(len(keys), MESSAGE_RECORDS)
+    columns = (MESSAGE, sizes - RECORD.size, keys, 0, log_times, log_times)
+    for name, column in zip(heads.dtype.names or (), columns, strict=True):
+        heads[name] = column
+    width, data = MESSAGE_RECORDS.itemsize, heads.tobytes()
+    return [data[at : at + width] for at in range(0, len(data), width)]
+
+
+def _with_size(data: bytes | bytearray) -> bytes:
     return struct.pack("<I", len(data)) + data
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -46,8 +47,9 @@ def write_records(
     notes = [note for record, _ in records for note in record.notes]
     remarks = Remarks(notes, [fault for record, _ in records for fault in record.faults])
     with BagWriter(path, storage, recording=False, remarks=remarks, force=force) as bag:
-        for log_time, name, msgtype, raw in _in_order(series):
-            bag.write(name, msgtype, log_time, raw)
+        kinds = [one.topic for one in series]
+        for which, log_times, raws in _in_order(series):
+            bag.write_all(kinds, which, log_times, raws)
 
 
 @dataclass(frozen=True)
@@ -60,13 +62,15 @@ class _Series:
     log_times: IntArray
     values: Mapping[str, FloatArray]
 
-    def rows(self, part: slice) -> Iterator[tuple[int, str, str, bytes]]:
-        """Yield log time, topic, type and content of some messages."""
+    @property
+    def topic(self) -> tuple[str, str]:
+        """Name and message type."""
+        return self.topics.topic(self.role), TYPES[self.role]
+
+    def messages(self, part: slice) -> list[bytes]:
+        """Return some messages, serialised."""
         values = {field: column[part] for field, column in self.values.items()}
-        messages = _encode(self.stamps[part], values, self.topics)
-        name, msgtype = self.topics.topic(self.role), TYPES[self.role]
-        for log_time, raw in zip(self.log_times[part].tolist(), messages, strict=True):
-            yield log_time, name, msgtype, raw
+        return _encode(self.stamps[part], values, self.topics)
 
 
 def _check_apart(series: Sequence[_Series]) -> None:
@@ -78,20 +82,27 @@ def _check_apart(series: Sequence[_Series]) -> None:
             raise BagError(f"topic {topic}: is both {other[1]} and {one.role}, expected a topic for each")
 
 
-def _in_order(series: Sequence[_Series]) -> Iterator[tuple[int, str, str, bytes]]:
-    """Yield the messages of all series by log time, made BATCH of the longest at a time."""
+def _in_order(series: Sequence[_Series]) -> Iterator[tuple[IntArray, IntArray, list[bytes]]]:
+    """Yield the messages of all series by log time, made BATCH of the longest at a time.
+
+    A batch has the index of the series, the log time in ns, each shape (n,), and the content of each message.
+    """
     if not series:
         return
     longest = max((one.log_times for one in series), key=len)
     done = [0] * len(series)
     for stop in [*longest[BATCH::BATCH].tolist(), None]:
-        rows: list[tuple[int, str, str, bytes]] = []
+        parts = []
         for i, one in enumerate(series):
             end = len(one.log_times) if stop is None else int(np.searchsorted(one.log_times, stop))
-            rows += one.rows(slice(done[i], end))
+            parts.append(slice(done[i], end))
             done[i] = end
-        rows.sort(key=lambda row: row[0])
-        yield from rows
+        log_times = np.concatenate([one.log_times[part] for one, part in zip(series, parts, strict=True)])
+        which = np.repeat(np.arange(len(series)), [part.stop - part.start for part in parts])
+        raws = list(chain.from_iterable(one.messages(part) for one, part in zip(series, parts, strict=True)))
+        order = np.argsort(log_times, kind="stable")
+        if order.size:
+            yield which[order], log_times[order], [raws[k] for k in order.tolist()]
 
 
 def _series(record: Record, topics: TopicMap) -> Iterator[_Series]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from msg_adapters.definitions import definition
 from msg_adapters.metadata import VERSION
 from rsea_ros.files import create
+from rsea_ros.signals import IntArray
 
 TABLES = """
 CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
@@ -55,6 +56,10 @@ class SqliteStorage:
     def write(self, key: int, log_time: int, raw: bytes) -> None:
         """Append a serialised message."""
         self._rows.append((key, log_time, raw))
+
+    def write_all(self, keys: IntArray, log_times: IntArray, raws: Sequence[bytes]) -> None:
+        """Append serialised messages; keys, log_times: shape (n,)."""
+        self._rows += zip(keys.tolist(), log_times.tolist(), raws, strict=True)
 
     def flush(self) -> None:
         """Commit the messages. Raises OSError when the disk is full."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
+
+from rsea_ros.signals import IntArray
 
 
 class Storage(Protocol):
@@ -17,6 +19,9 @@ class Storage(Protocol):
 
     def write(self, key: int, log_time: int, raw: bytes) -> None:
         """Append a serialised message."""
+
+    def write_all(self, keys: IntArray, log_times: IntArray, raws: Sequence[bytes]) -> None:
+        """Append serialised messages; keys, log_times: shape (n,)."""
 
     def flush(self) -> None:
         """Pass written data to the system, where they survive the end of this process."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from types import TracebackType
+
+import numpy as np
 
 from msg_adapters import metadata
 from msg_adapters.definitions import definition
@@ -21,6 +23,7 @@ from msg_adapters.topic_map import check_topic
 from rsea_ros import files
 from rsea_ros.errors import BagError, OutputError
 from rsea_ros.interrupts import hold_signals
+from rsea_ros.signals import IntArray
 from rsea_ros.staging import Stage, make_stage
 
 STORAGES: Mapping[str, tuple[str, Callable[[Path], Storage]]] = {
@@ -86,17 +89,38 @@ class BagWriter:
 
         Raises BagError for a topic that ROS could not have, and for a topic of another type than before.
         """
-        try:
-            key, known = self._topics.get(topic) or self._declare(topic, msgtype)
-            if known.msgtype != msgtype:
-                raise BagError(f"topic {topic}: is {known.msgtype} and {msgtype}, expected one type")
+        with self._name_failure():
+            key, known = self._known(topic, msgtype)
             self._storage.write(key, log_time, raw)
-            known.count += 1
-            first, last = self._span if self._span[1] else (log_time, log_time)
-            self._span = (min(first, log_time), max(last, log_time))
-        except OSError as error:
-            raise self._error(error) from None
+            self._count(known, 1, log_time, log_time)
         self.keep_up()
+
+    def write_all(
+        self, topics: Sequence[tuple[str, str]], which: IntArray, log_times: IntArray, raws: Sequence[bytes]
+    ) -> None:
+        """Append serialised messages, each of topics[which] (name, type); which, log_times: shape (n,), ns.
+
+        Raises BagError as write does.
+        """
+        with self._name_failure():
+            keys, known = zip(*(self._known(*topic) for topic in topics), strict=True)
+            self._storage.write_all(np.array(keys)[which], log_times, raws)
+            for i, count in enumerate(np.bincount(which, minlength=len(topics))):
+                self._count(known[i], int(count), int(log_times.min()), int(log_times.max()))
+        self.keep_up()
+
+    def _known(self, topic: str, msgtype: str) -> tuple[int, Topic]:
+        """Return key and topic. Raises BagError for a topic of another type than before."""
+        key, known = self._topics.get(topic) or self._declare(topic, msgtype)
+        if known.msgtype != msgtype:
+            raise BagError(f"topic {topic}: is {known.msgtype} and {msgtype}, expected one type")
+        return key, known
+
+    def _count(self, topic: Topic, messages: int, first: int, last: int) -> None:
+        """Count what is written, log times in ns."""
+        topic.count += messages
+        span = self._span if self._span[1] else (first, last)
+        self._span = (min(span[0], first), max(span[1], last))
 
     def _declare(self, topic: str, msgtype: str) -> tuple[int, Topic]:
         """Return key and topic of a new one."""
@@ -114,21 +138,17 @@ class BagWriter:
 
     def flush(self) -> None:
         """Make written data safe against the end of this process."""
-        try:
+        with self._name_failure():
             self._storage.flush()
-        except OSError as error:
-            raise self._error(error) from None
         self._flushed = time.monotonic()
 
     def _sync(self) -> None:
         """Put flushed data on the disk, unless the previous sync is still running."""
         if self._syncing is not None and not self._syncing.done():
             return
-        try:
+        with self._name_failure():
             if self._syncing is not None:
                 self._syncing.result()
-        except OSError as error:
-            raise self._error(error) from None
         self._syncing = self._disk.submit(self._storage.sync)
 
     def __exit__(
@@ -216,6 +236,14 @@ class BagWriter:
         if self._stage is not None:
             self._stage.release()
             self._stage = None
+
+    @contextmanager
+    def _name_failure(self) -> Iterator[None]:
+        """Raise BagError, with the file and what is kept, where the system fails."""
+        try:
+            yield
+        except OSError as error:
+            raise self._error(error) from None
 
     def _error(self, error: OSError) -> BagError:
         kept = f"; what was written until then is in {self.partial}" if self._recording else ""
