@@ -14,7 +14,12 @@ from rsea_ros.diagnosis.candidate import (
     fit_candidate,
     is_within_clocks,
 )
-from rsea_ros.diagnosis.criteria import costs_priors_less, is_far_from_floor, preference
+from rsea_ros.diagnosis.criteria import (
+    costs_priors_less,
+    is_far_from_floor,
+    keeps_known_values,
+    preference,
+)
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.problem_variants import without_effect
 from rsea_ros.diagnosis.screening import screen
@@ -83,7 +88,8 @@ class ReducedModels:
     def is_needed(self, model: Candidate, without: Candidate) -> bool:
         """Return whether a model is better than without one of its causes, or with another in its place."""
         extra, rule = model.parameters - without.parameters, self.settings.acceptance
-        return preference(model.validation, without.validation, extra, rule).better
+        better = preference(model.validation, without.validation, extra, rule).better
+        return better or keeps_known_values(model, without, self.settings)
 
     def _without(self, model: Candidate, name: str) -> Candidate:
         """Fit a model again without one of its causes."""

@@ -161,6 +161,14 @@ def costs_priors_less(model: Scored, other: Scored, settings: DiagnosisSettings 
     return model.prior_cost + loss_excess(model, other) < other.prior_cost - settings.acceptance.prior_gain
 
 
+def keeps_known_values(model: Scored, other: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+    """Return whether a model keeps the known values so much better that its further unknowns are paid for."""
+    rule = settings.acceptance
+    price = rule.prior_gain + rule.price * max(model.parameters - other.parameters, 0)
+    spared = other.prior_cost - model.prior_cost
+    return min(spared, likelier_by(model, other, settings.floor.far)) > price
+
+
 def is_far_from_floor(model: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
     """Return whether a model is far from the noise floor in its worst channel."""
     return worst_ratio(model) >= settings.floor.far

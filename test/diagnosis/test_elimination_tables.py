@@ -39,6 +39,20 @@ def test_a_cause_that_the_others_make_redundant_goes(world, ratios, left, gone):
     assert reasons(selection) == [(name, "redundant", "") for name in gone]
 
 
+@pytest.mark.parametrize(
+    ("prior_without", "prior_with", "stays"),
+    [(100.0, 1.0, True), (3.0, 1.0, False), (100.0, 99.0, False), (1.0, 100.0, False)],
+)
+def test_a_cause_stays_without_which_known_values_would_have_to_leave(
+    world, prior_without, prior_with, stays
+):
+    """A resonance alone does as well as with the delay, but takes an inertia ten doubts off."""
+    priors = {DELAY: prior_without, GAP: 1.0, f"{DELAY}+{GAP}": prior_with}
+    ratios = {"": 9.0, DELAY: 4.0, GAP: 9.0, f"{DELAY}+{GAP}": 4.0}
+    selection = world(script(ratios, priors)).eliminate(DELAY, GAP)
+    assert (GAP in selection.last.causes) is stays
+
+
 def test_an_only_cause_is_not_taken_out(world):
     scripted_run = world(script({"": 1.0, FRICTION: 1.0}))
     selection = scripted_run.eliminate(FRICTION)
