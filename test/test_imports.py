@@ -14,13 +14,14 @@ STAMPS = {
     "coarse_clock", "coverage", "held_commands", "held_samples", "lost_commands", "mixed_rows", "stamps",
     "stamp_gaps", "stamp_order", "torque_edge",
 }  # fmt: skip
-FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "version"} | STAMPS
+FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "spectra", "version"} | STAMPS
 BASE = FACTS | {"progress", "setting", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 AROUND = {"laws", "experiment", "health", "trends", "exports"}
 OWN = {
     "errors": set(),
     "signals": {"errors", "arrays"},
+    "spectra": {"signals"},
     "coarse_clock": {"signals"},
     "coverage": {"signals"},
     "held_commands": {"signals", "lost_commands"},
@@ -118,6 +119,7 @@ FOREIGN = {
     "watch": {"tornado"},
     "benchmark": {"numpy"},
     "signals": {"numpy"},
+    "spectra": {"numpy"},
     "arrays": {"numpy"},
     "library": {"numpy", "plotly", "rich"},
     "coarse_clock": {"numpy"},

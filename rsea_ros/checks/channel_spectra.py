@@ -13,10 +13,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.fft import rfft
 
 from rsea_ros.fast_length import next_fast_length
 from rsea_ros.signals import BoolArray, ComplexArray, FloatArray, IntArray
+from rsea_ros.spectra import segment_spectra
 
 _SEGMENTS = 5
 """A record is cut into segments of a fifth: slow ramps still have their line, and nine of them overlap."""
@@ -123,9 +123,7 @@ def usable(q: Quotient) -> BoolArray:
 
 def _segments(values: FloatArray, length: int) -> ComplexArray:
     """Return the spectra of half-overlapping Hann segments from the second line on, shape (k, lines)."""
-    parts = np.lib.stride_tricks.sliding_window_view(values, length)[:: length // 2]
-    window = np.hanning(length + 1)[:-1]
-    spectra: ComplexArray = rfft((parts - parts.mean(axis=1, keepdims=True)) * window, axis=1)
+    spectra = segment_spectra(values, length)
     return spectra[:, _FIRST : int(0.9 * spectra.shape[1])]
 
 

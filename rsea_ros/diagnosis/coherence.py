@@ -7,12 +7,12 @@ segments of mere noise it exceeds 1 - a^(1 / (K - 1)) with probability a (Carter
 from __future__ import annotations
 
 import numpy as np
-from scipy import signal
 
 from rsea_ros.diagnosis.settings import BlockSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import BoolArray, ComplexArray, FloatArray, IntArray
+from rsea_ros.spectra import cross_density, power_density
 
 _LOST = 0.5
 """Coherence^2 below which more than half of a channel's power has nothing to do with the command."""
@@ -58,9 +58,9 @@ def lost_above(case: Case, channel: str) -> float | None:
     rate, length = 1.0 / float(np.median(np.diff(t))), min(_LINES, len(t) // _SEGMENTS)
     if length < _SHORTEST:
         return None
-    frequency, power = signal.welch(u, rate, nperseg=length)
-    cross = np.abs(signal.csd(u, y, rate, nperseg=length)[1]) ** 2
-    coherence = cross / np.maximum(power * signal.welch(y, rate, nperseg=length)[1], 1e-300)
+    frequency, power = power_density(u, rate, length)
+    cross = np.abs(cross_density(u, y, rate, length)[1]) ** 2
+    coherence = cross / np.maximum(power * power_density(y, rate, length)[1], 1e-300)
     is_excited = (power > 1e-3 * np.median(power)) & (frequency > _LOWEST)
     is_lost, frequency = (coherence < _LOST)[is_excited], frequency[is_excited]
     count = np.arange(1, len(is_lost) + 1)

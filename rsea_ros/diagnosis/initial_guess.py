@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
 from rsea_ros.diagnosis.residual_peaks import (
     angle_errors,
@@ -30,6 +29,7 @@ from rsea_ros.identification.unknowns import WELL_KNOWN
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
+from rsea_ros.spectra import power_density
 
 _SEGMENT = 1024
 """Samples of a segment of the spectrum in which a mode is looked for: at 280 Hz lines of 0.27 Hz, a third of
@@ -150,10 +150,10 @@ class RecordView:
         if is_sharp and isinstance(self.case.drive, Drive) and self.case.drive.spans:
             residual = on_even_clock(t, residual, rate)
         if is_sharp:
-            bins, level = signal.periodogram(residual, rate, window="hann")
+            bins, level = power_density(residual, rate, len(residual))
             apart = max(3, int(_SHARP_APART / (bins[1] - bins[0])))
         else:
-            bins, level = signal.welch(residual, rate, nperseg=min(_SEGMENT, len(residual)))
+            bins, level = power_density(residual, rate, min(_SEGMENT, len(residual)))
             apart = _APART
         level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
         return [interpolate_peak(bins, level, k) for k in peaks(level, apart)]

@@ -6,7 +6,6 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from rsea_ros.diagnosis.result import Misfit, Spectrum
 from rsea_ros.identification.problem import Case
@@ -14,10 +13,13 @@ from rsea_ros.identification.residual_bins import edges_of, rms_in
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
+from rsea_ros.spectra import power_density
 
 _SHOWN_ABOVE = 1.25
 """Times the noise. It steers what is shown, no verdict."""
 _BINS = 8
+_SEGMENT = 2048
+"""Samples."""
 _MOST = 3
 """Misfits shown in each respect."""
 
@@ -36,7 +38,7 @@ def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) 
 def by_frequency(t: FloatArray, residual: FloatArray, noise: float, channel: str) -> list[Misfit]:
     """Return the residual's level in third-octave bands over that of white noise of the floor's size."""
     rate = 1.0 / float(np.median(np.diff(t)))
-    frequency, level = signal.welch(residual, rate, nperseg=min(2048, len(residual)))
+    frequency, level = power_density(residual, rate, min(_SEGMENT, len(residual)))
     white = noise**2 / (0.5 * rate)
     edges = np.geomspace(max(frequency[1], 0.5), 0.5 * rate, 3 * 8 + 1)
     bands = []
@@ -56,7 +58,7 @@ def spectrum(
     densities = []
     for outputs in (before, after):
         residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
-        frequency, level = signal.welch(residual, rate, nperseg=min(2048, len(residual)))
+        frequency, level = power_density(residual, rate, min(_SEGMENT, len(residual)))
         densities.append(np.sqrt(level))
     return Spectrum(
         channel, frequency[1:], densities[0][1:], densities[1][1:], case.noise[channel] / np.sqrt(0.5 * rate)
