@@ -113,12 +113,22 @@ class ReducedModels:
             guesses = initial_guesses(rival, RecordView(model.cases[0], rig, rest.outputs[0]))
         guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
         screened = screen(solution, rival, guesses, self.settings.forward)
-        return None if screened is None else self._fit(model, screened.problem, screened.theta)
+        if screened is None:
+            return None
+        setup = replace(self._setup(model), is_quick=True, iterations=self.settings.fits.full_iterations)
+        quick = fit_candidate(setup, screened.problem, screened.theta)
+        if self._is_far(quick) and not self._is_far(model):  # more steps would not bring it near
+            return quick
+        return self._fit(model, screened.problem, quick.solution.theta)
 
     def _fit(self, model: Candidate, problem: Problem, theta: FloatArray) -> Candidate:
         """Fit a problem as a model was fitted from which it was made."""
-        setup = FitSetup(model.cases, self.settings, self.pools.run, model.validation)
-        return fit_candidate(replace(setup, is_quick=self._is_far(model)), problem, theta)
+        return fit_candidate(self._setup(model), problem, theta)
+
+    def _setup(self, model: Candidate) -> FitSetup:
+        """Return how a model was fitted."""
+        is_quick = self._is_far(model)
+        return FitSetup(model.cases, self.settings, self.pools.run, model.validation, is_quick=is_quick)
 
     def _is_far(self, model: Candidate) -> bool:
         return is_far_from_floor(model, self.settings)
