@@ -120,3 +120,20 @@ def test_learning_over_a_while_is_learning_at_one_go():
     assert monitor.changes._scatter.scale == pytest.approx(scatter_of(at_once.evidence).scale, rel=1e-12)
     assert learned["spring.stiffness"][0] == pytest.approx(BENCH.plant.k_s, rel=2e-3)
     assert learned["coulomb_friction.torque"][0] == pytest.approx(BENCH.plant.coulomb, rel=0.02)
+
+
+def test_a_change_that_no_cause_explains_is_not_looked_at_closer_for_ever():
+    """Looks of each second and fits that find nothing would take more of a core than a joint may have."""
+    settings, rng = WatchSettings(learn=5, every=2.0, fitted=3), np.random.default_rng(1)
+    monitor, looks = Monitor(rig(), noise_of(rig()), settings), []
+    for bench, start, length in ((BENCH, 0.0, 40.0), (BENCH.with_values(resonance=0.4), 40.0, 40.0)):
+        run = record_command(bench, command(length, 2), rng)
+        t, kind, values = events_of(run)
+        for k in range(0, len(t), 210):
+            before = monitor.looks
+            monitor.take(t[k : k + 210] + start, kind[k : k + 210], values[k : k + 210])
+            looks += [monitor.now] * (monitor.looks - before)
+            if monitor.job is not None:
+                monitor.conclude(monitor.job())
+    assert [f.code for f in monitor.findings()] == ["RSEA_UNEXPLAINED"]
+    assert min(np.diff(looks[-4:])) > 1.5
