@@ -21,6 +21,7 @@ import dask
 import distributed
 from dask.utils import key_split
 from distributed.scheduler import KilledWorker
+from distributed.utils import silence_logging_cmgr
 
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
 from rsea_ros.fleet.fleet_error import FleetError
@@ -115,17 +116,20 @@ class OnDask:
 
 @contextmanager
 def on_scheduler(address: str) -> Iterator[OnDask]:
-    """Give an executor on a cluster that runs already. Raises FleetError where nobody answers."""
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a lost scheduler is one FleetError
-    try:
-        client = distributed.Client(  # type: ignore[no-untyped-call]
-            address, timeout=CONNECT, set_as_default=False
-        )
-    except (OSError, ValueError, TimeoutError) as error:
-        expected = "expected the address of a Dask scheduler that runs"
-        raise FleetError(f"--scheduler {address}: {error}, {expected}") from None
-    with client, frequent_collection():
-        yield OnDask(client)
+    """Give an executor on a cluster that runs already. Raises FleetError where nobody answers.
+
+    Dask logs nothing meanwhile: a lost scheduler is one FleetError, not a traceback on the terminal.
+    """
+    with silence_logging_cmgr(logging.CRITICAL):
+        try:
+            client = distributed.Client(  # type: ignore[no-untyped-call]
+                address, timeout=CONNECT, set_as_default=False
+            )
+        except (OSError, ValueError, TimeoutError) as error:
+            expected = "expected the address of a Dask scheduler that runs"
+            raise FleetError(f"--scheduler {address}: {error}, {expected}") from None
+        with client, frequent_collection():
+            yield OnDask(client)
 
 
 @contextmanager
