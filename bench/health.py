@@ -3,8 +3,9 @@
 Run: python bench/health.py [SECTION …] [--hours 1] [--seeds 0 1 2] [--seconds 60]
 white   false alarms of the sums on scores drawn at the edge of the doubt: stated, measured
 alarms  false alarms over hours of clean work of test/independent, at several stated rates on the same looks
-faults  each fault switched on after two minutes of work: named, delay, size
-cost    CPU of the monitor alone, and of the node with plant and excite, as a share of one core
+faults  each fault switched on after five minutes of work: named, delay, size
+cost    CPU of the monitor alone, as a share of one core, while it learns and afterwards
+node    the same of the node with its subscriptions, beside plant and excite
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -32,9 +33,12 @@ from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 
 EVERY, RATES = 3.0, (100.0, 10.0, 1.0, 1e-3)
-CLEAN, WORN, START = 120.0, 60.0, 120.0
-LEARNED = 90.0
-"""s after the start when learning is over, on a loaded machine too; it costs a second or more, once."""
+CLEAN, WORN = 300.0, 60.0
+"""s of work before a fault, with learning (it waits for motion), and after it."""
+LEARNED = 220.0
+"""s after the start of a joint in motion when learning is over."""
+WINDOW = 10.0
+"""s over which a share of a core is taken."""
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -106,22 +110,24 @@ def _again(rows: list[tuple[Cusum, tuple[np.ndarray, ...]]], rate: float) -> int
 def faults(args: argparse.Namespace) -> Iterator[str]:
     """Switch a fault on after clean work; the last name within a minute counts, and the delay to it."""
     rows: dict[str, list[tuple[bool, float, float, str]]] = {name: [] for name in FAULTS}
+    fits: list[float] = []
     for seed in args.seeds:
         for name, fault in FAULTS.items():
             rng = np.random.default_rng([seed, 2])
             bench, rig = draw_bench(rng)
             monitor = monitor_of(rig)
             early = list(watch(monitor, pieces(bench, CLEAN, rng)))
-            raised = list(watch(monitor, pieces(faulty(bench, fault), WORN, rng, START)))
+            raised = list(watch(monitor, pieces(faulty(bench, fault), WORN, rng, CLEAN), fits))
             names = [f.code for f in monitor.changes.findings.values()] if monitor.changes else []
-            times = [at - START for at, f in raised if f.code == fault.code]
+            times = [at - CLEAN for at, f in raised if f.code == fault.code]
             sizes = [f.size for _, f in raised if f.code == fault.code]
             right = set(names) == {fault.code}
-            told = ", ".join(f"{f.code} {f.name} {f.size:.4g} after {at - START:.1f} s" for at, f in raised)
+            told = ", ".join(f"{f.code} {f.name} {f.size:.4g} after {at - CLEAN:.1f} s" for at, f in raised)
             yield f"seed {seed} {name}: {'right' if right else 'WRONG'}; {told or 'nothing'}"
             if early:
                 yield f"  false before: {', '.join(f.code for _, f in early)}"
             rows[name].append((right, min(times, default=np.inf), sizes[-1] if sizes else np.nan, told))
+    yield f"fits of causes: {len(fits)}, {np.median(fits):.1f} s of a core, the longest {max(fits):.1f} s"
     for name, each in rows.items():
         delays = [delay for _, delay, _, _ in each]
         line = f"{name:22} right {sum(r for r, *_ in each)} of {len(each)}"
@@ -129,45 +135,62 @@ def faults(args: argparse.Namespace) -> Iterator[str]:
 
 
 def cost(args: argparse.Namespace) -> Iterator[str]:
-    """Measure CPU time over the time of the joint, after learning."""
+    """Measure CPU time of the monitor alone over the time of the joint, in windows."""
     for rate in (280.0, 1000.0):
-        rig = load_rig("paper_high_impedance")
-        t = np.arange(round(150.0 * rate)) / rate
-        rng = np.random.default_rng(3)
-        record = synthesize(rig, Channel(t, work(150.0, rng, rate)), seed=1)
-        monitor, before = monitor_of(rig), 0.0
-        events = events_of(record)
-        step = round(0.75 * rate)
+        rig, rng = load_rig("paper_high_impedance"), np.random.default_rng(3)
+        t = np.arange(round(LEARNED * 1.5 * rate)) / rate
+        events = events_of(synthesize(rig, Channel(t, work(len(t) / rate, rng, rate)), seed=1))
+        monitor, step = monitor_of(rig), round(0.75 * rate)
+        spent: dict[bool, list[float]] = {True: [], False: []}
+        longest, window, begun = 0.0, time.process_time(), 0.0
         for k in range(0, len(events[0]), step):
-            if monitor.now < LEARNED:
-                before = time.process_time()
-            learning, begun = monitor.learning, time.process_time()
+            before = time.process_time()
             monitor.take(*(part[k : k + step] for part in events))
-            if learning and not monitor.learning:
-                spent = time.process_time() - begun
-                yield f"end of learning, once, {rate:g} Hz: {spent:.2f} s of a core"
-        share = (time.process_time() - before) / 60.0
-        yield f"monitor alone, {rate:g} Hz: {100.0 * share:.2f} % of a core"
-        node = 100.0 * _node_share(rate, args.seconds)
-        yield f"node, {rate:g} Hz: {node:.2f} % of a core (asked at 280 Hz: < 5)"
+            now = time.process_time()
+            longest = max(longest, now - before)
+            if monitor.now >= begun + WINDOW:
+                spent[monitor.learning].append((now - window) / (monitor.now - begun))
+                window, begun = now, monitor.now
+        for learning, shares in spent.items():
+            yield f"monitor alone, {rate:g} Hz, {_phase(learning)}: {_shares(shares)}"
+        yield f"longest single call, {rate:g} Hz: {1e3 * longest:.0f} ms"
 
 
-def _node_share(rate: float, seconds: float) -> float:
-    """Return the CPU share of the node's process beside plant and excite, after learning."""
+def node(args: argparse.Namespace) -> Iterator[str]:
+    """Measure CPU time of the node with its subscriptions, beside plant and excite."""
+    used = _node_cpu(args.rate, args.seconds)
+    yield f"node, {args.rate:g} Hz, until {WINDOW:g} s after its start: {used[1]:.1f} s of a core"
+    shares = np.diff(used[1:]) / WINDOW
+    learned = round(LEARNED / WINDOW) - 1
+    for learning, part in ((True, shares[:learned]), (False, shares[learned:])):
+        yield f"node, {args.rate:g} Hz, {_phase(learning)}: {_shares(part)} (asked at 280 Hz: < 5)"
+
+
+def _phase(learning: bool) -> str:
+    return "while it learns" if learning else "afterwards"
+
+
+def _shares(shares: Sequence[float] | np.ndarray) -> str:
+    mean, worst = 100.0 * np.mean(shares), 100.0 * np.max(shares)
+    return f"{mean:.2f} % of a core, at most {worst:.2f} % over {WINDOW:g} s"
+
+
+def _node_cpu(rate: float, seconds: float) -> list[float]:
+    """Return the CPU time of the node's process after each window, through learning and seconds more, s."""
     def arguments(**values: object) -> list[str]:
         return ["--ros-args", *(w for n, v in values.items() for w in ("-p", f"{n}:={v}"))]
 
-    length = seconds + LEARNED + 5.0
-    work = {"kind": "multisine", "low": 0.2, "high": 6.0, "amplitude": 6.0, "duration": length}
+    work = {"kind": "multisine", "low": 0.2, "high": 6.0, "amplitude": 6.0, "duration": seconds + LEARNED + 5}
     excite = arguments(**work, subscribers=2, rate=rate)
     options = {"stdout": -3, "stderr": -3}  # subprocess.DEVNULL
     nodes = [start("plant", arguments(rate=rate), **options), start("excite", excite, **options)]
     health = start("health", arguments(out="/nonexistent", bags=0), **options)
+    begun, used = time.monotonic(), [0.0]
     try:
-        time.sleep(LEARNED)
-        begin, at = _cpu(health.pid), time.monotonic()
-        time.sleep(seconds)
-        return (_cpu(health.pid) - begin) / (time.monotonic() - at)
+        while len(used) * WINDOW <= LEARNED + seconds:
+            time.sleep(max(0.0, begun + len(used) * WINDOW - time.monotonic()))
+            used.append(_cpu(health.pid))
+        return used
     finally:
         health.send_signal(signal.SIGINT)
         stop([*nodes, health])
@@ -180,7 +203,7 @@ def _cpu(pid: int) -> float:
 
 
 SECTIONS: dict[str, Callable[[argparse.Namespace], Iterable[str]]] = {
-    "white": white, "alarms": alarms, "faults": faults, "cost": cost,
+    "white": white, "alarms": alarms, "faults": faults, "cost": cost, "node": node,
 }  # fmt: skip
 
 
@@ -189,7 +212,8 @@ def main() -> None:
     parser = parser_of(__doc__)
     parser.add_argument("--hours", type=float, default=0.5, help="of clean work for each seed")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
-    parser.add_argument("--seconds", type=float, default=60.0, help="of the node's CPU")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of the node's CPU after learning")
+    parser.add_argument("--rate", type=float, default=280.0, help="of the node's measurements, Hz")
     args, sections = choose(parser, SECTIONS)
     with threadpool_limits(1):
         for name, section in sections:

@@ -13,6 +13,7 @@ from rsea_ros.cli._output import FOUND, add_fail_on
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
 from rsea_ros.fleet.executor import Executor, serial
+from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.joints import Diagnose, load_joints
 from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.time_limit import TIME_LIMIT
@@ -55,7 +56,11 @@ def add_work(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Process new recordings, and print the outcomes."""
     check_options(args)
-    summary = write_rows(args, args.out, bags_in(args))
+    held = bags_in(args)
+    if not held:
+        expected = "expected .mcap or .db3 files, or tables of the map"
+        raise FleetError(f"{', '.join(args.sources)}: no recording, {expected}")
+    summary = write_rows(args, args.out, held)
     print(summary.sentence())
     for joint, bag, why in summary.quarantined[:MOST_SHOWN]:
         print(f"quarantined: {joint}: {bag}: {why}")

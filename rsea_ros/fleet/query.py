@@ -10,6 +10,7 @@ import duckdb
 
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.store import Store
+from rsea_ros.fleet.store_keys import EXPECTED_FILES
 
 _ANALYSES = """
 CREATE VIEW analyses AS SELECT * FROM read_parquet('{pattern}', hive_partitioning = true,
@@ -46,24 +47,25 @@ _EMPTY = "No files found that match"
 def connect(store: Store) -> Iterator[Any]:
     """Give a connection to DuckDB with the views of a store, that can read the store and write nowhere.
 
-    Raises FleetError for a store without rows.
+    Raises FleetError for a store without rows, or with a file that is not one of rows.
     """
     rows = str(store.rows.resolve())
     pattern = f"{_quote(rows)}/joint=*/month=*/*.parquet"
-    with duckdb.connect(":memory:") as database:
-        try:
+    try:
+        with duckdb.connect(":memory:") as database:
             database.execute(_ANALYSES.format(pattern=pattern))
-        except duckdb.IOException as error:
-            if _EMPTY in str(error):
-                raise FleetError(f"{store.path}: no row, expected one: rsea fleet run makes it") from None
-            raise
-        for view in _VIEWS:
-            database.execute(view)
-        database.execute("SET TimeZone = 'UTC'")
-        database.execute(f"SET allowed_directories = ['{_quote(rows)}']")
-        database.execute("SET enable_external_access = false")
-        database.execute("SET lock_configuration = true")
-        yield database
+            for view in _VIEWS:
+                database.execute(view)
+            database.execute("SET TimeZone = 'UTC'")
+            database.execute(f"SET allowed_directories = ['{_quote(rows)}']")
+            database.execute("SET enable_external_access = false")
+            database.execute("SET lock_configuration = true")
+            yield database
+    except duckdb.Error as error:
+        if _EMPTY in str(error):
+            raise FleetError(f"{store.path}: no row, expected one: rsea fleet run makes it") from None
+        text = " ".join(str(error).split("\nLINE ")[0].split())
+        raise FleetError(f"{store.path}: {text}, {EXPECTED_FILES}") from None
 
 
 def answer(store: Store, query: str) -> tuple[list[str], list[tuple[Any, ...]]]:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 from pyarrow import parquet
 
+from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.row import key_of
+from rsea_ros.wording import brief
 
+EXPECTED_FILES = "expected whole Parquet files: remove the damaged one, and the next run makes its rows anew"
+_LONGEST = 120
+"""Characters of an error of Parquet."""
 _COLUMNS = ["recording", "model_version", "settings", "bag", "bytes", "stamp"]
 
 
@@ -26,11 +33,24 @@ def known_rows(rows: Path) -> tuple[set[str], dict[tuple[str, int, str], str]]:
 
 
 def read(file: Path, columns: list[str] | None = None) -> pa.Table:
-    """Return some columns of one file, all by default, without those in its path."""
-    with parquet.ParquetFile(file) as opened:
+    """Return some columns of one file, all by default, without those in its path.
+
+    Raises FleetError for a damaged file.
+    """
+    with _named(file), parquet.ParquetFile(file) as opened:
         return opened.read(columns=columns)
 
 
 def metadata(file: Path) -> dict[Any, Any]:
-    """Return the metadata of a file."""
-    return dict(parquet.read_schema(file).metadata or {})
+    """Return the metadata of a file. Raises FleetError for a damaged file."""
+    with _named(file):
+        return dict(parquet.read_schema(file).metadata or {})
+
+
+@contextmanager
+def _named(file: Path) -> Iterator[None]:
+    """Let an error of a damaged file name it."""
+    try:
+        yield
+    except pa.ArrowInvalid as error:
+        raise FleetError(f"{file}: {brief(str(error), _LONGEST)}, {EXPECTED_FILES}") from None

@@ -93,8 +93,8 @@ class Changes:
 
     @property
     def suspects(self) -> bool:
-        """Whether more should be looked at."""
-        return self._cusum.suspects
+        """Whether more should be looked at now: not for long where no cause is sure."""
+        return self._cusum.suspects and self._patience <= PATIENT
 
     def take(self, look: Look, evidence: LookEvidence) -> None:
         """Process a look with motion."""

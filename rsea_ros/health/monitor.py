@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,24 +11,24 @@ from rsea_ros.errors import RigError
 from rsea_ros.health.bank import Bank
 from rsea_ros.health.changes import CandidateCauses, Changes
 from rsea_ros.health.health_finding import HealthFinding, sensor_findings
-from rsea_ros.health.hypotheses import FACTOR, GAINS, ChangeHypothesis, hypotheses_of, nuisances_of
-from rsea_ros.health.look import FEWEST, Cutter, Look
+from rsea_ros.health.hypotheses import hypotheses_of
+from rsea_ros.health.learning import USUAL, Learned, Learning
+from rsea_ros.health.look import Cutter, Look
 from rsea_ros.health.recursive_estimates import ChangeEstimate
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.health.sensors import Sensors
 from rsea_ros.health.settings import WatchSettings
-from rsea_ros.health.tuning import tune
-from rsea_ros.model.observer.log import STATE
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, IntArray
 
 JUMP = 1.0
 """s. Stamps that jump so far, either way, are of another run or of a clock that was set: looks begin anew."""
-USUAL = 1e-3
-"""s between measurements with which a look has too few."""
 STILL = 30.0
 """Standard deviations of the position within which a look has too little motion."""
+
+_NOTHING = Look(np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 2)), np.zeros(1, dtype=bool))
+"""A look without measurements that count: with it the filter is compiled before the joint is watched."""
 
 
 class Monitor:
@@ -44,7 +43,7 @@ class Monitor:
         if rig.loop is not None:
             raise RigError(f"rig {rig.name}: a position loop commands it, expected torques as commands")
         self._rig, self._noise, self._settings = rig, noise, settings or WatchSettings()
-        Bank(rig, noise, hypotheses_of(rig, USUAL), self._settings.hold)
+        Bank(rig, noise, hypotheses_of(rig, USUAL), self._settings.hold).evidence(_NOTHING)
         self._least = STILL * noise.position if math.isfinite(noise.position) else 0.0
         self.sensors = Sensors(rig)
         self.looks = self.still = self.jumps = self.late = 0
@@ -53,7 +52,7 @@ class Monitor:
     def begin(self) -> None:
         """Restart the learning of the joint."""
         self._cutter = Cutter(self._settings.every)
-        self._first: list[Look] = []
+        self._learning: Learning | None = Learning(self._rig, self._noise, self._settings)
         self.changes: Changes | None = None
         self.now = -math.inf
 
@@ -71,14 +70,16 @@ class Monitor:
             return
         self.now = float(t[-1])
         self.sensors.take(t, kind, values)
-        closer = self.changes is None or self.changes.suspects
+        closer = self._learning.collecting if self._learning else bool(self.changes and self.changes.suspects)
         for look in self._cutter.take(t, kind, values, closer=closer):
             self._weigh(look)
+        if self._learning is not None:
+            self._start(self._learning.advance(self.now))
 
     @property
     def learning(self) -> bool:
         """Whether it does not know yet how the innovations scatter when all is right."""
-        return self.changes is None
+        return self._learning is not None
 
     @property
     def job(self) -> Callable[[], CandidateCauses] | None:
@@ -107,31 +108,17 @@ class Monitor:
                 self.changes.estimates.hold()
         elif self.changes is not None:
             self.changes.take(look, self.changes.bank.evidence(look))
-        else:
-            self._learn(look)
+        elif self._learning is not None:
+            self._learning.take(look)
 
-    def _learn(self, look: Look) -> None:
-        """Collect the first looks; then begin with their values and scatter."""
-        self._first.append(look)
-        if len(self._first) < self._settings.learn:
+    def _start(self, learned: Learned | None) -> None:
+        """Watch for changes from what was learned, if learning is over, and from the first looks on."""
+        if learned is None:
             return
-        t = look.t[look.kind == STATE]
-        period = float(np.median(np.diff(t))) if len(t) > FEWEST else USUAL
-        models = hypotheses_of(self._rig, period)
-        single = (*(h for h in models if h.name not in (FACTOR, *GAINS)), *nuisances_of(self._rig))
-        rig, now = tune(self._rig, self._noise, single, self._first, self._settings.hold)
-        known = {h.name: h for h in now}
-        hypotheses = tuple(
-            replace(h, value=known[h.name].value, common=known[h.name].common) if h.name in known else h
-            for h in models
-        )
-        self._start(rig, hypotheses, {h.name: h.value for h in models})
-
-    def _start(self, rig: Rig, hypotheses: tuple[ChangeHypothesis, ...], models: dict[str, float]) -> None:
-        """Watch for changes from a rig, and from the first looks on."""
-        bank = Bank(rig, self._noise, hypotheses, self._settings.hold)
-        first, self._first = [(look, bank.evidence(look)) for look in self._first], []
-        scatter = scatter_of([evidence for _, evidence in first])
-        self.changes = Changes(rig, self._noise, hypotheses, models, scatter, self._settings)
-        for each in first:
-            self.changes.take(*each)
+        self._learning = None
+        self.changes = Changes(
+            learned.rig, self._noise, learned.hypotheses, learned.models, scatter_of(learned.evidence),
+            self._settings,
+        )  # fmt: skip
+        for look, evidence in zip(learned.looks, learned.evidence, strict=True):
+            self.changes.take(look, evidence)

@@ -7,10 +7,11 @@ for all parameters together. A deviation beyond the doubt stays a change and ala
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from rsea_ros.health.bank import Bank, LookEvidence
 from rsea_ros.health.hypotheses import ChangeHypothesis
@@ -31,12 +32,12 @@ ROUNDS = 2
 
 def tune(
     rig: Rig, noise: Noise, hypotheses: Sequence[ChangeHypothesis], looks: Sequence[Look], hold: float
-) -> tuple[Rig, tuple[ChangeHypothesis, ...]]:
-    """Return rig and hypotheses with the values that the looks have, within the doubts."""
+) -> Generator[None, None, tuple[Rig, tuple[ChangeHypothesis, ...]]]:
+    """Return rig and hypotheses with the values that the looks have, within the doubts; yield as examine."""
     total, now, first = np.zeros(len(hypotheses)), tuple(hypotheses), rig
     for _ in range(ROUNDS):
-        bank = Bank(rig, noise, now, hold)
-        total, sigma = _change([bank.evidence(look) for look in looks], hypotheses, total)
+        evidence = yield from examine(Bank(rig, noise, now, hold), looks)
+        total, sigma = _change(evidence, hypotheses, total)
         changes = list(zip(hypotheses, total.tolist(), strict=True))
         now = tuple(
             replace(h, value=min(max(h.value + by, h.low), h.high), common=s)
@@ -48,12 +49,19 @@ def tune(
     return rig, now
 
 
+def examine(bank: Bank, looks: Sequence[Look]) -> Generator[None, None, list[LookEvidence]]:
+    """Return the evidence of the looks; yield after each."""
+    evidence = []
+    for look in looks:
+        evidence.append(bank.evidence(look))
+        yield
+    return evidence
+
+
 def _change(
     evidence: Sequence[LookEvidence], hypotheses: Sequence[ChangeHypothesis], before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the change of each parameter in all and its sigma, (p,). before: as the looks were judged."""
-    from scipy.optimize import lsq_linear  # takes 0.2 s that only this needs
-
     scatter = scatter_of(evidence)
     both = [e.scale_sums(scatter.scale) for e in evidence]
     score, information = np.sum([c for c, _ in both], axis=0), np.sum([a for _, a in both], axis=0)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import io
+import logging
 import os
 from types import SimpleNamespace
 
@@ -10,7 +13,7 @@ from dask.utils import key_split
 from distributed.scheduler import KilledWorker
 
 from rsea_ros.fleet import cluster
-from rsea_ros.fleet.cluster import PER_WORKER, OnDask, on_this_machine
+from rsea_ros.fleet.cluster import PER_WORKER, OnDask, frequent_collection, on_scheduler, on_this_machine
 from rsea_ros.fleet.executor import Job, WorkerLost
 from rsea_ros.fleet.fleet_error import FleetError
 
@@ -127,3 +130,26 @@ def test_a_worker_allocates_memory_as_a_serial_run_does(monkeypatch):
         workers.submit(Job(os.getenv, "MALLOC_TRIM_THRESHOLD_"))
         done = workers.next(10.0)
     assert done is not None and done.error is None and done.value is None
+
+
+def test_garbage_does_not_wait_until_it_is_a_quarter_of_all_modules():
+    before = gc.get_freeze_count()
+    with frequent_collection():
+        assert gc.get_freeze_count() > 50_000
+    assert gc.get_freeze_count() <= before
+
+
+def test_a_lost_scheduler_leaves_no_traceback_of_dask_on_the_terminal(monkeypatch):
+    """Its client logs 40 lines while it tries to connect again; the run says it in one line."""
+    written = io.StringIO()
+    terminal = logging.StreamHandler(written)
+    monkeypatch.setattr(logging.getLogger("distributed"), "handlers", [terminal])
+
+    def refused(*_, **__):
+        logging.getLogger("distributed.client").error("Traceback")
+        raise OSError("refused")
+
+    monkeypatch.setattr(cluster.distributed, "Client", refused)
+    with pytest.raises(FleetError, match="refused"), on_scheduler("tcp://127.0.0.1:1"):
+        pass
+    assert written.getvalue() == ""

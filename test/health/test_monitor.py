@@ -5,17 +5,20 @@ import pytest
 from independent.bench import Bench, record_command
 
 from rsea_ros.errors import RigError
-from rsea_ros.health.look import events_of
+from rsea_ros.health.bank import Bank
+from rsea_ros.health.learning import learn
+from rsea_ros.health.look import Cutter, events_of
 from rsea_ros.health.monitor import Monitor
+from rsea_ros.health.scatter import scatter_of
 from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record
 
-RATE, CLEAN, AFTER = 280.0, 8.0, 8.0
+RATE, CLEAN, AFTER = 280.0, 14.0, 8.0
 BENCH = Bench().with_values(coulomb=3.0, b_m=8.0)
-SETTINGS = WatchSettings(learn=6, every=1.0, fitted=3)
+SETTINGS = WatchSettings(learn=6, every=0.25, fitted=3)
 
 
 def rig():
@@ -76,3 +79,61 @@ def test_a_change_is_named_and_sized(fault, code, size, tolerance):
     assert finding.size == pytest.approx(size, abs=tolerance)
     assert finding.ci95[0] < finding.size < finding.ci95[1]
     assert CLEAN - 1.0 < finding.since < CLEAN + 3.0
+
+
+def watched_from_start(seconds, settings, every=70):
+    """A monitor that learned from a clean record, and how many looks it examined after which time (s)."""
+    monitor, examined = Monitor(rig(), noise_of(rig()), settings), []
+    events = events_of(record_command(BENCH, command(seconds, 2), np.random.default_rng(1)))
+    evidence = Bank.evidence
+
+    def noted(bank, look):
+        examined.append(monitor.now)
+        return evidence(bank, look)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Bank, "evidence", noted)
+        for k in range(0, len(events[0]), every):
+            if monitor.learning:
+                monitor.take(*(part[k : k + every] for part in events))
+    return monitor, examined
+
+
+@pytest.mark.parametrize("pace", [0.25, 1.0])
+def test_learning_examines_no_look_before_the_last_one_is_a_while_ago(pace):
+    settings = WatchSettings(learn=6, every=pace)
+    monitor, examined = watched_from_start(30.0, settings)
+    assert not monitor.learning and len(examined) == 3 * 6 and min(np.diff(examined)) >= pace
+
+
+def test_learning_over_a_while_is_learning_at_one_go():
+    """No look counts but the first ones, and the values are those of the bench."""
+    t, kind, values = events_of(record_command(BENCH, command(CLEAN, 2), np.random.default_rng(1)))
+    first = [look for look in Cutter(1.0).take(t, kind, values) if look.travel() > 0.01][:6]
+    steps = learn(rig(), noise_of(rig()), first, SETTINGS.hold)
+    with pytest.raises(StopIteration) as end:
+        while True:
+            next(steps)
+    at_once, (monitor, _) = end.value.value, watched_from_start(CLEAN, SETTINGS)
+    learned = {h.name: (h.value, h.common) for h in monitor.changes._base.hypotheses}
+    assert learned == {h.name: (h.value, h.common) for h in at_once.hypotheses}
+    assert monitor.changes._scatter.scale == pytest.approx(scatter_of(at_once.evidence).scale, rel=1e-12)
+    assert learned["spring.stiffness"][0] == pytest.approx(BENCH.plant.k_s, rel=2e-3)
+    assert learned["coulomb_friction.torque"][0] == pytest.approx(BENCH.plant.coulomb, rel=0.02)
+
+
+def test_a_change_that_no_cause_explains_is_not_looked_at_closer_for_ever():
+    """Looks of each second and fits that find nothing would take more of a core than a joint may have."""
+    settings, rng = WatchSettings(learn=5, every=2.0, fitted=3), np.random.default_rng(1)
+    monitor, looks = Monitor(rig(), noise_of(rig()), settings), []
+    for bench, start, length in ((BENCH, 0.0, 40.0), (BENCH.with_values(resonance=0.4), 40.0, 40.0)):
+        run = record_command(bench, command(length, 2), rng)
+        t, kind, values = events_of(run)
+        for k in range(0, len(t), 210):
+            before = monitor.looks
+            monitor.take(t[k : k + 210] + start, kind[k : k + 210], values[k : k + 210])
+            looks += [monitor.now] * (monitor.looks - before)
+            if monitor.job is not None:
+                monitor.conclude(monitor.job())
+    assert [f.code for f in monitor.findings()] == ["RSEA_UNEXPLAINED"]
+    assert min(np.diff(looks[-4:])) > 1.5

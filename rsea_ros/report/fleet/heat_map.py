@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.report.fleet.dates_below import months
 from rsea_ros.report.fleet.links import Links
-from rsea_ros.report.fleet.words import name, percent, short_day
+from rsea_ros.report.fleet.words import name, percent, short_day, undetermined_state
 from rsea_ros.report.page.html import section
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.cause_series import Naming
@@ -33,14 +33,15 @@ def heat_map(parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: S
     change, undetermined = np.array([c for c, _ in shown]), np.array([u for _, u in shown])
     full = _full(np.abs(change[np.isfinite(change)]))
     picture = _picture(
-        change / full, undetermined, joints, steps, links, lambda i, j: percent(float(change[i, j]))
-    )
+        change / full, undetermined, joints, steps, links,
+        lambda i, j: percent(float(change[i, j])) if np.isfinite(change[i, j]) else _why_blank(rows[i]),
+    )  # fmt: skip
     return section(
         _title(parameter, rows),
         picture,
         _key(percent(-full), "as on the first day", percent(full), (-1.0, 1.0)),
         caption=f"Mean of each {steps.name} against the joint's first level, at its mean temperature. Grey: "
-        "recordings that do not determine it. Empty: no recording.",
+        "recordings that do not determine it, or of too few days for a level. Empty: no recording.",
     )
 
 
@@ -97,6 +98,13 @@ def _row(trend: Trend | None, steps: Steps) -> tuple[FloatArray, BoolArray]:
     return change, (bins.recorded > 0) & ~np.isfinite(change)
 
 
+def _why_blank(trend: Trend | None) -> str:
+    """Return why a week with recordings has no level to compare."""
+    if trend is None or trend.state != "undetermined":
+        return "not determined"
+    return undetermined_state(trend)
+
+
 def _share(naming: Naming, steps: Steps) -> FloatArray:
     asked, named = steps.count(naming.time_s), steps.count(naming.time_s[naming.named])
     share: FloatArray = np.where(asked > 0, named / np.maximum(asked, 1), np.nan)
@@ -113,9 +121,8 @@ def _picture(
     for i, joint in enumerate(joints):
         for j in np.flatnonzero(np.isfinite(depth[i]) | undetermined[i]):
             blank = bool(undetermined[i, j])
-            change = "cannot be determined" if blank else text(i, int(j))
             shade = "n" if blank else _class(float(depth[i, j]))
-            cells.append(_cell(i, int(j), shade, f"{joint}, {weeks[j]}: {change}"))
+            cells.append(_cell(i, int(j), shade, f"{joint}, {weeks[j]}: {text(i, int(j))}"))
     height = _ROW * len(joints)
     labels = "".join(f"<li>{links.joint(j)}</li>" for j in joints)
     return (
@@ -152,7 +159,8 @@ def _title(parameter: str, rows: Sequence[Trend | None]) -> str:
     moved = [t for t in determined if t.state != "steady"]
     plain = name(parameter)
     if not determined:
-        return f"{plain} cannot be determined in any joint"
+        reasons = sorted({undetermined_state(trend) for trend in rows if trend is not None})
+        return f"{plain}: {' or '.join(reasons)} in every joint"
     if not moved:
         return f"{plain} is steady in all {len(determined)} joints that tell it"
     most = max(moved, key=lambda t: abs(t.relative))

@@ -35,6 +35,12 @@ _UNDATED = (
     "its form as “date” in joints.yaml (for example %Y-%m-%d). The table shows their values without an order."
 )
 
+_NO_PAGE = (
+    "A recording links diagnosis.json where its run kept no page. To see one as a page: rsea diagnose BAG "
+    "--rig RIG --out page. Paths: rsea fleet sql \"SELECT recording, bag FROM recordings\" --store STORE. "
+    "rsea fleet run --pages keeps the pages of new recordings."
+)
+
 
 def joint_page(
     joint: str, fleet: FleetTrends, alarms: Sequence[Alarm], history: Table, recordings: Table, steps: Steps,
@@ -147,7 +153,9 @@ def _recordings(recordings: Table, rows: np.ndarray, links: Links) -> str:
         )
         for i in latest
     ]
-    return table_of_cells(head, body)
+    artefacts = [str(recordings["artefacts"][i]) for i in latest]
+    hint = paragraph(_NO_PAGE) if any(map(links.lacks_page, artefacts)) else ""
+    return hint + table_of_cells(head, body)
 
 
 def _names(items: object, key: str) -> str:

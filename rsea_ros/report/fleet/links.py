@@ -30,9 +30,15 @@ class Links:
         """Return a link to the results of a recording; its plain name where it left none."""
         if not artefacts:
             return escape(name)
+        return _link(Path(os.path.relpath(self._best(artefacts), self.out)).as_posix(), name)
+
+    def lacks_page(self, artefacts: str) -> bool:
+        """Return whether a recording was diagnosed without a page."""
+        return bool(artefacts) and self._best(artefacts).name == DIAGNOSIS_JSON
+
+    def _best(self, artefacts: str) -> Path:
         folder = self.store / artefacts
-        best = next((folder / f for f in _RESULTS if (folder / f).exists()), folder)
-        return _link(Path(os.path.relpath(best, self.out)).as_posix(), name)
+        return next((folder / f for f in _RESULTS if (folder / f).exists()), folder)
 
 
 def _link(target: str, text: str) -> str:

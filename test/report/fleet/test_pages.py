@@ -21,6 +21,7 @@ from rsea_ros.trends import alarms
 
 JOINTS = ("hip", "knee <left>", "ankle/1", "elbow")
 WORN = "knee <left>"
+HOW_TO_PAGE = "rsea diagnose BAG --rig RIG --out page"
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +75,20 @@ def test_a_cause_in_the_latest_recording_is_reported_before_a_trend_exists(tmp_p
     assert "<h1>right: backlash in its latest recording" in (index.parent / "joint-right.html").read_text()
 
 
+def test_a_joint_of_a_few_days_says_so_and_not_that_it_cannot_be_determined(tmp_path):
+    made = history(np.random.default_rng(1), joints=JOINTS, days=100)
+    kept = (made["joint"] != "hip") | (made["time_s"] < START + 3 * 86_400.0)
+    few = {name: column[kept] for name, column in made.items()}
+    index = write_fleet_report(few, recordings(JOINTS, 100), tmp_path / "out")
+    cells = re.findall(r"<title>hip, [^<:]*: ([^<]*)</title>", index.read_text(encoding="utf-8"))
+    assert cells and {text for text in cells if "recordings" not in text} == {"too few days"}
+    assert HOW_TO_PAGE not in (index.parent / "joint-hip.html").read_text(encoding="utf-8")
+
+
+def test_a_recording_without_a_page_says_how_to_make_one(pages):
+    assert HOW_TO_PAGE in pages["joint-hip.html"]
+
+
 def test_links_lead_to_the_joints_and_to_the_diagnosis_that_shows_it(pages, tables):
     for target in re.findall(r'href="(joint-[^"]*)"', pages["index.html"]):
         assert target in pages
@@ -90,7 +105,7 @@ def test_a_map_has_a_cell_and_a_word_for_each_recorded_week(pages):
     cells = re.findall(r"<title>(hip|elbow), ([^:]*): ([^<]*)</title>", pages["index.html"])
     stiffness = [c for c in cells if "recordings" not in c[2]]
     assert len(stiffness) == 2 * weeks
-    assert {c[2] for c in stiffness if c[0] == "elbow"} == {"cannot be determined"}
+    assert {c[2] for c in stiffness if c[0] == "elbow"} == {"not enough excitation"}
 
 
 def test_pages_stay_small_and_ask_for_nothing(pages):
