@@ -56,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(required=True, metavar="make|fit|score")
     make = verbs.add_parser("make", help="diagnose records and keep the evidence; goes on where it stopped")
     make.add_argument("--records", type=int, default=600, help="how many (default %(default)s)")
+    make.add_argument("--seed", type=int, default=12, help="of the records; a cache for each (%(default)s)")
     make.add_argument("--searches", type=Path, help="keep the searches here, to weigh them again later")
     make.add_argument(
         "--pool", type=int, default=0, help="try at most N effects a record, 0: all (default %(default)s)"
@@ -72,7 +73,7 @@ def _parser() -> argparse.ArgumentParser:
 def _make(args: argparse.Namespace) -> None:
     """Append the evidence of every record that the cache does not hold yet."""
     done = {entry["name"] for entry in read_log(args.cache)}
-    for plan in plans(args.records):
+    for plan in plans(args.records, args.seed):
         if plan.name not in done:
             entry = _entry(plan, args.searches, args.pool)
             append_to_log(args.cache, entry)

@@ -74,7 +74,7 @@ class Plan:
         return tuple(n for n in self.hidden if n not in self.without)
 
 
-def plans(count: int, seed: int = 12) -> list[Plan]:
+def plans(count: int, seed: int) -> list[Plan]:
     """Return the plans of so many records; a larger count begins with the same ones."""
     return [_plan(k, np.random.default_rng([seed, k])) for k in range(count)]
 
