@@ -26,16 +26,17 @@ class Fixed:
         chances = (1.0,) * len(hypotheses)
         if hypotheses[0].probability >= Rules.confirmed:  # what a run within the limits could still show
             chances = propose(hypotheses, asked, noise, run, tell).chances
-        return _Played(ramp_ends(piece, min(round(0.25 * RATE), len(piece) // 4)), chances)
+        run = ramp_ends(piece, min(round(0.25 * RATE), len(piece) // 4))
+        return _Played(run, tuple(h.name for h in hypotheses), chances)
 
 
 class _Played:
     """The part of a proposal that the campaign uses."""
 
-    def __init__(self, run, chances):
+    def __init__(self, run, names, chances):
         command = at_rest_around(run, RATE)
         self.command, self.duration, self.rate = command, len(run) / RATE, RATE
-        self.chances = chances
+        self.names, self.chances = names, chances
         self.decided, self.hopeless, self.energy = 1.0, (), float(np.sum(command**2) / RATE)
 
 

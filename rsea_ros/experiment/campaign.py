@@ -161,7 +161,7 @@ class Campaign:
         """Design a run and have it played; return the outcome, None where the loop continues."""
         weighing = session.weighing
         end, spent = self.known_end(weighing), self._budget_end(session.rounds)
-        richer = self._richer(weighing) if end == "confirmed" else []
+        richer = self._richer(session) if end == "confirmed" else []
         if end and not richer:
             return session.conclude(end)
         if spent:
@@ -197,9 +197,16 @@ class Campaign:
             return "unexplained"
         return "nothing_wrong" if weighing.best == NOTHING else "confirmed"
 
-    def _richer(self, weighing: RunWeighing) -> list[Hypothesis]:
-        """Return the best and the richer causes that fit as well and may be true; none without such."""
-        names = [n for n in weighing.richer_by_data(self.rules.by_data) if n in weighing.probability]
+    def _richer(self, session: _Session) -> list[Hypothesis]:
+        """Return the best and the richer causes that fit as well, were not tested yet, and may be true.
+
+        None without such. A run tests a cause that it would rather have shown than not, were it true.
+        """
+        weighing, played = session.weighing, [r.proposal for r in session.rounds if r.proposal is not None]
+        seen = {
+            n for p in played for n, c in zip(p.names, p.chances, strict=True) if c >= self.rules.shown
+        }
+        names = set(weighing.richer_by_data(self.rules.by_data)) - seen
         rivals = [h for h in weighing.hypotheses(self.rules.possible) if h.name in names]
         return [weighing.hypotheses()[0], *rivals] if rivals else []
 
