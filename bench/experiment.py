@@ -94,7 +94,7 @@ def play_policy(policy, first, weighing, bench, rig, rng, pools, limits):
         return record_command(bench, proposal.command, rng)
 
     campaign = Campaign(
-        rig, USUAL, asked, play, Budget(seconds=SECONDS, runs=10), run=pools.run, choose=policy
+        rig, USUAL, asked, play, Budget(seconds=SECONDS, runs=12), run=pools.run, choose=policy
     )
     outcome = campaign.go([first], weighing)
     return outcome, outcome_entry(outcome)

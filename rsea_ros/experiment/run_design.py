@@ -119,7 +119,7 @@ def _trials(rater: ShapeRater, shapes: Sequence[Shape], apart: BoolArray) -> lis
     for seconds in np.geomspace(asked.shortest, asked.longest, doublings + 1):
         length = float(np.rint(seconds * asked.rate) / asked.rate)
         best = _worth_most(trials, asked.per_run) if trials else None
-        if best and best.share > _LEAST and best.per_second(asked.per_run) > 1.0 / (asked.per_run + length):
+        if best and best.share >= _LEAST and best.per_second(asked.per_run) > 1.0 / (asked.per_run + length):
             break
         possible = [s for s in shapes if length * asked.rate >= FEWEST[s.kind]]
         trials += [_Trial(_share(rater, s, length, apart), length, s) for s in possible]
@@ -127,9 +127,14 @@ def _trials(rater: ShapeRater, shapes: Sequence[Shape], apart: BoolArray) -> lis
 
 
 def _worth_most(trials: Sequence[_Trial], per_run: float) -> _Trial:
-    """Return the trial that decides most per second, of those that decide LEAST or nearly the most."""
-    least = min(_LEAST, 0.5 * max(t.share for t in trials))
-    return max((t for t in trials if t.share >= least), key=lambda t: t.per_second(per_run))
+    """Return the trial that decides most per second; where none decides LEAST, the one that decides most.
+
+    The longest of several that decide nothing.
+    """
+    enough = [t for t in trials if t.share >= _LEAST]
+    if not enough:
+        return max(trials, key=lambda t: (t.share, t.length))
+    return max(enough, key=lambda t: t.per_second(per_run))
 
 
 def _share(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -> float:
