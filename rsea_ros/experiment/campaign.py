@@ -17,6 +17,7 @@ from rsea_ros.experiment.joint_weighing import RunWeighing, weigh
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import largest_share
+from rsea_ros.experiment.run_shape import FEWEST
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -218,14 +219,18 @@ class Campaign:
         return is_larger and largest_share(now.expected, self.asked.limits) < self.rules.held_back
 
     def _asked(self, rounds: Sequence[Round]) -> DesignRequest:
-        """Return the request for the next run: at least as long as all before it, which did not decide."""
+        """Return the request for the next run, within the budget.
+
+        At least as long as all runs before it, which did not decide.
+        """
         played = sum(r.proposal.duration for r in rounds if r.proposal is not None)
-        shortest = min(max(self.asked.shortest, played), self.asked.longest)
-        return replace(self.asked, shortest=shortest)
+        longest = min(self.asked.longest, self.budget.seconds - played)
+        return replace(self.asked, shortest=min(max(self.asked.shortest, played), longest), longest=longest)
 
     def _budget_end(self, rounds: Sequence[Round]) -> End | None:
         played = [r.proposal for r in rounds if r.proposal is not None]
         seconds, energy = sum(p.duration for p in played), sum(p.energy for p in played)
         budget = self.budget
-        left = seconds + self.asked.shortest <= budget.seconds and energy < budget.energy
+        next_run = max(self.asked.shortest, max(FEWEST.values()) / self.asked.rate)
+        left = seconds + next_run <= budget.seconds and energy < budget.energy
         return None if left and len(played) < budget.runs else "spent"

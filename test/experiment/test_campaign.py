@@ -120,11 +120,13 @@ def test_the_next_run_is_as_long_as_all_that_did_not_decide(log, known, proposal
     lengths = []
 
     def choose(possible, asked, *_):
-        lengths.append(asked.shortest)
-        return replace(proposal, duration=max(asked.shortest, 0.5), decided=1.0)
+        lengths.append((asked.shortest, asked.longest))
+        return replace(proposal, duration=asked.shortest, decided=1.0)
 
-    Campaign(RIG, CAUSES, ASKED, lambda _: log, Budget(seconds=6.0), choose=choose).go([log], known)
-    assert lengths[:4] == [0.5, 0.5, 1.0, 2.0]
+    outcome = Campaign(RIG, CAUSES, ASKED, lambda _: log, Budget(seconds=5.2), choose=choose).go([log], known)
+    expected = [(0.5, 2.0), (0.5, 2.0), (1.0, 2.0), (2.0, 2.0), (1.2, 1.2)]
+    assert np.array(lengths) == pytest.approx(np.array(expected))
+    assert outcome.end == "spent" and outcome.seconds == pytest.approx(5.2)
 
 
 def test_the_loop_confirms_the_hidden_cause_by_a_run(log, known, campaign, tmp_path):
