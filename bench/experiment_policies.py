@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from rsea_ros.experiment.campaign import Rules
+from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_shape import at_rest_around
 from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramp_ends
 
@@ -21,15 +23,20 @@ class Fixed:
         size = max(self._shortest, self._at)
         piece = self._command[self._at : self._at + size]
         self._at += len(piece)
-        return _Played(ramp_ends(piece, min(round(0.25 * RATE), len(piece) // 4)))
+        chances = (1.0,) * len(hypotheses)
+        if hypotheses[0].probability >= Rules.confirmed:  # what a run within the limits could still show
+            chances = propose(hypotheses, asked, noise, run, tell).chances
+        run = ramp_ends(piece, min(round(0.25 * RATE), len(piece) // 4))
+        return _Played(run, tuple(h.name for h in hypotheses), chances)
 
 
 class _Played:
     """The part of a proposal that the campaign uses."""
 
-    def __init__(self, run):
+    def __init__(self, run, names, chances):
         command = at_rest_around(run, RATE)
         self.command, self.duration, self.rate = command, len(run) / RATE, RATE
+        self.names, self.chances = names, chances
         self.decided, self.hopeless, self.energy = 1.0, (), float(np.sum(command**2) / RATE)
 
 

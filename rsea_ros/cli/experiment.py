@@ -40,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--limits", required=True, metavar="NAME=VALUE,…", help=f"limits in both directions: {units}")
     add("--bag", nargs="+", action="extend", default=[], help="earlier runs, used to weight the causes")
     add("--rate", type=positive, default=280.0, help="rate of the commands, Hz (default %(default)g)")
+    add("--shortest", type=positive, default=0.5, help="shortest duration, s (default %(default)g)")
     add("--longest", type=positive, default=10.0, help="longest duration of the run, s (default %(default)g)")
     add(
         "--refine",
@@ -62,9 +63,8 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.identification.workers import worker_pools
 
     place = results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
-    asked = DesignRequest(
-        limits_from(args.limits), args.rate, min(0.5, args.longest), args.longest, refine=args.refine
-    )
+    shortest = min(args.shortest, args.longest)
+    asked = DesignRequest(limits_from(args.limits), args.rate, shortest, args.longest, refine=args.refine)
     models = [model for path in args.models for model in models_in(path)]
     with progress("experiment") as tell, worker_pools() as pools:
         tell("reading", 0.0)

@@ -7,7 +7,7 @@ refuses. It raises DeviceError for a run that broke off, which is discarded, and
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from rsea_ros.errors import DeviceError, IdentificationError, ParameterError
@@ -17,6 +17,7 @@ from rsea_ros.experiment.joint_weighing import RunWeighing, weigh
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import largest_share
+from rsea_ros.experiment.run_shape import FEWEST
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -53,7 +54,9 @@ class Rules:
     """When the loop ends. confirmed: probability of a cause. possible: probability from which it is still one
     that a run is designed for. floor: RMS over the noise above which the best cause leaves something else.
     by_data: S by which the data alone must prefer the best to every other of no more parameters, so that no
-    name rests on its prior. worth: share that the next run must be expected to decide. most: causes for
+    name rests on its prior. shown: chance with which a run must decide for a possible cause of more
+    parameters that fits as well, were it true, to be played before the simpler one is confirmed. worth:
+    share that the next run must be expected to decide. most: causes for
     which a run is designed. larger: than all runs before, by which a run that decides nothing by itself is
     worth playing, while it uses less than held_back of the limits at the likeliest values.
     """
@@ -64,6 +67,7 @@ class Rules:
     worth: float = 0.02
     most: int = 7
     by_data: float = 6.0
+    shown: float = 0.5
     larger: float = 1.15
     held_back: float = 0.8
 
@@ -157,14 +161,20 @@ class Campaign:
     def _round(self, session: _Session) -> CampaignOutcome | None:
         """Design a run and have it played; return the outcome, None where the loop continues."""
         weighing = session.weighing
-        if end := self.known_end(weighing) or self._budget_end(session.rounds):
+        end, spent = self.known_end(weighing), self._budget_end(session.rounds)
+        richer = self._richer(session) if end == "confirmed" else []
+        if end and not richer:
             return session.conclude(end)
-        possible, noise = self.possible(weighing), weighing.cases[0].noise
+        if spent:
+            return session.conclude(spent)
+        possible, noise = richer or self.possible(weighing), weighing.cases[0].noise
         try:
-            proposal = self.choose(possible, self.asked, noise, self.run, self.tell)
+            proposal = self.choose(possible, self._asked(session.rounds), noise, self.run, self.tell)
         except ParameterError as error:
             return session.conclude("failed", why=str(error))
-        if proposal.decided < self.rules.worth and not self._widens(proposal, session.rounds):
+        if end and max(proposal.chances[1:]) < self.rules.shown:
+            return session.conclude(end)
+        if proposal.decided < self.rules.worth and not end and not self._widens(proposal, session.rounds):
             proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
             return session.conclude("undecidable", proofs)
         self.hear(Round(weighing, proposal))
@@ -188,6 +198,19 @@ class Campaign:
             return "unexplained"
         return "nothing_wrong" if weighing.best == NOTHING else "confirmed"
 
+    def _richer(self, session: _Session) -> list[Hypothesis]:
+        """Return the best and the richer causes that fit as well, were not tested yet, and may be true.
+
+        None without such. A run tests a cause that it would rather have shown than not, were it true.
+        """
+        weighing, played = session.weighing, [r.proposal for r in session.rounds if r.proposal is not None]
+        seen = {
+            n for p in played for n, c in zip(p.names, p.chances, strict=True) if c >= self.rules.shown
+        }
+        names = set(weighing.richer_by_data(self.rules.by_data)) - seen
+        rivals = [h for h in weighing.hypotheses(self.rules.possible) if h.name in names]
+        return [weighing.hypotheses()[0], *rivals] if rivals else []
+
     def _widens(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
         """Return whether a run is the largest so far and only doubt holds it back: it lessens the doubt."""
         before = [r.proposal.peaks.at_level["torque"] for r in rounds if r.proposal is not None]
@@ -195,9 +218,19 @@ class Campaign:
         is_larger = now.at_level["torque"] > self.rules.larger * max(before, default=0.0)
         return is_larger and largest_share(now.expected, self.asked.limits) < self.rules.held_back
 
+    def _asked(self, rounds: Sequence[Round]) -> DesignRequest:
+        """Return the request for the next run, within the budget.
+
+        At least as long as all runs before it, which did not decide.
+        """
+        played = sum(r.proposal.duration for r in rounds if r.proposal is not None)
+        longest = min(self.asked.longest, self.budget.seconds - played)
+        return replace(self.asked, shortest=min(max(self.asked.shortest, played), longest), longest=longest)
+
     def _budget_end(self, rounds: Sequence[Round]) -> End | None:
         played = [r.proposal for r in rounds if r.proposal is not None]
         seconds, energy = sum(p.duration for p in played), sum(p.energy for p in played)
         budget = self.budget
-        left = seconds + self.asked.shortest <= budget.seconds and energy < budget.energy
+        next_run = max(self.asked.shortest, max(FEWEST.values()) / self.asked.rate)
+        left = seconds + next_run <= budget.seconds and energy < budget.energy
         return None if left and len(played) < budget.runs else "spent"

@@ -3,7 +3,8 @@
 For each cause that may be true, the largest of every limited quantity is simulated at the most likely values
 and at both ends of every principal axis of their posterior, z standard deviations away, and half-way
 to them. The increases add up as squares: for a peak linear in the values that is the quantile of
-z, for another one the simulated ends count. z is such that all causes together, each by its probability,
+z, for another one the simulated ends count. A cause with several parameters is also simulated with these
+moved together, and at draws from its posterior. z is such that all causes together, each by its probability,
 break a limit with less than 1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
 """
 
@@ -25,8 +26,10 @@ LEVEL = 1.0 - 1e-5
 """Probability with which all limits hold, over the causes and what is known of their numbers."""
 _POINTS = 4
 """On each axis: both ends and half-way to them, for a stop is struck hardest somewhere in between."""
-_LEVELS = 17
-"""Of a cause's size, where its other parameters are moved with it."""
+_LEVELS = 33
+"""Of a cause's size within its bounds, where its other parameters are moved with it."""
+_DRAWS = 64
+"""Rigs drawn from the posterior of a cause with several parameters."""
 _LIKELIEST = 0.01
 """Share of its benches in which even the least likely cause may break a limit."""
 BETWEEN = 1.02
@@ -79,17 +82,23 @@ def _ends(hypothesis: Hypothesis, z: float) -> list[Rig]:
 
 
 def _corners(hypothesis: Hypothesis, z: float) -> list[Rig]:
-    """Return rigs with the cause's own parameters moved together: a near stop is worst where it is stiff."""
+    """Return rigs with the cause's own parameters moved together, and some drawn from the posterior.
+
+    A near stop is worst where it is stiff, at some distances more than at those beside them, and where the
+    rest damps little.
+    """
     positions, sd = hypothesis.cause_indices[:3], hypothesis.sd()
     if len(positions) < 2:
         return []
-    others = [(-1.0, 0.0, 1.0)] * (len(positions) - 1)
+    main = positions[0]
+    low, high = ((bounds - hypothesis.theta)[main] / (z * sd[main]) for bounds in hypothesis.bounds())
+    sizes = np.linspace(max(-1.0, low), min(1.0, high), _LEVELS)
     rigs = []
-    for corner in product(np.linspace(-1.0, 1.0, _LEVELS), *others):
+    for corner in product(sizes, *[(-1.0, 0.0, 1.0)] * (len(positions) - 1)):
         moved = hypothesis.theta.copy()
         moved[positions] += z * np.array(corner) * sd[positions]
         rigs.append(hypothesis.rig_at(moved))
-    return rigs
+    return rigs + hypothesis.draws(_DRAWS, np.random.default_rng(0))
 
 
 def peaks(command: FloatArray, rate: float, groups: Sequence[Group]) -> Peaks:

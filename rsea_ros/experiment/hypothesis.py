@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian, serial
 from rsea_ros.identification.unknowns import apply
@@ -19,6 +20,8 @@ NOTHING = "nothing"
 """Name of the hypothesis that the rig, its values fitted, is all that there is."""
 _SEEN = 3.0
 """Standard deviations from none at all, from which the size of a cause counts as known."""
+_QUANTILES = np.array([-1.38, -0.67, -0.21, 0.21, 0.67, 1.38])
+"""Of the normal distribution, in the middle of six equal shares."""
 
 
 @dataclass(frozen=True)
@@ -62,17 +65,43 @@ class Hypothesis:
         The most likely ones; where its size may as well be zero, one standard deviation from zero, and the
         others as they correlate with it: a run is rated by what it would show of the cause.
         """
+        if not self.cause_indices or not self._may_be_none():
+            return self.theta
+        away, sd = self._size()
+        result: FloatArray = self._with_size(np.array([np.copysign(sd, away)]))[0]
+        return result
+
+    def likely_values(self) -> FloatArray:
+        """Return values that the cause may have if it is present, shape (m, n): equally likely sizes of it.
+
+        The others as they correlate with its size.
+        """
         if not self.cause_indices:
-            return self.theta
-        main, spread = self.cause_indices[0], np.linalg.inv(self.information)
-        away = self.theta[main] - self.problem.unknowns[main].inner(self.problem.unknowns[main].start)
-        sd = float(np.sqrt(spread[main, main]))
-        if abs(away) > _SEEN * sd:
-            return self.theta
-        side = -1.0 if away < 0.0 else 1.0
-        moved = self.theta + spread[:, main] / sd * side
+            return self.theta[None, :]
+        away, sd = self._size()
+        if not self._may_be_none():
+            return self._with_size(sd * _QUANTILES.reshape(3, 2).mean(axis=1))
+        sizes = np.sort(np.abs(abs(away) + sd * _QUANTILES)).reshape(3, 2).mean(axis=1)
+        return self._with_size(np.copysign(sizes - abs(away), away))
+
+    def _with_size(self, steps: FloatArray) -> FloatArray:
+        """Return the values with the size of the cause moved by some steps, shape (m, n)."""
+        spread = np.linalg.inv(self.information)[:, self.cause_indices[0]]
+        moved = self.theta + np.outer(steps, spread / spread[self.cause_indices[0]])
         result: FloatArray = np.clip(moved, *self.bounds())
         return result
+
+    def _may_be_none(self) -> bool:
+        """Return whether the size of the cause may as well be none; on a logarithmic scale it never is."""
+        away, sd = self._size()
+        start = self.problem.unknowns[self.cause_indices[0]].start
+        return start == effect_named(self.name).main.null and abs(away) <= _SEEN * sd
+
+    def _size(self) -> tuple[float, float]:
+        """Return how far the size of the cause is from its prior's middle, and its standard deviation."""
+        main = self.cause_indices[0]
+        unknown = self.problem.unknowns[main]
+        return float(self.theta[main] - unknown.inner(unknown.start)), float(self.sd()[main])
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and highest coordinates, shape (n,) each."""
@@ -91,11 +120,13 @@ class Hypothesis:
 class Response:
     """The prediction of a hypothesis for a run, over the sensors' noise.
 
-    if_there: with the values to be expected if it is true, shape (m,). predicted, slope: at its most likely
-    values, (m,), with derivatives, (m, n), from which it is fitted where another is true.
+    if_there: with the values to be expected if it is true, shape (m,); likely: with each of its likely
+    values, (k, m). predicted, slope: at its most likely values, (m,), with derivatives, (m, n), from which
+    it is fitted where another is true.
     """
 
     if_there: FloatArray
+    likely: FloatArray
     predicted: FloatArray
     slope: FloatArray
 
@@ -127,7 +158,8 @@ def response(hypothesis: Hypothesis, case: Case, run: Map = serial) -> Response:
     problem = replace(hypothesis.problem, cases=(case,))
     predicted = problem.residual(hypothesis.theta)
     slope = jacobian(problem, hypothesis.theta, predicted, run)
-    return Response(problem.residual(hypothesis.if_there()), predicted, slope)
+    likely = np.array([problem.residual(theta) for theta in hypothesis.likely_values()])
+    return Response(problem.residual(hypothesis.if_there()), likely, predicted, slope)
 
 
 def motion(rig: Rig, command: FloatArray, rate: float) -> dict[str, FloatArray]:

@@ -65,11 +65,21 @@ class RunWeighing:
 
         By the data alone, without their priors.
         """
-        best = self.fits[self.best].solution
-        others = {n: f.solution for n, f in self.fits.items() if n != self.best}
-        fewer = {n: s for n, s in others.items() if len(s.theta) <= len(best.theta)}
-        away = {n: (power(s.residual) - power(best.residual)) / self.scale for n, s in fewer.items()}
-        return [n for n, s in away.items() if s < least]
+        return [n for n in self._fit_as_well(least) if not self._is_richer(n)]
+
+    def richer_by_data(self, least: float) -> list[str]:
+        """Return the causes of more parameters than the best that fit less than `least` worse, in S.
+
+        A cause that contains the best always does: what it adds may be absent, or not shown so far.
+        """
+        return [n for n in self._fit_as_well(least) if self._is_richer(n)]
+
+    def _fit_as_well(self, least: float) -> list[str]:
+        costs = {n: power(f.solution.residual) / self.scale for n, f in self.fits.items()}
+        return [n for n, c in costs.items() if n != self.best and c - costs[self.best] < least]
+
+    def _is_richer(self, name: str) -> bool:
+        return len(self.fits[name].solution.theta) > len(self.fits[self.best].solution.theta)
 
     def hypotheses(self, least: float = 0.0) -> list[Hypothesis]:
         """Return the causes with a probability of at least `least`, the likeliest first."""

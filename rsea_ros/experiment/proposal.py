@@ -9,13 +9,16 @@ import numpy as np
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.chance_constraint import Peaks
 from rsea_ros.experiment.run_limits import RunLimits
-from rsea_ros.experiment.run_shape import Kind, Shape
+from rsea_ros.experiment.run_shape import FEWEST, Kind, Shape
 from rsea_ros.signals import FloatArray
 
 
 @dataclass(frozen=True)
 class DesignRequest:
-    """The freedom of a design. rate: Hz. shortest, longest: s. refine: evaluations of the refinement."""
+    """The freedom of a design. rate: Hz. shortest, longest: s. refine: evaluations of the refinement.
+
+    per_run: s of excitation that are as dear as one more run; little of it makes more and shorter runs.
+    """
 
     limits: RunLimits
     rate: float = 280.0
@@ -24,11 +27,17 @@ class DesignRequest:
     probe: float = 2.0
     refine: int = 24
     kinds: tuple[Kind, ...] = ("multisine", "chirp", "steps", "holds")
+    per_run: float = 0.5
 
     def __post_init__(self) -> None:
         if not 0.0 < self.shortest <= self.longest:
             raise ParameterError(
                 f"longest run {self.longest:g} s, expected at least the shortest of {self.shortest:g} s"
+            )
+        if self.longest * self.rate < max(FEWEST.values()):
+            raise ParameterError(
+                f"longest run {self.longest:g} s at {self.rate:g} Hz, "
+                f"expected at least {max(FEWEST.values())} samples"
             )
 
 
@@ -38,7 +47,8 @@ class Proposal:
 
     duration: s, of the excitation; command: N m, at `rate` Hz, shape (n,), with rest around it. names,
     table: S_ij with i true and j its rival. hopeless: pairs that no shape tried separates. decided: expected
-    share that it decides; sharpened: nats by which it narrows the parameters where one cause is left.
+    share that it decides; chances: that it decides, for each name, were it true; sharpened: nats by which it
+    narrows the parameters where one cause is left.
     expected, at_level: peaks of every quantity.
     """
 
@@ -50,6 +60,7 @@ class Proposal:
     table: FloatArray
     hopeless: tuple[tuple[str, str], ...]
     decided: float
+    chances: tuple[float, ...]
     sharpened: float
     peaks: Peaks
     tried: int

@@ -1,6 +1,7 @@
 """Design of a run: the shape and length that decide most per second, within limits for every possible bench.
 
-Shapes of every kind are tried, the best is refined by Nelder and Mead's method (scipy), which needs no smooth
+Shapes of every kind are tried, from the shortest run to the length that no chance of deciding could make
+worth its seconds; the best is refined by Nelder and Mead's method (scipy), which needs no smooth
 objective: gear friction and stops give none. Shapes are rated by simulation with the compiled step;
 separation.py has the measure. The final amplitude is the largest with which chance_constraint.py keeps all
 limits.
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -19,8 +21,15 @@ from rsea_ros.experiment.chance_constraint import Group, Peaks, ends_of, peaks, 
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.refine import refine
-from rsea_ros.experiment.run_shape import Shape
-from rsea_ros.experiment.separation import decided_share, information_gain, refit, separations
+from rsea_ros.experiment.run_shape import FEWEST, Shape
+from rsea_ros.experiment.separation import (
+    chances_decided,
+    decided_share,
+    information_gain,
+    likely_separations,
+    refit,
+    separations,
+)
 from rsea_ros.experiment.shape_rater import INSIDE, ShapeRater, noise_by_channel
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
@@ -36,20 +45,19 @@ TRIED: tuple[Shape, ...] = (
     Shape("multisine", 0.3, low=0.5, high=40.0, tilt=0.5),
     Shape("chirp", 1.0, low=0.3, high=30.0),
     Shape("chirp", 1.0, low=2.0, high=100.0),
+    Shape("steps", 1.0, hold=0.03),
     Shape("steps", 1.0, hold=0.1),
     Shape("steps", 1.0, hold=0.3),
     Shape("holds", 1.0, hold=0.15),
     Shape("steps", 0.3, bias=0.5, hold=0.2),
 )
 """Where the search begins; amplitude and bias as shares of what the limits allow."""
-_PER_RUN = 0.5
-"""s that a run costs beside its excitation, in what it must decide."""
+_LEAST = 0.05
+"""Share that a run must be expected to decide to be preferred to a longer one."""
 _HOPE = 2.0
 """S that the longest run's data give a pair at best, below which no run is designed for it."""
 _FAR = 1e4
 """S of one linear step, above which a full fit of the rival would not bring it near nothing."""
-_KEPT = 0.8
-"""Of what the probe promises of a shorter run, what that must keep; else it is made longer."""
 _SMALLEST, _BISECTIONS = 0.01, 8
 
 
@@ -81,23 +89,57 @@ def propose(
     shapes = [s for s in TRIED if s.kind in asked.kinds]
     tables = []
     for k, shape in enumerate(shapes):
-        say(f"trying {shape.kind}", 0.6 * k / len(shapes))
+        say(f"trying {shape.kind}", 0.5 * k / len(shapes))
         tables.append(separations(hypotheses, rater.responses(rater.within(shape, asked.probe))))
-    say("fitting rivals", 0.6)
+    say("fitting rivals", 0.5)
     apart = _hopeless(rater, shapes, tables)
-    values = [max(_per_second(rater, t, apart, asked))[0] for t in tables]
-    length = max(_per_second(rater, tables[int(np.argmax(values))], apart, asked))[1]
+    trials = _trials(rater, shapes, apart)
+    best = _worth_most(trials, asked.per_run)
+    say("refining", 0.6)
+    shape, count = refine(best.shape, lambda s: _share(rater, s, best.length, apart), asked, say)
+    return _final(rater, shape, best.length, apart, len(shapes) + len(trials) + count)
 
-    def value(shape: Shape) -> float:
-        table = separations(hypotheses, rater.responses(rater.within(shape, length)))
-        return decided_share(table, rater.probability, apart)
 
-    again = [value(shape) for shape in shapes]
-    while max(again) < _KEPT * max(values) * (_PER_RUN + length) and 2.0 * length <= asked.longest:
-        length *= 2.0
-        again = [value(shape) for shape in shapes]
-    shape, count = refine(shapes[int(np.argmax(again))], value, asked, say)
-    return _final(rater, shape, length, apart, 2 * len(shapes) + count)
+@dataclass(frozen=True)
+class _Trial:
+    """A shape of a length (s), and the share that it is expected to decide."""
+
+    share: float
+    length: float
+    shape: Shape
+
+    def per_second(self, per_run: float) -> float:
+        return self.share / (per_run + self.length)
+
+
+def _trials(rater: ShapeRater, shapes: Sequence[Shape], apart: BoolArray) -> list[_Trial]:
+    """Return the shapes of every length, up to the one that could not be worth its seconds."""
+    asked, trials = rater.asked, list[_Trial]()
+    doublings = max(1, math.ceil(math.log2(asked.longest / asked.shortest)))
+    for seconds in np.geomspace(asked.shortest, asked.longest, doublings + 1):
+        length = float(np.rint(seconds * asked.rate) / asked.rate)
+        best = _worth_most(trials, asked.per_run) if trials else None
+        if best and best.share >= _LEAST and best.per_second(asked.per_run) > 1.0 / (asked.per_run + length):
+            break
+        possible = [s for s in shapes if length * asked.rate >= FEWEST[s.kind]]
+        trials += [_Trial(_share(rater, s, length, apart), length, s) for s in possible]
+    return trials
+
+
+def _worth_most(trials: Sequence[_Trial], per_run: float) -> _Trial:
+    """Return the trial that decides most per second; where none decides LEAST, the one that decides most.
+
+    The longest of several that decide nothing.
+    """
+    enough = [t for t in trials if t.share >= _LEAST]
+    if not enough:
+        return max(trials, key=lambda t: (t.share, t.length))
+    return max(enough, key=lambda t: t.per_second(per_run))
+
+
+def _share(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -> float:
+    rows = likely_separations(rater.hypotheses, rater.responses(rater.within(shape, length)))
+    return decided_share(rater.hypotheses, chances_decided(rater.hypotheses, rows, apart))
 
 
 def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
@@ -114,30 +156,25 @@ def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[Float
     return apart
 
 
-def _per_second(
-    rater: ShapeRater, table: FloatArray, apart: BoolArray, asked: DesignRequest
-) -> list[tuple[float, float]]:
-    """Return the share of cases that a shape decides per second, and the length, for several run lengths."""
-    lengths = np.geomspace(asked.shortest, asked.longest, 7)
-    scaled = [(decided_share(table * s / asked.probe, rater.probability, apart), float(s)) for s in lengths]
-    return [(share / (_PER_RUN + s), s) for share, s in scaled]
-
-
 def _final(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
     """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
     asked, hypotheses = rater.asked, rater.hypotheses
     command, reached = limit_command(rater.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
     responses = rater.responses(command, is_quick=False)
-    table = _with_refits(rater, command, separations(hypotheses, responses))
+    linear = separations(hypotheses, responses)
+    table = _with_refits(rater, command, linear)
     names = tuple(h.name for h in hypotheses)
     k = len(names)
     pairs = tuple((names[i], names[j]) for i in range(k) for j in range(i + 1, k) if apart[i, j])
     narrow = information_gain(hypotheses[0], responses[0])
     energy = float(np.sum(command**2) / asked.rate)
-    share = decided_share(table, rater.probability, apart) if k > 1 else 1.0
+    nearer = np.divide(table, linear, out=np.ones_like(table), where=np.isfinite(table) & (linear > 0.0))
+    rows = likely_separations(hypotheses, responses)
+    chances = chances_decided(hypotheses, [r * n for r, n in zip(rows, nearer, strict=True)], apart)
+    share = decided_share(hypotheses, chances) if k > 1 else 1.0
     return Proposal(
-        shape, length, asked.rate, command, names, table, pairs, share, narrow, reached, tried,
-        energy,
+        shape, length, asked.rate, command, names, table, pairs, share, tuple(chances.tolist()), narrow,
+        reached, tried, energy,
     )  # fmt: skip
 
 

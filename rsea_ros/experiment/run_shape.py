@@ -132,3 +132,5 @@ KINDS: Mapping[Kind, Callable[[Shape, int, float], FloatArray]] = MappingProxyTy
     {"multisine": _multisine, "chirp": _chirp, "steps": _steps, "holds": _holds}
 )
 """Each makes the moving part, its peak 1, from shape, number of samples and rate."""
+FEWEST: Mapping[Kind, int] = MappingProxyType({"multisine": 4, "chirp": 10, "steps": 4, "holds": 4})
+"""Samples of a run, with which it still has its form, a soft start and a soft stop."""

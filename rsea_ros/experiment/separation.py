@@ -13,19 +13,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from rsea_ros.experiment.hypothesis import Hypothesis, Response
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map, jacobian, power, serial
 from rsea_ros.signals import BoolArray, FloatArray
 
-ENOUGH = 12.0
-"""S that decides between two: odds of 400 to one, so that noise hardly ever turns them below 20."""
+SURE = float(np.log(19.0))
+"""Logarithm of the odds that confirm a cause: 0.95 to 0.05."""
 
 
-def separation(true: Response, rival: Response, information: FloatArray) -> float:
-    """Return S of a rival, with the priors of its numbers."""
-    difference = rival.predicted - true.if_there
+def separation(true: FloatArray, rival: Response, information: FloatArray) -> float:
+    """Return S of a rival, with the priors of its numbers, where the prediction `true` is, shape (m,)."""
+    difference = rival.predicted - true
     if not np.isfinite(difference).all():
         return 0.0
     slope = rival.slope.T @ difference
@@ -35,13 +36,22 @@ def separation(true: Response, rival: Response, information: FloatArray) -> floa
 
 def separations(hypotheses: Sequence[Hypothesis], responses: Sequence[Response]) -> FloatArray:
     """Return S_ij where i is true and j its rival, shape (k, k); infinite on the diagonal."""
-    k = len(hypotheses)
-    table = np.full((k, k), np.inf)
-    for i in range(k):
-        for j in range(k):
-            if i != j:
-                table[i, j] = separation(responses[i], responses[j], hypotheses[j].information)
-    return table
+    return np.array([_row(r.if_there, i, hypotheses, responses) for i, r in enumerate(responses)])
+
+
+def likely_separations(hypotheses: Sequence[Hypothesis], responses: Sequence[Response]) -> list[FloatArray]:
+    """Return for each hypothesis its rows of S with each of its likely values, shape (m, k) each."""
+    return [
+        np.array([_row(true, i, hypotheses, responses) for true in r.likely]) for i, r in enumerate(responses)
+    ]
+
+
+def _row(
+    true: FloatArray, i: int, hypotheses: Sequence[Hypothesis], responses: Sequence[Response]
+) -> FloatArray:
+    pairs = zip(responses, hypotheses, strict=True)
+    rivals = enumerate(pairs)
+    return np.array([np.inf if i == j else separation(true, r, h.information) for j, (r, h) in rivals])
 
 
 @dataclass(frozen=True)
@@ -89,16 +99,31 @@ def refit(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial) ->
     return Refit(cost, power(residual))
 
 
-def nearest(table: FloatArray, apart: BoolArray) -> FloatArray:
-    """Return for each hypothesis the S of its worst rival, shape (k,). apart: pairs that no run separates."""
-    return np.asarray(np.where(apart, np.inf, table).min(axis=1))
+def decided_share(hypotheses: Sequence[Hypothesis], chances: FloatArray) -> float:
+    """Return the share of the cases that a run is expected to decide. chances: as chances_decided."""
+    probability = np.array([h.probability for h in hypotheses])
+    return float(probability @ chances / max(probability.sum(), 1e-300))
 
 
-def decided_share(table: FloatArray, probability: FloatArray, apart: BoolArray) -> float:
-    """Return the share that a run is expected to decide: the mean of 1 - exp(-S / ENOUGH), S the worst."""
-    worst = nearest(table, apart)
-    share = np.where(np.isfinite(worst), -np.expm1(-np.minimum(worst, 1e6) / ENOUGH), 0.0)
-    return float(probability @ share / max(probability.sum(), 1e-300))
+def chances_decided(
+    hypotheses: Sequence[Hypothesis], rows: Sequence[FloatArray], apart: BoolArray
+) -> FloatArray:
+    """Return for each hypothesis, if it is true, the chance that a run decides it, shape (k,).
+
+    That its log odds over the worst rival reach SURE: they become normal, with mean
+    ln(p_i / p_j) + S_ij / 2 and variance S_ij. The mean over its likely values. rows: as
+    likely_separations. apart: pairs that no run separates, shape (k, k).
+    """
+    odds = np.log(np.maximum([h.probability for h in hypotheses], 1e-300))
+    return np.array([_chance(odds[i] - odds, rows[i], apart[i]) for i in range(len(rows))])
+
+
+def _chance(odds: FloatArray, rows: FloatArray, apart: BoolArray) -> float:
+    counts = np.isfinite(rows[0]) & ~apart
+    if not counts.any():
+        return 0.0
+    s = np.maximum(rows[:, counts], 1e-12)
+    return float(np.mean(ndtr(((odds[counts] + 0.5 * s - SURE) / np.sqrt(s)).min(axis=1))))
 
 
 def information_gain(hypothesis: Hypothesis, seen: Response) -> float:

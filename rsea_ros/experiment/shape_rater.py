@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_limits import largest_share, of_command, of_response
@@ -58,11 +56,6 @@ class ShapeRater:
     def case(self, command: FloatArray, *, is_quick: bool) -> Case:
         """Return a run of a command, not yet made."""
         return run_case(command, self.asked.rate, self.noise, is_quick=is_quick)
-
-    @property
-    def probability(self) -> FloatArray:
-        """Of each hypothesis, shape (k,)."""
-        return np.array([h.probability for h in self.hypotheses])
 
 
 def noise_by_channel(hypotheses: Sequence[Hypothesis], measured: Mapping[str, float]) -> dict[str, float]:

@@ -46,7 +46,9 @@ TABLE = (
     NodeParameter("limits", "torque=10", "of every run, as in rsea experiment --limits"),
     NodeParameter("seconds", 60.0, "budget of excitation", "s", 0.5, 1e5),
     NodeParameter("energy", 1e6, "budget of the integral of the squared torque", "N^2 m^2 s", 1.0, 1e12),
+    NodeParameter("shortest", 0.5, "length of a run at least, with its soft ends", "s", 0.01, 600.0),
     NodeParameter("longest", 10.0, "length of a run at most", "s", 0.5, 600.0),
+    NodeParameter("per_run", 0.5, "excitation as dear as one more run; 0: least excitation", "s", 0.0, 600.0),
     NodeParameter("rate", 280.0, "commands a second", "Hz", 50.0, 1000.0),
     NodeParameter("ask", True, "wait for ~/approve before each run; false: play at once"),
     NodeParameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
@@ -86,7 +88,9 @@ class ExperimentNode:
         self._work: Future[CampaignOutcome] = self._pool.submit(self._go)
 
     def _make(self, values: dict[str, Any]) -> Campaign:
-        asked = DesignRequest(limits_from(values["limits"]), values["rate"], longest=values["longest"])
+        shortest, longest, per_run = (values[n] for n in ("shortest", "longest", "per_run"))
+        limits = limits_from(values["limits"])
+        asked = DesignRequest(limits, values["rate"], min(shortest, longest), longest, per_run=per_run)
         budget = Budget(values["seconds"], values["energy"])
         causes = causes_from(values["causes"])
         return Campaign(load_rig(values["rig"]), causes, asked, self._play, budget, hear=self._hear)

@@ -1,12 +1,16 @@
 """The loop finds a hidden cause by designed runs, and learns nothing from a run that broke off."""
 
 import json
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from independent.bench import Bench, record_command
 from independent.hidden import hide
 
+import rsea_ros.experiment.campaign
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.experiment.campaign import Budget, Campaign
 from rsea_ros.experiment.joint_weighing import middles_of_runs, weigh
@@ -55,6 +59,74 @@ def campaign(proposal):
 def test_a_cause_that_the_log_could_not_show_stays_as_likely_as_none(known):
     assert known.probability["hard_stop"] == pytest.approx(known.probability["nothing"], rel=0.1)
     assert min(known.probability.values()) > 0.05
+
+
+def test_a_cause_of_which_the_log_shows_nothing_is_expected_at_its_usual_size(known):
+    lag, stop = ({h.name: h for h in known.hypotheses()}[n] for n in CAUSES)
+    usual = effect_named("hard_stop").typical["angle"]
+    assert stop.rig_at(stop.if_there()).effects[-1].parameters["angle"] == pytest.approx(usual, rel=0.2)
+    angles = [stop.rig_at(v).effects[-1].parameters["angle"] for v in stop.likely_values()]
+    assert angles[0] < usual < angles[-1]
+    assert np.array_equal(lag.if_there(), lag.theta)
+
+
+def test_a_cause_that_may_be_none_is_expected_with_some_size(log):
+    weighing = weigh([log], RIG, ["nonlinear_spring"])
+    spring = next(h for h in weighing.hypotheses() if h.name == "nonlinear_spring")
+    main = spring.cause_indices[0]
+    assert abs(spring.if_there()[main]) > abs(spring.theta[main])
+    sizes = np.abs(spring.likely_values()[:, main]) / spring.sd()[main]
+    assert sizes == pytest.approx([0.2, 0.7, 1.4], abs=0.15)
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the loop reads of a weighing in which a richer cause fits as well as the best."""
+
+    best: str = "current_loop_lag"
+    left: float = 1.0
+    cases: tuple = (SimpleNamespace(noise={}),)
+
+    @property
+    def probability(self):
+        return {"current_loop_lag": 0.97, "hard_stop": 0.03}
+
+    def hypotheses(self, least=0.0):
+        return [SimpleNamespace(name=n, probability=p) for n, p in self.probability.items() if p >= least]
+
+    def near_by_data(self, least):
+        return []
+
+    def richer_by_data(self, least):
+        return ["hard_stop"]
+
+
+@pytest.mark.parametrize(("chance", "end"), [(0.9, "declined"), (0.1, "confirmed")])
+def test_a_name_waits_for_the_run_that_would_show_a_richer_cause(log, proposal, chance, end):
+    tried = replace(proposal, names=("current_loop_lag", "hard_stop"), chances=(0.0, chance))
+    work = Campaign(RIG, CAUSES, ASKED, lambda _: None, choose=lambda *_: tried)
+    assert work.go([log], Known()).end == end
+
+
+def test_a_richer_cause_is_tested_once(log, proposal, monkeypatch):
+    tried = replace(proposal, names=("current_loop_lag", "hard_stop"), chances=(0.0, 0.9))
+    monkeypatch.setattr(rsea_ros.experiment.campaign, "weigh", lambda *_: Known())
+    outcome = Campaign(RIG, CAUSES, ASKED, lambda _: log, choose=lambda *_: tried).go([log], Known())
+    assert outcome.end == "confirmed" and len(outcome.rounds) == 2
+
+
+def test_the_next_run_is_as_long_as_all_that_did_not_decide(log, known, proposal, monkeypatch):
+    monkeypatch.setattr(rsea_ros.experiment.campaign, "weigh", lambda *_: known)
+    lengths = []
+
+    def choose(possible, asked, *_):
+        lengths.append((asked.shortest, asked.longest))
+        return replace(proposal, duration=asked.shortest, decided=1.0)
+
+    outcome = Campaign(RIG, CAUSES, ASKED, lambda _: log, Budget(seconds=5.2), choose=choose).go([log], known)
+    expected = [(0.5, 2.0), (0.5, 2.0), (1.0, 2.0), (2.0, 2.0), (1.2, 1.2)]
+    assert np.array(lengths) == pytest.approx(np.array(expected))
+    assert outcome.end == "spent" and outcome.seconds == pytest.approx(5.2)
 
 
 def test_the_loop_confirms_the_hidden_cause_by_a_run(log, known, campaign, tmp_path):

@@ -17,7 +17,7 @@ from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
 from rsea_ros.experiment.run_shape import Shape, at_rest_around, command_of
-from rsea_ros.experiment.separation import Refit, refit
+from rsea_ros.experiment.separation import SURE, Refit, chances_decided, refit
 from rsea_ros.experiment.stored_models import hypotheses_from, model_of
 from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.identification.solver import power, solve
@@ -25,6 +25,7 @@ from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")
 LIMITS = RunLimits(torque=15.0, velocity=1.5, deflection=0.03)
+BRIEF = DesignRequest(LIMITS, 280.0, 0.05, 0.8, probe=0.8, refine=0, kinds=("steps",), per_run=0.0)
 ASKED = DesignRequest(LIMITS, refine=3, probe=1.0, kinds=("multisine", "chirp"))
 NOISE = {"ft": 0.03, "position": 6e-6}
 
@@ -89,6 +90,47 @@ def test_one_cause_gets_the_run_that_narrows_its_parameters():
     fast = propose([alone], asked)
     slow = propose([alone], replace(asked, limits=replace(LIMITS, slew=60.0)))
     assert fast.sharpened > slow.sharpened + 0.5 > 0.5
+
+
+def test_a_short_run_is_taken_where_it_decides_and_a_longer_one_where_not():
+    pair = possible(command_delay={"delay": 3e-3}, current_loop_lag={"time_constant": 3e-3})
+    strong = propose(pair, BRIEF)
+    weak = propose(pair, replace(BRIEF, limits=replace(LIMITS, torque=0.1)))
+    assert strong.duration == pytest.approx(0.05) and strong.decided > 0.9
+    assert weak.duration >= 4 * strong.duration
+
+
+def test_fewer_runs_are_asked_for_by_a_price_on_each():
+    pair = possible(command_delay={"delay": 3e-3}, current_loop_lag={"time_constant": 3e-3})
+    asked = replace(BRIEF, limits=replace(LIMITS, torque=0.2))
+    assert propose(pair, replace(asked, per_run=5.0)).duration > propose(pair, asked).duration
+
+
+def test_the_longest_run_is_taken_where_none_decides():
+    pair = possible(command_delay={"delay": 3e-3}, current_loop_lag={"time_constant": 3e-3})
+    hopeless = propose(pair, replace(BRIEF, limits=replace(LIMITS, torque=0.01)))
+    assert hopeless.duration == pytest.approx(BRIEF.longest) and hopeless.decided < 0.02
+
+
+def test_a_run_too_short_for_its_shapes_is_refused():
+    with pytest.raises(ParameterError, match="expected at least 10 samples"):
+        DesignRequest(LIMITS, shortest=0.01, longest=0.02)
+
+
+def test_the_chance_of_a_decision_follows_the_odds_before_and_the_separation():
+    pair = possible(coulomb_friction={"torque": 0.3}, backlash={"gap": 4e-4})
+    even = [replace(h, probability=0.5) for h in pair]
+    none_apart = np.eye(2, dtype=bool)
+
+    def chance(s, pair=even):
+        rows = [np.array([[np.inf, s]]), np.array([[s, np.inf]])]
+        return chances_decided(pair, rows, none_apart)[0]
+
+    assert chance(2.0 * SURE) == pytest.approx(0.5)
+    assert chance(1.0) < 0.02 and chance(40.0) > 0.99
+    doubted = [replace(h, probability=p) for h, p in zip(even, (0.01, 0.99), strict=True)]
+    assert chance(2.0 * SURE, doubted) < 0.1
+    assert chances_decided(even, [np.full((1, 2), np.inf)] * 2, ~none_apart).tolist() == [0.0, 0.0]
 
 
 def test_no_run_tells_a_torque_constant_from_a_gain_of_the_sensor():
