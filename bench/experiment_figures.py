@@ -15,7 +15,7 @@ def print_figures(lines):
     apart = [x for x in lines if x["shown"] and x["cause"] not in ALIKE]
     right = [x for x in apart if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] == x["cause"]]
     alike = [x for x in lines if x["cause"] in ALIKE]
-    proved = [x for x in alike if x["designed"]["end"] == "undecidable" and x["designed"]["cause"] in ALIKE]
+    proved = [x for x in alike if x["designed"]["cause"] in ALIKE and x["designed"]["proofs"]]
     wrong = [x for x in lines if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] != x["cause"]]
     print(f"benches {len(lines)}, of which a run within the limits can tell {len(apart)}")
     print(

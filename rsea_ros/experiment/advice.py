@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.experiment.apart import Apart, measurements_apart
 from rsea_ros.experiment.bound import Bound, bound
 from rsea_ros.experiment.hypothesis import Hypothesis
@@ -20,10 +21,14 @@ LONGEST_OF_ALL = 60.0
 
 @dataclass(frozen=True)
 class Proof:
-    """A pair that no run separates: the larger bound of both directions, and separate measurements."""
+    """A pair that no run separates: the larger bound of both directions, and separate measurements.
+
+    covers_all: every effect of both is linear, so that the bound by sines holds for any run.
+    """
 
     bound: Bound
     apart: tuple[Apart, ...]
+    covers_all: bool
 
 
 @dataclass(frozen=True)
@@ -84,4 +89,6 @@ def _prove(
     true, rival, larger = max(both, key=lambda item: item[2].most)
     if not larger.is_hopeless:
         return None
-    return Proof(larger, tuple(measurements_apart(larger, true, rival)))
+    effects = [effect_named(e.name) for h in (a, b) for e in h.problem.rig.effects]
+    is_linear = all(e.claims.amplitude_exponent == 1.0 for e in effects)
+    return Proof(larger, tuple(measurements_apart(larger, true, rival)), is_linear)

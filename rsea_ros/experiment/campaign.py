@@ -27,8 +27,9 @@ End = Literal[
     "confirmed", "nothing_wrong", "unexplained", "undecidable", "spent", "declined", "broken", "failed"
 ]
 """confirmed: one cause. nothing_wrong: none is there. unexplained: no cause fits what the runs show.
-undecidable: no run tells more apart. spent: the budget is. declined: a person said no. broken: a run broke
-off. failed: the runs could not be weighed, or no run was possible within the limits.
+undecidable: no run tells more apart, by a proof that covers all, or the longest did not. spent: the budget
+is. declined: a person said no. broken: a run broke off. failed: the runs could not be weighed, or no run was
+possible within the limits.
 """
 Play = Callable[[Proposal], Record | None]
 
@@ -176,7 +177,8 @@ class Campaign:
             return session.conclude(end)
         if proposal.decided < self.rules.worth and not end and not self._widens(proposal, session.rounds):
             proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
-            return session.conclude("undecidable", proofs)
+            if any(p.covers_all for p in proofs) or self._played_longest(session.rounds):
+                return session.conclude("undecidable", proofs)
         self.hear(Round(weighing, proposal))
         try:
             record = self.play(proposal)
@@ -217,6 +219,11 @@ class Campaign:
         now = proposal.peaks
         is_larger = now.at_level["torque"] > self.rules.larger * max(before, default=0.0)
         return is_larger and largest_share(now.expected, self.asked.limits) < self.rules.held_back
+
+    def _played_longest(self, rounds: Sequence[Round]) -> bool:
+        """Return whether a run of the longest length was played, to a tenth."""
+        played = (r.proposal.duration for r in rounds if r.proposal is not None)
+        return max(played, default=0.0) > 0.9 * self.asked.longest
 
     def _asked(self, rounds: Sequence[Round]) -> DesignRequest:
         """Return the request for the next run, within the budget.

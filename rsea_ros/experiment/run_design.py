@@ -2,7 +2,8 @@
 
 Shapes of every kind are tried, from the shortest run to the length that no chance of deciding could make
 worth its seconds; the best is refined by Nelder and Mead's method (scipy), which needs no smooth
-objective: gear friction and stops give none. Shapes are rated by simulation with the compiled step;
+objective: gear friction and stops give none. Where full fits of the rivals leave it nothing to decide, the
+longest run is designed instead. Shapes are rated by simulation with the compiled step;
 separation.py has the measure. The final amplitude is the largest with which chance_constraint.py keeps all
 limits.
 """
@@ -93,67 +94,93 @@ def propose(
         tables.append(separations(hypotheses, rater.responses(rater.within(shape, asked.probe))))
     say("fitting rivals", 0.5)
     apart = _hopeless(rater, shapes, tables)
-    trials = _trials(rater, shapes, apart)
+    trials = _trials(rater, shapes, apart, asked.shortest)
     best = _worth_most(trials, asked.per_run)
     say("refining", 0.6)
     shape, count = refine(best.shape, lambda s: _share(rater, s, best.length, apart), asked, say)
-    return _final(rater, shape, best.length, apart, len(shapes) + len(trials) + count)
+    tried = len(shapes) + len(trials) + count
+    final = _final(rater, shape, best.length, apart, tried)
+    if final.decided >= _LEAST or best.length == asked.longest:
+        return final
+    trial = _worth_most(_trials(rater, shapes, apart, asked.longest), asked.per_run)
+    longest = _final(rater, trial.shape, trial.length, apart, tried + len(shapes))
+    return max(longest, final, key=lambda p: p.decided)
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """A shape of a length (s), and the share that it is expected to decide."""
+    """A shape of a length (s), the share that it is expected to decide, the least S of the likeliest two."""
 
     share: float
     length: float
     shape: Shape
+    least: float
 
     def per_second(self, per_run: float) -> float:
         return self.share / (per_run + self.length)
 
 
-def _trials(rater: ShapeRater, shapes: Sequence[Shape], apart: BoolArray) -> list[_Trial]:
-    """Return the shapes of every length, up to the one that could not be worth its seconds."""
+def _trials(
+    rater: ShapeRater, shapes: Sequence[Shape], apart: BoolArray, shortest: float
+) -> list[_Trial]:
+    """Return the shapes of every length from some seconds, up to one that could not be worth its seconds."""
     asked, trials = rater.asked, list[_Trial]()
-    doublings = max(1, math.ceil(math.log2(asked.longest / asked.shortest)))
-    for seconds in np.geomspace(asked.shortest, asked.longest, doublings + 1):
+    doublings = math.ceil(math.log2(asked.longest / shortest))
+    for seconds in np.geomspace(shortest, asked.longest, doublings + 1):
         length = float(np.rint(seconds * asked.rate) / asked.rate)
         best = _worth_most(trials, asked.per_run) if trials else None
         if best and best.share >= _LEAST and best.per_second(asked.per_run) > 1.0 / (asked.per_run + length):
             break
         possible = [s for s in shapes if length * asked.rate >= FEWEST[s.kind]]
-        trials += [_Trial(_share(rater, s, length, apart), length, s) for s in possible]
+        trials += [_trial(rater, s, length, apart) for s in possible]
     return trials
 
 
 def _worth_most(trials: Sequence[_Trial], per_run: float) -> _Trial:
     """Return the trial that decides most per second; where none decides LEAST, the one that decides most.
 
-    The longest of several that decide nothing.
+    Of several that decide nothing the longest, with the largest S of the likeliest two.
     """
     enough = [t for t in trials if t.share >= _LEAST]
     if not enough:
-        return max(trials, key=lambda t: (t.share, t.length))
+        return max(trials, key=lambda t: (t.share, t.length, t.least))
     return max(enough, key=lambda t: t.per_second(per_run))
 
 
 def _share(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -> float:
+    return _trial(rater, shape, length, apart).share
+
+
+def _trial(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -> _Trial:
     rows = likely_separations(rater.hypotheses, rater.responses(rater.within(shape, length)))
-    return decided_share(rater.hypotheses, chances_decided(rater.hypotheses, rows, apart))
+    share = decided_share(rater.hypotheses, chances_decided(rater.hypotheses, rows, apart))
+    first, second = sorted(range(len(rows)), key=lambda k: -rater.hypotheses[k].probability)[:2]
+    least = min(float(rows[first][:, second].mean()), float(rows[second][:, first].mean()))
+    return _Trial(share, length, shape, least)
 
 
 def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
     """Return which pairs no tried shape separates in the longest run, in either direction, shape (k, k)."""
-    stack, asked = np.array(tables), rater.asked
-    apart = np.eye(len(rater.hypotheses), dtype=bool)
+    stack = np.array(tables)
+    apart = np.eye(stack.shape[1], dtype=bool)
     for a, b in combinations(range(len(apart)), 2):
-        i, j = (a, b) if stack[:, a, b].max() > stack[:, b, a].max() else (b, a)
-        best = int(np.argmax(stack[:, i, j]))
-        if stack[best, i, j] < _FAR:
-            case = rater.case(rater.within(shapes[best], asked.probe), is_quick=True)
-            data = refit(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).data
-            apart[i, j] = apart[j, i] = data * asked.longest / asked.probe < _HOPE
+        both = [(float(stack[k, i, j]), k, i, j) for k in range(len(shapes)) for i, j in ((a, b), (b, a))]
+        ranked = sorted(both, reverse=True)
+        apart[a, b] = apart[b, a] = not any(_may_show(rater, shapes[k], s, i, j) for s, k, i, j in ranked)
     return apart
+
+
+def _may_show(rater: ShapeRater, shape: Shape, linear: float, i: int, j: int) -> bool:
+    """Return whether the longest run of a shape may separate a rival j from i. linear: S of a probe of it.
+
+    A linear step can also leave too much: a rival that contains the other is fitted in full.
+    """
+    asked = rater.asked
+    longer = asked.longest / asked.probe
+    if linear >= _FAR or linear * longer < _HOPE:
+        return linear >= _FAR
+    case = rater.case(rater.within(shape, asked.probe), is_quick=True)
+    return refit(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).data * longer >= _HOPE
 
 
 def _final(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:

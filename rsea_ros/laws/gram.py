@@ -19,6 +19,8 @@ from rsea_ros.signals import FloatArray, IntArray
 _RIDGE = 1e-6
 """Of each column's power: keeps columns apart that the data do not."""
 _REWEIGHTINGS = 3
+_LEAST = 1e-30
+"""RMS of a column, over the noise, below which the data do not show it: it is not scaled."""
 FOLDS = ((0,), (1,), (2,))
 """Sets of blocks that are held out in turn; the test blocks take part in nothing."""
 
@@ -46,6 +48,11 @@ class Gram:
         a, b, rr = (np.array(v) for v in sums)
         return a, b, rr
 
+    @cached_property
+    def penalty(self) -> FloatArray:
+        """The squared priors of the rig's columns, in the columns' scale."""
+        return np.asarray((self.prior / self.scale[: len(self.prior)]) ** 2)
+
     @property
     def nominal(self) -> IntArray:
         """The rig's columns."""
@@ -67,7 +74,7 @@ class Gram:
         rr, count = self.rr[groups].sum(axis=0), np.maximum(self.count[groups].sum(axis=0), 1.0)
         beta = np.zeros(len(which))
         penalty = np.zeros(len(which))
-        penalty[: len(self.prior)] = (self.prior * self.scale[: len(self.prior)] ** -1.0) ** 2
+        penalty[: len(self.prior)] = self.penalty
         for _ in range(_REWEIGHTINGS):
             squares = rr - 2.0 * b @ beta + np.einsum("i,cij,j->c", beta, a, beta)
             weight = 1.0 / np.maximum(squares / count, 1.0)
@@ -113,7 +120,8 @@ def gram_of(rows: ResidualRows, columns: Sequence[FloatArray]) -> Gram:
     scale = np.empty(x.shape[1])
     for k in range(x.shape[1]):
         column = nominal[:, k] if k < nominal.shape[1] else columns[k - nominal.shape[1]]
-        scale[k] = max(float(np.sqrt(np.mean(column**2))), 1e-300)
+        size = float(np.sqrt(np.mean(column**2)))
+        scale[k] = size if size > _LEAST else 1.0
         x[:, k] = column / scale[k]
     n, groups, channels = x.shape[1], 4 * GROUPS, len(rows.channels)
     a, b = np.zeros((groups, channels, n, n)), np.zeros((groups, channels, n))

@@ -11,7 +11,7 @@ from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws.assembly import curve_of, law_of
 from rsea_ros.laws.base import Base, fitted_base, levels_of
-from rsea_ros.laws.choice import MATTERS, Choice, Search, chosen_models, make_search, summarize_models
+from rsea_ros.laws.choice import Choice, Search, chosen_models, is_better, make_search, summarize_models
 from rsea_ros.laws.dependence import Dependence, dependences
 from rsea_ros.laws.effect_source import LawProvenance
 from rsea_ros.laws.file import Draft, finish_laws
@@ -69,7 +69,7 @@ def _result(
     drafts = [Draft(law, effect_from(Draft.source(law), law.name)) for law in laws]
     with register([d.effect for d in drafts]):
         refined = refined_laws(base, drafts) if drafts else None
-        if refined is None or gain_on_tests(base, refined)[0] < MATTERS:
+        if refined is None or not is_better(*gain_on_tests(base, refined)):
             return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,
                            tried=summarize_models(search, choice, ()))  # fmt: skip
         gain, ci95 = gain_on_tests(base, refined)

@@ -67,7 +67,7 @@ def fold_sums(gram: Gram, weight: FloatArray) -> Folded:
     inside = [(np.asarray(whole_a - a[k]), np.asarray(whole_b - b[k])) for k in sets]
     outside = [(a[k], b[k], float(squares[k] @ weight)) for k in sets]
     penalty = np.zeros(gram.b.shape[2])
-    penalty[: len(gram.prior)] = (gram.prior / gram.scale[: len(gram.prior)]) ** 2
+    penalty[: len(gram.prior)] = gram.penalty
     return Folded(tuple(inside), tuple(outside), penalty)
 
 

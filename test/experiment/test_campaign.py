@@ -20,6 +20,7 @@ from rsea_ros.experiment.run_limits import RunLimits
 from rsea_ros.experiment.weighed_causes import causes_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.campaign.files import write_campaign
+from rsea_ros.report.campaign.page import probability_figure
 
 RIG = load_rig("paper_high_impedance")
 CAUSES = ("current_loop_lag", "hard_stop")
@@ -129,6 +130,24 @@ def test_the_next_run_is_as_long_as_all_that_did_not_decide(log, known, proposal
     assert outcome.end == "spent" and outcome.seconds == pytest.approx(5.2)
 
 
+@pytest.mark.parametrize(("proofs", "lengths"), [((), [0.5, 2.0]), ((False,), [0.5, 2.0]), ((True,), [])])
+def test_without_a_proof_longer_runs_are_played_up_to_the_longest(
+    log, known, proposal, monkeypatch, proofs, lengths
+):
+    monkeypatch.setattr(rsea_ros.experiment.campaign, "weigh", lambda *_: known)
+    proved = tuple(SimpleNamespace(covers_all=p) for p in proofs)
+    monkeypatch.setattr(rsea_ros.experiment.campaign, "proofs_of", lambda *_: proved)
+    small = replace(proposal.peaks, at_level=dict.fromkeys(proposal.peaks.at_level, 0.0))
+    designed = iter([0.5, 2.0, 2.0])
+
+    def choose(*_):
+        return replace(proposal, duration=next(designed), decided=0.0, peaks=small)
+
+    outcome = Campaign(RIG, CAUSES, ASKED, lambda _: log, choose=choose).go([log], known)
+    assert (outcome.end, outcome.proofs) == ("undecidable", proved)
+    assert [r.proposal.duration for r in outcome.rounds if r.proposal] == lengths
+
+
 def test_the_loop_confirms_the_hidden_cause_by_a_run(log, known, campaign, tmp_path):
     rng, played = np.random.default_rng(2), []
 
@@ -143,6 +162,8 @@ def test_the_loop_confirms_the_hidden_cause_by_a_run(log, known, campaign, tmp_p
     assert len(outcome.records) == 1 + len(played)
     report = write_campaign(outcome, work, tmp_path / "out").read_text(encoding="utf-8")
     assert "Current loop lag" in report and "after run 1" in report
+    notes = probability_figure(outcome).layout["annotations"]
+    assert notes and all((n["xref"], n["xanchor"]) == ("paper", "left") for n in notes), "cut on a phone"
     said = json.loads((tmp_path / "out" / "experiment.json").read_text(encoding="utf-8"))
     assert said["end"] == "confirmed" and len(said["rounds"]) == len(played) + 1
     assert load_rig(tmp_path / "out" / "model.yaml").effects[-1].name == "current_loop_lag"

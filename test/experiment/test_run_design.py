@@ -8,7 +8,7 @@ from independent.bench import Bench, record_command
 from independent.hidden import hide
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.advice import advise
+from rsea_ros.experiment.advice import advise, proofs_of
 from rsea_ros.experiment.bound import bound
 from rsea_ros.experiment.chance_constraint import at_ends
 from rsea_ros.experiment.hypothesis import motion, run_case
@@ -138,7 +138,7 @@ def test_no_run_tells_a_torque_constant_from_a_gain_of_the_sensor():
     advice = advise(pair, replace(ASKED, refine=0, kinds=("chirp",), probe=1.0))
     assert advice.proposal is None
     (proof,) = advice.proofs
-    assert proof.bound.most < 1e-3 and proof.bound.duration >= 60.0
+    assert proof.covers_all and proof.bound.most < 1e-3 and proof.bound.duration >= 60.0
     assert any("F/T sensor" in a.what for a in proof.apart)
     assert any("stiffness" in a.what and a.separation > 12.0 for a in proof.apart)
 
@@ -150,6 +150,15 @@ def test_the_bound_leaves_room_where_a_run_separates():
     command = command_of(Shape("multisine", LIMITS.torque), 1.0, 280.0)
     peaks = refit(delay, lag, run_case(command, 280.0, NOISE))
     assert isinstance(peaks, Refit) and peaks.data <= peaks.total <= room.most
+
+
+def test_a_bound_by_sines_does_not_cover_all_runs_on_a_nonlinear_cause():
+    noise = dict.fromkeys(NOISE, 1e3)
+    kinds = [{"coulomb_friction": {"torque": 0.3}}, {"command_delay": {"delay": 3e-3}}]
+    pairs = [possible(**kind, current_loop_lag={"time_constant": 3e-3}) for kind in kinds]
+    names = [[tuple(h.name for h in pair)] for pair in pairs]
+    proofs = [proofs_of(p, n, ASKED, noise)[0] for p, n in zip(pairs, names, strict=True)]
+    assert [p.covers_all for p in proofs] == [False, True]
 
 
 def test_a_joint_that_positions_command_is_refused():

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
+from independent.bench import drawn_bench, record_run
 from independent.plant import Plant
+
+import rsea_ros.laws.learn
+from rsea_ros.laws.learn import learn
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.law.words import headline
 
 RATIO = Plant().ratio
 
@@ -47,3 +54,12 @@ def test_the_gain_is_measured_on_blocks_that_took_part_in_nothing(learn_of):
     assert result.gain_ci95[0] < result.gain < result.gain_ci95[1]
     assert all(result.after[n] < 1.3 * result.noise[n] for n in ("ft", "position"))
     assert result.share > 0.95
+
+
+@pytest.mark.parametrize(("gain", "ci95"), [(0.12, (-0.01, 0.3)), (0.01, (0.005, 0.015))])
+def test_a_law_that_is_not_surely_better_is_not_written(monkeypatch, gain, ci95):
+    monkeypatch.setattr(rsea_ros.laws.learn, "gain_on_tests", lambda *_: (gain, ci95))
+    bench = drawn_bench(np.random.default_rng(3)).with_values(quadratic_drag=12.0)
+    result = learn([record_run(bench, 3, "chirp_noise", 4.0)], load_rig("paper_high_impedance"))
+    assert result.laws == () and result.gain == 0.0 and result.tried
+    assert "no law surely reduces it" in headline(result)

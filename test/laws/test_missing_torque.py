@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from effect_bench import RIG, command
 
@@ -10,6 +12,7 @@ from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.identification.unknowns import vector_of
 from rsea_ros.laws.columns import case_model, rows_of
 from rsea_ros.laws.gram import SELECTION, gram_of
+from rsea_ros.laws.sparse_regression import fold_sums
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 
@@ -36,6 +39,17 @@ def test_a_hidden_torque_is_reconstructed_within_its_doubt():
     error = (missing.torque - np.interp(missing.t + 0.5 / 280.0, t, bump(t)))[inside]
     assert np.std(error) < 0.35
     assert 0.5 < np.std(error) / missing.sd < 2.0
+
+
+def test_a_value_of_the_rig_that_the_data_do_not_show_stays_at_its_prior():
+    problem, theta = problem_with(bump(np.arange(2800) / 280.0))
+    rows = rows_of(problem, theta)
+    unseen = rows.nominal.copy()
+    unseen[:, 0] = 0.0
+    gram = gram_of(replace(rows, nominal=unseen), [np.sin(np.arange(len(rows.residual)))])
+    column = np.array([len(gram.prior)])
+    assert gram.fit(column, SELECTION)[0] == 0.0
+    assert np.isfinite(fold_sums(gram, np.ones(len(rows.channels))).loss(np.append(gram.nominal, column)))
 
 
 def test_held_out_losses_are_those_of_fits_by_hand():

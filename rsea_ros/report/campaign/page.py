@@ -72,7 +72,7 @@ def probability_figure(outcome: CampaignOutcome) -> Figure:
             )
         )
         if y[-1] >= 0.03 or k == 0:
-            notes.append(label(plain_name(name), float(x[-1]), float(y[-1]), colour, xshift=10))
+            notes.append(label(plain_name(name), 1.01, float(y[-1]), colour, xref="paper"))
     ticks = ["first records" if not k else f"after run {k}" for k in range(len(rounds))]
     return Figure(
         "Remaining causes after each run",

@@ -22,7 +22,7 @@ def headline(result: LawResult) -> str:
     if result.at_floor:
         return "No law is needed: the model is at the noise floor"
     if not result.laws:
-        return f"{_remaining_text(result)} remains, but no law of it holds on held-out blocks"
+        return f"{_remaining_text(result)} remains, but no law surely reduces it on held-out blocks"
     law = result.laws[0].law
     kind = "A learnt law, which names no cause: " if law.is_learnt else ""
     share = min(100.0 * result.share, 100.0)

@@ -12,11 +12,13 @@ from rsea_ros.report.diagnosis.sketch import sketch, upright_sketch
 from rsea_ros.report.figures.figure import Figure, axis, label, layout, line
 from rsea_ros.report.figures.palette import BEFORE, INK
 from rsea_ros.report.page.frame import page
+from rsea_ros.report.page.html import equation
 from rsea_ros.report.page.html_table import table, table_of_cells
 from test.watch.browser import Browser
 
 CAUSE = ["ft_gain_error"]
 CURVE = Figure("Rising", "", [{"type": "scatter", "x": [0, 1], "y": [0, 1], "name": "y"}], layout())
+LAW = "T = -saturating_drag · tanh(ω/drag_width) - stribeck · exp(-(ω/stribeck_velocity)²)·sign(ω)"
 UNITS = {"xaxis": axis("time, s"), "yaxis": axis("torque, N·m")}
 BESIDE = [label(name, 1.01, y, INK, xref="paper", yref="paper") for name, y in (("y", 0.9), ("z", 0.5))]
 _X = np.linspace(0.0, 1.0, 9)
@@ -38,7 +40,8 @@ LIGHT, DARK = ([{"name": "prefers-color-scheme", "value": value}] for value in (
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
-    (folder / "page.html").write_text(page("t", "k", [sketch(CAUSE) + upright_sketch(CAUSE), CURVE], []))
+    drawn = sketch(CAUSE) + upright_sketch(CAUSE) + equation(LAW)
+    (folder / "page.html").write_text(page("t", "k", [drawn, CURVE], []))
     with closing(Browser(folder)) as made:
         made.open((folder / "page.html").as_uri())
         made.until("document.querySelector('[data-drawn]')")
@@ -51,6 +54,14 @@ def test_the_name_of_the_culprit_is_in_view_and_can_be_read(browser, width):
     browser.size(width, 900)
     ((left, right, height),) = browser.value(SHOWN)
     assert 0.0 <= left < right <= width and height > 10.0
+
+
+def test_an_equation_is_in_view_on_a_phone(browser):
+    """Its end was behind the edge of its box."""
+    browser.size(400, 900)
+    shown = "[...document.querySelectorAll('.equation')].map((e) => [e.scrollWidth, e.clientWidth])"
+    ((whole, seen),) = browser.value(shown)
+    assert 0 < whole <= seen < 400
 
 
 def test_figures_follow_the_colours_of_the_system(browser):
