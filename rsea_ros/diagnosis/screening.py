@@ -101,6 +101,17 @@ def _best_of(
     return None if best is None else replace(best, unsure=least)
 
 
+def best_guess(
+    current: Solution, effect: Effect, guesses: Iterable[dict[str, float]], rule: ForwardSettings
+) -> ScreenedEffect | None:
+    """Return the best of some guesses after two steps with the derivatives that are known.
+
+    None for an effect that shows in no channel.
+    """
+    tried = (_with_present_derivatives(current, effect, guess, rule) for guess in guesses)
+    return min((t for t in tried if t is not None), key=lambda s: s.cost, default=None)
+
+
 def continue_fit(screened: ScreenedEffect, rule: ForwardSettings) -> ScreenedEffect:
     """Return the best of an effect's guesses after more steps of those that were unsure."""
     longer = [solve(s.problem, s.theta, iterations=rule.bent_steps) for s in screened.unsure]

@@ -13,6 +13,7 @@ from rsea_ros.diagnosis.candidate import (
     Candidate,
     FitSetup,
     fit_candidate,
+    leaves_only_noise,
     refit,
 )
 from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, loss_excess, preference
@@ -25,7 +26,7 @@ from rsea_ros.diagnosis.problem_variants import (
     without_clocks,
 )
 from rsea_ros.diagnosis.score import Score, score_on
-from rsea_ros.diagnosis.screening import ScreenedEffect, continue_fit, screen
+from rsea_ros.diagnosis.screening import ScreenedEffect, best_guess, continue_fit, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
@@ -110,6 +111,18 @@ class StepFits:
         """Fit screened effects to all training blocks."""
         return list(self.pools.fits.map(self._fit_all, screened))
 
+    def fit_modes_again(self, models: Sequence[Candidate]) -> list[Candidate]:
+        """Return models, those of a mode fitted again from typical values where that leads further.
+
+        A peak of the residual may lie beside the mode: between two of them, or at an edge of the band. A fit
+        that begins at it ends in a poor minimum. Where some model leaves little, nothing is fitted again.
+        """
+        if any(self._leaves_little(m) for m in models):
+            return list(models)
+        again = [m for m in models if "mode" in effect_named(m.newest).tags]
+        better = {m.newest: m for m in self.pools.fits.map(self._fit_mode_again, again)}
+        return [better.get(m.newest, m) for m in models]
+
     def find_overlooked(self, left_out: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
         """Return those of the effects left out that surely help on the validation blocks, as fitted so far.
 
@@ -160,22 +173,39 @@ class StepFits:
 
     def _fit_all(self, screened: ScreenedEffect) -> Candidate:
         self.say(f"fitting {screened.name} to all training blocks", 0.8)
-        current, fits = self.current, self.settings.fits
-        setup = FitSetup(
-            current.cases, self.settings, self.pools.run, current.validation, iterations=fits.full_iterations,
-            is_quick=self.is_far,
-        )  # fmt: skip
         problem, theta = self.complete(screened)
-        masked = setup.mask(problem)
+        masked = self._setup.mask(problem)
         start = min(self._starts(problem, theta), key=lambda t: power(masked.residual(t)))
-        first = fit_candidate(setup, problem, start)
+        return self._fit_from(problem, start)
+
+    def _fit_from(self, problem: Problem, start: FloatArray) -> Candidate:
+        """Fit to all training blocks, and again in units of what that leaves."""
+        first = fit_candidate(self._setup, problem, start)
         if problem.on_angle:
-            free = fit_candidate(setup, replace(problem, on_angle=False), first.solution.theta)
+            free = fit_candidate(self._setup, replace(problem, on_angle=False), first.solution.theta)
             first = free if is_equally_good(free, first, self.settings) else first
         if not self._has_moved(first):
             return first
         is_quick = is_far_from_floor(first, self.settings)
-        return refit(first, replace(setup, iterations=None, is_quick=is_quick))
+        return refit(first, replace(self._setup, iterations=None, is_quick=is_quick))
+
+    def _fit_mode_again(self, model: Candidate) -> Candidate:
+        """Return the fit of a mode from the best of its typical values, or the model where that is no better."""
+        self.say(f"fitting {model.newest} from other values", 0.8)
+        (mode,) = (e for e in self.effects if e.name == model.newest)
+        best = best_guess(self.current.solution, mode, mode.default_guesses, self.settings.forward)
+        if best is None:
+            return model
+        other = self._fit_from(replace(best.problem, cases=self.current.cases), best.theta)
+        return min(model, other, key=lambda m: float(m.validation.loss(self.current.validation).sum()))
+
+    @property
+    def _setup(self) -> FitSetup:
+        """How effects are fitted beside the current model."""
+        return FitSetup(
+            self.current.cases, self.settings, self.pools.run, self.current.validation,
+            iterations=self.settings.fits.full_iterations, is_quick=self.is_far,
+        )  # fmt: skip
 
     def _surely_helps(self, screened: ScreenedEffect) -> bool:
         """Return whether an effect with its fit to the pieces does better on the validation blocks."""
@@ -183,6 +213,11 @@ class StepFits:
         _, theta = self.complete(screened)
         extra, rule = len(theta) - self.current.parameters, self.settings.acceptance
         return any(preference(s, self.current.validation, extra, rule).sure for s in scores)
+
+    def _leaves_little(self, model: Candidate) -> bool:
+        """Return whether a model leaves only noise, or has come near it from afar."""
+        near = self.is_far and not is_far_from_floor(model, self.settings)
+        return near or leaves_only_noise(model, self.settings.floor.only_noise)
 
     def _least_loss(self, screened: ScreenedEffect, chosen: Candidate) -> float:
         """Return how much more an effect with its fit to the pieces loses than the chosen model."""
