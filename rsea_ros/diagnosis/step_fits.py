@@ -190,7 +190,7 @@ class StepFits:
         return refit(first, replace(self._setup, iterations=None, is_quick=is_quick))
 
     def _fit_mode_again(self, model: Candidate) -> Candidate:
-        """Return the fit of a mode from the best of its typical values, or the model where that is no better."""
+        """Return the fit of a mode from the best of its typical values, where it is better than the model."""
         self.say(f"fitting {model.newest} from other values", 0.8)
         (mode,) = (e for e in self.effects if e.name == model.newest)
         best = best_guess(self.current.solution, mode, mode.default_guesses, self.settings.forward)
