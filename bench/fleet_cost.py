@@ -104,10 +104,13 @@ def scheduler(count: int = 10_000) -> bool:
             begin = time.process_time()
             took = seconds_of(lambda: stub.run_engine(store, bags, workers, stub.stub_row))
             busy = time.process_time() - begin
+            merged = resident()
     both = f"{1e3 * busy / count:.1f} ms of CPU, {1e3 * took / count:.1f} ms in all for each task"
     line("client and scheduler", "–", both)
     curve = ", ".join(f"{b / MEGA:.0f}" for b in held[:: count // 10])
     line("… its memory, MB", "–", f"{curve} after each {count // 10} tasks")
+    ends = f"{held[-1] / MEGA:.1f}, {merged / MEGA:.1f} after the merge of all rows"
+    line("… at the end, MB", "–", ends)
     later = np.array(held)[count // 5 :]
     slope = float(np.polyfit(np.arange(len(later)), later, 1)[0])
     whole = slope * 1e4 / later[0]

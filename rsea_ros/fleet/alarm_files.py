@@ -17,7 +17,7 @@ from typing import Any
 
 from rsea_ros.errors import OutputError
 from rsea_ros.files import make_folder
-from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet.query import NoRowsError
 from rsea_ros.fleet.store import Store
 from rsea_ros.fleet.store_columns import history, recordings
 from rsea_ros.new_files import write_text
@@ -48,7 +48,7 @@ def write_alarms(store: Store) -> list[AlarmFile]:
 def _new(store: Store, folder: Path) -> Iterator[AlarmFile]:
     try:
         present = alarms(history(store.path), recordings(store.path))
-    except FleetError:  # no row yet
+    except NoRowsError:
         return
     for alarm in present:
         file = folder / f"{alarm.joint}-{hashlib.sha256(alarm.key.encode()).hexdigest()[:12]}.json"

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
+from multiprocessing import resource_tracker
 from typing import Any
 
 import dask
@@ -138,6 +139,7 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
 
     memory: bytes that each worker may have. dashboard: host and port, port 0 for any.
     """
+    resource_tracker.ensure_running()  # its start would let the threads of the block hear Ctrl-C again
     with dask.config.set(SETTINGS):
         with deaf_to_interrupts():
             cluster = distributed.LocalCluster(  # type: ignore[no-untyped-call]

@@ -62,7 +62,8 @@ def finish(rows: Path) -> None:
 def _merge(folder: Path, files: Sequence[Path]) -> None:
     """Make one file of some files of a partition."""
     if len(files) > 1:
-        _replace(folder, files, _once(pa.concat_tables([read(file) for file in files])))
+        tables = [read(file) for file in files]
+        _replace(folder, files, _once(pa.concat_tables(tables, promote_options="default")))
 
 
 def _replace(folder: Path, files: Sequence[Path], table: pa.Table) -> None:

@@ -110,8 +110,8 @@ def open_store(path: str | Path, *, create: bool = False) -> Store:
         raise FleetError(f"{path}: no {MARK} in it, expected a store that rsea fleet run has made") from None
     except (ValueError, KeyError, TypeError):
         raise FleetError(f"{mark}: cannot be read, expected the mark of a store") from None
-    if not isinstance(schema, int) or schema > SCHEMA:
-        raise FleetError(f"{mark}: schema {schema}, expected {SCHEMA}: a later version made this store")
+    if schema not in range(1, SCHEMA + 1):
+        raise FleetError(f"{mark}: schema {schema}, expected {SCHEMA}: another version made this store")
     make_folder(store.rows)
     return store
 

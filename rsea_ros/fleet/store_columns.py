@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from rsea_ros.fleet.query import connect
+from rsea_ros.fleet.query import connect, read_again
 from rsea_ros.fleet.store import open_store
 
 Columns = dict[str, npt.NDArray[Any]]
@@ -47,8 +47,13 @@ def recordings(store: str | Path) -> Columns:
 
 
 def _columns(store: str | Path, query: str) -> Columns:
-    with connect(open_store(store)) as database:
-        table = database.sql(query).to_arrow_table()
+    opened = open_store(store)
+
+    def read() -> pa.Table:
+        with connect(opened) as database:
+            return database.sql(query).to_arrow_table()
+
+    table = read_again(read)
     return {name: _plain(table[name].combine_chunks()) for name in table.column_names}
 
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from rsea_ros.fleet.fleet_error import FleetError
-from rsea_ros.fleet.row import key_of
+from rsea_ros.fleet.row import COLUMNS, key_of
 from rsea_ros.wording import brief
 
 EXPECTED_FILES = "expected whole Parquet files: remove the damaged one, and the next run makes its rows anew"
@@ -35,10 +35,14 @@ def known_rows(rows: Path) -> tuple[set[str], dict[tuple[str, int, str], str]]:
 def read(file: Path, columns: list[str] | None = None) -> pa.Table:
     """Return some columns of one file, all by default, without those in its path.
 
-    Raises FleetError for a damaged file.
+    Columns that an earlier version did not write are null. Raises FleetError for a damaged file.
     """
     with _named(file), parquet.ParquetFile(file) as opened:
-        return opened.read(columns=columns)
+        table = opened.read(columns=columns)
+    for name in columns or COLUMNS:
+        if name not in table.column_names:
+            table = table.append_column(name, pa.nulls(len(table), COLUMNS[name]))
+    return table
 
 
 def metadata(file: Path) -> dict[Any, Any]:

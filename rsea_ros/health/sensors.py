@@ -46,6 +46,7 @@ class Sensors:
     _spans: dict[str, list[tuple[float, float, float]]] = field(default_factory=dict)
     _begin: float = math.inf
     _now: float = -math.inf
+    _silence: float = 0.0
 
     def __post_init__(self) -> None:
         self._noise = {n: max(s.noise, s.quantum, 1e-12) for n, s in self.rig.sensors.items()}
@@ -54,20 +55,24 @@ class Sensors:
 
     def begin(self) -> None:
         """Forget all measurements."""
-        self._begin, self._now, self._spans = math.inf, -math.inf, {}
+        self._begin, self._now, self._spans, self._silence = math.inf, -math.inf, {}, 0.0
         self._state = {name: _Sensor() for name in CHANNELS if name in self.rig.sensors}
 
     def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:
         """Process events, sorted."""
         if not len(t):
             return
-        self._begin, self._now = min(self._begin, float(t[0])), float(t[-1])
+        self._begin, self._now, self._silence = min(self._begin, float(t[0])), float(t[-1]), 0.0
         self._note("command", t[kind == COMMAND], values[kind == COMMAND, 0])
         for name, (of, column) in CHANNELS.items():
             self._note(name, t[kind == of], values[kind == of, column])
         for name, sensor in self._state.items():
             of, column = CHANNELS[name]
             self._follow(name, sensor, t[kind == of], values[kind == of, column])
+
+    def hear_nothing(self, seconds: float) -> None:
+        """Note how long ago by a steady clock the last event came: without events no stamp shows it."""
+        self._silence = seconds
 
     @property
     def frozen(self) -> dict[str, float]:
@@ -78,7 +83,8 @@ class Sensors:
     def missing(self) -> dict[str, float]:
         """Sensors that send nothing, and since when, s."""
         last = {n: max(s.seen, self._begin) for n, s in self._state.items()}
-        return {name: t for name, t in last.items() if self._now - t > SILENT}
+        now = self._now + self._silence
+        return {name: t for name, t in last.items() if now - t > SILENT}
 
     def _note(self, name: str, t: FloatArray, y: FloatArray) -> None:
         """Keep the range of a signal for as long as others may be compared with it."""

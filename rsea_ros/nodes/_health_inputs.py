@@ -18,6 +18,8 @@ from rsea_ros.signals import FloatArray, IntArray
 
 LAG = SECOND // 10
 """ns that one topic may come later than another and still be put in its place."""
+MOST = 10_000
+"""Events that wait at most: commands without measurements would wait, and grow, for as long as these stop."""
 Events = tuple[FloatArray, IntArray, FloatArray]
 Keep = Callable[[str, str, int, bytes], None]
 
@@ -60,6 +62,7 @@ class HealthInputs:
             self._newest = newest
         self._waiting += measured + [row for row in map(self._place, commands) if row is not None]
         self._waiting.sort()
+        del self._waiting[:-MOST]
         return self._ready()
 
     def _ready(self) -> Events:

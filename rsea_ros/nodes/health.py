@@ -82,6 +82,8 @@ class HealthNode:
         events = self._inputs.take()
         if len(events[0]):
             self._heard = time.monotonic()
+        else:
+            self._monitor.sensors.hear_nothing(time.monotonic() - self._heard)
         try:
             self._weigh(events)
         except (ArithmeticError, ValueError) as error:

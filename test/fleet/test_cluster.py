@@ -6,6 +6,8 @@ import gc
 import io
 import logging
 import os
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -153,3 +155,20 @@ def test_a_lost_scheduler_leaves_no_traceback_of_dask_on_the_terminal(monkeypatc
     with pytest.raises(FleetError, match="refused"), on_scheduler("tcp://127.0.0.1:1"):
         pass
     assert written.getvalue() == ""
+
+
+MASK = """
+import signal
+from rsea_ros.fleet.cluster import on_this_machine
+from rsea_ros.fleet.executor import Job
+with on_this_machine(1, 4_000_000_000, "127.0.0.1:0") as (workers, _):
+    workers.submit(Job(lambda _: signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []), 0))
+    print(workers.next(20.0).value)
+"""
+
+
+def test_a_worker_that_starts_does_not_hear_ctrl_c():
+    """The first start of multiprocessing's tracker unblocked it: a worker printed a traceback."""
+    command = [sys.executable, "-c", MASK]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "True"

@@ -79,6 +79,16 @@ def test_stamps_of_another_time_restart_the_watch(heard, listener):
     assert len(inputs._waiting) <= 60
 
 
+def test_commands_to_a_joint_that_publishes_nothing_do_not_pile_up(heard, listener, monkeypatch):
+    """They wait for measurements of their time: 280 a second for as long as these stopped."""
+    monkeypatch.setattr("rsea_ros.nodes._health_inputs.MOST", 50)
+    inputs, _, _, command, _ = heard
+    for k in range(120):
+        command.publish(joint_state_message(EPOCH + k * PERIOD, 0.0, 0.0, 1.0))
+    listener.until(lambda: len(inputs.take()[0]) == 0 and inputs.counts["torque_command"] >= 120)
+    assert len(inputs._waiting) == 50
+
+
 def test_memory_is_bounded_in_time_and_size():
     ring = Ring(1.0, 0.001)
     for k in range(1000):

@@ -158,9 +158,6 @@ def _title(parameter: str, rows: Sequence[Trend | None]) -> str:
     determined = [t for t in rows if t is not None and t.state != "undetermined"]
     moved = [t for t in determined if t.state != "steady"]
     plain = name(parameter)
-    if not determined:
-        reasons = sorted({undetermined_state(trend) for trend in rows if trend is not None})
-        return f"{plain}: {' or '.join(reasons)} in every joint"
     if not moved:
         return f"{plain} is steady in all {len(determined)} joints that tell it"
     most = max(moved, key=lambda t: abs(t.relative))

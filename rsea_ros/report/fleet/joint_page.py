@@ -49,7 +49,8 @@ def joint_page(
     """Return the page as HTML that opens without a network. alarms: of this joint, the most urgent first."""
     rows = np.flatnonzero(np.asarray(recordings["joint"], str) == joint)
     latest = latest_causes([joint], recordings).get(joint, "")
-    quiet = f"{latest} in its latest recording" if latest else _quiet(fleet, joint)
+    dated = _is_dated(recordings, rows)
+    quiet = f"{latest} in its latest recording" if latest else _quiet(fleet, joint, dated)
     title = f"{joint}: {sentence(alarms[0]) if alarms else quiet}"
     blocks = list(_blocks(joint, fleet, alarms, history, recordings, rows, steps, links))
     footer = ["rsea fleet report. All values in SI, all times UTC."]
@@ -62,7 +63,7 @@ def _blocks(
 ) -> Iterator[Block]:  # fmt: skip
     trends = [t for (j, _), t in fleet.trends.items() if j == joint]
     yield '<p class="next"><a href="index.html">All joints</a></p>'
-    dated = bool(np.any(np.isfinite(np.asarray(recordings["time_s"], float)[rows])))
+    dated = _is_dated(recordings, rows)
     yield key_numbers(_keys(trends, recordings, rows, dated))
     if alarms:
         yield section("Findings", alarm_table(alarms, links, with_joint=False))
@@ -128,7 +129,13 @@ def _keys(
     ]
 
 
-def _quiet(fleet: FleetTrends, joint: str) -> str:
+def _is_dated(recordings: Table, rows: np.ndarray) -> bool:
+    return bool(np.any(np.isfinite(np.asarray(recordings["time_s"], float)[rows])))
+
+
+def _quiet(fleet: FleetTrends, joint: str, dated: bool) -> str:
+    if not dated:
+        return "no recording has a date"
     trends = [t for (j, _), t in fleet.trends.items() if j == joint]
     determined = [t for t in trends if t.state != "undetermined"]
     return (

@@ -27,8 +27,6 @@ from rsea_ros.trends.series import Table
 from rsea_ros.trends.weeks import Steps
 from rsea_ros.wording import list_names
 
-_NAMED = 3
-"""Joints that the headline names."""
 _ROWS = 60
 """Joints of a heat map: the first of a larger fleet."""
 
@@ -55,7 +53,7 @@ def _blocks(
     yield timeline(ranked, steps, links)
     if ranked:
         yield section("Worst joints first", alarm_table(ranked, links))
-    for parameter in _parameters_with_map(fleet):
+    for parameter in _parameters_with_map(fleet, joints[:_ROWS]):
         yield heat_map(parameter, joints[:_ROWS], fleet, steps, links)
     for kind, subject in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
         yield naming_map(
@@ -66,10 +64,10 @@ def _blocks(
     yield fold("Certainty of these findings", bullets(_sure(fleet)))
 
 
-def _parameters_with_map(fleet: FleetTrends) -> list[str]:
+def _parameters_with_map(fleet: FleetTrends, shown: Sequence[str]) -> list[str]:
     """Return the parameters that have a map, those that moved most first; of causes the usual ones.
 
-    A parameter without a trend in any joint has none: the table of the undetermined ones says why.
+    A parameter without a trend in any joint shown has none: the table of the undetermined ones says why.
     """
     sized = [p for _, p in fleet.sizes]
     usual = [p for p in dict.fromkeys(sized) if 2 * sized.count(p) > len(fleet.joints)]
@@ -79,22 +77,28 @@ def _parameters_with_map(fleet: FleetTrends) -> list[str]:
         changed = [t for (_, p), t in trends.items() if p == parameter and t.changes]
         return -max((abs(t.relative) for t in changed), default=0.0)
 
-    with_trend = {p for (_, p), t in trends.items() if t.state != "undetermined"}
+    with_trend = {p for (joint, p), t in trends.items() if joint in shown and t.state != "undetermined"}
     every = dict.fromkeys([*(p for _, p in fleet.trends), *usual])
     return sorted((p for p in every if p in with_trend), key=movement)
 
 
 def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:
     if not any(t.state != "undetermined" for t in fleet.trends.values()):
-        latest = [f"{cause} in {joint}" for joint, cause in latest_causes(fleet.joints, recordings).items()]
-        now = f"; the latest name {list_names(latest[:_NAMED])}" if latest else ""
-        return f"Too few recordings yet for trends{now}"
+        return f"Too few recordings yet for trends{_latest(fleet, recordings)}"
     groups = by_joint(alarms)
     if not groups:
         return f"All {len(fleet.joints)} joints are steady"
     first = next(iter(groups))
     number = f"{len(groups)} of {len(fleet.joints)} joints need" if len(groups) > 1 else "One joint needs"
     return f"{number} a look, {first} first: {about(groups[first][0])}"
+
+
+def _latest(fleet: FleetTrends, recordings: Table) -> str:
+    """Return what the latest recordings name: the causes of one joint, or the number of joints."""
+    latest = latest_causes(fleet.joints, recordings)
+    if len(latest) > 1:
+        return f"; the latest of {len(latest)} joints name causes"
+    return "".join(f"; the latest name {cause} in {joint}" for joint, cause in latest.items())
 
 
 def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table) -> list[tuple[str, str]]:

@@ -75,6 +75,14 @@ def test_a_cause_in_the_latest_recording_is_reported_before_a_trend_exists(tmp_p
     assert "<h1>right: backlash in its latest recording" in (index.parent / "joint-right.html").read_text()
 
 
+def test_the_headline_of_many_joints_with_causes_counts_them(tmp_path):
+    """Three joints of two causes each filled six lines of the page."""
+    made = history(np.random.default_rng(1), joints=JOINTS, days=2)
+    worn = recordings(JOINTS, 2, causes=lambda j, d: [cause("backlash", 4e-3)] if j != "hip" else [])
+    text = write_fleet_report(made, worn, tmp_path / "out").read_text(encoding="utf-8")
+    assert "<h1>Too few recordings yet for trends; the latest of 3 joints name causes</h1>" in text
+
+
 def test_a_joint_of_a_few_days_says_so_and_not_that_it_cannot_be_determined(tmp_path):
     made = history(np.random.default_rng(1), joints=JOINTS, days=100)
     kept = (made["joint"] != "hip") | (made["time_s"] < START + 3 * 86_400.0)
@@ -161,6 +169,7 @@ def test_a_joint_without_a_date_has_its_row_and_its_page(tmp_path):
     index = write_fleet_report(made, names, tmp_path / "out").read_text(encoding="utf-8")
     assert "Fleet of 2 joints" in index and "no recording has a date" in index
     rail = (tmp_path / "out" / "joint-rail.html").read_text(encoding="utf-8")
+    assert "<h1>rail: no recording has a date" in rail
     assert "No recording has a date" in rail and "“date” in joints.yaml" in rail
     assert "latest recording" not in rail, "without dates none is the latest"
     assert "0 of 0" not in rail and re.search(r"<small>spring.stiffness</small>.*?1\d{3} N·m/rad", rail)

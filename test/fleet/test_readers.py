@@ -1,0 +1,102 @@
+"""Readers of a store while a run writes, and of files that an earlier version wrote."""
+
+from __future__ import annotations
+
+import pytest
+from fleet_stubs import KNEE, stub_work
+from pyarrow import parquet
+
+from rsea_ros.fleet import history, query, recordings
+from rsea_ros.fleet.alarm_files import write_alarms
+from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet.query import MergedError, answer
+from rsea_ros.fleet.sources import Bag
+from rsea_ros.fleet.store import open_store
+from rsea_ros.fleet.store_keys import read
+from rsea_ros.fleet.task import Task
+
+COUNT = "SELECT count(*) FROM recordings"
+
+
+def put(store, number):
+    store.put(stub_work(Task(Bag(f"/{number}", 1, ""), KNEE, f"{number:016x}", "1")))
+
+
+@pytest.fixture
+def merging(store, monkeypatch):
+    """Return a store whose rows another process merges between the listing and the reading of its files."""
+    for number in range(8):
+        put(store, number)
+    connect = query.duckdb.connect
+
+    class Database:
+        def __init__(self, database) -> None:
+            self._database = database
+
+        def __getattr__(self, name):
+            return getattr(self._database, name)
+
+        def __enter__(self):
+            self._database.__enter__()
+            return self
+
+        def __exit__(self, *error):
+            return self._database.__exit__(*error)
+
+        def sql(self, text):
+            relation = self._database.sql(text)
+            store.compact()
+            return relation
+
+    monkeypatch.setattr(query.duckdb, "connect", lambda place: Database(connect(place)))
+    return store
+
+
+def test_files_that_a_run_merges_while_they_are_read_are_read_again(merging):
+    """A report during a run ended with the advice to remove a damaged file."""
+    assert answer(merging, COUNT)[1] == [(8,)]
+
+
+def test_a_report_during_a_run_reads_again(merging):
+    assert len(recordings(merging.path)["joint"]) == 8
+
+
+def test_a_store_that_never_rests_says_so(store, monkeypatch):
+    tries = []
+
+    def never(path, text):
+        tries.append(1)
+        raise MergedError("busy")
+
+    monkeypatch.setattr("rsea_ros.fleet.query._answer", never)
+    with pytest.raises(MergedError):
+        answer(store, COUNT)
+    assert len(tries) == query.TRIES
+
+
+def test_files_without_later_columns_are_read_and_merged(store):
+    put(store, 1)
+    (file,) = store.rows.rglob("*.parquet")
+    parquet.write_table(read(file).drop_columns(["diagnosis", "stamp", "faults"]), file)
+    assert answer(store, COUNT)[1] == [(1,)] and list(recordings(store.path)["verdict"]) == [""]
+    assert len(history(store.path)["value"]) == 1
+    keys, bags = store.known_rows()
+    assert len(keys) == len(bags) == 1
+    put(store, 2)
+    store.compact()
+    assert answer(store, "SELECT count(*), count(stamp) FROM recordings")[1] == [(2, 1)]
+
+
+def test_a_store_of_no_known_schema_is_refused(tmp_path):
+    (tmp_path / "store.json").write_text('{"schema": 0}')
+    with pytest.raises(FleetError, match="schema 0, expected 1: another version made this store"):
+        open_store(tmp_path)
+
+
+def test_a_damaged_file_is_no_store_without_alarms(store):
+    """The watch took it for a store without rows, and was silent."""
+    put(store, 1)
+    (file,) = store.rows.rglob("*.parquet")
+    file.write_text("junk")
+    with pytest.raises(FleetError, match="remove the damaged one"):
+        write_alarms(store)
