@@ -1,18 +1,20 @@
 """Designed experiments against fixed ones: python bench/experiment.py COMMAND LOG …
 
-    causes LOG [FIRST COUNT] [--limits full|lab]   hidden-cause benches, one a line of LOG; resumes
-    summary LOG                the figures of those lines
-    wire OUT                   the real driver on a simulated bench, an overload in the middle of a run
-    limits RUNS                limit violations in RUNS simulated runs, true values drawn from their intervals
+    causes LOG [FIRST COUNT] [--limits full|lab|work]   hidden-cause benches, one a line of LOG; resumes
+    random LOG OUT [--limits …]   the random multisines of LOG once more, on the same benches, into OUT
+    summary LOG                   the figures of those lines
+    wire OUT                      the real driver on a simulated bench, an overload in the middle of a run
+    limits RUNS                   limit violations in RUNS runs, true values drawn from their intervals
 
 Truth is the second bench of test/independent. Every policy starts from the same poor log, 10 s of slow work
 at 0.5 N m, weighs the same causes by the same rule, and stops at the same probability; what differs is the
 run: designed; a piece of the paper's chirp, 20 s long, of the same peak as the limit; a random multisine of
-the designed run's power in 0.5 to 100 Hz. Causes are those that a
+the designed runs' power in 0.5 to 100 Hz, clipped at the limit. Causes are those that a
 session weighs (experiment/weighed_causes.py).
 
 Limits `full`: the bench near its rating (the paper's chirp has 20 N m). Limits `lab`: 3 N m, six times the
-slow work, as for the first runs on a machine with a suspected fault. seconds: of all runs played, whole.
+slow work, as for the first runs on a machine with a suspected fault. Limits `work`: 0.65 N m, the peak of
+the slow work: no run is stronger than what the machine has already done. seconds: of all runs played, whole.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ from independent.bench import drawn_bench, record_command  # noqa: E402
 from independent.hidden import hide  # noqa: E402
 from independent.severities import SEVERITIES, drawn_parameters  # noqa: E402
 
-from bench.experiment_figures import SECONDS, print_figures  # noqa: E402
+from bench.experiment_figures import SECONDS, SHORTEST, print_figures  # noqa: E402
 from bench.experiment_policies import RATE, Fixed, fixed_chirp, random_multisine  # noqa: E402
 from bench.json_log import append_to_log, read_log  # noqa: E402
 from bench.sections import parser_of  # noqa: E402
@@ -54,11 +56,12 @@ from rsea_ros.signals import Channel  # noqa: E402
 LIMITS = {
     "full": RunLimits(torque=25.0, velocity=2.0, deflection=0.04),
     "lab": RunLimits(torque=3.0, velocity=2.0, deflection=0.04),
+    "work": RunLimits(torque=0.65, velocity=2.0, deflection=0.04),
 }
 DESIGNS = 5
 """Benches whose designed runs are repeated for the limits."""
-SHORTEST, PER_RUN = 0.015, 0.0
-"""s of the first run of a policy, at least (four samples); s as dear as one more run: it counts no runs."""
+PER_RUN = 0.0
+"""s that are as dear as one more run: the bench does not count runs."""
 
 
 def hidden_case(k):
@@ -117,6 +120,22 @@ def one(k, pools, limits):
         commands = {"chirp": fixed_chirp(limits), "random": random_multisine(rms, k, limits.torque)}
         line |= {n: play_policy(Fixed(u, SHORTEST), *same)[1] for n, u in commands.items()}
     return line | {"cpu": time.process_time() - begun}
+
+
+def random_again(log, out, limits):
+    """Write the lines of a log with the random multisine played once more."""
+    rig = load_rig("paper_high_impedance")
+    with worker_pools() as pools:
+        for line in read_log(log)[len(read_log(out)) :]:
+            if "random" in line:
+                k = line["bench"]
+                bench, rng = hidden_case(k)[1], np.random.default_rng([18, k])
+                first = record_command(bench, slow_work(), rng)
+                policy = Fixed(random_multisine(line["rms"], k, limits.torque), SHORTEST)
+                weighing = weigh([first], rig, USUAL, run=pools.run)
+                line["random"] = play_policy(policy, first, weighing, bench, rig, rng, pools, limits)[1]
+                print(k, line["cause"], line["designed"]["seconds"], line["random"]["seconds"], flush=True)
+            append_to_log(out, line)
 
 
 def outcome_entry(outcome):
@@ -210,6 +229,10 @@ def main() -> None:
     played.add_argument("first", type=int, nargs="?", default=0)
     played.add_argument("count", type=int, nargs="?", default=60)
     played.add_argument("--limits", choices=LIMITS, default="full")
+    again = commands.add_parser("random")
+    again.add_argument("log", type=Path)
+    again.add_argument("out", type=Path)
+    again.add_argument("--limits", choices=LIMITS, default="full")
     commands.add_parser("summary").add_argument("log", type=Path)
     commands.add_parser("wire").add_argument("out", type=Path)
     commands.add_parser("limits").add_argument("runs", type=int, nargs="?", default=10_000)
@@ -220,6 +243,8 @@ def main() -> None:
         wire(args.out)
     elif args.command == "summary":
         print_figures(read_log(args.log))
+    elif args.command == "random":
+        random_again(args.log, args.out, LIMITS[args.limits])
     else:
         causes(args.log, args.first, args.count, LIMITS[args.limits])
 

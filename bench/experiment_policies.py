@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import brentq
 
 from rsea_ros.experiment.campaign import Rules
 from rsea_ros.experiment.run_design import propose
@@ -11,6 +12,8 @@ from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramp_e
 
 RATE, CHIRP = 280.0, 20.0
 """Hz; s."""
+MOST = 0.99
+"""Largest RMS of a clipped multisine as a share of its limit."""
 
 
 class Fixed:
@@ -48,11 +51,21 @@ def fixed_chirp(limits):
 
 
 def random_multisine(rms, seed, torque):
-    """Return a multisine of random phases and equal lines in 0.5 to 100 Hz of some RMS, 20 s, N m."""
+    """Return a multisine of random phases and equal lines in 0.5 to 100 Hz of some RMS, 20 s, N m.
+
+    Clipped at the limit, and so much larger before that its RMS afterwards is as asked. Without clipping, its
+    peak would be about four times its RMS.
+    """
     rng = np.random.default_rng(seed)
     n = round(CHIRP * RATE)
     spectrum = np.zeros(n // 2 + 1, complex)
     lines = np.arange(round(0.5 * CHIRP), round(100.0 * CHIRP))
     spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
     signal = np.fft.irfft(spectrum, n)
-    return np.clip(signal * rms / signal.std(), -torque, torque)
+    signal, asked = signal / signal.std(), min(rms, MOST * torque)
+
+    def excess(log_size):
+        return float(np.std(np.clip(np.exp(log_size) * signal, -torque, torque)) - asked)
+
+    size = np.exp(brentq(excess, np.log(0.5 * asked), np.log(1e4 * torque)))
+    return np.clip(size * signal, -torque, torque)

@@ -23,6 +23,14 @@ def number(value: Any, name: str, unit: str) -> float:
     return converted
 
 
+def interval(value: Any, name: str, unit: str) -> tuple[float, float]:
+    """Return [low, high] as two floats. Raises FieldError for anything else."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise FieldError(f"{name} = {quote(value)}, expected [low, high] in {plain(unit)}", name)
+    low, high = (number(v, name, unit) for v in value)
+    return low, high
+
+
 def switch(body: Mapping[str, Any], name: str) -> bool:
     """Return true or false of a group. Raises FieldError when it is something else."""
     value = body.get(name.split(".")[-1], False)

@@ -6,7 +6,7 @@ import argparse
 import runpy
 from pathlib import Path
 
-from rsea_ros.cli._numbers import positive, seed
+from rsea_ros.cli._numbers import positive, whole_number
 from rsea_ros.cli._output import path
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import BenchmarkError, ParameterError
@@ -20,10 +20,10 @@ def add_make(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `make`."""
     add = parser.add_argument
     add("out", type=path, help="new folder for the data set; the truth goes beside it, OUT.truth.json")
-    add("--records", type=seed, default=60, help=f"how many, 1 to {MOST} (default %(default)s)")
+    add("--records", type=whole_number, default=60, help=f"how many, 1 to {MOST} (default %(default)s)")
     add("--duration", type=positive, default=12.0, help="of each record, s, 5 to 600 (default %(default)g)")
     seeds = parser.add_mutually_exclusive_group()
-    seeds.add_argument("--seed", type=seed, default=1, help="public seed (default %(default)s)")
+    seeds.add_argument("--seed", type=whole_number, default=1, help="public seed (default %(default)s)")
     secret = f"file with a secret seed: any text of at least {SHORTEST} characters, for a hidden half"
     seeds.add_argument("--seed-file", type=path, help=secret)
 

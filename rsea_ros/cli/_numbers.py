@@ -6,8 +6,8 @@ import argparse
 import math
 
 
-def seed(text: str) -> int:
-    """Return the seed of random numbers. Raises ArgumentTypeError for anything but a whole number >= 0."""
+def whole_number(text: str) -> int:
+    """Return a whole number >= 0. Raises ArgumentTypeError for anything else."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r}, expected a whole number >= 0")
     return int(text)

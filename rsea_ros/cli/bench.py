@@ -14,7 +14,7 @@ from pathlib import Path
 from shlex import quote
 
 from rsea_ros.cli._graph import parameters_of_bench
-from rsea_ros.cli._numbers import seed
+from rsea_ros.cli._numbers import whole_number
 from rsea_ros.cli._output import path
 from rsea_ros.cli._runs import RIG
 from rsea_ros.errors import ParameterError
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="no F/T sensor: an encoder on the spring of the first motor, with ID 100 on the same line")
     add("--torque-constant", type=float, default=0.0, help="N·m at the output per A; 0: that of the model")
     add("--return-delay", type=int, default=0, help="delay of each reply in units of 2 µs, 0 to 254")
-    add("--seed", type=seed, default=0, help="seed of the sensor noise and of the misbehaviour")
+    add("--seed", type=whole_number, default=0, help="seed of the sensor noise and of the misbehaviour")
     add("--requests", action="store_true", help="read requests to misbehave from stdin, JSON lines")
 
 

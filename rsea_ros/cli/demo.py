@@ -20,7 +20,7 @@ from rsea_ros import strict_yaml
 from rsea_ros.cli._columns import columns
 from rsea_ros.cli._graph import parameters_of_bench
 from rsea_ros.cli._lines import say
-from rsea_ros.cli._numbers import seed
+from rsea_ros.cli._numbers import whole_number
 from rsea_ros.cli._output import path
 from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._progress import progress
@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=path, help="directory of the results (default out/demo-TIME)")
     parser.add_argument(
-        "--seed", type=seed, default=1, help="seed of true values, excitation and noise (default 1)"
+        "--seed", type=whole_number, default=1, help="seed of true values, excitation and noise (default 1)"
     )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 101 (default: a random one)")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._lines import say
-from rsea_ros.cli._numbers import positive
+from rsea_ros.cli._numbers import positive, whole_number
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
@@ -40,11 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--limits", required=True, metavar="NAME=VALUE,…", help=f"limits in both directions: {units}")
     add("--bag", nargs="+", action="extend", default=[], help="earlier runs, used to weight the causes")
     add("--rate", type=positive, default=280.0, help="rate of the commands, Hz (default %(default)g)")
-    add("--shortest", type=positive, default=0.5, help="shortest duration, s (default %(default)g)")
+    add("--shortest", type=positive, help="shortest duration, s (default 0.5, or the longest if less)")
     add("--longest", type=positive, default=10.0, help="longest duration of the run, s (default %(default)g)")
     add(
         "--refine",
-        type=int,
+        type=whole_number,
         default=24,
         metavar="N",
         help="number of shapes to compare (default %(default)s)",
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.identification.workers import worker_pools
 
     place = results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
-    shortest = min(args.shortest, args.longest)
+    shortest = args.shortest or min(0.5, args.longest)
     asked = DesignRequest(limits_from(args.limits), args.rate, shortest, args.longest, refine=args.refine)
     models = [model for path in args.models for model in models_in(path)]
     with progress("experiment") as tell, worker_pools() as pools:
@@ -87,10 +87,14 @@ def models_in(path: str) -> list[ModelFile]:
 
     if Path(path).suffix != ".json":
         return [model_of(load_rig(path))]
-    extended = load_rig(Path(path).parent / MODEL)
+    content = strict_yaml.read(Path(path)).content
+    beside = Path(path).parent / MODEL
+    if not beside.is_file():
+        raise ParameterError(f"{path}: no {MODEL} beside it, expected both files of a diagnosis")
+    extended = load_rig(beside)
     try:
-        return models_of(strict_yaml.read(Path(path)).content, extended)
-    except FieldError as error:
+        return models_of(content, extended)
+    except (FieldError, ParameterError) as error:
         raise ParameterError(f"{path}: {error}") from None
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._numbers import seed
+from rsea_ros.cli._numbers import whole_number
 from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
@@ -42,7 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="duration of each simulated test, s (default %(default)s)",
     )
     parser.add_argument(
-        "--seed", type=seed, default=5, help="seed of benches, commands and noise (default %(default)s)"
+        "--seed",
+        type=whole_number,
+        default=5,
+        help="seed of benches, commands and noise (default %(default)s)",
     )
     parser.add_argument(
         "--figures",

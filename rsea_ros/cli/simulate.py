@@ -10,7 +10,7 @@ import numpy as np
 
 from msg_adapters import write_record
 from rsea_ros.cli._lines import say
-from rsea_ros.cli._numbers import seed
+from rsea_ros.cli._numbers import whole_number
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.decimal_number import is_decimal
@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--limit", type=float, help="largest command allowed (default 100 N·m, for a position loop 3.2 rad)")
     parser.add_argument(
-        "--seed", type=seed, default=0, help="seed of command and sensor noise (default %(default)s)"
+        "--seed", type=whole_number, default=0, help="seed of command and sensor noise (default %(default)s)"
     )
     parser.add_argument("--no-noise", action="store_true", help="simulate perfect sensors")
     add_topic_options(parser)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._numbers import positive, seed
+from rsea_ros.cli._numbers import positive, whole_number
 from rsea_ros.cli._ros import need_ros
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "--seconds", type=positive, default=usual, help="time to listen, s (default %(default)s)"
         )
     echo.add_argument(
-        "--count", type=seed, default=1, help="number of messages to show (default %(default)s)"
+        "--count", type=whole_number, default=1, help="number of messages to show (default %(default)s)"
     )
     echo.add_argument(
         "--seconds", type=positive, default=10.0, help="longest time to wait, s (default %(default)s)"

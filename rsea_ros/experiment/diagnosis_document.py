@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.checked import mapping, number, text
+from rsea_ros.checked import interval, mapping, number, text
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError
 from rsea_ros.experiment.hypothesis import NOTHING
@@ -53,10 +53,12 @@ def _cause(body: Mapping[str, Any], where: str, extended: Rig) -> ModelFile:
             entry = mapping(sizes[p.name], f"{where}.parameters.{p.name}")
             values[p.name] = number(entry.get("value"), f"{where}.parameters.{p.name}.value", p.unit)
             if entry.get("ci95"):
-                low, high = (number(v, f"{where}.parameters.{p.name}.ci95", p.unit) for v in entry["ci95"])
-                intervals[f"{name}.{p.name}"] = (low, high)
+                place = f"{where}.parameters.{p.name}.ci95"
+                intervals[f"{name}.{p.name}"] = interval(entry["ci95"], place, p.unit)
     setting = EffectSetting(name, {**effect.typical, **values})
     probability = number(body.get("probability", 1.0), f"{where}.probability", "1")
+    if not 0.0 <= probability <= 1.0:
+        raise FieldError(f"{where}.probability = {probability:g}, expected 0 to 1", f"{where}.probability")
     return ModelFile(name, extended.with_effects(setting), intervals, probability)
 
 

@@ -43,7 +43,8 @@ def hypotheses_from(models: Sequence[ModelFile]) -> list[Hypothesis]:
     names = [m.name for m in models]
     for name in names:
         if names.count(name) > 1:
-            raise ParameterError(f"two models with {name}, expected each cause once")
+            what = "without a cause" if name == NOTHING else f"with {name}"
+            raise ParameterError(f"two models {what}, expected each cause once")
     total = sum(m.probability or 0.0 for m in models)
     unstated = sum(m.probability is None for m in models)
     rest = max(1.0 - total, 0.05) / unstated if unstated else 0.0

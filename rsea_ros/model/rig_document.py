@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from rsea_ros.checked import mapping, number, only_keys, switch, text, unit
+from rsea_ros.checked import interval, mapping, number, only_keys, switch, text, unit
 from rsea_ros.errors import FieldError, RigError
 from rsea_ros.keys import names
 from rsea_ros.model.effect_settings import check_effects
@@ -93,15 +93,8 @@ def _quantity(name: str, item: Any) -> Quantity:
         raise RigError(
             f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10", f"{name}.spread"
         )
-    ci95 = _interval(body["ci95"], f"{name}.ci95", field.unit) if "ci95" in body else None
+    ci95 = interval(body["ci95"], f"{name}.ci95", field.unit) if "ci95" in body else None
     return Quantity(value, spread, text(body.get("source", ""), f"{name}.source"), ci95)
-
-
-def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
-    if not isinstance(item, list) or len(item) != 2:
-        raise RigError(f"{name} = {quote(item)}, expected [low, high] in {plain(unit_name)}", name)
-    low, high = (number(v, name, unit_name) for v in item)
-    return low, high
 
 
 def _other_trains(items: Any) -> tuple[Any, ...]:

@@ -39,6 +39,8 @@ def test_the_run_keeps_its_limits_and_can_be_played(models, tmp_path, capsys):
     [
         (["--limits", "velocity=1"], "--limits: no torque"),
         (["--limits", "torque=5", "--longest", "0"], "expected a number > 0"),
+        (["--limits", "torque=5", "--refine", "-3"], "expected a whole number >= 0"),
+        (["--limits", "torque=5", "--shortest", "5", "--longest", "1"], "longest run 1 s, expected at least"),
     ],
 )
 def test_an_impossible_run_is_refused_in_one_line(models, words, message, capsys):
@@ -48,6 +50,38 @@ def test_an_impossible_run_is_refused_in_one_line(models, words, message, capsys
         status = error.code
     shown = capsys.readouterr().err
     assert status == 2 and message in shown and len(shown.splitlines()) == 1
+
+
+def cause(**body):
+    """Return diagnosis.json with one cause."""
+    return json.dumps({"causes": [{"name": "backlash", **body}]})
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (cause(name="unheard"), "effect 'unheard': not in the catalogue"),
+        (cause(probability=-1), "causes[0].probability = -1, expected 0 to 1"),
+        (cause(parameters={"gap": {"value": 1e-3, "ci95": [1]}}), "gap.ci95 = [1], expected [low, high]"),
+        (cause(parameters={"gap": {"value": 1e-3, "ci95": 3}}), "gap.ci95 = 3, expected [low, high]"),
+    ],
+)
+def test_a_wrong_diagnosis_file_is_refused_in_one_line_that_names_it(content, message, tmp_path, capsys):
+    save_rig(RIG, tmp_path / "model.yaml")
+    path = tmp_path / "diagnosis.json"
+    path.write_text(content, encoding="utf-8")
+    assert main(["experiment", str(path), "--limits", "torque=5"]) == 2
+    shown = capsys.readouterr().err
+    assert f"{path}: " in shown and message in shown and len(shown.splitlines()) == 1
+
+
+def test_a_missing_file_of_a_diagnosis_is_named(tmp_path, capsys):
+    path = tmp_path / "diagnosis.json"
+    assert main(["experiment", str(path), "--limits", "torque=5"]) == 2
+    assert f"{path}: No such file" in capsys.readouterr().err
+    path.write_text(cause(), encoding="utf-8")
+    assert main(["experiment", str(path), "--limits", "torque=5"]) == 2
+    assert f"{path}: no model.yaml beside it" in capsys.readouterr().err
 
 
 def test_a_diagnosis_file_supplies_the_doubtful_cause_and_its_alternatives():

@@ -10,9 +10,10 @@ from independent.hidden import hide
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.advice import advise, proofs_of
 from rsea_ros.experiment.bound import bound
-from rsea_ros.experiment.chance_constraint import at_ends
-from rsea_ros.experiment.hypothesis import motion, run_case
+from rsea_ros.experiment.chance_constraint import at_ends, ends_of, peaks
+from rsea_ros.experiment.hypothesis import Hypothesis, motion, run_case
 from rsea_ros.experiment.joint_weighing import cases_of
+from rsea_ros.experiment.prior import problem_of, weights_of
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
@@ -21,6 +22,7 @@ from rsea_ros.experiment.separation import SURE, Refit, chances_decided, refit
 from rsea_ros.experiment.stored_models import hypotheses_from, model_of
 from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.identification.solver import power, solve
+from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")
@@ -65,9 +67,20 @@ def test_limits_hold_on_every_bench_drawn_from_what_is_known(friction_or_play):
     pair, run = friction_or_play
     rng = np.random.default_rng(2)
     for true in [rig for h in pair for rig in h.draws(60, rng)]:
-        peaks = of_response(run.command, motion(true, run.command, run.rate))
-        assert largest_share(peaks | of_command(run.command, run.rate), LIMITS) <= 1.0
+        reached = of_response(run.command, motion(true, run.command, run.rate))
+        assert largest_share(reached | of_command(run.command, run.rate), LIMITS) <= 1.0
     assert run.peaks.at_level["velocity"] >= run.peaks.expected["velocity"]
+
+
+def test_a_stop_that_no_record_showed_strikes_no_harder_than_stated():
+    """Peaks at 17 distances, most of them beyond its bounds, missed the hardest blow by 4 %."""
+    problem = problem_of("hard_stop", RIG, ())
+    known = np.diag(weights_of(problem))
+    stop = Hypothesis("hard_stop", problem, start_vector(problem.unknowns), known, 0.14)
+    command = command_of(Shape("multisine", 4.0, low=0.5, high=8.0), 0.5, 280.0)
+    stated = peaks(command, 280.0, ends_of([stop])).at_level["ft"]
+    drawn = stop.draws(400, np.random.default_rng(1))
+    assert max(of_response(command, motion(r, command, 280.0))["ft"] for r in drawn) <= stated
 
 
 def test_more_doubt_makes_a_smaller_run():
@@ -148,8 +161,8 @@ def test_the_bound_leaves_room_where_a_run_separates():
     room = bound(delay, lag, LIMITS, 10.0, NOISE)
     assert not room.is_hopeless
     command = command_of(Shape("multisine", LIMITS.torque), 1.0, 280.0)
-    peaks = refit(delay, lag, run_case(command, 280.0, NOISE))
-    assert isinstance(peaks, Refit) and peaks.data <= peaks.total <= room.most
+    apart = refit(delay, lag, run_case(command, 280.0, NOISE))
+    assert isinstance(apart, Refit) and apart.data <= apart.total <= room.most
 
 
 def test_a_bound_by_sines_does_not_cover_all_runs_on_a_nonlinear_cause():
