@@ -22,6 +22,7 @@ from rsea_ros.diagnosis.criteria import (
 )
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.problem_variants import without_effect
+from rsea_ros.diagnosis.score import likelier_by
 from rsea_ros.diagnosis.screening import screen
 from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -165,14 +166,17 @@ def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
 
 
 def nested_sequence(selection: Selection, models: ReducedModels) -> Selection:
-    """Return the selection with nested models: from all causes back, the least useful goes first."""
+    """Return the selection with nested models: from all causes back, the least useful goes first.
+
+    That is the one without which the model is the likeliest, known values of the rig considered.
+    """
     if not selection.last.causes:
         return replace(selection, models=(selection.last,))
     nested = [selection.last]
     while len(nested[-1].causes) > 1:
         largest = nested[-1]
         rests = models.without(largest).values()
-        nested.append(min(rests, key=lambda m: float(m.validation.loss(largest.validation).sum())))
+        nested.append(max(rests, key=lambda m: likelier_by(m, largest, models.settings.floor.far)))
     return replace(selection, models=(selection.models[0], *_in_order(list(reversed(nested)))))
 
 

@@ -86,8 +86,7 @@ class FitSetup:
 
     def mask(self, problem: Problem) -> Problem:
         """Return a problem on the samples and in the units of this setup."""
-        misfit = None if self.weights is None else self.weights.ratios
-        masked = on_blocks(problem, self.cases, self.blocks, misfit, self.settings.blocks)
+        masked = on_blocks(problem, self.cases, self.blocks, self.weights, self.settings.blocks)
         return with_doubled_step(masked) if self.is_quick else masked
 
     def solve(self, problem: Problem, theta: FloatArray | None, matrix: FloatArray | None = None) -> Solution:

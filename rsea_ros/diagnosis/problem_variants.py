@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.diagnosis.data_split import part
+from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import BlockSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
@@ -17,23 +18,26 @@ from rsea_ros.signals import FloatArray
 
 
 def on_blocks(
-    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], misfit: Mapping[str, float] | None,
+    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], weights: Score | None,
     rule: BlockSettings,
 ) -> Problem:  # fmt: skip
     """Return a problem on some blocks of the cases.
 
-    misfit: residual that counts as noise (with_misfit_as_noise).
+    weights: a score of these cases whose misfit counts as noise.
     """
-    return replace(problem, cases=tuple(with_misfit_as_noise(part(c, blocks, rule), misfit) for c in cases))
+    weighted = cases if weights is None else in_units_of(weights, cases)
+    return replace(problem, cases=tuple(part(c, blocks, rule) for c in weighted))
 
 
-def with_misfit_as_noise(case: Case, misfit: Mapping[str, float] | None) -> Case:
-    """Return a case in which a model's residual of a channel counts as its noise, where it is larger.
+def in_units_of(weights: Score, cases: Sequence[Case]) -> tuple[Case, ...]:
+    """Return the cases of a score with each run's residual of a channel as its noise, where it is larger.
 
-    misfit: RMS of the residual over the noise, by channel.
+    A model that misfits errs more in one run than in another, and not as their sensors' noise does.
     """
-    if misfit is None:
-        return case
+    return tuple(_with_misfit_as_noise(case, weights.ratios_in(k)) for k, case in enumerate(cases))
+
+
+def _with_misfit_as_noise(case: Case, misfit: Mapping[str, float]) -> Case:
     noise = {n: s * max(1.0, misfit[n]) if n in misfit else s for n, s in case.noise.items()}
     return replace(case, noise=noise)
 

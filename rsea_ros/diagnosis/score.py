@@ -28,19 +28,22 @@ class Score:
 
     sums, counts: by channel, shape (blocks,), of the blocks that have samples. missed: coherence^2 of the F/T
     torque's residual with the command where the model misses a response (coherence.py), the largest of all.
+    run: number of the run of each block, shape (blocks,); None where there is one.
     """
 
     sums: dict[str, FloatArray]
     counts: dict[str, FloatArray]
     missed: float = 0.0
+    run: IntArray | None = None
 
     def loss(self, against: Score) -> FloatArray:
         """Return the loss of each block in the units of another score, shape (blocks,).
 
-        Every channel counts in units of its residual in the other model, or of its noise where that is larger
-        (maximum likelihood with unknown noise): the finest sensor does not dominate the others.
+        Every channel of every run counts in units of its residual in the other model, or of its noise where
+        that is larger (maximum likelihood with unknown noise): neither the finest sensor nor the run with
+        the least noise dominates the others.
         """
-        scaled = [s / max(1.0, against.ratio(n)) ** 2 for n, s in self.sums.items()]
+        scaled = [s / against._units(n) ** 2 for n, s in self.sums.items()]
         return np.asarray(np.sum(scaled, axis=0))
 
     @property
@@ -48,14 +51,25 @@ class Score:
         """The channel with the largest RMS of the residual over its noise."""
         return max(self.sums, key=self.ratio)
 
-    @property
-    def ratios(self) -> dict[str, float]:
-        """RMS of the residual over the noise, by channel."""
-        return {n: self.ratio(n) for n in self.sums}
-
     def ratio(self, channel: str) -> float:
         """RMS of the residual over the noise of a channel."""
         return float(np.sqrt(self.sums[channel].sum() / max(self.counts[channel].sum(), 1.0)))
+
+    def ratios_in(self, run: int) -> dict[str, float]:
+        """Return the RMS of the residual over the noise in a run, by channel; of all where absent."""
+        return {n: self._ratio_in(run, n) for n in self.sums}
+
+    def _ratio_in(self, run: int, channel: str) -> float:
+        blocks = slice(None) if self.run is None else self.run == run
+        count = self.counts[channel][blocks].sum()
+        return float(np.sqrt(self.sums[channel][blocks].sum() / count)) if count else self.ratio(channel)
+
+    def _units(self, channel: str) -> FloatArray:
+        """Return RMS of residual over noise in the run of each block, 1 at least, shape (blocks,)."""
+        if self.run is None:
+            return np.full(len(self.sums[channel]), max(1.0, self.ratio(channel)))
+        by_run = [max(1.0, self._ratio_in(k, channel)) for k in range(int(self.run.max(initial=0)) + 1)]
+        return np.array(by_run)[self.run]
 
 
 def score_on(
@@ -77,14 +91,15 @@ def score(
     missed = [
         missed_response(c, o["ft"], "ft", blocks_of(c, "ft", rule), rule) for c, o in runs if _has_ft(c, o)
     ]
-    sums, counts = {}, {}
+    sums, counts, run = {}, {}, np.zeros(0, np.int64)
     for n in problem.channels:
         by_case = [_by_block(case, out, n, rule) for case, out in runs]
+        run = np.repeat(np.arange(len(runs)), [len(part[0]) for part in by_case])
         sums[n], counts[n] = (np.concatenate(parts) for parts in zip(*by_case, strict=True))
     used = np.sum(list(counts.values()), axis=0) > 0
     present = [n for n in problem.channels if counts[n].sum() > 0]
     sums, counts = ({n: by_block[n][used] for n in present} for by_block in (sums, counts))
-    return Score(sums, counts, max(missed, default=0.0))
+    return Score(sums, counts, max(missed, default=0.0), run[used])
 
 
 def _has_ft(case: Case, outputs: Mapping[str, FloatArray]) -> bool:

@@ -20,9 +20,9 @@ from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, loss
 from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.problem_variants import (
+    in_units_of,
     with_clocks,
     with_doubled_step,
-    with_misfit_as_noise,
     without_clocks,
 )
 from rsea_ros.diagnosis.score import Score, score_on
@@ -64,9 +64,9 @@ class StepFits:
 
         Near it the clocks stay: without them whatever shifts the response beats the effect that is missing.
         """
-        runs = zip(self.current.cases, self.current.outputs, strict=True)
-        pieces = (p for case, out in runs for p in short_pieces_of(case, out, self.settings))
-        cases = tuple(with_misfit_as_noise(p, self.current.validation.ratios) for p in pieces)
+        weighted = in_units_of(self.current.validation, self.current.cases)
+        runs = zip(weighted, self.current.outputs, strict=True)
+        cases = tuple(p for case, out in runs for p in short_pieces_of(case, out, self.settings))
         solution = self.current.solution
         problem, theta = replace(solution.problem, cases=cases), solution.theta
         if self.is_far:

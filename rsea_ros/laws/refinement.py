@@ -77,7 +77,7 @@ def refine(
     creeps = {f"{e.name}.creep_velocity" for e, _ in laws}
     problem = with_laws(base.problem, laws, frozenset(creeps) | held)
     start = np.concatenate([base.theta, start_vector(problem.unknowns[len(base.theta) :])])
-    blocks = on_blocks(problem, cases, (*TRAIN, *VALIDATION), weights.ratios, DEFAULT.blocks)
+    blocks = on_blocks(problem, cases, (*TRAIN, *VALIDATION), weights, DEFAULT.blocks)
     solution = solve(blocks, start, iterations=_ITERATIONS, gain=1e-4)
     confidence = confidence_of(solution)
     sd = np.sqrt(np.diag(confidence.covariance))

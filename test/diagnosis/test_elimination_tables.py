@@ -183,6 +183,15 @@ def test_models_nest_from_the_most_useful_cause_on(world):
     assert [m.validation.ratio("ft") for m in nested.models] == [9.0, 6.0, 2.0, 1.0]
 
 
+def test_a_cause_that_keeps_known_values_is_more_useful_than_one_that_explains_as_much(world):
+    """A mode stood first, and the delay beside it gained nothing more; alone it needed another inertia."""
+    ratios = {"": 9.0, FRICTION: 5.001, GAP: 5.0, f"{FRICTION}+{GAP}": 1.0}
+    scripted_run = world(script(ratios, {GAP: 110.0, FRICTION: 25.0}))
+    full = scripted_run.fits.candidate(GAP, FRICTION)
+    nested = nested_sequence(Selection((scripted_run.fits.candidate(), full)), scripted_run.models)
+    assert [m.causes for m in nested.models] == [(), (FRICTION,), (FRICTION, GAP)]
+
+
 def test_without_a_cause_the_nominal_model_is_the_only_one(world):
     scripted_run = world(script({"": 9.0}))
     nested = nested_sequence(Selection((scripted_run.fits.candidate(),)), scripted_run.models)

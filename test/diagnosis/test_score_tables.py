@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -132,9 +133,31 @@ def test_a_loss_is_in_units_of_the_other_models_residual(now, against, loss):
     assert now.loss(against).tolist() == [loss] * BLOCKS
 
 
+def two_runs(first, second):
+    """The score of two runs of 4 and 1 blocks, of residuals over the noise; nan: the run has no samples."""
+    squares = np.array([first, first, first, first, second]) ** 2
+    counts = np.where(np.isfinite(squares), 100.0, 0.0)
+    return Score({"ft": np.nan_to_num(100.0 * squares)}, {"ft": counts}, run=np.array([0, 0, 0, 0, 1]))
+
+
+def test_each_run_counts_in_units_of_its_own_residual():
+    """By one ratio for both, the run that the model misses hid what the other one shows."""
+    before, after = two_runs(2.0, 50.0), two_runs(1.0, 25.0)
+    assert before.loss(before).tolist() == [100.0] * 5
+    assert after.loss(before).tolist() == [25.0] * 5
+    assert before.loss(two_runs(0.5, 50.0)).tolist() == [400.0] * 4 + [100.0]
+
+
+def test_a_run_without_samples_takes_the_ratio_of_all():
+    score = two_runs(3.0, math.nan)
+    assert score.ratios_in(0) == score.ratios_in(1) == {"ft": 3.0}
+    assert score.loss(score).tolist() == [100.0] * 4 + [0.0]
+
+
 def test_ratios_by_channel_and_the_worst():
     result = score(ft=2.0, position=8.0, velocity=0.5)
-    assert result.ratios == {"ft": 2.0, "position": 8.0, "velocity": 0.5} and result.worst == "position"
+    assert result.ratios_in(0) == {"ft": 2.0, "position": 8.0, "velocity": 0.5}
+    assert result.worst == "position"
     assert Score({"ft": np.array([4.0])}, {"ft": np.array([1.0])}).ratio("ft") == 2.0
     assert Score({"ft": np.zeros(1)}, {"ft": np.zeros(1)}).ratio("ft") == 0.0, "no sample, no residual"
     assert Score({}, {}).missed == 0.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis.data_split import TEST, blocks_of, set_of
-from rsea_ros.diagnosis.problem_variants import with_misfit_as_noise, without_effect
+from rsea_ros.diagnosis.problem_variants import in_units_of, without_effect
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import BlockSettings, DiagnosisSettings
 from rsea_ros.identification.problem import Case, Problem
@@ -35,7 +35,7 @@ class ContributionRows:
 
 def weight_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Problem:
     """Return a problem on all samples of the cases, each channel in units of its residual in `weights`."""
-    return replace(problem, cases=tuple(with_misfit_as_noise(c, weights.ratios) for c in cases))
+    return replace(problem, cases=in_units_of(weights, cases))
 
 
 def rows_of(
