@@ -85,8 +85,9 @@ def sizes(
     effect: str, estimates: Sequence[ParameterEstimate], rule: SizeSettings
 ) -> dict[str, CauseParameter]:
     """Return the parameters of an effect among estimates, by their names without the effect's."""
-    parameters = [p for p in estimates if p.name.startswith(effect + ".")]
-    return {p.name.split(".")[1]: with_model_uncertainty(p, rule) for p in parameters}
+    estimated = {p.name: p for p in estimates}
+    known = [(p, estimated.get(f"{effect}.{p.name}")) for p in effect_named(effect).parameters]
+    return {p.name: with_model_uncertainty(e, rule, p.low) for p, e in known if e is not None}
 
 
 def size_of(effect: str, last: Evaluated, rule: SizeSettings) -> CauseParameter:
@@ -100,18 +101,20 @@ def is_known(size: CauseParameter, rule: SizeSettings) -> bool:
     return size.ci95[0] * size.ci95[1] > 0.0 and high < rule.widest * low
 
 
-def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings) -> CauseParameter:
+def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings, least: float) -> CauseParameter:
     """Return an estimate whose interval includes errors that no residual shows.
 
     The fit's interval covers noise only. Two right simulations of one bench differ by about `model_error`
     in a parameter (by their steps and smoothing of laws), and no time is known better than
-    the sensors' clocks. The interval by noise alone is kept beside the whole one.
+    the sensors' clocks. The interval by noise alone is kept beside the whole one. least: the parameter's
+    lower bound; where that is not negative, no end of the interval is.
     """
     value, sd = estimate.value, rule.model_error * abs(estimate.value)
     if estimate.unit == "s":
         sd = float(np.hypot(sd, CLOCK_DOUBT))
     low, high = (float(np.hypot(end - value, Z95 * sd)) for end in estimate.ci95)
-    return CauseParameter(value, estimate.unit, (value - low, value + high), estimate.ci95, sd)
+    begin = max(value - low, 0.0) if least >= 0.0 else value - low
+    return CauseParameter(value, estimate.unit, (begin, value + high), estimate.ci95, sd)
 
 
 def latest(trials: Sequence[Trial]) -> list[Trial]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 
 from rsea_ros.diagnosis.naming import outcome
-from rsea_ros.diagnosis.naming.cause_facts import is_known
+from rsea_ros.diagnosis.naming.cause_facts import is_known, sizes
 from rsea_ros.diagnosis.naming.status import Named
 from rsea_ros.diagnosis.result import CauseParameter
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.identification.result import ParameterEstimate
 
 
 @pytest.mark.parametrize(
@@ -25,6 +26,23 @@ from rsea_ros.diagnosis.settings import DEFAULT
 )
 def test_a_size_is_known_that_has_a_sign_and_less_than_a_factor_of_ten(low, high, known):
     assert is_known(CauseParameter(0.5 * (low + high), "N m", (low, high)), DEFAULT.sizes) == known
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter", "value", "ci95", "begin"),
+    [
+        ("torque_constant_drift", "time_constant", 1e5, (0.3, 1e5), 0.0),  # it was -0.9 s
+        ("command_delay", "delay", 4e-6, (2e-6, 6e-6), 0.0),
+        ("torque_constant_drift", "relative_change", 0.01, (-0.02, 0.04), -0.02),
+    ],
+)
+def test_the_models_error_leads_no_interval_below_zero(effect, parameter, value, ci95, begin):
+    unit = "s" if begin == 0.0 else "1"
+    estimate = ParameterEstimate(f"{effect}.{parameter}", value, unit, ci95, value, 1.0, 1.0)
+    ((name, size),) = sizes(effect, [estimate], DEFAULT.sizes).items()
+    assert name == parameter and size.statistical_ci95 == ci95
+    assert size.ci95[0] == pytest.approx(begin, rel=1e-3, abs=0.0)
+    assert size.ci95[1] >= ci95[1]
 
 
 class Stage:
