@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("models", nargs="+", metavar="MODEL", help=what)
     add("--limits", required=True, metavar="NAME=VALUE,…", help=f"limits in both directions: {units}")
     add("--bag", nargs="+", action="extend", default=[], help="earlier runs, used to weight the causes")
-    add("--rate", type=positive, default=280.0, help="rate of the commands, Hz (default %(default)g)")
+    add("--rate", type=positive, default=280.0, help="commands a second, 50 to 1000 Hz (default %(default)g)")
     add("--shortest", type=positive, help="shortest duration, s (default 0.5, or the longest if less)")
     add("--longest", type=positive, default=10.0, help="longest duration of the run, s (default %(default)g)")
     add(

@@ -12,12 +12,18 @@ from rsea_ros.experiment.run_limits import RunLimits
 from rsea_ros.experiment.run_shape import FEWEST, Kind, Shape
 from rsea_ros.signals import FloatArray
 
+RATES = (50.0, 1000.0)
+"""Hz, least and most commands a second: the rates of the nodes that play a run."""
+LONGEST = 600.0
+"""s, of a run at most."""
+
 
 @dataclass(frozen=True)
 class DesignRequest:
     """The freedom of a design. rate: Hz. shortest, longest: s. refine: evaluations of the refinement.
 
     per_run: s of excitation that are as dear as one more run; little of it makes more and shorter runs.
+    Raises ParameterError for a rate outside RATES and for lengths that no run can have.
     """
 
     limits: RunLimits
@@ -30,6 +36,11 @@ class DesignRequest:
     per_run: float = 0.5
 
     def __post_init__(self) -> None:
+        low, high = RATES
+        if not low <= self.rate <= high:
+            raise ParameterError(f"rate = {self.rate:g} Hz, expected {low:g} to {high:g} Hz")
+        if not self.longest <= LONGEST:
+            raise ParameterError(f"longest run {self.longest:g} s, expected at most {LONGEST:g} s")
         if not 0.0 < self.shortest <= self.longest:
             raise ParameterError(
                 f"longest run {self.longest:g} s, expected at least the shortest of {self.shortest:g} s"

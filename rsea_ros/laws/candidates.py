@@ -24,6 +24,7 @@ from rsea_ros.laws.terms import (
     Term,
     hum_terms,
     mode_terms,
+    stiffness_waves,
     wave_terms,
 )
 from rsea_ros.laws.variables import Variables
@@ -130,6 +131,8 @@ def terms_for(cases: Sequence[CaseModel]) -> tuple[Term, ...]:
     ]
     for cycles in wave_numbers(model):
         made += wave_terms(cycles)
+    for cycles in wave_numbers(model, "d"):
+        made += stiffness_waves(cycles)
     if "ft" in model.places:
         made += [t for f in sensor_lines(model) for t in hum_terms(f)]
         made += mode_terms(sensor_modes(model))
@@ -139,12 +142,12 @@ def terms_for(cases: Sequence[CaseModel]) -> tuple[Term, ...]:
     )
 
 
-def wave_numbers(model: CaseModel) -> list[float]:
-    """Return cycles per revolution of the rotor at which the missing torque repeats."""
+def wave_numbers(model: CaseModel, factor: str = "") -> list[float]:
+    """Return cycles per revolution of the rotor at which the missing torque, over a factor, repeats."""
     variables, missing = model.variables, model.missing
     at = (np.arange(len(variables.letters["t"])) + (0.5 if model.injector else 0.0)) * variables.step
-    theta = np.interp(missing.t, at, variables.letters["theta"])
-    return periods(theta, missing.torque)
+    theta, size = (np.interp(missing.t, at, variables.letters[n]) for n in ("theta", factor or "theta"))
+    return periods(theta, missing.torque, size if factor else None)
 
 
 def sensor_modes(model: CaseModel) -> list[float]:

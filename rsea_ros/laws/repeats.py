@@ -19,11 +19,12 @@ _LOWEST, _HIGHEST = 1.0, 0.45
 """Hz, and share of the rate, between which lines are looked for."""
 
 
-def periods(angle: FloatArray, torque: FloatArray) -> list[float]:
+def periods(angle: FloatArray, torque: FloatArray, factor: FloatArray | None = None) -> list[float]:
     """Return cycles per radian-turn of the waves that the torque follows best over an angle, at most two.
 
-    angle: rad, of the rotor. The torque is averaged in bins of the angle, which removes parts that follow
-    time only.
+    angle: rad, of the rotor. factor: what multiplies the waves, such as the deflection of a spring whose
+    stiffness repeats; without it, such a wave shows as two lines beside its true one. The torque is averaged
+    in bins of the angle, which removes parts that follow time only.
     """
     travel = float(np.ptp(angle))
     if travel <= 0.0:
@@ -35,6 +36,8 @@ def periods(angle: FloatArray, torque: FloatArray) -> list[float]:
     x = np.linspace(-1.0, 1.0, _BINS)
     trend = np.polyval(np.polyfit(x, mean, 3, w=weight + 1e-9), x)
     wave = (mean - trend) * weight
+    if factor is not None:
+        wave *= np.bincount(at, factor, _BINS) / np.maximum(count, 1)
     level = np.abs(np.fft.rfft(wave, 8 * _BINS)) ** 2
     cycles = np.arange(len(level)) / 8.0
     level = np.where((cycles > _TURNS) & (cycles < _MOST), level, 0.0)

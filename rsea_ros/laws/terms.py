@@ -205,19 +205,28 @@ ENCODER_TERMS = (
 
 
 def wave_terms(cycles: float) -> tuple[Term, ...]:
-    """Return terms that repeat with the rotor's angle, so often a turn: torque, stiffness, encoder error."""
-    terms = []
-    for name, f in (("sine", "sin"), ("cosine", "cos")):
-        wave, shown = f"{f}(a * theta)", f"{f}({{a}}·θ)"
-        shape = ("cycles_per_revolution", "1", "", (cycles,))
-        terms += [
-            Term(name, "gear", "position, periodic", wave, shown, "N m", *shape),
-            Term(f"spring_{name}", "spring", "deflection and position, periodic", f"d * {wave}",
-                 f"d·{shown}", "N m/rad", *shape),
-            Term(f"angle_{name}", "encoder", "position, periodic, at the encoder", wave, shown, "rad",
-                 *shape),
-        ]  # fmt: skip
-    return tuple(terms)
+    """Return terms that repeat with the rotor's angle, so often a turn: torque, encoder error."""
+    return (
+        *_waves("", "gear", "position, periodic", "N m", cycles),
+        *_waves("angle_", "encoder", "position, periodic, at the encoder", "rad", cycles),
+    )
+
+
+def stiffness_waves(cycles: float) -> tuple[Term, ...]:
+    """Return a stiffness of the spring that repeats with the rotor's angle, so often a turn."""
+    return _waves("spring_", "spring", "deflection and position, periodic", "N m/rad", cycles, "d")
+
+
+def _waves(
+    prefix: str, place: Place, regressor: str, unit: str, cycles: float, factor: str = ""
+) -> tuple[Term, ...]:
+    """Return a sine and a cosine of the rotor's angle, times a factor."""
+    shape = ("cycles_per_revolution", "1", "", (cycles,))
+    return tuple(
+        Term(f"{prefix}{name}", place, regressor, f"{factor} * {f}(a * theta)".removeprefix(" * "),
+             f"{factor}·{f}({{a}}·θ)".removeprefix("·"), unit, *shape)
+        for name, f in (("sine", "sin"), ("cosine", "cos"))
+    )  # fmt: skip
 
 
 def hum_terms(frequency: float) -> tuple[Term, ...]:

@@ -20,7 +20,7 @@ from msg_adapters.ros import JointState, Trigger
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.experiment.campaign import Budget, Campaign, CampaignOutcome, Round
 from rsea_ros.experiment.opinion import diagnose_together
-from rsea_ros.experiment.proposal import DesignRequest, Proposal
+from rsea_ros.experiment.proposal import LONGEST, RATES, DesignRequest, Proposal
 from rsea_ros.experiment.run_limits import limits_from
 from rsea_ros.experiment.weighed_causes import USUAL, causes_from
 from rsea_ros.model.rig_file import load_rig
@@ -46,10 +46,10 @@ TABLE = (
     NodeParameter("limits", "torque=10", "of every run, as in rsea experiment --limits"),
     NodeParameter("seconds", 60.0, "budget of excitation", "s", 0.5, 1e5),
     NodeParameter("energy", 1e6, "budget of the integral of the squared torque", "N^2 m^2 s", 1.0, 1e12),
-    NodeParameter("shortest", 0.5, "length of a run at least, with its soft ends", "s", 0.01, 600.0),
-    NodeParameter("longest", 10.0, "length of a run at most", "s", 0.5, 600.0),
+    NodeParameter("shortest", 0.5, "length of a run at least, with its soft ends", "s", 0.01, LONGEST),
+    NodeParameter("longest", 10.0, "length of a run at most", "s", 0.5, LONGEST),
     NodeParameter("per_run", 0.5, "excitation as dear as one more run; 0: least excitation", "s", 0.0, 600.0),
-    NodeParameter("rate", 280.0, "commands a second", "Hz", 50.0, 1000.0),
+    NodeParameter("rate", 280.0, "commands a second", "Hz", *RATES),
     NodeParameter("ask", True, "wait for ~/approve before each run; false: play at once"),
     NodeParameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
     NodeParameter(

@@ -41,6 +41,9 @@ def test_the_run_keeps_its_limits_and_can_be_played(models, tmp_path, capsys):
         (["--limits", "torque=5", "--longest", "0"], "expected a number > 0"),
         (["--limits", "torque=5", "--refine", "-3"], "expected a whole number >= 0"),
         (["--limits", "torque=5", "--shortest", "5", "--longest", "1"], "longest run 1 s, expected at least"),
+        (["--limits", "torque=5", "--longest", "1e6"], "longest run 1e+06 s, expected at most 600 s"),
+        (["--limits", "torque=5", "--rate", "5"], "rate = 5 Hz, expected 50 to 1000 Hz"),
+        (["--limits", "torque=5", "--rate", "1e9"], "rate = 1e+09 Hz, expected 50 to 1000 Hz"),
     ],
 )
 def test_an_impossible_run_is_refused_in_one_line(models, words, message, capsys):

@@ -1,6 +1,7 @@
 """The loop finds a hidden cause by designed runs, and learns nothing from a run that broke off."""
 
 import json
+import re
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -18,9 +19,12 @@ from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import RunLimits
 from rsea_ros.experiment.weighed_causes import causes_from
+from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.normal import Z95
 from rsea_ros.report.campaign.files import write_campaign
 from rsea_ros.report.campaign.page import probability_figure
+from rsea_ros.report.campaign.words import run_count
 
 RIG = load_rig("paper_high_impedance")
 CAUSES = ("current_loop_lag", "hard_stop")
@@ -162,6 +166,9 @@ def test_the_loop_confirms_the_hidden_cause_by_a_run(log, known, campaign, tmp_p
     assert len(outcome.records) == 1 + len(played)
     report = write_campaign(outcome, work, tmp_path / "out").read_text(encoding="utf-8")
     assert "Current loop lag" in report and "after run 1" in report
+    value, half = map(float, re.search(r"time constant ([\d.]+) ± ([\d.]+) ms:", report).groups())
+    assert abs(value - 3.0) < half and half > 1e3 * Z95 * CLOCK_DOUBT, "not 95 %, as a diagnosis states it"
+    assert len(played) == 1 and run_count(outcome) == ("1", "run")
     notes = probability_figure(outcome).layout["annotations"]
     assert notes and all((n["xref"], n["xanchor"]) == ("paper", "left") for n in notes), "cut on a phone"
     said = json.loads((tmp_path / "out" / "experiment.json").read_text(encoding="utf-8"))

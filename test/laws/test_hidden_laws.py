@@ -7,12 +7,20 @@ import math
 import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_run
+from independent.excitations import chirp_noise
 from independent.plant import Plant
 
 import rsea_ros.laws.learn
+from rsea_ros.effects import signal_table as st
+from rsea_ros.effects.catalogue import lend
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import Port
 from rsea_ros.laws.learn import learn
+from rsea_ros.laws.repeats import periods
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
 from rsea_ros.report.law.words import headline
+from rsea_ros.signals import Channel
 
 RATIO = Plant().ratio
 
@@ -34,6 +42,36 @@ def test_a_wave_of_the_output_is_a_law_of_position_with_its_period(learn_of):
     cycles = 2.0 * math.pi / (0.004 * RATIO)
     assert law.parts[0].shape == pytest.approx(cycles, rel=2e-3)
     assert math.hypot(*(p.coefficient for p in law.parts)) == pytest.approx(1.2, rel=0.05)
+
+
+@compiled
+def wavy_spring(s, p, x):
+    """Add p[0] d sin(900 d) to the torque of a spring of deflection d, rad."""
+    s[st.SPRING_TORQUE] += p[0] * s[st.DEFLECTION] * math.sin(900.0 * s[st.DEFLECTION])
+
+
+def test_a_stiffness_that_repeats_is_one_law_of_its_period():
+    change = Parameter("change", "N m/rad", 0.0, -1e3, 1e3, 300.0)
+    claims = Claims("deflection", "neither", None)
+    effect = Effect("wavy", Port.SPRING, (change,), claims, wavy_spring, reads=(st.DEFLECTION,))
+    command = chirp_noise(8.0, np.random.default_rng(5))
+    rig = load_rig("paper_high_impedance")
+    with lend(effect):
+        hidden = rig.with_effect("wavy", change=300.0)
+        record = synthesize(hidden, Channel(np.arange(len(command)) / 280.0, command), seed=5)
+    (written,) = learn([record], rig).laws
+    (part,) = written.law.parts
+    assert written.law.regressor == "deflection and position, periodic"
+    assert abs(part.coefficient) == pytest.approx(300.0, rel=0.05)
+    assert part.shape * RATIO == pytest.approx(900.0, rel=0.02)
+
+
+def test_waves_of_a_stiffness_have_one_period_and_those_of_a_torque_another():
+    deflection = 0.02 * np.sin(np.linspace(0.0, 300.0, 20_000))
+    torque = deflection * np.sin(900.0 * deflection)
+    assert periods(deflection, torque, deflection)[0] == pytest.approx(900.0, rel=0.02)
+    assert periods(deflection, torque)[0] != pytest.approx(900.0, rel=0.02)
+    assert periods(deflection, torque, 0.0 * deflection) == []
 
 
 def test_a_dead_band_is_a_law_of_the_command(learn_of):

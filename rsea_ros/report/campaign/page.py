@@ -6,7 +6,7 @@ import numpy as np
 
 from rsea_ros.experiment.campaign import CampaignOutcome
 from rsea_ros.experiment.run_limits import RunLimits
-from rsea_ros.report.campaign.words import end_sentence, size
+from rsea_ros.report.campaign.words import end_sentence, run_count, size
 from rsea_ros.report.experiment.page import command_figure, limits_section, spectrum_figure
 from rsea_ros.report.experiment.words import plain_name, proof_words, shape_words
 from rsea_ros.report.figures.figure import Figure, axis, label, layout, line, numbers
@@ -50,9 +50,8 @@ def _title(outcome: CampaignOutcome) -> str:
 
 def _keys(outcome: CampaignOutcome) -> list[tuple[str, str]]:
     p = outcome.weighing.probability[outcome.cause]
-    count = sum(r.proposal is not None for r in outcome.rounds)
     keys = [(f"{p:.1%}", plain_name(outcome.cause)), (f"{outcome.seconds:.3g} s", "of excitation")]
-    return [*keys, (str(count), "runs"), (f"{outcome.weighing.left:.2f}", "times the noise remains")]
+    return [*keys, run_count(outcome), (f"{outcome.weighing.left:.2f}", "times the noise remains")]
 
 
 def probability_figure(outcome: CampaignOutcome) -> Figure:

@@ -10,6 +10,7 @@ from rsea_ros.experiment.campaign import CampaignOutcome
 from rsea_ros.experiment.hypothesis import NOTHING
 from rsea_ros.experiment.joint_weighing import RunWeighing
 from rsea_ros.model.rig import CLOCK_DOUBT
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.experiment.words import plain_name
 from rsea_ros.wording import list_names
@@ -24,7 +25,10 @@ def known_causes(weighing: RunWeighing) -> str:
 
 
 def size(weighing: RunWeighing, name: str) -> str:
-    """Return a cause's main parameter with one sigma, the simulation's own doubt included; empty for none."""
+    """Return a cause's main parameter with its 95 % interval, as a diagnosis states it; empty for no cause.
+
+    The simulation's own doubt is included.
+    """
     if name == NOTHING:
         return ""
     main = effect_named(name).main
@@ -35,9 +39,10 @@ def size(weighing: RunWeighing, name: str) -> str:
     value = unknown.outer(at)
     noise = abs(unknown.outer(at + sd) - unknown.outer(at - sd)) / 2.0
     clock = CLOCK_DOUBT if main.unit == "s" else 0.0
-    spread = math.hypot(noise, DEFAULT.sizes.model_error * value, clock)
-    unit = "" if main.unit == "1" else f" {words.unit(main.unit)}"
-    return f"{main.name.replace('_', ' ')} {value:.4g} ± {spread:.2g}{unit}"
+    half = Z95 * math.hypot(noise, DEFAULT.sizes.model_error * value, clock)
+    factor, unit = words.unit_factor(value, main.unit)
+    number, doubt = words.with_doubt(*(factor * v for v in (value, value - half, value + half)))
+    return f"{main.name.replace('_', ' ')} {number}{doubt} {'' if main.unit == '1' else unit}".rstrip()
 
 
 def end_sentence(outcome: CampaignOutcome) -> str:
@@ -69,8 +74,13 @@ def end_sentence(outcome: CampaignOutcome) -> str:
 
 
 def _runs(outcome: CampaignOutcome) -> str:
+    return " ".join(run_count(outcome))
+
+
+def run_count(outcome: CampaignOutcome) -> tuple[str, str]:
+    """Return how many runs were played, and their noun: ("1", "run")."""
     count = sum(r.proposal is not None for r in outcome.rounds)
-    return "1 run" if count == 1 else f"{count} runs"
+    return str(count), "run" if count == 1 else "runs"
 
 
 def _open(outcome: CampaignOutcome) -> str:
