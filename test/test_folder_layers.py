@@ -10,7 +10,8 @@ from import_graph import MODULES, ROOT, imports
 DIAGNOSIS = (
     {"settings", "residual_peaks"},
     {"result", "data_split", "coherence", "screening"},
-    {"score", "problem_variants", "residual_analysis", "initial_guess"},
+    {"score", "residual_analysis", "initial_guess"},
+    {"problem_variants"},
     {"candidate", "criteria", "next_experiment"},
     {"selection", "step_fits", "stretches"},
     {"forward_step", "backward_elimination", "evaluation"},
