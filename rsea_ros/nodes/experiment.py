@@ -31,7 +31,7 @@ from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._trial import Ears, LiveRun
-from rsea_ros.report.campaign.files import write_campaign
+from rsea_ros.report.campaign.files import check_session_free, write_campaign
 from rsea_ros.report.campaign.words import end_sentence, known_causes
 from rsea_ros.report.diagnosis.files import write_diagnosis
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
@@ -66,6 +66,7 @@ class ExperimentNode:
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node, self._values = node, values
         self._out = unused_path(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
+        check_session_free(self._out)
         self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
         self._ears = Ears(node, values["axis"])
         self._trial: LiveRun | None = None

@@ -69,6 +69,16 @@ def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(bench, start, l
     assert not list(out.glob("run-*"))
 
 
+@pytest.mark.parametrize("name", ["run-2.mcap", "experiment.json"])
+def test_a_folder_with_another_session_is_refused_before_a_run(bench, start, name, tmp_path):
+    (tmp_path / name).write_text("earlier", encoding="utf-8")
+    values = {"causes": "current_loop_lag", "limits": f"torque={LIMIT}", "ask": False, "out": tmp_path}
+    node = start("experiment", rig=RIG, bag=bench / "slow.mcap", **values)
+    status, said = node.wait(), "\n".join(node.output)
+    assert status == 2 and f"{name}: exists already" in said, said
+    assert "proposed" not in said
+
+
 def test_excite_plays_the_file_of_a_run(tmp_path):
     command = command_of(Shape("multisine", 4.0), 0.5, RATE)
     (tmp_path / "run.csv").write_text(run_text(command, RATE), encoding="utf-8")

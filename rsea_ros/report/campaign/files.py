@@ -7,12 +7,20 @@ from pathlib import Path
 from rsea_ros.experiment.campaign import Campaign, CampaignOutcome
 from rsea_ros.experiment.run_file import run_text
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.new_files import NewFiles
+from rsea_ros.new_files import NewFiles, check_free
 from rsea_ros.report.campaign.json import campaign_json
 from rsea_ros.report.campaign.page import campaign_page
 from rsea_ros.report.file_names import EXPERIMENT_JSON, MODEL, REPORT
 from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.provenance import Provenance
+
+
+def check_session_free(out: Path) -> None:
+    """Refuse, before any run, a folder that holds files of a session: no run is played and then lost.
+
+    Raises OutputError for the first of them.
+    """
+    check_free([*(out / name for name in (EXPERIMENT_JSON, MODEL, REPORT)), *sorted(out.glob("run-*"))])
 
 
 def write_campaign(
