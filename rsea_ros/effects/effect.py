@@ -65,7 +65,7 @@ class Effect:
     structure: instead of a function, a change to the rig: `f(rig, parameters) -> rig`.
     main: the parameter that gives the size of the effect.
     is_searched: a diagnosis tries it; otherwise it acts only where a rig states it.
-    reads: the signals among FIRST_READ … LAST_READ that the function looks at.
+    reads: the signals among FIRST_READ … LAST_READ that the function looks at; at GEAR and SPRING only.
     guesses: initial guesses from a residual; without it, `default_guesses`.
     tags: its kinds. compensation: the torque that a controller may add against it, by the same law.
     response: its linear frequency response on its signal (at a sensor, on ft), for a controller's margins.
@@ -91,6 +91,13 @@ class Effect:
     response: Response | None = None
     part: str = ""
     idle: Callable[[Any], tuple[str, ...]] | None = None
+
+    def __post_init__(self) -> None:
+        if self.reads and self.port in (Port.COMMAND, Port.MOTOR, Port.SENSOR):
+            known = "OUTPUT_ANGLE and OUTPUT_VELOCITY at the end of the last step, without reads"
+            raise ParameterError(
+                f"effect {self.name}: reads at port {self.port.name}, expected port GEAR or SPRING ({known})"
+            )
 
     @property
     def main(self) -> Parameter:

@@ -12,6 +12,9 @@ from enum import IntEnum
 class Port(IntEnum):
     """Where in the chain an effect acts; the step calls the ports in this order.
 
+    Of the signals from FIRST_READ to LAST_READ, COMMAND, MOTOR and SENSOR have only OUTPUT_ANGLE and
+    OUTPUT_VELOCITY, at the end of the last step, or of this one at SENSOR.
+
     COMMAND: once a step, changes s[COMMAND], the mean over the step, and s[CURRENT], which the measured
         current shows at the end of the step.
     MOTOR: once a step, changes s[COMMAND] after that, which the measured current does not show.

@@ -195,6 +195,13 @@ def test_a_file_that_fails_is_a_fault_of_that_file(tmp_path: Path, monkeypatch, 
         catalogue()
 
 
+@pytest.mark.parametrize("port", [Port.COMMAND, Port.MOTOR, Port.SENSOR])
+def test_an_effect_that_would_read_a_state_where_none_is_filled_is_refused(port: Port):
+    """A torque constant that depends on GEAR_ANGLE changed nothing at all, in silence."""
+    with pytest.raises(ParameterError, match=rf"torque_ripple: reads at port {port.name}, expected"):
+        replace(effect_named("torque_ripple"), port=port)
+
+
 def test_the_measured_current_shows_only_what_is_done_to_the_command():
     driven = drive(duration=1.0)
     nominal = simulate(driven)["motor_torque"]
