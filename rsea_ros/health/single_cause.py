@@ -3,14 +3,15 @@
 Each hypothesis is fitted by Gauss-Newton with the observer itself, so play or a long delay, which no slope at
 zero describes, are compared by their real effect. The cost of an innovation w is that of Student's t with
 four degrees of freedom, 2.5 log(1 + w^2 / 4): outliers do not decide. The gain is the drop of its sum, over
-the ratio of the best cause's cost to that of white innovations.
+the ratio of the best cause's cost to that of white innovations. Each hypothesis is fitted to the clearest
+look first, the one with the greatest cost, and only those that explain it best are fitted to all looks.
 Source: Lange, Little, Taylor, Journal of the American Statistical Association 84, 1989 (t instead of Gauss).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,8 @@ ROUNDS, SHORTEST = 8, 0.02
 """Steps of Gauss-Newton; a step so small beside its own sigma, or beside `least`, is the last."""
 HOPELESS, TRIES = 200.0, 2
 """Cost by which a fit may be worse than the best so far after so many steps, and still go on."""
+FINALISTS = 4
+"""Causes that are fitted to all looks."""
 STARTS = (-3.0, 3.0, 12.0)
 """Changes from which a fit may begin, in `least`, beside that of the sensitivities."""
 
@@ -70,15 +73,12 @@ class Fitter:
         self._looks, self._scale = looks, scale
 
     def causes(self, hypotheses: Sequence[ChangeHypothesis], starts: FloatArray) -> list[ChangeCause]:
-        """Return the causes, the most probable first. starts: changes to begin with, (p,)."""
+        """Return the FINALISTS causes, the most probable first. starts: changes to begin with, (p,)."""
         before = self._innovations(self._rig)
         usual = WHITE * float(np.isfinite(before).sum())
         excess = float(cost(before) - usual)
-        begun = [(h, self._start(h, float(start))) for h, start in zip(hypotheses, starts, strict=True)]
-        fits: list[_Fit] = []
-        for hypothesis, first in sorted(begun, key=lambda one: one[1][2]):
-            limit = min((f.cost for f in fits), default=math.inf) + HOPELESS
-            fits.append(self._fit(hypothesis, first, limit))
+        finalists = self._finalists(hypotheses, starts)
+        fits = self._fits((f.hypothesis, self._at(f.hypothesis, f.change)) for f in finalists)
         phi = max(1.0, min(f.cost for f in fits) / usual)
         gains = np.array([(cost(before) - f.cost) / phi for f in fits])
         weights = np.exp(np.clip(gains - gains.max(), -700.0, 0.0))
@@ -93,6 +93,26 @@ class Fitter:
     def now(self) -> float:
         """Return the cost of the unchanged rig on the looks; zero without any."""
         return cost(self._innovations(self._rig)) if self._looks else 0.0
+
+    def _finalists(self, hypotheses: Sequence[ChangeHypothesis], starts: FloatArray) -> list[_Fit]:
+        """Return the fits to the clearest look that explain it best, the best first."""
+        look = max(self._looks, key=lambda one: self._on(one).now())
+        clearest = self._on(look)
+        begun = [(h, clearest._start(h, float(start))) for h, start in zip(hypotheses, starts, strict=True)]
+        fits = clearest._fits(sorted(begun, key=lambda one: one[1][2]))
+        return sorted(fits, key=lambda fit: fit.cost)[:FINALISTS]
+
+    def _on(self, look: Look) -> Fitter:
+        """Return the fitter of a single look."""
+        return Fitter(self._rig, self._noise, self._hold, [look], self._scale)
+
+    def _fits(self, begun: Iterable[tuple[ChangeHypothesis, _Point]]) -> list[_Fit]:
+        """Return the fits of hypotheses from the points given; a hopeless one ends early."""
+        fits: list[_Fit] = []
+        for hypothesis, first in begun:
+            limit = min((f.cost for f in fits), default=math.inf) + HOPELESS
+            fits.append(self._fit(hypothesis, first, limit))
+        return fits
 
     def _start(self, hypothesis: ChangeHypothesis, start: float) -> _Point:
         """Return the best of some changes to begin with."""
