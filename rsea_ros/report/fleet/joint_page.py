@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from html import escape
 
 import numpy as np
@@ -77,13 +77,17 @@ def _blocks(
 
 
 def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: Steps) -> Iterator[Block]:
-    """Yield the figures of changed parameters and new causes, then steady, usual and undetermined ones."""
+    """Yield the figures of changed parameters and new causes, then steady, usual and undetermined ones.
+
+    A cause that nearly every recording names is shown as a parameter, or as a cause if its trend is unknown.
+    """
     sized = [t for (j, p), t in fleet.sizes.items() if j == joint and _is_usual(p, joint, fleet)]
     moved = [t for t in (*trends, *sized) if t.state in ("trending", "changed")]
     yield from (parameter_figure(t, steps) for t in sorted(moved, key=lambda t: -_size(t)))
-    yield from _namings(joint, fleet, steps, appeared=True)
+    known = {t.series.parameter.partition(".")[0] for t in sized if t.state != "undetermined"}
+    yield from _namings(joint, fleet, steps, known, appeared=True)
     yield from (parameter_figure(t, steps) for t in (*trends, *sized) if t.state == "steady")
-    yield from _namings(joint, fleet, steps, appeared=False)
+    yield from _namings(joint, fleet, steps, known, appeared=False)
     undetermined = [t for t in trends if t.state == "undetermined"]
     yield from (section(finding(t), paragraph(f"{capital(t.reason)}.")) for t in undetermined)
 
@@ -98,12 +102,17 @@ def _is_usual(parameter: str, joint: str, fleet: FleetTrends) -> bool:
     return any(n.joint == joint and n.about == cause and np.mean(n.named) > _USUAL for n in fleet.namings)
 
 
-def _namings(joint: str, fleet: FleetTrends, steps: Steps, appeared: bool) -> Iterator[Block]:
+def _namings(
+    joint: str, fleet: FleetTrends, steps: Steps, known: Set[str], appeared: bool
+) -> Iterator[Block]:
+    """Yield the figures of causes and faults. known: causes that are shown as parameters."""
     appearances = {(a.joint, a.about, a.kind): a for a in fleet.appearances}
     for naming in sorted((n for n in fleet.namings if n.joint == joint), key=lambda n: n.kind):
         appearance = appearances.get((joint, naming.about, naming.kind))
         share = np.mean(naming.named)
-        if (appearance is not None) != appeared or (appearance is None and not _RARE <= share <= _USUAL):
+        is_parameter = naming.about in known if naming.kind == "cause" else share > _USUAL
+        is_shown = appearance is not None or (share >= _RARE and not (share > _USUAL and is_parameter))
+        if (appearance is not None) != appeared or not is_shown:
             continue
         yield (
             cause_figure(naming, appearance, steps)

@@ -75,6 +75,16 @@ def test_a_cause_in_the_latest_recording_is_reported_before_a_trend_exists(tmp_p
     assert "<h1>right: backlash in its latest recording" in (index.parent / "joint-right.html").read_text()
 
 
+def test_a_cause_that_every_one_of_a_few_recordings_names_has_its_figure(tmp_path):
+    """A cause named once had one, and that of the title none: with so few days its size has no trend."""
+    made = history(np.random.default_rng(1), joints=("hip",), days=2)
+    worn = recordings(("hip",), 2, causes=lambda j, d: [cause("backlash", 4e-3)])
+    index = write_fleet_report(made, worn, tmp_path / "out")
+    hip = (index.parent / "joint-hip.html").read_text(encoding="utf-8")
+    assert "<h1>hip: backlash in its latest recording" in hip
+    assert "<h2>Backlash is named in 2 of 2 recordings</h2>" in hip
+
+
 def test_the_headline_of_many_joints_with_causes_counts_them(tmp_path):
     """Three joints of two causes each filled six lines of the page."""
     made = history(np.random.default_rng(1), joints=JOINTS, days=2)
