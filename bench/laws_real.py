@@ -68,6 +68,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.table:
         print(table(args.out))
         return 0
+    if args.machine is None:
+        parser.error("expected a machine or --table")
     if not DATA.is_dir():
         print(f"{DATA}: no such folder, expected the measurements of real machines", file=sys.stderr)
         return 2
