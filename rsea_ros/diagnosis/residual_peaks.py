@@ -18,9 +18,9 @@ import numpy as np
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.equations import train_ratio
-from rsea_ros.model.inverse import Motion
+from rsea_ros.model.inverse import Motion, smooth
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import BoolArray, FloatArray
 
 _FEWEST_PERIODS = 2.0
 """As often a ripple must have repeated over the rotor's travel: one period may be anything."""
@@ -30,6 +30,8 @@ _REVOLUTIONS = 8
 """After so many every whole multiple of 1/8 cycle repeats."""
 _BINS = 1 << 13
 """Of these revolutions: 17 in a period of the fastest ripple."""
+_BINS_PER_TURN, _PADDED = 4, 8
+"""Sums in a revolution, of what varies over eight of them; points of the spectrum in one of its lines."""
 _APART = 6
 """Lines of 1/8 cycle between two peaks that count as two: over one revolution a peak is as wide."""
 _MOST_PEAKS = 2
@@ -42,7 +44,12 @@ def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dic
     if missing is None:
         return []
     position, torque = missing
-    return _repetitions(position * rig["gear.ratio"], torque)
+    cycles = _repetitions(position * rig["gear.ratio"], torque)
+    if isinstance(case.drive, Motion):
+        return [
+            _at_motion(case.drive, case.mask["motor_torque"], torque, c, rig["gear.ratio"]) for c in cycles
+        ]
+    return [_with_sine(position * rig["gear.ratio"], torque, c) for c in cycles]
 
 
 def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
@@ -54,17 +61,51 @@ def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> lis
         return []
     keep = case.mask["position"]
     angle = train_ratio(rig) * case.measured["position"][keep]
-    return _repetitions(angle, residual_of(case, outputs, "position")[keep])
+    error = residual_of(case, outputs, "position")[keep]
+    return [_with_sine(angle, error, c) for c in _repetitions(angle, error)]
 
 
-def _repetitions(angle: FloatArray, values: FloatArray) -> list[dict[str, float]]:
-    """Return cycles per revolution, amplitude and phase of the strongest repetitions over an angle (rad)."""
+def _with_sine(angle: FloatArray, values: FloatArray, cycles: float) -> dict[str, float]:
+    return {"cycles_per_revolution": cycles, **sine_at(angle, values - np.mean(values), cycles)}
+
+
+def _at_motion(
+    motion: Motion, keep: BoolArray, torque: FloatArray, cycles: float, ratio: float
+) -> dict[str, float]:
+    """Return a ripple by the torque that is missing along a filtered motion.
+
+    The filter keeps of a ripple what passes slowly: the sine that is fitted is filtered alike.
+    """
+    period = float(motion.t[1] - motion.t[0])
+    waves = [smooth(wave(cycles * ratio * motion.q), period)[keep] for wave in (np.sin, np.cos)]
+    return {"cycles_per_revolution": cycles, **_sum_of(waves, torque - np.mean(torque))}
+
+
+def _repetitions(angle: FloatArray, values: FloatArray) -> list[float]:
+    """Return cycles per revolution of the strongest repetitions over an angle (rad)."""
     values = values - np.mean(values)
     cycles, power = _periodogram(angle, values)
     resolvable = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
     power = np.where(resolvable & (cycles < _MOST), power, 0.0)
-    repeating = [interpolate_peak(cycles, power, k) for k in peaks(power, apart=_APART)]
-    return [{"cycles_per_revolution": c, **sine_at(angle, values, c)} for c in repeating]
+    return [_sharpened(angle, values, float(cycles[k])) for k in peaks(power, apart=_APART)]
+
+
+def _sharpened(angle: FloatArray, values: FloatArray, cycles: float) -> float:
+    """Return where within a line of 1/8 cycle a repetition is strongest, as sharply as the travel tells.
+
+    values exp(-i cycles angle) varies slowly with the angle: a spectrum of its sums over half revolutions.
+    """
+    turns = (angle - angle.min()) / (2.0 * math.pi)
+    travel = float(turns.max())
+    slow = values * np.exp(-2.0j * math.pi * cycles * turns)
+    bins = max(math.ceil(_BINS_PER_TURN * travel), 8)
+    place = np.minimum((turns / travel * bins).astype(np.int64), bins - 1)
+    sums = np.bincount(place, slow.real, bins) + 1j * np.bincount(place, slow.imag, bins)
+    power = np.fft.fftshift(np.abs(np.fft.fft(sums, _PADDED * bins)) ** 2)
+    off = np.fft.fftshift(np.fft.fftfreq(_PADDED * bins, travel / bins))
+    near = np.flatnonzero(np.abs(off) <= 1.0 / _REVOLUTIONS)
+    power, off = power[near], off[near]
+    return cycles + interpolate_peak(off, power, int(np.argmax(power)))
 
 
 def _periodogram(angle: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -95,9 +136,7 @@ def missing_torque(
     return case.measured["position"][1:-1][keep], torque[keep]
 
 
-def _along(
-    motion: Motion, case: Case, outputs: Mapping[str, FloatArray]
-) -> tuple[FloatArray, FloatArray]:
+def _along(motion: Motion, case: Case, outputs: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return the angles of a measured motion (rad), and the torque that its motor did not need, N m."""
     keep = case.mask["motor_torque"]
     return motion.q[keep], (outputs["motor_torque"] - case.measured["motor_torque"])[keep]
@@ -155,6 +194,10 @@ def interpolate_peak(bins: FloatArray, level: FloatArray, k: int) -> float:
 
 def sine_at(x: FloatArray, y: FloatArray, pulsation: float) -> dict[str, float]:
     """Return amplitude and phase (rad) of the sine of a pulsation in y(x)."""
-    basis = np.column_stack([np.sin(pulsation * x), np.cos(pulsation * x)])
-    a, b = np.linalg.lstsq(basis, y, rcond=None)[0]
+    return _sum_of([np.sin(pulsation * x), np.cos(pulsation * x)], y)
+
+
+def _sum_of(waves: list[FloatArray], y: FloatArray) -> dict[str, float]:
+    """Return amplitude and phase (rad) of the sum of a sine and a cosine that is nearest to y."""
+    a, b = np.linalg.lstsq(np.column_stack(waves), y, rcond=None)[0]
     return {"amplitude": float(math.hypot(a, b)), "phase": float(math.atan2(b, a))}

@@ -9,10 +9,11 @@ import pytest
 
 from rsea_ros import simulate
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.residual_peaks import missing_torque
+from rsea_ros.diagnosis.residual_peaks import missing_torque, ripples
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.problem import case_from
+from rsea_ros.model.inverse import CUT_OFF, predict_torque
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
@@ -33,12 +34,39 @@ def test_the_missing_torque_of_a_rigid_joint_is_that_of_rotor_and_link():
     assert np.max(np.abs(torque[200:])) == pytest.approx(reaction, rel=0.01)
 
 
-def test_cogging_of_a_bare_drive_is_named():
-    """No effect explained it: only a sensor behind a spring gave the ripple a place to begin at."""
+def cogging_record(seed):
+    """Return a drive with cogging, and a record of 15 s: it shows only where the drive is nearly at rest."""
     rig = load_rig("bare_drive")
     ripple = {"amplitude": 3.0, "cycles_per_revolution": 7.0, "phase": 0.4}
-    command = np.convolve(60.0 * np.random.default_rng(3).standard_normal(3000), np.ones(40) / 40.0, "same")
-    record = simulate(rig.with_effect("torque_ripple", **ripple), command, rate=200.0)
+    noise = np.random.default_rng(seed).standard_normal(3000)
+    command = np.convolve(60.0 * noise, np.ones(40) / 40.0, "same")
+    return rig, simulate(rig.with_effect("torque_ripple", **ripple), command, rate=200.0)
+
+
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_cogging_is_guessed_as_sharply_as_the_travel_tells(seed):
+    """Lines of 1/8 cycle were a hundredth off: a whole period over a hundred turns, and no fit found it."""
+    rig, record = cogging_record(seed)
+    case = case_from(record, rig)
+    travel = np.ptp(record["position"].y) * rig["gear.ratio"]
+    first = ripples(case, rig, predict_torque(rig, case.drive))[0]
+    assert abs(first["cycles_per_revolution"] - 7.0) * travel < 0.25 * 2.0 * np.pi
+    assert first["phase"] == pytest.approx(0.4, abs=0.8)
+
+
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_the_noise_of_a_drive_is_not_its_command(seed):
+    """The command's own top of the band passed for noise where it happened to be flat: 0.5 N m for 0.03."""
+    rig, record = cogging_record(seed)
+    sensor = rig.sensors["motor_torque"]
+    passed = np.sqrt(2.0 * CUT_OFF / record["motor_torque"].rate)
+    stated = np.hypot(sensor.noise, sensor.quantum / np.sqrt(12.0)) * passed
+    assert case_from(record, rig).noise["motor_torque"] == pytest.approx(stated, rel=0.25)
+
+
+def test_cogging_of_a_bare_drive_is_named():
+    """No effect explained it: only a sensor behind a spring gave the ripple a place to begin at."""
+    rig, record = cogging_record(seed=5)
     diagnosis = diagnose([record], rig)
     (cause,) = diagnosis.causes
     assert cause.name == "torque_ripple"
