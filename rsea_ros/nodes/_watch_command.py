@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from rclpy.node import Node
@@ -27,6 +28,8 @@ LIMITS = ("torque_limit", "slew_limit", "soft_start")
 """Parameters of a driver; a plant has none."""
 LOOK = 0.5
 """s between looks at who is there."""
+ANSWER = 2.0
+"""s after which limits are requested again: the first answer of a bench just found may be lost."""
 
 
 class WatchCommand:
@@ -43,7 +46,7 @@ class WatchCommand:
         self._writer = RawWriter(template, JOINT_STATE, "effort")
         self._bench = ""
         self._client: AsyncParameterClient | None = None
-        self._asked = False
+        self._asked = -math.inf
         self._cycle: Cycle | None = None
         self._due = 0.0
 
@@ -87,18 +90,20 @@ class WatchCommand:
         return self._source.newest + round(periods * SECOND / self._rate)
 
     def _see_to_the_limits(self) -> None:
-        """Request the limits from the publisher of joint_states, once."""
+        """Request the limits from the publisher of joint_states until it has said them."""
         bench = ", ".join(sorted(self._publishers("joint_states")))
         if bench != self._bench:
-            self._bench, self._client, self._asked, self.commander.bounds = bench, None, False, None
-        if not bench or "," in bench or self._asked:
+            self._bench, self._client, self._asked, self.commander.bounds = bench, None, -math.inf, None
+        if not bench or "," in bench or self.commander.bounds is not None:
             return
         self._client = self._client or AsyncParameterClient(self._node, bench)
-        if self._client.services_are_ready():
-            self._asked = True
-            self._client.get_parameters(list(LIMITS)).add_done_callback(self._on_limits)
+        if time.monotonic() > self._asked + ANSWER and self._client.services_are_ready():
+            self._asked = time.monotonic()
+            self._client.get_parameters(list(LIMITS)).add_done_callback(partial(self._on_limits, bench))
 
-    def _on_limits(self, future: Any) -> None:
+    def _on_limits(self, bench: str, future: Any) -> None:
+        if bench != self._bench:  # it has left since
+            return
         values = [v.double_value if v.type else math.inf for v in future.result().values]
         torque, slew, growth = [*values, math.inf, math.inf, math.inf][:3]
         most = self._most
