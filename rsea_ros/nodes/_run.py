@@ -20,6 +20,7 @@ from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.interrupts import STOPPING, Stopped
 from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._parameters import NodeParameter, declare, usage
+from rsea_ros.nodes._pulse import Pulse
 from rsea_ros.nodes._sockets import publish_by_sockets
 from rsea_ros.wording import printable
 
@@ -132,10 +133,11 @@ def _work(node: Node, program: Program, stop: _Stop) -> bool:
     """Spin until the program has finished or a signal requests a stop; return whether it had finished."""
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    pulse = Pulse(node, TICK)
     try:
         done = False
         while not (stop.asked or done):
-            ready = anything_to_do(node, executor, TICK)
+            ready = anything_to_do(node, executor, pulse)
             done = program.is_finished()
             if ready and not done:
                 executor.spin_once(timeout_sec=0.0)
@@ -144,4 +146,5 @@ def _work(node: Node, program: Program, stop: _Stop) -> bool:
         return done
     finally:
         program.close()
+        pulse.close()
         executor.shutdown()

@@ -11,7 +11,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._pulse import FOR_EVER, Pulse
 from rsea_ros.nodes._realtime import exact_timers
 
 
@@ -24,8 +24,8 @@ class Waiter:
     def __init__(
         self, node: Node, subscriptions: Sequence[Subscription[Any]], work: Callable[[], None], pause: float
     ) -> None:
-        self._context, self._subscriptions, self._work = node.context, subscriptions, work
-        self._pause = round(pause * SECOND)
+        self._node, self._subscriptions, self._work = node, subscriptions, work
+        self._pause = pause
         self._stop = threading.Event()
         self.thread = threading.Thread(target=self._run, daemon=True)
         self.error: Exception | None = None
@@ -48,18 +48,22 @@ class Waiter:
 
     def _run(self) -> None:
         exact_timers()
+        pulse = Pulse(self._node, self._pause)
         try:
-            context, handles = self._context.handle, [s.handle for s in self._subscriptions]
+            context, handles = self._node.context.handle, [s.handle for s in self._subscriptions]
             assert context is not None
             with ExitStack() as kept:
-                for handle in (context, *handles):
+                for handle in (context, pulse.guard, *handles):
                     kept.enter_context(handle)
-                waits = rclpy_implementation.WaitSet(len(handles), 0, 0, 0, 0, 0, context)
+                waits = rclpy_implementation.WaitSet(len(handles), 1, 0, 0, 0, 0, context)
                 while not self._stop.is_set():
                     waits.clear_entities()
+                    waits.add_guard_condition(pulse.guard)
                     for handle in handles:
                         waits.add_subscription(handle)
-                    waits.wait(self._pause)
+                    waits.wait(FOR_EVER)
                     self._work()
         except Exception as error:  # handed to the main thread by `running`
             self.error = error
+        finally:
+            pulse.close()

@@ -16,6 +16,7 @@ from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._alarm import SignalListener
 from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._publishers import Obeyed
+from rsea_ros.nodes._pulse import Pulse
 from rsea_ros.nodes._qos import COMMAND
 from test.nodes.clock_shim import in_python, preload, set_clock
 from test.nodes.stalls import is_stall
@@ -168,9 +169,11 @@ def test_wrong_stamps_are_reported(driver):
 
 
 def test_clear_fault_without_a_fault_says_so(driver):
-    driver.clear()
-    answer = driver.clear()
-    assert answer.success and "there is no fault" in answer.message
+    def nothing_to_clear():  # a busy machine may have latched a stall
+        answer = driver.clear()
+        return answer if "there is no fault" in answer.message else None
+
+    assert driver.listener.until(nothing_to_clear).success
 
 
 def test_of_two_publishers_the_first_is_obeyed_until_it_is_silent():
@@ -218,13 +221,15 @@ def test_a_signal_acts_while_the_main_thread_waits(listener):
     sender = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGHUP))
     late = threading.Timer(0.1, lambda: order.append(reacted.wait(20.0)))
     order = []
+    pulse = Pulse(listener.node, 0.5)
     try:
         sender.start()
         late.start()
         while not order:
-            anything_to_do(listener.node, listener._executor, 0.5)
+            anything_to_do(listener.node, listener._executor, pulse)
         assert order == [True]
     finally:
+        pulse.close()
         alarm.close()
         signal.signal(signal.SIGHUP, before)
 
@@ -233,3 +238,13 @@ def test_simulated_time_is_refused(start):
     process = start("driver", use_sim_time=True)
     assert process.wait() == 2
     assert "use_sim_time = true, expected false" in process.output[-1]
+
+
+def test_a_driver_whose_clock_was_set_back_ends_at_ctrl_c(driver):
+    """The middleware's waits of 0.1 s lasted an hour longer: the last test here, for it ends the driver."""
+    driver.set_clock(0)
+    driver.drive()
+    driver.set_clock(-3600)
+    driver.process.send_signal(signal.SIGINT)
+    assert driver.process.wait(20.0) == 0
+    assert driver.bench.torque() == (0, False)
