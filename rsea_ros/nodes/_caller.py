@@ -19,6 +19,8 @@ _PATIENCE = 60.0
 """s that an answer may take: a driver that configures talks to its devices."""
 _SEARCH = 8.0
 """s that a running node may take to be seen: on a busy machine 3 s were not always enough."""
+_UNCHANGED = 0.5
+"""s after which a node has shown what it offers: its services are announced together."""
 _QUESTIONS = 3
 """Repetitions of a question whose answer was lost: a service may be seen before it sees who asks."""
 _MATCHING = 0.1
@@ -60,7 +62,7 @@ class Caller:
         Raises ParameterError for an unknown node or action, CallRefused when the node does not do it.
         """
         name = self.full_name(name)
-        _await(lambda: action in self.actions(name))
+        self._discover(name, action)
         if action in (transitions := self._transitions(name)):
             return self._change(name, action, transitions[action])
         if action in self._triggers(name):
@@ -69,6 +71,14 @@ class Caller:
         state = f" while {self.state(name)}" if self._has_lifecycle(name) else ""
         near = did_you_mean(action, offered)
         raise ParameterError(f"{name}: {action!r}{state}, expected one of: {', '.join(offered)}{near}")
+
+    def _discover(self, name: str, action: str) -> None:
+        """Return when a node offers an action, or has offered nothing new for a while."""
+        deadline, offered, since = time.monotonic() + DISCOVERY, self.actions(name), time.monotonic()
+        while action not in offered and time.monotonic() < min(deadline, since + _UNCHANGED):
+            time.sleep(POLL)
+            before, offered = offered, self.actions(name)
+            since = since if offered == before else time.monotonic()
 
     def _change(self, name: str, transition: str, number: int) -> str:
         request = ChangeState.Request()
@@ -136,7 +146,7 @@ class Caller:
             self._node.destroy_client(client)
 
 
-def _await(is_true: Callable[[], bool], patience: float = DISCOVERY) -> bool:
+def _await(is_true: Callable[[], bool], patience: float) -> bool:
     """Return whether something becomes true while a graph is being discovered. patience: s."""
     deadline = time.monotonic() + patience
     while not (done := is_true()) and time.monotonic() < deadline:
