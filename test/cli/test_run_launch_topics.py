@@ -125,7 +125,7 @@ def visitor():
 def test_a_node_that_hangs_is_listed_as_such(visitor, monkeypatch):
     monkeypatch.setattr(_caller, "DISCOVERY", 0.1)
     caller = _caller.Caller(visitor)
-    assert _caller._await(lambda: "/rsea/mute" in caller.callable_nodes(0.0))
+    assert _caller._await(lambda: "/rsea/mute" in caller.callable_nodes(0.0), 3.0)
     assert offer_of(caller, "/rsea/mute") == ("no answer", "-")
 
 
@@ -184,4 +184,5 @@ def test_a_visitor_does_not_propose_itself(visitor, monkeypatch):
     monkeypatch.setattr(_caller, "_SEARCH", 0.1)
     with pytest.raises(ParameterError) as error:
         _caller.Caller(visitor).full_name("visitr")
-    assert str(error.value) == "node /rsea/visitr: it does not run (rsea call lists what does)"
+    assert "node /rsea/visitr: it does not run" in str(error.value)
+    assert "did you mean /rsea/visitor" not in str(error.value)
