@@ -110,7 +110,8 @@ class DatagramReceiver:
     def _run(self) -> None:
         """Drain the socket between calls, and repeat the request when nothing comes."""
         asked = time.monotonic()
-        while not self._stop.wait(PAUSE):
+        while not self._stop.is_set():
+            time.sleep(PAUSE)  # by the steady clock, as a wait of Python 3.10 for the event would not be
             self.drain()
             if time.monotonic() - max(asked, self._heard) > ASK_AGAIN:
                 self.send(STREAM)
