@@ -159,7 +159,9 @@ def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
                 f"{record.source}: {name} holds one value, expected motion: "
                 "a rig without a spring is judged by what moves it"
             )
-    noise = _torque_noise(record, rig, rule) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
+    level, is_flat = top_of_band(torque.y, rule=rule)
+    stated = 0.0 if is_flat else rig.sensors.get("motor_torque", Sensor()).noise
+    noise = max(level, stated) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
     return Case(
         drive=motion,
         t={"motor_torque": motion.t},
@@ -168,15 +170,6 @@ def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
         mask={"motor_torque": motion.counts},
         source=record.source,
     )
-
-
-def _torque_noise(record: Record, rig: Rig, rule: NoiseSettings) -> float:
-    """Return the RMS of the noise of the torque that acted, N m, unfiltered."""
-    sensor = rig.sensors.get("motor_torque", Sensor())
-    if "motor_torque" in record and "command" in record:
-        return noise_floor(record, "motor_torque", sensor, rule)
-    level, is_flat = top_of_band(acting_torque(record).y, rule=rule)
-    return max(level, 0.0 if is_flat else sensor.noise)
 
 
 def simulate_cases(

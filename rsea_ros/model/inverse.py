@@ -183,13 +183,13 @@ def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     machine = build(rig, period, float(motion.t[-1] - motion.t[0]))
     motion = _as_moved(machine, motion, period)
     gravity = rig_as_is["spring_end.gravity"] * np.sin(motion.q + rig_as_is["spring_end.gravity_angle"])
-    torque = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q + gravity
+    linear = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q
     load = gravity + sum(
         rig_as_is[f"spring_end.{name}"] * values
         for name, values in (("inertia", motion.a), ("damping", motion.v), ("stiffness", motion.q))
     )
     added = _effect_torques(*_parts(machine), motion.q, motion.v, motion.torque, load)
-    needed = (torque - smooth(added, period)) / motor_gains(*_parts(machine), len(motion.t))
+    needed = (linear + smooth(gravity - added, period)) / motor_gains(*_parts(machine), len(motion.t))
     return _undone(machine, motion, needed, period) if motion.commanded else needed
 
 

@@ -12,8 +12,9 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.residual_peaks import missing_torque, ripples
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.signal_table import Port
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import case_from
-from rsea_ros.model.inverse import CUT_OFF, predict_torque
+from rsea_ros.model.inverse import predict_torque
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
@@ -54,16 +55,6 @@ def test_cogging_is_guessed_as_sharply_as_the_travel_tells(seed):
     assert first["phase"] == pytest.approx(0.4, abs=0.8)
 
 
-@pytest.mark.parametrize("seed", range(1, 7))
-def test_the_noise_of_a_drive_is_not_its_command(seed):
-    """The command's own top of the band passed for noise where it happened to be flat: 0.5 N m for 0.03."""
-    rig, record = cogging_record(seed)
-    sensor = rig.sensors["motor_torque"]
-    passed = np.sqrt(2.0 * CUT_OFF / record["motor_torque"].rate)
-    stated = np.hypot(sensor.noise, sensor.quantum / np.sqrt(12.0)) * passed
-    assert case_from(record, rig).noise["motor_torque"] == pytest.approx(stated, rel=0.25)
-
-
 def test_cogging_of_a_bare_drive_is_named():
     """No effect explained it: only a sensor behind a spring gave the ripple a place to begin at."""
     rig, record = cogging_record(seed=5)
@@ -74,3 +65,15 @@ def test_cogging_of_a_bare_drive_is_named():
     assert cause.parameters["cycles_per_revolution"].value == pytest.approx(7.0, rel=1e-3)
     of_a_spring = {e.name for e in catalogue().values() if e.port is Port.SPRING}
     assert not of_a_spring & {r.name for r in diagnosis.rejected}, "an effect without a place was tried"
+
+
+def test_the_torque_of_a_pendulum_that_turns_over_is_filtered_like_its_measurement():
+    """The sine of a filtered angle has lines above the filter: 0.088 N m of 5.7 were left, without noise."""
+    rig = load_rig("pendulum")
+    settings = ExcitationSettings(duration=20.0, amplitude=10.0, noise=2.0)
+    command = excitation("chirp", settings)
+    channel = Channel(np.arange(len(command)) / 280.0, command)
+    case = case_from(synthesize(rig, channel, noise=False), rig)
+    left = case.measured["motor_torque"] - predict_torque(rig, case.drive)["motor_torque"]
+    keep = case.mask["motor_torque"]
+    assert np.std(left[keep]) < 2e-3 * np.std(case.measured["motor_torque"][keep])
