@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from rsea_ros.report.fleet import write_fleet_report
 from rsea_ros.report.fleet.links import page_names
 from rsea_ros.report.fleet.words import day, doubt_of_date, name, percent
 from rsea_ros.trends import alarms
+from test.watch.browser import Browser
 
 JOINTS = ("hip", "knee <left>", "ankle/1", "elbow")
 WORN = "knee <left>"
@@ -193,3 +195,37 @@ def test_a_joint_with_few_days_shows_what_its_latest_recording_says(tmp_path):
     hip = (tmp_path / "out" / "joint-hip.html").read_text(encoding="utf-8")
     assert re.search(r"\d+ ± [\d.]+ N·m/rad<small>latest recording</small>", hip)
     assert "too few days" in hip and "cannot be determined" not in hip
+
+
+COLOURS = """[...document.querySelectorAll('.rail i:last-child')].map((i) => getComputedStyle(i).backgroundColor)"""
+CELLS = """[...document.querySelectorAll('.heat svg [class^=u], .heat svg [class^=d]')]
+  .map((c) => getComputedStyle(c).fill)"""
+MONTHS = """[...document.querySelectorAll('.months')].map((m) => [...m.children]
+  .map((c) => c.getBoundingClientRect()).map((r) => [r.left, r.right]))"""
+
+
+@pytest.fixture(scope="module")
+def fleet_in_browser(tables, tmp_path_factory):
+    index = write_fleet_report(*tables, tmp_path_factory.mktemp("shown") / "out")
+    with closing(Browser(tmp_path_factory.mktemp("profile"))) as made:
+        made.open(index.as_uri())
+        made.until("document.querySelector('.heat')")
+        yield made
+
+
+def test_bars_and_cells_have_their_colours_in_a_browser(fleet_in_browser):
+    """A script took `--before` in the style for an option of a command: no bar was seen, all cells black."""
+    bars, cells = fleet_in_browser.value(COLOURS), fleet_in_browser.value(CELLS)
+    assert bars and set(bars) == {"rgb(217, 115, 13)"}
+    assert cells and set(cells) <= {"rgb(217, 115, 13)", "rgb(24, 100, 171)"}
+
+
+@pytest.mark.parametrize("width", [1400, 400, 320])
+def test_names_of_months_do_not_overlap(fleet_in_browser, width):
+    """On a phone the names of five months lay on each other."""
+    fleet_in_browser.size(width, 900)
+    rows = fleet_in_browser.value(MONTHS)
+    assert rows
+    for row in rows:
+        assert len(row) > 1 and row[0][0] >= 0.0 and row[-1][1] <= width
+        assert all(before[1] <= after[0] for before, after in zip(row, row[1:], strict=False))
