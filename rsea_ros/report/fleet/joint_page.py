@@ -37,7 +37,7 @@ _UNDATED = (
 
 _NO_PAGE = (
     "A recording links diagnosis.json where its run kept no page. To see one as a page: rsea diagnose BAG "
-    "--rig RIG --out page. Paths: rsea fleet sql \"SELECT recording, bag FROM recordings\" --store STORE. "
+    '--rig RIG --out page. Paths: rsea fleet sql "SELECT recording, bag FROM recordings" --store STORE. '
     "rsea fleet run --pages keeps the pages of new recordings."
 )
 
@@ -125,9 +125,7 @@ def _has_size(naming: Naming) -> bool:
     return naming.size is not None and bool(np.any(np.isfinite(naming.size)))
 
 
-def _keys(
-    trends: Sequence[Trend], recordings: Table, rows: np.ndarray, dated: bool
-) -> list[tuple[str, str]]:
+def _keys(trends: Sequence[Trend], recordings: Table, rows: np.ndarray, dated: bool) -> list[tuple[str, str]]:
     determined = sum(t.state != "undetermined" for t in trends)
     done = int(np.sum(np.asarray(recordings["outcome"], str)[rows] == "done"))
     faulty = sum(bool(len(recordings["faults"][i])) for i in rows if recordings["faults"][i] is not None)
