@@ -38,7 +38,9 @@ class Dated:
 def date_course(course: Course, doubt: float) -> Dated:
     """Return a course with the ranges of its dates. doubt: fall of twice the log likelihood."""
     ranges = tuple(date_range(course, i, doubt) for i in range(len(course.terms)))
-    moved = tuple((_move(course, i, first), _move(course, i, last)) for i, (first, last) in enumerate(ranges))
+    moved = tuple(
+        (_move(course, i, first), _move(course, i, last)) for i, (first, last) in enumerate(ranges)
+    )
     return Dated(course, ranges, moved)
 
 

@@ -113,7 +113,8 @@ class Trend:
 class Appearance:
     """A cause or a fault of the data that a joint's recordings name from some day on, or from the first.
 
-    about: its name. share: of the days since then that name it. size: of the cause now, by its main parameter.
+    about: its name. share: of the days since then that name it. size: of the cause now, by its main
+    parameter. growth: of that size.
     q: false discovery rate. row: place of the first of the recordings that name it. limit: size below which
     it would not have been named (detection limit), NaN where unknown.
     """

@@ -66,14 +66,8 @@ def probability_figure(outcome: CampaignOutcome) -> Figure:
         y = np.array([r.weighing.probability.get(name, 0.0) for r in rounds])
         traces.append(
             line(
-                x,
-                y,
-                plain_name(name),
-                colour,
-                2.2,
-                mode="lines+markers",
-                marker={"size": 7, "color": colour},
-                hovertemplate="probability %{y:.3f}",
+                x, y, plain_name(name), colour, 2.2, mode="lines+markers",
+                marker={"size": 7, "color": colour}, hovertemplate="probability %{y:.3f}",
             )
         )
         if y[-1] >= 0.03 or k == 0:

@@ -66,7 +66,9 @@ def end_sentence(outcome: CampaignOutcome) -> str:
         case "declined":
             return f"The next run was declined {spent}: {_open(outcome)} remain possible"
         case "broken":
-            return f"A run was aborted ({outcome.why}) and is not used; {_open(outcome)} remain possible"
+            return (
+                f"A run was aborted ({outcome.why}) and is not used; {_open(outcome)} remain possible"
+            )
         case _:
             return f"The session could not continue ({outcome.why}): {_open(outcome)} remain possible"
 

@@ -114,11 +114,7 @@ def spectrum_figure(runs: Sequence[tuple[str, Proposal]]) -> Figure:
         colour = (AFTER, BEFORE, QUIET)[k % 3]
         traces.append(
             line(
-                f,
-                density,
-                name,
-                colour,
-                line={"color": colour, "width": 1.4, "dash": _DASH[k % 4]},
+                f, density, name, colour, line={"color": colour, "width": 1.4, "dash": _DASH[k % 4]},
                 hovertemplate="%{y:.3g} N·m/√Hz",
             )
         )

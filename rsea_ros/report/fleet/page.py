@@ -103,10 +103,11 @@ def _latest(fleet: FleetTrends, recordings: Table) -> str:
 
 def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table) -> list[tuple[str, str]]:
     kinds = [a.kind for group in groups.values() for a in group]
+    changes = kinds.count("trend") + kinds.count("change")
     done = int(np.sum(np.asarray(recordings["outcome"], str) == "done"))
     return [
         (f"{len(groups)} of {len(fleet.joints)}", "joints need a look"),
-        (str(kinds.count("trend") + kinds.count("change")), f"changes, {kinds.count('trend')} going on"),
+        (str(changes), f"{_plural(changes, 'change')}, {kinds.count('trend')} going on"),
         (str(kinds.count("cause")), _causes_word([a for group in groups.values() for a in group])),
         (_group_digits(done), f"recordings used, of {_group_digits(len(recordings['joint']))}"),
         (
@@ -119,7 +120,12 @@ def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table)
 def _causes_word(alarms: Sequence[Alarm]) -> str:
     causes = [a for a in alarms if a.kind == "cause"]
     always = sum(a.from_first for a in causes)
-    return f"causes, {always} from the first recording on" if always else "causes that appeared"
+    word = _plural(len(causes), "cause")
+    return f"{word}, {always} from the first recording on" if always else f"{word} that appeared"
+
+
+def _plural(number: int, word: str) -> str:
+    return word if number == 1 else f"{word}s"
 
 
 def _group_digits(number: int) -> str:

@@ -43,9 +43,7 @@ def gain_section(result: LawResult) -> str:
         + "".join(
             f"<td class='number' data-label='{case}'>{words.quantity(rms, CHANNEL_UNITS[n], 3)}</td>"
             for case, rms in (
-                ("without", result.before[n]),
-                ("with the law", result.after[n]),
-                ("noise", result.noise[n]),
+                ("without", result.before[n]), ("with the law", result.after[n]), ("noise", result.noise[n])
             )
         )
         + "</tr>"

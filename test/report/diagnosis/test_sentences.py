@@ -13,7 +13,8 @@ RUN = {"kind": "multisine"}
 SAID = {
     "separates": (
         Experiment("separates", "backlash", ("hard_stop",), 3.21, excitation=RUN),
-        "backlash and hard_stop do as well on these data; this run makes them differ by 3.2 times the noise",
+        "backlash and hard_stop do as well on these data; "
+        "this run makes them differ by 3.2 times the noise",
     ),
     "inseparable": (
         Experiment("inseparable", "ft_gain_error", ("torque_constant_error", "ft_bias"), 0.042),
