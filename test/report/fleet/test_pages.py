@@ -279,3 +279,32 @@ def test_names_of_months_do_not_overlap(fleet_in_browser, width):
     for row in rows:
         assert len(row) > 1 and row[0][0] >= 0.0 and row[-1][1] <= width
         assert all(before[1] <= after[0] for before, after in pairwise(row))
+
+
+@pytest.fixture(scope="module")
+def young(tmp_path_factory):
+    """The page of a joint with two parameters and three days."""
+    parts = [
+        history(np.random.default_rng(1), joints=("hip",), days=3, parameter=parameter)
+        for parameter in ("spring.stiffness", "rotor.reflected_damping")
+    ]
+    made = {n: np.concatenate([p[n] for p in parts]) for n in parts[0]}
+    worn = recordings(("hip",), 3, causes=lambda j, d: [cause("backlash", 4e-3)])
+    index = write_fleet_report(made, worn, tmp_path_factory.mktemp("young") / "out")
+    return index.parent / "joint-hip.html"
+
+
+def test_parameters_without_a_trend_for_one_reason_share_a_section(young):
+    """Four sections stood one below the other with the same sentence."""
+    text = young.read_text(encoding="utf-8")
+    assert "<h2>2 parameters: too few days</h2>" in text
+    assert text.count("8 days are needed") == 1
+    assert "Rotor damping, reflected; Spring stiffness. 6 of 6 recordings" in text
+
+
+def test_the_axis_of_a_few_days_names_days(young, fleet_in_browser):
+    """It named noons, and days as Americans write them."""
+    fleet_in_browser.open(young.as_uri())
+    fleet_in_browser.until("document.querySelector('.xtick text')")
+    ticks = fleet_in_browser.value("[...document.querySelectorAll('.xtick text')].map((t) => t.textContent)")
+    assert ticks[:3] == ["1 Jan2025", "2 Jan", "3 Jan"]
