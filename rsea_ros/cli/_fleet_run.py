@@ -71,6 +71,8 @@ def run(args: argparse.Namespace) -> int:
         print(line)
     for joint, bag, why in summary.quarantined[:MOST_SHOWN]:
         print(f"quarantined: {joint}: {bag}: {why}")
+    if (more := len(summary.quarantined) - MOST_SHOWN) > 0:
+        print(f"quarantined: {more} more, all in the view recordings of rsea fleet sql")
     for line in summary.unreadable[:MOST_SHOWN]:
         print(f"unreadable, left for the next run: {line}")
     for bag in summary.changed[:MOST_SHOWN]:
