@@ -82,7 +82,8 @@ def webhook(alarm: Alarm) -> dict[str, Any]:
 
 def sentence(alarm: Alarm) -> str:
     """Return a sentence on the event: joint, cause, size, date."""
-    since = f" since {_time(alarm.since_s)[:10]}" if math.isfinite(alarm.since_s) else ""
+    begun = "since the first recording," if alarm.from_first else "since"
+    since = f" {begun} {_time(alarm.since_s)[:10]}" if math.isfinite(alarm.since_s) else ""
     if alarm.size is None:
         return f"{alarm.joint}: {alarm.about} ({alarm.kind}){since}"
     size = with_unit(f"{alarm.size.value:+.4g}", alarm.unit)

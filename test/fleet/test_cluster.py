@@ -177,7 +177,7 @@ def test_a_worker_that_starts_does_not_hear_ctrl_c():
 @pytest.mark.parametrize("address", ["foo", "tcp://foo", "tcp://foo:port", ""])
 def test_what_is_no_address_is_refused_at_once(address):
     """Dask waited a minute for its end, and then printed a traceback below the error."""
-    with pytest.raises(FleetError, match="no address, expected .*tcp://HOST:8786"), on_scheduler(address):
+    with pytest.raises(FleetError, match=r"no address, expected .*tcp://HOST:8786"), on_scheduler(address):
         pass
 
 
