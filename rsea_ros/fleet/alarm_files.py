@@ -88,7 +88,8 @@ def sentence(alarm: Alarm) -> str:
         return f"{alarm.joint}: {alarm.about} ({alarm.kind}){since}"
     size = with_unit(f"{alarm.size.value:+.4g}", alarm.unit)
     interval = f"{alarm.size.low:.4g} to " + with_unit(f"{alarm.size.high:.4g}", alarm.unit)
-    return f"{alarm.joint}: {alarm.about} ({alarm.kind}) {size}, {interval}{since}"
+    name = f"{alarm.about} or a look-alike" if alarm.status == "one_of" else alarm.about
+    return f"{alarm.joint}: {name} ({alarm.kind}) {size}, {interval}{since}"
 
 
 def _time(seconds: float) -> str:

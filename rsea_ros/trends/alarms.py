@@ -25,6 +25,8 @@ class Alarm:
     change from before or the cause's size now, with its 95 % interval; None for a fault. relative: size over
     the level before, NaN where none. confidence: 1 less the false discovery rate. recording, artefacts: of
     the first recording that shows it. share: of the days since then that name a cause or a fault.
+    from_first: the first recording shows it, so since_s is the latest at which it may have begun. status: of
+    a cause, as most of its diagnoses say; `one_of`: the data do not distinguish it from another.
     """
 
     key: str
@@ -43,6 +45,7 @@ class Alarm:
     share: float = 1.0
     from_first: bool = False
     growth: Growth = ""
+    status: str = ""
 
 
 def alarms(history: Table, recordings: Table, settings: TrendSettings = DEFAULT) -> tuple[Alarm, ...]:
@@ -108,7 +111,7 @@ def _of_appearance(a: Appearance, recordings: Table) -> Alarm:
     return Alarm(
         f"{a.joint}/{a.about}/{a.kind}", a.joint, a.about, a.kind, a.since_s, a.earliest_s, a.latest_s,
         a.size, a.unit, float("nan"), 1.0 - a.q, str(recordings["recording"][a.row]),
-        str(recordings["artefacts"][a.row]), a.share, a.from_first, a.growth,
+        str(recordings["artefacts"][a.row]), a.share, a.from_first, a.growth, a.status,
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, numbers
 from rsea_ros.report.figures.palette import BEFORE, MEASURED, NOISE, QUIET, faint
 from rsea_ros.report.fleet.marks import change_marks, date_axis, points
-from rsea_ros.report.fleet.words import beginning, name, size_now
+from rsea_ros.report.fleet.words import beginning, cause_name, name, size_now
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance
 from rsea_ros.trends.weeks import Steps
@@ -78,6 +78,7 @@ def _title(naming: Naming, appearance: Appearance | None) -> str:
     often = f"{int(np.sum(naming.named))} of {len(naming.named)} recordings"
     if appearance is None:
         return f"{plain}{' is named' if naming.kind == 'cause' else ''} in {often}"
+    plain = plain if naming.kind == "fault" else cause_name(appearance)
     return f"{plain} {beginning(appearance)}{size_now(appearance)}"
 
 

@@ -83,7 +83,7 @@ def about(alarm: Alarm) -> str:
         return f"{_plain(alarm.about)} in the data"
     if alarm.kind == "cause":
         size = f", {value(alarm.size, alarm.unit)}" if alarm.size is not None else ""
-        return f"{name(alarm.about)}{size}"
+        return f"{cause_name(alarm)}{size}"
     if alarm.kind == "outlier":
         side = "above" if alarm.relative > 0.0 else "below"
         return f"{name(alarm.about)} {amount(alarm.relative)} {side} the fleet"
@@ -103,13 +103,18 @@ def sentence(alarm: Alarm) -> str:
     if alarm.kind == "fault":
         return f"{_plain(alarm.about)} in the data {since}"
     if alarm.kind == "cause":
-        return f"{name(alarm.about)} {beginning(alarm)}{size_now(alarm)}"
+        return f"{cause_name(alarm)} {beginning(alarm)}{size_now(alarm)}"
     up = alarm.size is not None and alarm.size.value > 0.0
     if alarm.kind == "trend":
         way = "rising" if up else "falling"
         return f"{subject(alarm.about)} has been {way} {since}: {percent(alarm.relative)} so far"
     from_on = f"from {day(alarm.since_s)} on" if not alarm.from_first else "from the first recording on"
     return f"{subject(alarm.about)} {'rose' if up else 'fell'} by {amount(alarm.relative)} {from_on}"
+
+
+def cause_name(cause: Alarm | Appearance) -> str:
+    """Return the name of a cause, beside which another may stand if the diagnoses do not exclude it."""
+    return f"{name(cause.about)}{' or a look-alike' if cause.status == 'one_of' else ''}"
 
 
 def beginning(cause: Alarm | Appearance) -> str:
