@@ -17,8 +17,10 @@ AGAIN = 0.1
 class Stopped(KeyboardInterrupt):
     """A signal asks this process to stop; code that handles Ctrl-C handles it.
 
-    status: 128 plus the number.
+    status: 128 plus the number. note: what the work that it stopped has to say, empty for nothing.
     """
+
+    note = ""
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)

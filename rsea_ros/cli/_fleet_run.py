@@ -5,21 +5,23 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
 from rsea_ros.cli._output import FOUND, add_fail_on
 from rsea_ros.cli._progress import progress
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.fleet.executor import Executor, serial
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.joints import Diagnose, load_joints
 from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.time_limit import TIME_LIMIT
+from rsea_ros.interrupts import Stopped
 
 if TYPE_CHECKING:
     from rsea_ros.fleet.plan import Held
+    from rsea_ros.fleet.store import Store
 
 GIGA, MINUTE = 1e9, 60.0
 MOST_SHOWN = 10
@@ -57,19 +59,38 @@ def run(args: argparse.Namespace) -> int:
     """Process new recordings, and print the outcomes."""
     check_options(args)
     held = bags_in(args)
+    sources = ", ".join(args.sources)
     if not held:
-        expected = "expected .mcap or .db3 files, or tables of the map"
-        raise FleetError(f"{', '.join(args.sources)}: no recording, {expected}")
+        raise FleetError(f"{sources}: no recording, expected .mcap or .db3 files, or tables of the map")
+    if not any(joints for _, joints in held):
+        found = f"{len(held)} recordings, of no joint of {args.map}, such as {held[0][0].url}"
+        raise FleetError(f"{sources}: {found}, expected paths that end as its bags")
     summary = write_rows(args, args.out, held)
     print(summary.sentence())
+    for line in _hints(args, summary, held):
+        print(line)
     for joint, bag, why in summary.quarantined[:MOST_SHOWN]:
         print(f"quarantined: {joint}: {bag}: {why}")
+    if (more := len(summary.quarantined) - MOST_SHOWN) > 0:
+        print(f"quarantined: {more} more, all in the view recordings of rsea fleet sql")
     for line in summary.unreadable[:MOST_SHOWN]:
         print(f"unreadable, left for the next run: {line}")
     for bag in summary.changed[:MOST_SHOWN]:
         print(f"changed while it was read, left for the next run: {bag}")
     print(f"store: {args.out}; next: rsea fleet report {args.out} --out report")
     return FOUND if set(summary.outcomes).intersection(args.fail_on) else 0
+
+
+def _hints(args: argparse.Namespace, summary: RunSummary, held: Sequence[Held]) -> Iterator[str]:
+    """Yield what is likely a mistake of the map."""
+    seen = {joint.name for _, joints in held for joint in joints}
+    missing = [joint for joint in load_joints(args.map) if joint.name not in seen]
+    for joint in missing[:MOST_SHOWN]:
+        yield f"no recording of {joint.name}: no path ends as its bags: {', '.join(joint.bags)}"
+    if summary.unmapped:
+        yield f"of no joint: {summary.example}{' and others' if summary.unmapped > 1 else ''}"
+    if summary.undated:
+        yield "without a date no trend can be estimated: state as “date” in the map how paths hold it"
 
 
 def bags_in(args: argparse.Namespace) -> list[Held]:
@@ -97,8 +118,22 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
         memory = None if args.serial or args.scheduler else _memory(args)
         limits = EngineLimits(memory, time=args.time_limit * MINUTE, pages=args.pages)
         place = executor(args, memory) if is_anything_new(store, held) else serial()
-        with place as places, progress("fleet") as tell:
+        with _left_said(store, held), place as places, progress("fleet") as tell:
             return Engine(store, places, work, tell, limits).run(held)
+
+
+@contextmanager
+def _left_said(store: Store, held: Sequence[Held]) -> Iterator[None]:
+    """Let a signal that stops the block say how many recordings are left."""
+    from rsea_ros.fleet.plan import count_new
+
+    try:
+        yield
+    except Stopped as stop:
+        with suppress(RseaError, OSError):
+            number, all_of = count_new(store, held), sum(len(joints) for _, joints in held)
+            stop.note = f"{number} of {all_of} recordings are left, the same line goes on"
+        raise
 
 
 @contextmanager

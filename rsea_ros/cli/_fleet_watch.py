@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._fleet_run import add_work, bags_in, check_options, write_rows
 from rsea_ros.cli._output import FOUND
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.wording import printable
 
 if TYPE_CHECKING:
     from rsea_ros.fleet.plan import Held
@@ -32,12 +34,26 @@ def run(args: argparse.Namespace) -> int:
     if args.once:
         return FOUND if _look(args, bags_in(args), at_first=True) else 0
     seen: dict[str, str] = {}
-    at_first = True
+    at_first, said = True, ""
     while True:
-        held = bags_in(args)
-        _look(args, [(bag, joints) for bag, joints in held if seen.get(bag.url) == bag.stamp], at_first)
-        seen, at_first = {bag.url: bag.stamp for bag, _ in held}, False
+        try:
+            held = bags_in(args)
+            _look(args, [(bag, joints) for bag, joints in held if seen.get(bag.url) == bag.stamp], at_first)
+            seen, at_first, said = {bag.url: bag.stamp for bag, _ in held}, False, ""
+        except BrokenPipeError:
+            raise
+        except (RseaError, OSError) as error:
+            if at_first:
+                raise
+            said = _say_once(f"{error}", said)
         time.sleep(args.every)
+
+
+def _say_once(text: str, said: str) -> str:
+    """Print an error that the next look may not have, a share that is away, unless it was the last one."""
+    if text != said:
+        print(f"rsea fleet: {printable(text)}: looking again", file=sys.stderr, flush=True)
+    return text
 
 
 def _look(args: argparse.Namespace, held: list[Held], at_first: bool) -> int:

@@ -194,9 +194,10 @@ def _fault(error: Exception) -> str:
 
 def _report_stop(prefix: str, error: KeyboardInterrupt) -> int:
     """Report that a signal stopped the work, and return its status."""
+    note = f": {error.note}" if isinstance(error, Stopped) and error.note else ""
     if isinstance(error, Stopped) and error.status != INTERRUPTED:
-        return _fail(prefix, f"stopped by {error}", error.status)
-    return _fail(prefix, "interrupted", INTERRUPTED)
+        return _fail(prefix, f"stopped by {error}{note}", error.status)
+    return _fail(prefix, f"interrupted{note}", INTERRUPTED)
 
 
 def _fail(prefix: str, message: str, status: int = BAD_INPUT) -> int:

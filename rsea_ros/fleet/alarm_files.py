@@ -82,12 +82,14 @@ def webhook(alarm: Alarm) -> dict[str, Any]:
 
 def sentence(alarm: Alarm) -> str:
     """Return a sentence on the event: joint, cause, size, date."""
-    since = f" since {_time(alarm.since_s)[:10]}" if math.isfinite(alarm.since_s) else ""
+    begun = "since the first recording," if alarm.from_first else "since"
+    since = f" {begun} {_time(alarm.since_s)[:10]}" if math.isfinite(alarm.since_s) else ""
     if alarm.size is None:
         return f"{alarm.joint}: {alarm.about} ({alarm.kind}){since}"
     size = with_unit(f"{alarm.size.value:+.4g}", alarm.unit)
     interval = f"{alarm.size.low:.4g} to " + with_unit(f"{alarm.size.high:.4g}", alarm.unit)
-    return f"{alarm.joint}: {alarm.about} ({alarm.kind}) {size}, {interval}{since}"
+    name = f"{alarm.about} or a look-alike" if alarm.status == "one_of" else alarm.about
+    return f"{alarm.joint}: {name} ({alarm.kind}) {size}, {interval}{since}"
 
 
 def _time(seconds: float) -> str:

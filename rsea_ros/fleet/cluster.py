@@ -11,6 +11,7 @@ import logging
 import math
 import os
 import queue
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -51,6 +52,8 @@ PER_WORKER = 3
 """Tasks in flight for each worker: one that runs, and some that wait at the scheduler."""
 NAMES = 1000
 """Jobs after which Dask's cache of their names is emptied: it keeps the last 100 000, about 0.3 kB each."""
+_ADDRESS = re.compile(r"(\w+://)?(\[[0-9a-fA-F:]+\]|[^\s/:]+):\d+/?")
+"""HOST:PORT with or without a protocol: Dask looks a minute for anything else."""
 CONNECT = "30s"
 COUNTED_EVERY = 10.0
 """s, after which the workers are counted anew: those of another cluster come and go."""
@@ -121,16 +124,30 @@ def on_scheduler(address: str) -> Iterator[OnDask]:
 
     Dask logs nothing meanwhile: a lost scheduler is one FleetError, not a traceback on the terminal.
     """
+    expected = "expected the address of a Dask scheduler that runs"
+    if not _ADDRESS.fullmatch(address):
+        raise FleetError(f"--scheduler {address}: no address, {expected}, such as tcp://HOST:8786")
     with silence_logging_cmgr(logging.CRITICAL):
         try:
             client = distributed.Client(  # type: ignore[no-untyped-call]
                 address, timeout=CONNECT, set_as_default=False
             )
         except (OSError, ValueError, TimeoutError) as error:
-            expected = "expected the address of a Dask scheduler that runs"
             raise FleetError(f"--scheduler {address}: {error}, {expected}") from None
         with client, frequent_collection():
             yield OnDask(client)
+
+
+@contextmanager
+def _dashboard_named(address: str) -> Iterator[None]:
+    """Let the error of a cluster that cannot begin name the only address that a user states."""
+    try:
+        yield
+    except RuntimeError as error:
+        if not isinstance(error.__cause__, OSError):
+            raise
+        why = error.__cause__.strerror or error.__cause__
+        raise FleetError(f"--dashboard {address}: {why}, expected HOST:PORT of this machine") from None
 
 
 @contextmanager
@@ -141,7 +158,7 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
     """
     resource_tracker.ensure_running()  # its start would let the threads of the block hear Ctrl-C again
     with dask.config.set(SETTINGS):
-        with deaf_to_interrupts():
+        with deaf_to_interrupts(), _dashboard_named(dashboard):
             cluster = distributed.LocalCluster(  # type: ignore[no-untyped-call]
                 n_workers=workers,
                 threads_per_worker=1,

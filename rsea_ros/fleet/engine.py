@@ -72,7 +72,8 @@ class Engine:
         Raises FleetError where the scheduler is lost, OSError where the store cannot be written.
         """
         self._joints = {bag.url: joints for bag, joints in held}
-        self._summary.unmapped = sum(not joints for _, joints in held)
+        unmapped = [bag.url for bag, joints in held if not joints]
+        self._summary.unmapped, self._summary.example = len(unmapped), next(iter(unmapped), "")
         self._rate = Rate(sum(len(joints) for _, joints in held), self._tell)
         unseen = iter([bag for bag, joints in held if joints])
         while True:
@@ -178,6 +179,7 @@ class Engine:
         row = outcome.row
         self._store.put(outcome)
         self._summary.outcomes[row["outcome"]] += 1
+        self._summary.undated += row["outcome"] == "done" and row["time"] is None
         if row["outcome"] == "quarantined":
             self._summary.quarantined.append((row["joint"], row["bag"], row["reason"]))
         self._rate.over(1)

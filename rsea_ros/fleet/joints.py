@@ -15,6 +15,7 @@ from msg_adapters.topic_map import TopicMap
 from rsea_ros import strict_yaml
 from rsea_ros.checked import mapping, only_keys, text
 from rsea_ros.errors import FieldError, RseaError
+from rsea_ros.fleet.dated_paths import names_a_day
 from rsea_ros.fleet.fleet_error import JointMapError
 from rsea_ros.fleet.joint_keys import JOINT, MAP, TOPIC
 from rsea_ros.keys import names
@@ -96,6 +97,9 @@ def _joint(name: Any, given: Any, defaults: Mapping[str, Any], folder: Path) -> 
     if "rig" not in body:
         raise FieldError(f"{where}: no rig, expected the name or the file of one", where)
     texts = {key: text(body[key], at[key]) for key in ("temperature", "date") if key in body}
+    if "date" in texts and not names_a_day(texts["date"]):
+        expected = "year, month and day as strptime reads them, such as %Y-%m-%d"
+        raise FieldError(f"{at['date']} = {quote(texts['date'])}, expected {expected}", at["date"])
     return MappedJoint(
         name,
         _rig(text(body["rig"], at["rig"]), at["rig"], folder),

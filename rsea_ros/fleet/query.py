@@ -21,8 +21,9 @@ QUALIFY row_number() OVER (PARTITION BY joint, recording, model_version, setting
 """
 _VIEWS = (
     """
-CREATE VIEW recordings AS SELECT * FROM analyses
-QUALIFY row_number() OVER (PARTITION BY joint, recording ORDER BY written DESC) = 1
+CREATE VIEW recordings AS SELECT * FROM (
+    FROM analyses QUALIFY row_number() OVER (PARTITION BY joint, recording ORDER BY written DESC) = 1)
+QUALIFY time IS NULL OR row_number() OVER (PARTITION BY joint, bag, time ORDER BY written DESC) = 1
 """,
     """
 CREATE VIEW parameters AS SELECT joint, recording, time, temperature, bag, verdict, artefacts,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timezone
@@ -15,13 +14,12 @@ from msg_adapters.tables import import_record
 from msg_adapters.temperature import mean_temperature
 from msg_adapters.topic_map import ROLES
 from rsea_ros.errors import RseaError
+from rsea_ros.fleet.dated_paths import date_in
 from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.signals import Record
 
 _DATED_NS = 10**17
 """Stamps below (1973) count since a machine's start, not since 1970."""
-_LETTERS = {"Y": r"\d{4}", "m": r"\d{2}", "d": r"\d{2}", "H": r"\d{2}", "M": r"\d{2}", "S": r"\d{2}",
-            "y": r"\d{2}", "j": r"\d{3}", "f": r"\d{1,6}", "b": r"[A-Za-z]{3}"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -59,20 +57,6 @@ def time_of(record: Record, url: str, date: str) -> datetime | None:
     if record.epoch_ns > _DATED_NS:
         return datetime.fromtimestamp(record.epoch_ns // 1000 * 1e-6, timezone.utc)
     return date_in(url, date) if date else None
-
-
-def date_in(path: str, pattern: str) -> datetime | None:
-    """Return the last date in a path that matches a strptime pattern, or None."""
-    parts = re.split(r"%(.)", pattern)
-    letters = [_LETTERS.get(part, re.escape(part)) for part in parts[1::2]]
-    texts = [re.escape(part) for part in parts[::2]]
-    expression = "".join(text + letter for text, letter in zip(texts, [*letters, ""], strict=True))
-    for text in reversed(re.findall(expression, path)):
-        try:
-            return datetime.strptime(text, pattern).replace(tzinfo=timezone.utc)
-        except ValueError:
-            continue
-    return None
 
 
 def is_refused(run: JointRecording) -> RseaError | None:

@@ -105,7 +105,8 @@ def _each(sources: Iterable[str]) -> Iterator[str]:
         try:
             lines = Path(source[1:]).read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
-            raise FleetError(f"{source[1:]}: {error}, expected a list with a source a line") from None
+            why = error.strerror if isinstance(error, OSError) else "not UTF-8"
+            raise FleetError(f"{source[1:]}: {why}, expected a list with a source a line") from None
         yield from (line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#"))
 
 

@@ -12,6 +12,7 @@ from rsea_ros.model.extent import LARGEST
 from rsea_ros.model.observer import Noise, noise_of
 from rsea_ros.model.rig import Rig
 
+_EXPECTED = "expected an identification.json of rsea identify"
 
 def noise_from(rig: Rig, path: str) -> Noise:
     """Return the noise of a rig, measured where an identification.json is named.
@@ -28,9 +29,10 @@ def _document(path: str) -> Mapping[str, Any]:
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise ParameterError(f"parameter identification = {path!r}: {error}") from None
+        why = error.strerror if isinstance(error, OSError) else "no JSON"
+        raise ParameterError(f"parameter identification = {path!r}: {why}, {_EXPECTED}") from None
     if not isinstance(document, dict):
-        raise ParameterError(f"parameter identification = {path!r}, expected an identification.json")
+        raise ParameterError(f"parameter identification = {path!r}, {_EXPECTED}")
     return document
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from rsea_ros.trends.fleet_trends import fleet_trends
-from rsea_ros.trends.result import Appearance, Change, FleetTrends, Interval, Outlier, Trend
+from rsea_ros.trends.result import Appearance, Change, FleetTrends, Growth, Interval, Outlier, Trend
 from rsea_ros.trends.series import Table
 from rsea_ros.trends.settings import DEFAULT, TrendSettings
 
@@ -25,6 +25,8 @@ class Alarm:
     change from before or the cause's size now, with its 95 % interval; None for a fault. relative: size over
     the level before, NaN where none. confidence: 1 less the false discovery rate. recording, artefacts: of
     the first recording that shows it. share: of the days since then that name a cause or a fault.
+    from_first: the first recording shows it, so since_s is the latest at which it may have begun. status: of
+    a cause, as most of its diagnoses say; `one_of`: the data do not distinguish it from another.
     """
 
     key: str
@@ -41,6 +43,9 @@ class Alarm:
     recording: str
     artefacts: str
     share: float = 1.0
+    from_first: bool = False
+    growth: Growth = ""
+    status: str = ""
 
 
 def alarms(history: Table, recordings: Table, settings: TrendSettings = DEFAULT) -> tuple[Alarm, ...]:
@@ -52,8 +57,12 @@ def alarms(history: Table, recordings: Table, settings: TrendSettings = DEFAULT)
 
 
 def alarms_of(fleet: FleetTrends, recordings: Table) -> tuple[Alarm, ...]:
-    """Return the alarms of a fleet's trends."""
-    appeared = {(a.joint, a.about) for a in fleet.appearances if a.kind == "cause"}
+    """Return the alarms of a fleet's trends.
+
+    A cause that appeared is one alarm, its size included; a size that changes later is another where the
+    joint had the cause from its first recording on.
+    """
+    appeared = {(a.joint, a.about) for a in fleet.appearances if a.kind == "cause" and not a.from_first}
     made = [_of_appearance(a, recordings) for a in fleet.appearances]
     for trend in fleet.trends.values():
         made += _of_trend(trend)
@@ -87,7 +96,7 @@ def _of_trend(trend: Trend) -> Iterator[Alarm]:
             f"{s.joint}/{s.parameter}/{way}/{number}", s.joint, s.parameter, "trend" if goes_on else "change",
             run[0].since_s, run[0].earliest_s, run[0].latest_s, total, s.unit,
             total.value / abs(level) if level else float("nan"), 1.0 - trend.q,
-            str(s.recording[row]), str(s.artefacts[row]),
+            str(s.recording[row]), str(s.artefacts[row]), from_first=run[0].open_start,
         )  # fmt: skip
         level += total.value
 
@@ -102,7 +111,7 @@ def _of_appearance(a: Appearance, recordings: Table) -> Alarm:
     return Alarm(
         f"{a.joint}/{a.about}/{a.kind}", a.joint, a.about, a.kind, a.since_s, a.earliest_s, a.latest_s,
         a.size, a.unit, float("nan"), 1.0 - a.q, str(recordings["recording"][a.row]),
-        str(recordings["artefacts"][a.row]), a.share,
+        str(recordings["artefacts"][a.row]), a.share, a.from_first, a.growth, a.status,
     )  # fmt: skip
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rsea_ros.normal import MAD_TO_SD, Z95
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.cause_series import Naming
-from rsea_ros.trends.result import Appearance, Interval
+from rsea_ros.trends.result import Appearance, Growth, Interval, Trend
 from rsea_ros.trends.settings import DAY, TrendSettings
 from rsea_ros.trends.significance import adjust
 
@@ -18,6 +18,8 @@ _LESS_BEFORE = 3.0
 """Log likelihood ratio, odds of 20, from which a joint is said to have been without it before."""
 _MOSTLY, _RARELY = 0.5, 0.25
 """Share of the days that name what a joint always had, at least, and in its fleet, at most."""
+_LATEST_DAYS = 3
+"""Days whose sizes stand for a cause's present size, where they have no course: as many as name it first."""
 _SURE = 0.98
 """Highest share of days that is assumed to name anything: a diagnosis may miss."""
 
@@ -120,7 +122,7 @@ def _appearance(scan: Scan, q: float, settings: TrendSettings) -> Appearance | N
     row = int(n.row[np.flatnonzero((n.time_s >= np.floor(t[first]) * DAY) & n.named)[0]])
     return Appearance(
         n.joint, n.about, n.kind, since * DAY, earliest * DAY, latest * DAY, from_first,
-        float(np.mean(scan.named[first:])), q, row, n.parameter, n.unit, _size_now(n), n.limit, n.status,
+        float(np.mean(scan.named[first:])), q, row, n.parameter, n.unit, _latest_size(n), n.limit, n.status,
     )  # fmt: skip
 
 
@@ -133,15 +135,32 @@ def _dates(scan: Scan, best: int, first: int, settings: TrendSettings) -> tuple[
     return min(earliest, since), since, max(float(t[likely[-1]]), since)
 
 
-def _size_now(n: Naming, last: int = 9) -> Interval | None:
-    """Return the median of a cause's last sizes, with the interval of their scatter and their own doubt."""
+def _latest_size(n: Naming) -> Interval | None:
+    """Return the median of a cause's sizes on the last days that name it.
+
+    Its interval holds their scatter and their own doubt. Only a few days: a size may grow.
+    """
     if n.size is None or n.sd is None:
         return None
-    usable = np.flatnonzero(n.named & np.isfinite(n.size))[-last:]
+    usable = np.flatnonzero(n.named & np.isfinite(n.size))
     if not len(usable):
         return None
+    days = np.floor(n.time_s[usable] / DAY)
+    usable = usable[days >= np.unique(days)[-_LATEST_DAYS:][0]]
     size, sd = n.size[usable], n.sd[usable]
     middle = float(np.median(size))
     spread = MAD_TO_SD * float(np.median(np.abs(size - middle)))
     half = Z95 * 1.25 * float(np.hypot(spread, np.median(sd))) / np.sqrt(len(usable))
     return Interval(middle, middle - half, middle + half)
+
+
+def with_course(appearance: Appearance, trend: Trend | None) -> Appearance:
+    """Return an appearance with the size of its cause now, and its growth, from the course of its sizes.
+
+    trend: of these sizes; None, or undetermined, leaves the median of the last days.
+    """
+    if trend is None or trend.now is None or trend.per_year is None or trend.state == "undetermined":
+        return appearance
+    outwards = trend.per_year.value * trend.now.value > 0.0
+    growth: Growth = "" if trend.state != "trending" else "growing" if outwards else "shrinking"
+    return replace(appearance, size=trend.now, growth=growth)

@@ -35,7 +35,7 @@ class Days:
 def day_means(series: Series, settings: TrendSettings) -> Days:
     """Return the weighted means of the days that determine the parameter, lone outliers left out."""
     s = series.keep(series.identifiable)
-    s = s.keep(~outliers(s.value, s.sd, settings.outlier_days))
+    s = s.keep(~outliers(s.time_s, s.value, s.sd, settings.outlier_days))
     scale = _scale(s.value)
     day = np.floor(s.time_s / DAY)
     starts = np.flatnonzero(np.diff(day, prepend=-np.inf))
@@ -57,14 +57,37 @@ def day_means(series: Series, settings: TrendSettings) -> Days:
     )
 
 
-def outliers(value: FloatArray, sd: FloatArray, most: float) -> BoolArray:
-    """Return which recordings lie farther than `most` standard deviations from their neighbours' median."""
+def outliers(time_s: FloatArray, value: FloatArray, sd: FloatArray, most: float) -> BoolArray:
+    """Return which recordings lie farther than `most` standard deviations from what their neighbours say.
+
+    That is their median, and for a recording far from it their line too: at the end of a ramp the neighbours
+    lie on one side of it.
+    """
     if len(value) < _NEIGHBOURS:
         return np.zeros(len(value), bool)
-    off = value - median_filter(value, _NEIGHBOURS, mode="mirror")
+    far = _are_far(value - median_filter(value, _NEIGHBOURS, mode="mirror"), sd, most)
+    return far & _are_far(value - _on_lines(time_s, value), sd, most) if np.any(far) else far
+
+
+def _are_far(off: FloatArray, sd: FloatArray, most: float) -> BoolArray:
     spread = MAD_TO_SD * float(np.median(np.abs(off)))
     far: BoolArray = np.abs(off) > most * np.sqrt(spread**2 + sd**2)
     return far
+
+
+def _on_lines(time_s: FloatArray, value: FloatArray) -> FloatArray:
+    """Return what the line through the neighbours of each recording says of it (Theil 1950, Sen 1968)."""
+    n = len(value)
+    first = np.clip(np.arange(n) - _NEIGHBOURS // 2, 0, n - _NEIGHBOURS)
+    near = first[:, None] + np.arange(_NEIGHBOURS)
+    near = near[near != np.arange(n)[:, None]].reshape(n, -1)
+    t, y = time_s[near] - time_s[:, None], value[near]
+    i, j = np.triu_indices(near.shape[1], 1)
+    apart = t[:, j] - t[:, i]
+    rise = np.where(apart > 0.0, (y[:, j] - y[:, i]) / np.where(apart > 0.0, apart, 1.0), 0.0)
+    slope = np.median(rise, axis=1)
+    level: FloatArray = np.median(y - slope[:, None] * t, axis=1)
+    return level
 
 
 def _scale(value: FloatArray) -> float:

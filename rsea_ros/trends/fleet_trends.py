@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.trends.appearing import appearances
+from rsea_ros.trends.appearing import appearances, with_course
 from rsea_ros.trends.cause_series import namings, size_series, temperatures
 from rsea_ros.trends.course_search import Tested, change_test, describe
 from rsea_ros.trends.day_effect import DayEffect, day_effect
@@ -41,7 +41,10 @@ def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DE
         of_parameters,
         of_causes,
         tuple(every),
-        appearances(every, joints, settings),
+        tuple(
+            with_course(a, of_causes.get((a.joint, f"{a.about}.{a.parameter}")))
+            for a in appearances(every, joints, settings)
+        ),
         outliers(of_parameters.values(), settings),
         settings.false_discovery,
         sum(t.state != "undetermined" for t in trends.values()),

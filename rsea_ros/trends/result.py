@@ -17,6 +17,8 @@ State = Literal["steady", "changed", "trending", "undetermined"]
 """undetermined: the recordings do not excite the parameter enough to say anything of its course."""
 
 
+Growth = Literal["", "growing", "shrinking"]
+"""Of the size of a cause; empty where it is steady or unknown."""
 _MANY, _LONG = 10, 28 * DAY
 """Recordings, and s, that make silence."""
 
@@ -111,7 +113,8 @@ class Trend:
 class Appearance:
     """A cause or a fault of the data that a joint's recordings name from some day on, or from the first.
 
-    about: its name. share: of the days since then that name it. size: of the cause by its main parameter.
+    about: its name. share: of the days since then that name it. size: of the cause now, by its main
+    parameter. growth: of that size.
     q: false discovery rate. row: place of the first of the recordings that name it. limit: size below which
     it would not have been named (detection limit), NaN where unknown.
     """
@@ -131,6 +134,7 @@ class Appearance:
     size: Interval | None = None
     limit: float = float("nan")
     status: str = ""
+    growth: Growth = ""
 
 
 @dataclass(frozen=True)

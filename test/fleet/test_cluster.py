@@ -172,3 +172,19 @@ def test_a_worker_that_starts_does_not_hear_ctrl_c():
     command = [sys.executable, "-c", MASK]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "True"
+
+
+@pytest.mark.parametrize("address", ["foo", "tcp://foo", "tcp://foo:port", ""])
+def test_what_is_no_address_is_refused_at_once(address):
+    """Dask waited a minute for its end, and then printed a traceback below the error."""
+    with pytest.raises(FleetError, match=r"no address, expected .*tcp://HOST:8786"), on_scheduler(address):
+        pass
+
+
+def test_a_dashboard_that_cannot_be_is_named():
+    """It was called a bug of this software."""
+    with (
+        pytest.raises(FleetError, match=r"^--dashboard nowhere\.invalid:1: .*, expected HOST:PORT"),
+        on_this_machine(1, 10**9, "nowhere.invalid:1"),
+    ):
+        pass

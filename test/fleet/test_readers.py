@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from fleet_stubs import KNEE, stub_work
+from fleet_stubs import KNEE, MARCH, stub_work
 from pyarrow import parquet
 
 from rsea_ros.fleet import history, query, recordings
@@ -100,3 +100,25 @@ def test_a_damaged_file_is_no_store_without_alarms(store):
     file.write_text("junk")
     with pytest.raises(FleetError, match="remove the damaged one"):
         write_alarms(store)
+
+
+def put_at(store, path, content, day):
+    outcome = stub_work(Task(Bag(path, 1, ""), KNEE, f"{content:016x}", "1"))
+    outcome.row["time"] = day and MARCH.replace(day=day)
+    store.put(outcome)
+
+
+def test_a_recording_that_replaced_another_of_the_same_start_counts_alone(store):
+    """A bag that was analysed while it was copied counted twice: its first half, and then the whole."""
+    put_at(store, "/a.mcap", 1, 5)
+    put_at(store, "/a.mcap", 2, 5)
+    shown = answer(store, "SELECT recording FROM recordings")[1]
+    assert shown == [(f"{2:016x}",)]
+    assert answer(store, "SELECT count(*) FROM analyses")[1] == [(2,)]
+
+
+def test_recordings_of_other_days_under_one_name_all_count(store):
+    """A robot may write each day to the same path."""
+    for content, day in ((1, 5), (2, 6), (3, None), (4, None)):
+        put_at(store, "/latest.mcap", content, day)
+    assert answer(store, COUNT)[1] == [(4,)]

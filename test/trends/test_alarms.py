@@ -122,3 +122,33 @@ def test_the_false_discovery_rate_is_that_of_benjamini_and_hochberg():
 def test_the_threshold_of_a_scan_has_its_rate(rate):
     for freedom in (5, 200, 1000):
         assert scan_p(scan_threshold(rate, 0.03, freedom), 0.03, freedom) == pytest.approx(rate, rel=1e-6)
+
+
+def growing(joint, d, since=20):
+    """Return a backlash of 0.1 mrad for each day since some day."""
+    size = 1e-4 * (d - since)
+    return [cause("backlash", size, doubt=2e-6 / size)] if joint == "c" and d > since else []
+
+
+def test_the_size_of_a_growing_cause_is_that_of_now():
+    """The median of its last nine recordings stood for it: 2.75 mrad with 3.75 in the last."""
+    (alarm,) = alarms(QUIET, recordings(JOINTS, 60, causes=growing))
+    assert alarm.size.low < 3.9e-3 < alarm.size.high
+    assert (alarm.growth, alarm.from_first) == ("growing", False)
+
+
+def test_the_size_of_a_cause_of_few_days_is_that_of_the_last():
+    (alarm,) = alarms(QUIET, recordings(JOINTS, 28, causes=growing))
+    assert alarm.size.low < 6e-4 < alarm.size.high and alarm.size.value >= 5.9e-4
+
+
+def test_a_cause_from_the_first_recording_on_that_grows_later_is_a_second_alarm():
+    """It was one alarm, dated to the first recording, and its growth was in no title."""
+
+    def causes(joint, d):
+        return [cause("backlash", 1e-3 + 1e-4 * max(0, d - 30), doubt=2e-3)] if joint == "c" else []
+
+    both = {a.kind: a for a in alarms(QUIET, recordings(JOINTS, 60, causes=causes))}
+    assert set(both) == {"cause", "trend"}
+    assert both["cause"].from_first and both["cause"].growth == "growing"
+    assert abs((both["trend"].since_s - START) / DAY - 30.0) <= 3.0

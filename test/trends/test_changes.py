@@ -149,3 +149,24 @@ def test_dates_at_midnight_on_a_monday_lie_in_their_own_week():
     result = fleet_trends(made, NOTHING).trends[STIFFNESS]
     bins = bin_days(result, steps_over(float(made["time_s"][0]), float(made["time_s"][-1])))
     assert len(bins.value) == 12 and np.all(np.isfinite(bins.value))
+
+
+def test_the_last_recordings_of_a_ramp_count():
+    """Its end lies on one side of its neighbours: it was left out, and the level now was two weeks old."""
+    made = history(
+        np.random.default_rng(2), days=40, each=1, sd=2e-3, day_sd=2e-3,
+        course=lambda j, d: 0.02 * np.clip(d - 15, 0, None),
+    )  # fmt: skip
+    (result,) = fleet_trends(made, NOTHING).trends.values()
+    assert day(result.curve.time_s[-1]) >= 39.0
+    assert abs(result.now.value - 1500.0 * (1.0 + 0.02 * 24)) < 12.0
+
+
+@pytest.mark.parametrize("wild", [0, 20, 39])
+def test_a_wild_recording_is_left_out_of_a_ramp_and_at_either_end(wild):
+    made = history(
+        np.random.default_rng(3), days=40, each=1, sd=1e-3, day_sd=1e-3, course=lambda j, d: 0.01 * d
+    )
+    made["value"][wild] *= 1.5
+    (result,) = fleet_trends(made, NOTHING).trends.values()
+    assert result.days_used == 39

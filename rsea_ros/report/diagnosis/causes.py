@@ -39,7 +39,7 @@ def _gain(cause: Cause) -> str:
 
 def _sizes(cause: Cause) -> str:
     cells = []
-    for name, p in cause.parameters.items():
+    for name, p in num.sizes(cause).items():
         value, doubt, unit = num.estimate(p)
         doubt = f" <small>{doubt.strip()}</small>" if doubt else ""
         label = f"{escape(name.replace('_', ' '))}, 95 % interval{escape(_model_share(p))}"

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from rsea_ros.diagnosis.result import CauseParameter, Diagnosis
+from rsea_ros.diagnosis.result import Cause, CauseParameter, Diagnosis
+from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.signals import UNITS
 from rsea_ros.units import in_motion
+
+_END = 0.99
+"""Share of the upper bound from which a value stands for an endless one."""
 
 
 def times_noise(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
@@ -57,6 +63,17 @@ def rms_change(diagnosis: Diagnosis, channel: str) -> str:
         for v in (diagnosis.residual_rms, diagnosis.extended_residual_rms, diagnosis.noise_rms)
     )
     return f"{before} → {after}, noise {noise}" if diagnosis.causes else f"{before}, noise {noise}"
+
+
+def sizes(cause: Cause) -> dict[str, CauseParameter]:
+    """Return the parameters that say how large a cause is.
+
+    One at the endless value at which it does nothing is left out: a drift that is a straight line has no time
+    constant.
+    """
+    effect = catalogue().get(cause.name)
+    ends = {p.name: p.high for p in effect.parameters if p.optional and math.isinf(p.null)} if effect else {}
+    return {n: p for n, p in cause.parameters.items() if p.value < _END * ends.get(n, math.inf)}
 
 
 def estimate(estimate: CauseParameter) -> tuple[str, str, str]:

@@ -48,7 +48,7 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
     if left := num.left_channel(d):
         yield "", f"{words.channel(left)} {num.residual_change(d, left)} times the noise"
     for cause in d.causes:
-        yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in cause.parameters.items())}"
+        yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in num.sizes(cause).items())}"
         gain, interval = num.percent(cause.gain_holdout), num.percent_range(cause.gain_holdout_ci95)
         yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
         yield "status", status_line(cause, d.alternatives, d.at_noise_floor)

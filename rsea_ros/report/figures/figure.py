@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +14,7 @@ from rsea_ros.signals import FloatArray
 
 Json = dict[str, Any]
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
-_DIGITS = 5
+_DIGITS, _MOST_DIGITS = 5, 15
 
 
 @dataclass(frozen=True)
@@ -29,9 +30,18 @@ class Figure:
     extra: Mapping[str, Any] = field(default_factory=dict)
 
 
-def numbers(values: FloatArray) -> list[float | None]:
-    """Return values for JSON: five significant digits, None where not finite."""
-    return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in np.asarray(values, dtype=float)]
+def numbers(values: FloatArray, step: float = 0.0) -> list[float | None]:
+    """Return values for JSON: five significant digits, None where not finite.
+
+    step: resolution that they keep at least, in their unit, where they are close to each other; 0 for none.
+    """
+    decimals = math.ceil(-math.log10(step)) if step > 0.0 else 0
+    return [_short(float(v), decimals) if np.isfinite(v) else None for v in np.asarray(values, dtype=float)]
+
+
+def _short(value: float, decimals: int) -> float:
+    before = math.floor(math.log10(abs(value))) + 1 if value else 0
+    return float(f"{value:.{max(_DIGITS, min(before + decimals, _MOST_DIGITS))}g}")
 
 
 def layout(**parts: Any) -> Json:

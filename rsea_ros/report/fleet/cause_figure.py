@@ -8,7 +8,7 @@ from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, numbers
 from rsea_ros.report.figures.palette import BEFORE, MEASURED, NOISE, QUIET, faint
 from rsea_ros.report.fleet.marks import change_marks, date_axis, points
-from rsea_ros.report.fleet.words import day, name, value
+from rsea_ros.report.fleet.words import beginning, cause_name, name, size_now
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance
 from rsea_ros.trends.weeks import Steps
@@ -78,11 +78,8 @@ def _title(naming: Naming, appearance: Appearance | None) -> str:
     often = f"{int(np.sum(naming.named))} of {len(naming.named)} recordings"
     if appearance is None:
         return f"{plain}{' is named' if naming.kind == 'cause' else ''} in {often}"
-    size = f", now {value(appearance.size, appearance.unit)}" if appearance.size is not None else ""
-    since = (
-        "from the first recording on" if appearance.from_first else f"since about {day(appearance.since_s)}"
-    )
-    return f"{plain} {since}{size}"
+    plain = plain if naming.kind == "fault" else cause_name(appearance)
+    return f"{plain} {beginning(appearance)}{size_now(appearance)}"
 
 
 def _since(appearance: Appearance | None) -> list[Json]:

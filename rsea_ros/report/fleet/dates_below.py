@@ -9,6 +9,8 @@ from rsea_ros.trends.weeks import Steps
 
 _MOST = 6
 """Months that find room on a phone."""
+_BEGIN, _END = 6.0, 96.0
+"""Percent of the width: a name before the one begins at its place, one behind the other has no room."""
 _STRIDES = (1, 2, 3, 6, 12, 24, 60, 120)
 
 
@@ -27,10 +29,20 @@ def months(steps: Steps) -> str:
     stride = next((s for s in _STRIDES if whole / s <= _MOST), _STRIDES[-1])
     every = [12 * first.year + first.month - 1 + k for k in range(1, whole + 1)]
     starts = [datetime(m // 12, m % 12 + 1, 1, tzinfo=timezone.utc) for m in every if m % stride == 0]
-    return _below([(t.timestamp(), short_day(t.timestamp())[2:]) for t in starts], steps)
+    shown = [t for t in starts if share(t.timestamp(), steps) < _END]
+    return _below([(t.timestamp(), _month(t, t is shown[0])) for t in shown], steps)
+
+
+def _month(time: datetime, first: bool) -> str:
+    """Return the name of a month, with its year below it for the first and each January."""
+    _, month, year = short_day(time.timestamp()).split()
+    return f"{month}\n{year}" if first or time.month == 1 else month
 
 
 def _below(marks: list[tuple[float, str]], steps: Steps) -> str:
     shown = [(share(t, steps), text) for t, text in marks]
-    spans = "".join(f'<span style="left:{x:.1f}%">{text}</span>' for x, text in shown if x < 96.0)
+    edge = [' class="edge"' if x < _BEGIN else "" for x, _ in shown]
+    spans = "".join(
+        f'<span{c} style="left:{x:.1f}%">{text}</span>' for c, (x, text) in zip(edge, shown, strict=True)
+    )
     return f'<div class="months">{spans}</div>'

@@ -157,9 +157,9 @@ def _key(low: str, middle: str, high: str, ends: tuple[float, float]) -> str:
 def _title(parameter: str, rows: Sequence[Trend | None]) -> str:
     determined = [t for t in rows if t is not None and t.state != "undetermined"]
     moved = [t for t in determined if t.state != "steady"]
-    plain = name(parameter)
     if not moved:
-        return f"{plain} is steady in all {len(determined)} joints that tell it"
+        which = f"all {len(determined)} joints that determine it" if len(determined) > 1 else "one joint"
+        return f"{name(parameter)}: steady in {which}"
     most = max(moved, key=lambda t: abs(t.relative))
     where = f"{len(moved)} of {len(determined)} joints, most in {most.series.joint}"
-    return f"{plain} moved in {where}: {percent(most.relative)}"
+    return f"{name(parameter)}: changed in {where}, by {percent(most.relative)}"

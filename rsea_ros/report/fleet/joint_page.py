@@ -12,7 +12,7 @@ from rsea_ros.report.fleet.latest import latest_causes
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.parameter_figure import parameter_figure
 from rsea_ros.report.fleet.tables import alarm_table, parameter_rows, undated_rows
-from rsea_ros.report.fleet.words import finding, sentence, short_day
+from rsea_ros.report.fleet.words import finding, name, sentence, short_day, undetermined_state
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import fold, key_numbers, paragraph, section
 from rsea_ros.report.page.html_table import table_of_cells
@@ -37,7 +37,7 @@ _UNDATED = (
 
 _NO_PAGE = (
     "A recording links diagnosis.json where its run kept no page. To see one as a page: rsea diagnose BAG "
-    "--rig RIG --out page. Paths: rsea fleet sql \"SELECT recording, bag FROM recordings\" --store STORE. "
+    '--rig RIG --out page. Paths: rsea fleet sql "SELECT recording, bag FROM recordings" --store STORE. '
     "rsea fleet run --pages keeps the pages of new recordings."
 )
 
@@ -89,7 +89,20 @@ def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: St
     yield from (parameter_figure(t, steps) for t in (*trends, *sized) if t.state == "steady")
     yield from _namings(joint, fleet, steps, known, appeared=False)
     undetermined = [t for t in trends if t.state == "undetermined"]
-    yield from (section(finding(t), paragraph(f"{capital(t.reason)}.")) for t in undetermined)
+    yield from _undetermined([t for t in undetermined if not np.isfinite(t.silent_since_s)])
+    silent = [t for t in undetermined if np.isfinite(t.silent_since_s)]
+    yield from (section(finding(t), paragraph(f"{capital(t.reason)}.")) for t in silent)
+
+
+def _undetermined(trends: Sequence[Trend]) -> Iterator[Block]:
+    """Yield a section for each reason why parameters have no trend."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for t in trends:
+        groups.setdefault((undetermined_state(t), t.reason), []).append(name(t.series.parameter))
+    for (state, reason), names in groups.items():
+        title = f"{names[0] if len(names) == 1 else f'{len(names)} parameters'}: {state}"
+        which = f"{'; '.join(names)}. " if len(names) > 1 else ""
+        yield section(title, paragraph(f"{which}{capital(reason)}."))
 
 
 def _size(trend: Trend) -> float:
@@ -125,9 +138,7 @@ def _has_size(naming: Naming) -> bool:
     return naming.size is not None and bool(np.any(np.isfinite(naming.size)))
 
 
-def _keys(
-    trends: Sequence[Trend], recordings: Table, rows: np.ndarray, dated: bool
-) -> list[tuple[str, str]]:
+def _keys(trends: Sequence[Trend], recordings: Table, rows: np.ndarray, dated: bool) -> list[tuple[str, str]]:
     determined = sum(t.state != "undetermined" for t in trends)
     done = int(np.sum(np.asarray(recordings["outcome"], str)[rows] == "done"))
     faulty = sum(bool(len(recordings["faults"][i])) for i in rows if recordings["faults"][i] is not None)

@@ -8,13 +8,26 @@ from rsea_ros.report.figures.figure import Json, axis
 from rsea_ros.report.figures.palette import BEFORE, faint
 from rsea_ros.report.fleet.words import dates
 from rsea_ros.signals import FloatArray
+from rsea_ros.trends.settings import DAY
 from rsea_ros.trends.weeks import Steps
+
+_DAY = "%-d %b\n%Y"
+
+
+_FEW = 14
+"""Days up to which each has its name: plotly would name their hours."""
 
 
 def date_axis(steps: Steps, until_s: float = 0.0) -> Json:
     """Return an axis of dates over all steps, longer where something lies beyond them."""
-    first, last = dates([steps.edges[0], max(steps.edges[-1], until_s)])  # type: ignore[arg-type]
-    return axis("", type="date", range=[first, last], showgrid=False, hoverformat="%e %b %Y")
+    end = max(float(steps.edges[-1]), until_s)
+    first, last = dates([steps.edges[0], end])  # type: ignore[arg-type]
+    days = (end - float(steps.edges[0])) / DAY
+    stride = 1 if days <= _FEW / 2 else 2
+    ticks = {"dtick": 1000.0 * DAY * stride, "tickformat": _DAY} if days <= _FEW else {}
+    formats = [{"dtickrange": [None, "M1"], "value": _DAY}, {"dtickrange": ["M1", None], "value": "%b\n%Y"}]
+    return axis("", type="date", range=[first, last], showgrid=False, hoverformat="%e %b %Y",
+                tickformatstops=[] if ticks else formats, **ticks)  # fmt: skip
 
 
 def points(time_s: FloatArray, y: list[float | None], title: str, **parts: Any) -> Json:

@@ -103,17 +103,29 @@ def _latest(fleet: FleetTrends, recordings: Table) -> str:
 
 def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table) -> list[tuple[str, str]]:
     kinds = [a.kind for group in groups.values() for a in group]
+    changes = kinds.count("trend") + kinds.count("change")
     done = int(np.sum(np.asarray(recordings["outcome"], str) == "done"))
     return [
         (f"{len(groups)} of {len(fleet.joints)}", "joints need a look"),
-        (str(kinds.count("trend") + kinds.count("change")), f"changes, {kinds.count('trend')} going on"),
-        (str(kinds.count("cause")), "causes that appeared"),
+        (str(changes), f"{_plural(changes, 'change')}, {kinds.count('trend')} going on"),
+        (str(kinds.count("cause")), _causes_word([a for group in groups.values() for a in group])),
         (_group_digits(done), f"recordings used, of {_group_digits(len(recordings['joint']))}"),
         (
             str(len(undetermined_trends(fleet))),
             f"of {len(fleet.trends)} trends not determined, or no more",
         ),
     ]
+
+
+def _causes_word(alarms: Sequence[Alarm]) -> str:
+    causes = [a for a in alarms if a.kind == "cause"]
+    always = sum(a.from_first for a in causes)
+    word = _plural(len(causes), "cause")
+    return f"{word}, {always} from the first recording on" if always else f"{word} that appeared"
+
+
+def _plural(number: int, word: str) -> str:
+    return word if number == 1 else f"{word}s"
 
 
 def _group_digits(number: int) -> str:
@@ -129,9 +141,7 @@ def _name_lines(fleet: FleetTrends, kind: str, subject: str, joints: Sequence[st
 def _undetermined_text(fleet: FleetTrends, links: Links) -> str:
     undetermined = undetermined_trends(fleet)
     if not undetermined:
-        return section(
-            "Nothing was left undetermined", paragraph("All recordings determine all parameters.")
-        )
+        return section("Nothing was left undetermined", paragraph("All recordings determine all parameters."))
     number = "One trend" if len(undetermined) == 1 else f"{len(undetermined)} trends"
     title = f"{number} not determined"
     return section(title, undetermined_table(undetermined, links))

@@ -9,10 +9,13 @@ from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, nu
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, NOISE, faint
 from rsea_ros.report.fleet.marks import change_marks, date_axis, points
 from rsea_ros.report.fleet.words import amount, dates, finding, name, percent, short_day, value
+from rsea_ros.signals import FloatArray
 from rsea_ros.trends.result import Change, Interval, Trend
 from rsea_ros.trends.settings import DAY, YEAR
 from rsea_ros.trends.weeks import Binned, Steps, bin_days
 
+_FINE = 0.02
+"""Share of the course's interval to which values are drawn."""
 _AHEAD = 0.5
 """Share of the time covered up to which a trend is drawn on."""
 
@@ -21,6 +24,7 @@ def parameter_figure(trend: Trend, steps: Steps) -> Figure:
     """Return the figure of a parameter that the recordings determine."""
     factor, unit = words.unit_factor(trend.now.value if trend.now else 1.0, trend.series.unit)
     bins = bin_days(trend, steps)
+    fine = _fine(trend) * abs(factor)
     ahead, until = _ahead(trend, steps, factor)
     marks = [m for c in trend.changes if not c.open_start
              for m in change_marks(c.since_s, c.earliest_s, c.latest_s)]  # fmt: skip
@@ -30,9 +34,9 @@ def parameter_figure(trend: Trend, steps: Steps) -> Figure:
         title=finding(trend),
         caption=_caption(trend),
         data=[
-            *_course(trend, factor),
+            *_course(trend, factor, fine),
             *ahead,
-            _weeks(bins, steps, factor, unit),
+            _weeks(bins, _places(trend, steps), steps.name, factor, unit, fine),
             _undetermined_marks(bins, steps),
         ],
         layout=layout(
@@ -41,19 +45,26 @@ def parameter_figure(trend: Trend, steps: Steps) -> Figure:
             yaxis2={"overlaying": "y", "range": [0.0, 1.0], "visible": False, "fixedrange": True},
             shapes=[*marks, *limit],
             annotations=[*labels, *limit_label],
-            margin={"l": 64, "r": 24, "t": 30, "b": 40},
+            margin={"l": 64, "r": 24, "t": 30 if labels else 12, "b": 40},
         ),
         height=300,
     )
 
 
-def _weeks(bins: Binned, steps: Steps, factor: float, unit: str) -> Json:
+def _places(trend: Trend, steps: Steps) -> FloatArray:
+    """Return the middle of each step, POSIX s, between the first recording and the last."""
+    places: FloatArray = np.clip(steps.middle, trend.series.time_s[0], trend.series.time_s[-1])
+    return places
+
+
+def _weeks(bins: Binned, time_s: FloatArray, step: str, factor: float, unit: str, fine: float) -> Json:
+    """Return the mean of each step. fine: resolution, in the unit."""
     some = np.isfinite(bins.value)
     y, half = bins.value[some] * factor, (bins.high - bins.low)[some] * factor / 2.0
     return points(
-        steps.middle[some],
-        numbers(y),
-        steps.name,
+        time_s[some],
+        numbers(y, fine),
+        step,
         marker={"color": MEASURED, "size": 5},
         error_y={
             "type": "data",
@@ -65,8 +76,14 @@ def _weeks(bins: Binned, steps: Steps, factor: float, unit: str) -> Json:
         customdata=[
             [int(a), int(b)] for a, b in zip(bins.identifiable[some], bins.recorded[some], strict=True)
         ],
-        hovertemplate=f"%{{y:.5g}} {unit}, %{{customdata[0]}} of %{{customdata[1]}} recordings",
+        hovertemplate=f"%{{y:.7g}} {unit}, %{{customdata[0]}} of %{{customdata[1]}} recordings",
     )
+
+
+def _fine(trend: Trend) -> float:
+    """Return a resolution at which the interval of the course can be drawn, in the parameter's unit."""
+    assert trend.curve is not None
+    return _FINE * float(np.median(trend.curve.high - trend.curve.low))
 
 
 def _undetermined_marks(bins: Binned, steps: Steps) -> Json:
@@ -82,17 +99,17 @@ def _undetermined_marks(bins: Binned, steps: Steps) -> Json:
     )
 
 
-def _course(trend: Trend, factor: float) -> list[Json]:
+def _course(trend: Trend, factor: float, fine: float) -> list[Json]:
     """Return the course as a line in its band."""
     assert trend.curve is not None
     c = trend.curve
     x = dates(c.time_s)
     band = {
         "type": "scatter", "mode": "lines", "x": [*x, *x[::-1]], "fill": "toself", "hoverinfo": "skip",
-        "y": numbers(np.concatenate([c.high, c.low[::-1]]) * factor), "line": {"width": 0},
+        "y": numbers(np.concatenate([c.high, c.low[::-1]]) * factor, fine), "line": {"width": 0},
         "fillcolor": faint(AFTER, 0.16),
     }  # fmt: skip
-    stroke = points(c.time_s, numbers(c.value * factor), "trend", mode="lines", hoverinfo="skip",
+    stroke = points(c.time_s, numbers(c.value * factor, fine), "trend", mode="lines", hoverinfo="skip",
                     line={"color": AFTER, "width": 2})  # fmt: skip
     return [band, stroke]
 

@@ -12,6 +12,7 @@ from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import (
+    amount,
     day,
     doubt_of_date,
     name,
@@ -103,16 +104,17 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
     for t in trends:
         s = t.series
         level = abs(t.now.value) if t.now is not None and t.now.value else float("nan")
-        shares = [percent(v / level) if v == v and level == level else "–" for v in
-                  (t.per_year.value if t.per_year else float("nan"), t.day_sd, t.detectable)]  # fmt: skip
+        slope = t.per_year.value if t.per_year else float("nan")
+        shares = [word(v / level) if v == v and level == level else "–" for word, v in
+                  ((percent, slope), (amount, t.day_sd), (amount, t.detectable))]  # fmt: skip
         rows.append(
             (
                 f"{escape(name(s.parameter))}<small>{escape(s.parameter)}</small>",
                 _STATES.get(t.state) or undetermined_state(t),
                 _level(t),
                 shares[0],
-                shares[1].lstrip("+") if t.day_sd else "–",
-                shares[2].lstrip("+"),
+                shares[1] if t.day_sd else "–",
+                shares[2],
                 f"{int(np.sum(s.identifiable))} of {len(s.identifiable)}",
             )
         )

@@ -29,7 +29,8 @@ def timeline(alarms: Sequence[Alarm], steps: Steps, links: Links) -> str:
     return section(
         f"What changed since when: {number}, the earliest of {short_day(first.since_s)}",
         f'<div class="spans">{rows}{months(steps)}</div>',
-        caption="A bar begins on the day of the change, pale if that day is uncertain. Orange: it continues, "
+        caption="A bar begins on the day of the change, pale if that day is uncertain, or with the first "
+        "recording if that shows it. Orange: it continues, "
         f"or has a name. Blue: the change is over, its level stays. Grey: bad data.{more}",
     )
 

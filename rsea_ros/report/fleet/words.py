@@ -11,7 +11,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.report import words
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.alarms import Alarm
-from rsea_ros.trends.result import Change, Interval, Trend
+from rsea_ros.trends.result import Appearance, Change, Interval, Trend
 from rsea_ros.wording import list_names
 
 _MONTHS = ("January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
@@ -66,8 +66,15 @@ def percent(share: float) -> str:
 
 
 def amount(share: float) -> str:
-    """Return the size of a relative change, `15 %`."""
-    return percent(abs(share)).lstrip("+")
+    """Return the size of a relative change, `15 %`; `less than 0.01 %` of one that would read as none."""
+    text = percent(abs(share)).lstrip("+")
+    return "less than 0.01 %" if share and text == "0 %" else text
+
+
+def subject(about: str) -> str:
+    """Return a plain name as the subject of a sentence: `Rotor damping, reflected,`."""
+    plain = name(about)
+    return f"{plain}," if "," in plain else plain
 
 
 def about(alarm: Alarm) -> str:
@@ -76,7 +83,7 @@ def about(alarm: Alarm) -> str:
         return f"{_plain(alarm.about)} in the data"
     if alarm.kind == "cause":
         size = f", {value(alarm.size, alarm.unit)}" if alarm.size is not None else ""
-        return f"{name(alarm.about)}{size}"
+        return f"{cause_name(alarm)}{size}"
     if alarm.kind == "outlier":
         side = "above" if alarm.relative > 0.0 else "below"
         return f"{name(alarm.about)} {amount(alarm.relative)} {side} the fleet"
@@ -91,24 +98,44 @@ def sentence(alarm: Alarm) -> str:
     """Return an alarm as a sentence, with its date."""
     if alarm.kind == "outlier":
         side = "above" if alarm.relative > 0.0 else "below"
-        return f"{name(alarm.about)} is {amount(alarm.relative)} {side} the median of the fleet"
-    since = day(alarm.since_s)
+        return f"{subject(alarm.about)} is {amount(alarm.relative)} {side} the median of the fleet"
+    since = f"since {day(alarm.since_s)}" if not alarm.from_first else "since the first recording"
     if alarm.kind == "fault":
-        return f"{_plain(alarm.about)} in the data since {since}"
+        return f"{_plain(alarm.about)} in the data {since}"
     if alarm.kind == "cause":
-        now = f": now {value(alarm.size, alarm.unit)}" if alarm.size is not None else ""
-        return f"{name(alarm.about)} appeared about {since}{now}"
+        return f"{cause_name(alarm)} {beginning(alarm)}{size_now(alarm)}"
     up = alarm.size is not None and alarm.size.value > 0.0
     if alarm.kind == "trend":
         way = "rising" if up else "falling"
-        return f"{name(alarm.about)} has been {way} since {since}: {percent(alarm.relative)} so far"
-    return f"{name(alarm.about)} {'rose' if up else 'fell'} by {amount(alarm.relative)} from {since} on"
+        return f"{subject(alarm.about)} has been {way} {since}: {percent(alarm.relative)} so far"
+    from_on = f"from {day(alarm.since_s)} on" if not alarm.from_first else "from the first recording on"
+    return f"{subject(alarm.about)} {'rose' if up else 'fell'} by {amount(alarm.relative)} {from_on}"
+
+
+def cause_name(cause: Alarm | Appearance) -> str:
+    """Return the name of a cause, beside which another may stand if the diagnoses do not exclude it."""
+    return f"{name(cause.about)}{' or a look-alike' if cause.status == 'one_of' else ''}"
+
+
+def beginning(cause: Alarm | Appearance) -> str:
+    """Return since when a joint has a cause, and whether it grows."""
+    growth = f"{cause.growth} " if cause.growth else ""
+    if cause.from_first:
+        return f"from the first recording on{', ' if growth else ''}{growth}".rstrip()
+    return f"appeared about {day(cause.since_s)}{' and is ' if growth else ''}{growth}".rstrip()
+
+
+def size_now(cause: Alarm | Appearance) -> str:
+    """Return the size of a cause now as the end of a sentence, empty if it is unknown."""
+    return f": now {value(cause.size, cause.unit)}" if cause.size is not None else ""
 
 
 def doubt_of_date(alarm: Alarm) -> str:
     """Return between which dates it began, empty where that is not known."""
     if not math.isfinite(alarm.since_s):
         return ""
+    if alarm.from_first:
+        return f"before {short_day(alarm.since_s)}"
     first, last = short_day(alarm.earliest_s).split(), short_day(alarm.latest_s).split()
     while first and first[-1] == last[len(first) - 1]:
         first.pop()
@@ -129,18 +156,19 @@ def undetermined_state(trend: Trend) -> str:
 
 
 def _finding(trend: Trend) -> str:
-    plain, unit = name(trend.series.parameter), trend.series.unit
+    about, unit = trend.series.parameter, trend.series.unit
     if trend.state == "undetermined":
-        return f"{plain}: {undetermined_state(trend)} to tell"
+        return f"{name(about)}: {undetermined_state(trend)}"
     if trend.state == "steady":
         factor, shown = words.unit_factor(trend.detectable, unit)
         level = trend.now.value if trend.now is not None else 0.0
         share = f", {amount(trend.detectable / abs(level))}" if level else ""
-        return f"{plain} is steady: no step above {words.number(trend.detectable * factor, 2)} {shown}{share}"
+        least = f"{words.number(trend.detectable * factor, 2)} {shown}".rstrip()
+        return f"{subject(about)} is steady: no step above {least}{share}"
     if trend.state == "trending" and trend.per_year is not None:
         way = "rising" if trend.per_year.value > 0.0 else "falling"
-        return f"{plain} is {way}: {percent(trend.relative)} since the first day{_limit(trend)}"
-    return f"{plain} {list_names([_movement_text(c, trend) for c in trend.changes[:_MOST]])}"
+        return f"{subject(about)} is {way}: {percent(trend.relative)} since the first day{_limit(trend)}"
+    return f"{subject(about)} {list_names([_movement_text(c, trend) for c in trend.changes[:_MOST]])}"
 
 
 def _movement_text(change: Change, trend: Trend) -> str:

@@ -237,7 +237,7 @@ function labelCells() {
 /* An option such as --rig stays in one piece: browsers break lines behind its hyphens. */
 function keepOptions() {
   const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT), texts = [];
-  while (walker.nextNode()) if (walker.currentNode.data.includes("--") && !walker.currentNode.parentElement.closest("script, svg")) texts.push(walker.currentNode);
+  while (walker.nextNode()) if (walker.currentNode.data.includes("--") && !walker.currentNode.parentElement.closest("script, style, svg")) texts.push(walker.currentNode);
   for (const text of texts) text.replaceWith(...text.data.split(/(--[a-z][\w-]*)/).filter(Boolean).map((piece) => {
     if (!/^--[a-z]/.test(piece)) return piece;
     const option = document.createElement("span");

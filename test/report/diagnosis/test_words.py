@@ -191,3 +191,17 @@ def test_the_numbers_of_the_noise_are_settings_in_json_and_page(diagnosed):
     assert (written["settings"]["noise.above"], written["settings"]["noise.fewest"]) == (1.1, 1500)
     assert "<b>1.1</b> (default 1.04)" in settings_section(changed)
     assert "0, 0.1, 0.25" in settings_section(changed)
+
+
+@pytest.mark.parametrize(("seconds", "shown"), [(1e5, ["drift"]), (12.0, ["drift", "time_constant"])])
+def test_a_drift_that_never_settles_has_no_time_constant(diagnosed, seconds, shown):
+    """A straight drift was given with a time constant of `100000 −100000/+490 s`."""
+    parameters = {
+        "drift": CauseParameter(0.5, "N m", (0.49, 0.51)),
+        "time_constant": CauseParameter(seconds, "s", (0.0, seconds + 490.0)),
+    }
+    cause = replace(diagnosed.diagnosis.causes[0], name="ft_drift", parameters=parameters)
+    assert list(num.sizes(cause)) == shown
+    rows = terminal(replace(diagnosed.diagnosis, causes=(cause,)))
+    (line,) = [row for row in rows if row.startswith("cause")]
+    assert ("time constant" in line) == ("time_constant" in shown)

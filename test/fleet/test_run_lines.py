@@ -1,0 +1,93 @@
+"""What `rsea fleet run` says of its sources, its map, and of a signal that stops it."""
+
+from __future__ import annotations
+
+import signal
+from argparse import Namespace
+
+import pytest
+from fleet_stubs import HIP, KNEE, stub_work
+
+from rsea_ros.cli import _fleet_run
+from rsea_ros.cli.main import main
+from rsea_ros.fleet import task
+from rsea_ros.fleet.sources import bags_of
+from rsea_ros.interrupts import Stopped
+
+MAP = """joints:
+  knee: {rig: paper_high_impedance, bags: '*'}
+  hip: {rig: paper_high_impedance, bags: hip/*}
+"""
+
+
+@pytest.fixture
+def run(tmp_path, folder, monkeypatch, capsys):
+    """Return a function that runs a map over the folder with stubs: status, and the lines printed."""
+    monkeypatch.setattr(task, "work", stub_work)
+
+    def run(text, *sources):
+        (tmp_path / "joints.yaml").write_text(text)
+        paths = ["--map", str(tmp_path / "joints.yaml"), "--out", str(tmp_path / "new")]
+        status = main(["fleet", "run", str(folder), *sources, *paths, "--serial"])
+        said = capsys.readouterr()
+        return status, said.out.splitlines(), said.err.splitlines()
+
+    return run
+
+
+def test_a_map_that_fits_no_recording_is_refused(run, tmp_path, folder):
+    """A wrong pattern gave `nothing new`, status 0 and an empty store."""
+    status, out, err = run(MAP.replace("'*'", "knees/*"))
+    assert (status, out, len(err)) == (2, [], 1)
+    assert "recordings, of no joint of" in err[0] and str(folder) in err[0]
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_joint_without_a_recording_is_named(run):
+    status, out, _ = run(MAP)
+    assert status == 0
+    assert "no recording of hip: no path ends as its bags: hip/*" in out
+
+
+def test_a_recording_of_no_joint_is_named(run, folder):
+    other = next(iter(sorted(folder.iterdir())))
+    _, out, _ = run(f"joints:\n  knee: {{rig: paper_high_impedance, bags: '{other.name}'}}\n")
+    assert any(line.startswith("of no joint: ") and line.endswith(" and others") for line in out)
+
+
+def test_rows_without_a_date_say_what_they_lack(run, monkeypatch):
+    def undated(job):
+        outcome = stub_work(job)
+        outcome.row["time"] = None
+        return outcome
+
+    monkeypatch.setattr(task, "work", undated)
+    _, out, _ = run(MAP)
+    assert out[0].endswith("without a date")
+    assert any("state as “date” in the map" in line for line in out)
+
+
+def test_a_missing_list_is_named_once(run, tmp_path):
+    status, _, err = run(MAP, f"@{tmp_path}/nolist")
+    why = "No such file or directory, expected a list with a source a line"
+    assert (status, err) == (2, [f"rsea fleet: {tmp_path}/nolist: {why}"])
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_says_how_many_recordings_are_left(folder, tmp_path, monkeypatch, number):
+    """It said only that it was stopped."""
+    worked = []
+
+    def stopped_at_the_third(job):
+        if len(worked) == 2:
+            raise Stopped(number)
+        worked.append(job)
+        return stub_work(job)
+
+    monkeypatch.setattr(task, "work", stopped_at_the_third)
+    held = bags_of([str(folder)], (KNEE, HIP))
+    args = Namespace(serial=True, scheduler=None, no_wait=True, again=False, time_limit=60.0, pages=False)
+    with pytest.raises(Stopped) as caught:
+        _fleet_run.write_rows(args, str(tmp_path / "new"), held)
+    total = 2 * len(held)
+    assert caught.value.note == f"{total - 2} of {total} recordings are left, the same line goes on"
