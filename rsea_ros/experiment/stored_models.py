@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.containment import NOTHING
+from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.prior import problem_of, vector_at, weights_of
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import Unknown
