@@ -14,6 +14,9 @@ from rsea_ros.report import words
 from rsea_ros.units import plain
 from rsea_ros.wording import list_names
 
+_NARROWER = 1.01
+"""Factor below which a run does not narrow an interval."""
+
 
 def plain_name(name: str) -> str:
     """Return the name of a cause for a sentence."""
@@ -50,6 +53,8 @@ def _narrowing(hypothesis: Hypothesis, p: Proposal) -> str:
     if hypothesis.name == NOTHING:
         return "No cause is in doubt; a run can only narrow the intervals of the rig, and this one does most"
     count = len(hypothesis.cause_indices) or len(hypothesis.theta)
+    if math.exp(p.sharpened / count) < _NARROWER:
+        return f"No run within the limits narrows the intervals of {plain_name(hypothesis.name)}; the best"
     times = f"{math.exp(p.sharpened / count):.3g} times"
     if count == 1:
         return f"The next run narrows the interval of {plain_name(hypothesis.name)} {times}"
