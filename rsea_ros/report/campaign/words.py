@@ -60,7 +60,7 @@ def end_sentence(outcome: CampaignOutcome) -> str:
                 f"{outcome.weighing.left:.2f} times the noise"
             )
         case "undecidable" if outcome.shared is not None:
-            return f"{shared_words(outcome)}, {spent}"
+            return shared_words(outcome, f" {spent}")
         case "undecidable":
             return f"No further run would help: {_open(outcome)} remain possible {spent}"
         case "spent":
@@ -73,14 +73,14 @@ def end_sentence(outcome: CampaignOutcome) -> str:
             return f"The session could not continue ({outcome.why}): {_open(outcome)} remain possible"
 
 
-def shared_words(outcome: CampaignOutcome) -> str:
-    """Return which causes share the name, and what would tell them apart."""
+def shared_words(outcome: CampaignOutcome, spent: str = "") -> str:
+    """Return which causes share the name, and what would tell them apart. spent: after what, in words."""
     assert outcome.shared is not None
     names, torque = outcome.shared.names, outcome.shared.torque
     of = outcome.weighing.probability
     head = " or ".join(f"{plain_name(n)} ({of[n]:.2f})" for n in names)
     needed = "" if torque is None else f"; it takes at least about {torque:.2g} N·m"
-    return f"{head}: no run within the limits shows which{needed}"
+    return f"{head}: no run within the limits shows which{spent}{needed}"
 
 
 def _runs(outcome: CampaignOutcome) -> str:
