@@ -40,7 +40,8 @@ class _Played:
         command = at_rest_around(run, RATE)
         self.command, self.duration, self.rate = command, len(run) / RATE, RATE
         self.names, self.chances = names, chances
-        self.decided, self.hopeless, self.energy = 1.0, (), float(np.sum(command**2) / RATE)
+        self.decided = self.resolved = 1.0
+        self.hopeless, self.energy = (), float(np.sum(command**2) / RATE)
 
 
 def fixed_chirp(limits):

@@ -111,7 +111,7 @@ def _possible(
         return hypotheses_from(models), {}, {}
     from rsea_ros.cli.diagnose import readable
     from rsea_ros.experiment.campaign import Rules
-    from rsea_ros.experiment.hypothesis import NOTHING
+    from rsea_ros.experiment.containment import NOTHING
     from rsea_ros.experiment.joint_weighing import weigh
 
     first = models[0].rig

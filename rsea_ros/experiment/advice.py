@@ -30,6 +30,11 @@ class Proof:
     apart: tuple[Apart, ...]
     covers_all: bool
 
+    @property
+    def pair(self) -> tuple[str, str]:
+        """The two causes."""
+        return self.bound.true, self.bound.rival
+
 
 @dataclass(frozen=True)
 class Advice:
@@ -46,7 +51,7 @@ class Advice:
 
 
 _WORTH = 0.02
-"""Share that a run must decide to be worth playing."""
+"""Share of what is undecided that a run must decide to be worth playing."""
 
 
 def advise(
@@ -62,7 +67,7 @@ def advise(
     """
     proposal = propose(hypotheses, asked, measured, run, tell)
     proofs = proofs_of(hypotheses, proposal.hopeless, asked, measured or {}, run)
-    is_worth = len(hypotheses) == 1 or proposal.decided > _WORTH
+    is_worth = len(hypotheses) == 1 or proposal.resolved > _WORTH
     return Advice(tuple(hypotheses), asked, proposal if is_worth else None, proofs)
 
 

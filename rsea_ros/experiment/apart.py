@@ -10,7 +10,8 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.experiment.bound import HOPELESS, Bound
-from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.containment import NOTHING
+from rsea_ros.experiment.hypothesis import Hypothesis
 
 ACCURACY = 0.01
 """Relative, one sigma: what a value measured apart with care is worth."""

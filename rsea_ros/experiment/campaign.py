@@ -12,10 +12,11 @@ from typing import Literal
 
 from rsea_ros.errors import DeviceError, IdentificationError, ParameterError
 from rsea_ros.experiment.advice import Proof, proofs_of
-from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.containment import NOTHING, may_contain
+from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.joint_weighing import RunWeighing, weigh
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
-from rsea_ros.experiment.run_design import propose
+from rsea_ros.experiment.run_design import propose, torque_that_shows
 from rsea_ros.experiment.run_limits import largest_share
 from rsea_ros.experiment.run_shape import FEWEST
 from rsea_ros.identification.solver import Map, serial
@@ -27,7 +28,8 @@ End = Literal[
     "confirmed", "nothing_wrong", "unexplained", "undecidable", "spent", "declined", "broken", "failed"
 ]
 """confirmed: one cause. nothing_wrong: none is there. unexplained: no cause fits what the runs show.
-undecidable: no run tells more apart, by a proof that covers all, or the longest did not. spent: the budget
+undecidable: no run tells more apart, by a proof that covers all, or the longest did not; or the likeliest
+cause shares its name with one that contains it. spent: the budget
 is. declined: a person said no. broken: a run broke off. failed: the runs could not be weighed, or no run was
 possible within the limits.
 """
@@ -56,10 +58,12 @@ class Rules:
     that a run is designed for. floor: RMS over the noise above which the best cause leaves something else.
     by_data: S by which the data alone must prefer the best to every other of no more parameters, so that no
     name rests on its prior. shown: chance with which a run must decide for a possible cause of more
-    parameters that fits as well, were it true, to be played before the simpler one is confirmed. worth:
-    share that the next run must be expected to decide. most: causes for
-    which a run is designed. larger: than all runs before, by which a run that decides nothing by itself is
-    worth playing, while it uses less than held_back of the limits at the likeliest values.
+    parameters that fits as well, were it true, to be played before the simpler one is confirmed; where
+    none within the limits has it, the two share the name. worth: share of what is undecided that the next
+    run must be expected to decide; else the longest is designed. most: causes for which a run is designed.
+    larger: than all runs before, by which a run that decides nothing by itself is worth playing, while it
+    uses less than held_back of the limits at the likeliest values. likely: probability from which a cause is
+    named among those that remain.
     """
 
     confirmed: float = 0.95
@@ -71,6 +75,7 @@ class Rules:
     shown: float = 0.5
     larger: float = 1.15
     held_back: float = 0.8
+    likely: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -82,9 +87,20 @@ class Round:
 
 
 @dataclass(frozen=True)
+class SharedName:
+    """A cause and those that contain it, which no run within the limits would rather show than not.
+
+    names: the likeliest first. torque: N m, about the least limit with which a run would, None: none would.
+    """
+
+    names: tuple[str, ...]
+    torque: float | None
+
+
+@dataclass(frozen=True)
 class CampaignOutcome:
     """How the loop ended. proofs: of pairs that no run separates. records: those that count, the first ones
-    included. why: the failure, in words.
+    included. why: the failure, in words. shared: None where no cause was as good as known.
     """
 
     end: End
@@ -92,6 +108,7 @@ class CampaignOutcome:
     records: tuple[Record, ...]
     proofs: tuple[Proof, ...] = ()
     why: str = ""
+    shared: SharedName | None = None
 
     @property
     def weighing(self) -> RunWeighing:
@@ -117,9 +134,11 @@ class _Session:
     weighing: RunWeighing
     rounds: list[Round] = field(default_factory=list)
 
-    def conclude(self, end: End, proofs: tuple[Proof, ...] = (), why: str = "") -> CampaignOutcome:
+    def conclude(
+        self, end: End, proofs: tuple[Proof, ...] = (), why: str = "", shared: SharedName | None = None
+    ) -> CampaignOutcome:
         rounds = (*self.rounds, Round(self.weighing, None))
-        return CampaignOutcome(end, rounds, tuple(self.records), proofs, why)
+        return CampaignOutcome(end, rounds, tuple(self.records), proofs, why, shared)
 
 
 @dataclass
@@ -169,16 +188,22 @@ class Campaign:
         if spent:
             return session.conclude(spent)
         possible, noise = richer or self.possible(weighing), weighing.cases[0].noise
+        asked = replace(self._asked(session.rounds), test=self.rules.shown if richer else 0.0)
         try:
-            proposal = self.choose(possible, self._asked(session.rounds), noise, self.run, self.tell)
+            proposal = self.choose(possible, asked, noise, self.run, self.tell)
+            if not end and not self._is_worth(proposal, session.rounds) and proposal.duration < asked.longest:
+                asked = replace(asked, shortest=asked.longest)
+                proposal = self.choose(possible, asked, noise, self.run, self.tell)
         except ParameterError as error:
             return session.conclude("failed", why=str(error))
-        if end and max(proposal.chances[1:]) < self.rules.shown:
-            return session.conclude(end)
-        if proposal.decided < self.rules.worth and not end and not self._widens(proposal, session.rounds):
+        if end and self._shows_too_little(proposal, session.rounds):
             proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
-            if any(p.covers_all for p in proofs) or self._played_longest(session.rounds):
-                return session.conclude("undecidable", proofs)
+            return self._undecidable(session, possible, proofs)
+        if not end and not self._is_worth(proposal, session.rounds):
+            proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
+            covered = any(p.covers_all and possible[0].name in p.pair for p in proofs)
+            if covered or self._played_longest(session.rounds):
+                return self._undecidable(session, possible, proofs)
         self.hear(Round(weighing, proposal))
         try:
             record = self.play(proposal)
@@ -206,12 +231,37 @@ class Campaign:
         None without such. A run tests a cause that it would rather have shown than not, were it true.
         """
         weighing, played = session.weighing, [r.proposal for r in session.rounds if r.proposal is not None]
-        seen = {
-            n for p in played for n, c in zip(p.names, p.chances, strict=True) if c >= self.rules.shown
-        }
+        seen = {n for p in played for n, c in zip(p.names, p.chances, strict=True) if c >= self.rules.shown}
         names = set(weighing.richer_by_data(self.rules.by_data)) - seen
         rivals = [h for h in weighing.hypotheses(self.rules.possible) if h.name in names]
         return [weighing.hypotheses()[0], *rivals] if rivals else []
+
+    def _shows_too_little(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
+        """Return whether a test would show none of the richer causes, or not rather than show one.
+
+        One that may is played once, in the longest run.
+        """
+        chance = max(proposal.chances[1:])
+        return chance < self.rules.worth or (chance < self.rules.shown and self._played_longest(rounds))
+
+    def _undecidable(
+        self, session: _Session, possible: Sequence[Hypothesis], proofs: tuple[Proof, ...]
+    ) -> CampaignOutcome:
+        """Return the outcome where no run tells more apart: a shared name if all that remain contain one."""
+        first, likely = possible[0].name, self.rules.likely
+        heard = [h for h in possible if h.name == first or h.addition or h.probability >= likely]
+        simple = _contained(heard)
+        if simple is None:
+            return session.conclude("undecidable", proofs)
+        asked, noise = replace(self.asked, test=self.rules.shown), session.weighing.cases[0].noise
+        richer = [h.beside(simple.name) for h in heard if h is not simple]
+        torque = torque_that_shows([simple, *richer], asked, noise, self.run)
+        shared = SharedName(tuple(h.name for h in heard), torque)
+        return session.conclude("undecidable", proofs, shared=shared)
+
+    def _is_worth(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
+        """Return whether a run may decide, or lessens the doubt that holds larger ones back."""
+        return proposal.resolved >= self.rules.worth or self._widens(proposal, rounds)
 
     def _widens(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
         """Return whether a run is the largest so far and only doubt holds it back: it lessens the doubt."""
@@ -241,3 +291,11 @@ class Campaign:
         next_run = max(self.asked.shortest, max(FEWEST.values()) / self.asked.rate)
         left = seconds + next_run <= budget.seconds and energy < budget.energy
         return None if left and len(played) < budget.runs else "spent"
+
+
+def _contained(causes: Sequence[Hypothesis]) -> Hypothesis | None:
+    """Return the cause that every other of them may contain, None without such or without others."""
+    for cause in causes if len(causes) > 1 else ():
+        if all(may_contain(other.name, cause.name) for other in causes if other is not cause):
+            return cause
+    return None

@@ -8,7 +8,7 @@ from typing import Any
 from rsea_ros.checked import interval, mapping, number, text
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError
-from rsea_ros.experiment.hypothesis import NOTHING
+from rsea_ros.experiment.containment import NOTHING
 from rsea_ros.experiment.stored_models import ModelFile
 from rsea_ros.model.rig import EffectSetting, Rig
 

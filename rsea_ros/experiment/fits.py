@@ -1,4 +1,13 @@
-"""Fits of a cause to records, from several starts, because many have local minima."""
+"""Fits of a cause to records, from several starts, because many have local minima; the evidence of each.
+
+The logarithm of the evidence is Laplace's, with priors on the rig's values and on the cause's size:
+
+    ln p(data | cause) = -C / (2 k) - (ln det(J'J / k + L) - ln det L) / 2
+
+C: cost of the fit, prior included; L: the prior's information; k: the variance that the best fit leaves, in
+units of the noise, not below 1. Of minima that leave about as much the one of the largest evidence counts: a
+narrow one that fits a little better says less than a wide one. (MacKay, Neural Computation 4, 1992.)
+"""
 
 from __future__ import annotations
 
@@ -9,7 +18,7 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.guess import Guess
-from rsea_ros.experiment.hypothesis import NOTHING
+from rsea_ros.experiment.containment import NOTHING, may_contain, shared_parameters
 from rsea_ros.experiment.prior import vector_at, weights_of
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Map, Solution, power, solve
@@ -49,19 +58,59 @@ def _smaller(name: str, guesses: Sequence[Guess]) -> list[Guess]:
 def repeat_fits(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
     """Return the fits, those that left a little more than the best once more from the rig's values there.
 
-    A fit that began far from the final values of the rig may stop in a local minimum.
+    A fit that began far from the final values of the rig may stop in a local minimum, and a cause that
+    contains another may miss it: where the other is near the best, it is fitted from there as well.
     """
-    best = min(fits.values(), key=lambda s: s.cost)
+    best, scale = min(fits.values(), key=lambda s: s.cost), scale_of(fits)
+    simpler = {n: f for n, f in fits.items() if n != NOTHING and f.cost < best.cost + _LITTLE}
     rig = {u.name: float(v) for u, v in zip(best.problem.unknowns, best.theta, strict=True)}
     again = dict(fits)
     for name, fit in fits.items():
-        if best.cost + _LITTLE < fit.cost < _CLOSE * best.cost and name != NOTHING:
-            theta = np.array(
-                [rig.get(u.name, float(v)) for u, v in zip(fit.problem.unknowns, fit.theta, strict=True)]
-            )
-            other = solve(fit.problem, theta, iterations=_ITERATIONS, gain=_GAIN, run=run)
-            again[name] = min(fit, other, key=lambda s: s.cost)
+        if name == NOTHING or fit.cost >= _CLOSE * best.cost:
+            continue
+        starts = [x for n, f in simpler.items() for x in _as_simpler(name, fit.problem, n, f)]
+        if best.cost + _LITTLE < fit.cost:
+            pairs = zip(fit.problem.unknowns, fit.theta, strict=True)
+            starts.append(np.array([rig.get(u.name, float(v)) for u, v in pairs]))
+        others = [solve(fit.problem, x, iterations=_ITERATIONS, gain=_GAIN, run=run) for x in starts]
+        again[name] = _likeliest([fit, *others], scale)
     return again
+
+
+def _likeliest(fits: Sequence[Solution], scale: float) -> Solution:
+    """Return the fit of the largest evidence, of those that leave at most a little more than the least."""
+    least = min(s.cost for s in fits)
+    return max((s for s in fits if s.cost <= least + _LITTLE), key=lambda s: log_evidence(s, scale))
+
+
+def scale_of(fits: Mapping[str, Solution]) -> float:
+    """Return the variance that the best fit leaves, in units of the noise, not below 1."""
+    samples = max(len(next(iter(fits.values())).residual), 1)
+    return max(1.0, min(s.cost for s in fits.values()) / samples)
+
+
+def information_of(solution: Solution, scale: float) -> FloatArray:
+    """Return the information of prior and data together, shape (n, n)."""
+    matrix = solution.jacobian
+    result: FloatArray = matrix.T @ matrix / scale + np.diag(weights_of(solution.problem))
+    return result
+
+
+def log_evidence(solution: Solution, scale: float) -> float:
+    """Return the logarithm of the evidence of a fit; see the module docstring. scale: k."""
+    known = weights_of(solution.problem)
+    spread = np.linalg.slogdet(information_of(solution, scale) / np.sqrt(np.outer(known, known)))[1]
+    return -0.5 * solution.cost / scale - 0.5 * float(spread)
+
+
+def _as_simpler(name: str, problem: Problem, simpler: str, fit: Solution) -> list[FloatArray]:
+    """Return where a cause does what a simpler one does, with no more than the other has, if it can."""
+    if not may_contain(name, simpler):
+        return []
+    found = {u.name: u.outer(float(v)) for u, v in zip(fit.problem.unknowns, fit.theta, strict=True)}
+    absent = {f"{name}.{p.name}": p.null for p in effect_named(name).parameters if math.isfinite(p.null)}
+    same = {f"{name}.{p}": found[f"{simpler}.{s}"] for p, s in shared_parameters(name, simpler).items()}
+    return [vector_at(problem, {}, found | absent | same)]
 
 
 def _best(problem: Problem, thetas: Sequence[FloatArray], run: Map) -> FloatArray:

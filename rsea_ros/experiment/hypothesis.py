@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.experiment.containment import addition_to
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian, serial
 from rsea_ros.identification.unknowns import apply
@@ -16,8 +17,6 @@ from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import simulate_drive
 from rsea_ros.signals import SENSED, Channel, FloatArray, Record
 
-NOTHING = "nothing"
-"""Name of the hypothesis that the rig, its values fitted, is all that there is."""
 _SEEN = 3.0
 """Standard deviations from none at all, from which the size of a cause counts as known."""
 _QUANTILES = np.array([-1.38, -0.67, -0.21, 0.21, 0.67, 1.38])
@@ -30,7 +29,8 @@ class Hypothesis:
 
     problem: the rig with the cause, and what may move; its cases do not matter. theta: the most likely
     values in the fit's coordinates, shape (n,). information: of prior and data so far, the inverse of the
-    covariance, shape (n, n). probability: beside the other hypotheses.
+    covariance, shape (n, n). probability: beside the other hypotheses. addition: which of the values is what
+    the cause adds to the likeliest one, where it contains that; else None: its size is its main parameter.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Hypothesis:
     theta: FloatArray
     information: FloatArray
     probability: float
+    addition: int | None = None
 
     @property
     def rig(self) -> Rig:
@@ -52,6 +53,11 @@ class Hypothesis:
         """Return the standard deviation of every unknown, in the fit's coordinates, shape (n,)."""
         result: FloatArray = np.sqrt(np.diag(np.linalg.inv(self.information)))
         return result
+
+    def beside(self, simpler: str) -> Hypothesis:
+        """Return the cause, its size what it adds to a simpler one that it may contain."""
+        names = [u.name for u in self.problem.unknowns]
+        return replace(self, addition=addition_to(simpler, self.name, names))
 
     def draws(self, count: int, rng: np.random.Generator) -> list[Rig]:
         """Return rigs whose values are drawn from their posterior."""
@@ -68,7 +74,7 @@ class Hypothesis:
         if not self.cause_indices or not self._may_be_none():
             return self.theta
         away, sd = self._size()
-        result: FloatArray = self._with_size(np.array([np.copysign(sd, away)]))[0]
+        result: FloatArray = self._with_size(np.array([np.copysign(max(sd - abs(away), 0.0), away)]))[0]
         return result
 
     def likely_values(self) -> FloatArray:
@@ -85,23 +91,43 @@ class Hypothesis:
         return self._with_size(np.copysign(sizes - abs(away), away))
 
     def _with_size(self, steps: FloatArray) -> FloatArray:
-        """Return the values with the size of the cause moved by some steps, shape (m, n)."""
-        spread = np.linalg.inv(self.information)[:, self.cause_indices[0]]
-        moved = self.theta + np.outer(steps, spread / spread[self.cause_indices[0]])
-        result: FloatArray = np.clip(moved, *self.bounds())
+        """Return the values with the size of the cause moved by some steps, shape (m, n).
+
+        What is added at the cost of the rest of the cause ends where none of that is left.
+        """
+        spread = np.linalg.inv(self.information)[:, self._main]
+        moves = np.outer(steps, spread / spread[self._main])
+        low, high = self.bounds()
+        if self.addition is not None:
+            own = self.cause_indices
+            room = np.where(moves > 0.0, high - self.theta, self.theta - low)[:, own]
+            size = np.abs(moves[:, own])
+            moves = (
+                moves * np.min(np.divide(room, size, np.ones_like(size), where=size > room), axis=1)[:, None]
+            )
+        result: FloatArray = np.clip(self.theta + moves, low, high)
         return result
+
+    @property
+    def _main(self) -> int:
+        """Where the size of the cause is among the values."""
+        return self.cause_indices[0] if self.addition is None else self.addition
 
     def _may_be_none(self) -> bool:
         """Return whether the size of the cause may as well be none; on a logarithmic scale it never is."""
         away, sd = self._size()
-        start = self.problem.unknowns[self.cause_indices[0]].start
-        return start == effect_named(self.name).main.null and abs(away) <= _SEEN * sd
+        unknown = self.problem.unknowns[self._main]
+        may_be = self.addition is not None or unknown.start == effect_named(self.name).main.null
+        return may_be and abs(away) <= _SEEN * sd
 
     def _size(self) -> tuple[float, float]:
-        """Return how far the size of the cause is from its prior's middle, and its standard deviation."""
-        main = self.cause_indices[0]
-        unknown = self.problem.unknowns[main]
-        return float(self.theta[main] - unknown.inner(unknown.start)), float(self.sd()[main])
+        """Return how far the size of the cause is from its prior's middle, and its standard deviation.
+
+        What is added, from none.
+        """
+        unknown = self.problem.unknowns[self._main]
+        middle = unknown.start if self.addition is None else 0.0
+        return float(self.theta[self._main] - unknown.inner(middle)), float(self.sd()[self._main])
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and highest coordinates, shape (n,) each."""

@@ -1,14 +1,8 @@
 """Causes weighed against each other by all records together: each fitted to all of them, their evidence
-compared.
+compared (fits.py).
 
-The logarithm of the evidence is Laplace's, with priors on the rig's values and on the cause's size:
-
-    ln p(data | cause) = -C / (2 k) - (ln det(J'J / k + L) - ln det L) / 2
-
-C: cost of the fit, prior included; L: the prior's information; k: the variance that the best fit leaves, in
-units of the noise, not below 1. A cause that the data cannot show weighs as much as no cause: it
-stays possible until a run could have shown it. All causes have the same prior probability. (MacKay,
-Neural Computation 4, 1992.)
+A cause that the data cannot show weighs as much as no cause: it stays possible until a run could have shown
+it. All causes have the same prior probability.
 """
 
 from __future__ import annotations
@@ -19,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.checks.faults import check
-from rsea_ros.experiment.fits import fit_cause, repeat_fits
-from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
-from rsea_ros.experiment.prior import problem_of, weights_of
+from rsea_ros.experiment.containment import NOTHING
+from rsea_ros.experiment.fits import fit_cause, information_of, log_evidence, repeat_fits, scale_of
+from rsea_ros.experiment.hypothesis import Hypothesis
+from rsea_ros.experiment.prior import problem_of
 from rsea_ros.identification.problem import Case, case_from
 from rsea_ros.identification.solver import Map, Solution, power, serial
 from rsea_ros.model.rig import Rig
@@ -90,7 +85,8 @@ class RunWeighing:
         solution = self.fits[name].solution
         information = information_of(solution, self.scale)
         problem = replace(solution.problem, cases=())
-        return Hypothesis(name, problem, solution.theta, information, self.probability[name])
+        hypothesis = Hypothesis(name, problem, solution.theta, information, self.probability[name])
+        return hypothesis.beside(self.best)
 
 
 def cases_of(records: Sequence[Record], rig: Rig) -> tuple[Case, ...]:
@@ -146,26 +142,12 @@ def _where(before: RunWeighing | None, name: str) -> FloatArray | None:
     return before.fits[name].solution.theta if before is not None and name in before.fits else None
 
 
-def information_of(solution: Solution, scale: float) -> FloatArray:
-    """Return the information of prior and data together, shape (n, n)."""
-    matrix = solution.jacobian
-    result: FloatArray = matrix.T @ matrix / scale + np.diag(weights_of(solution.problem))
-    return result
-
-
 def _weigh(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> RunWeighing:
-    samples = max(len(next(iter(solutions.values())).residual), 1)
-    scale = max(1.0, min(s.cost for s in solutions.values()) / samples)
-    fits = {n: WeighedCause(n, s, _evidence(s, scale), _rms_left(s)) for n, s in solutions.items()}
+    scale = scale_of(solutions)
+    fits = {n: WeighedCause(n, s, log_evidence(s, scale), _rms_left(s)) for n, s in solutions.items()}
     logs = np.array([f.log_evidence for f in fits.values()])
     shares = np.exp(logs - logs.max())
     return RunWeighing(cases, fits, dict(zip(fits, (shares / shares.sum()).tolist(), strict=True)), scale)
-
-
-def _evidence(solution: Solution, scale: float) -> float:
-    known = weights_of(solution.problem)
-    spread = np.linalg.slogdet(information_of(solution, scale) / np.sqrt(np.outer(known, known)))[1]
-    return -0.5 * solution.cost / scale - 0.5 * float(spread)
 
 
 def _rms_left(solution: Solution) -> float:

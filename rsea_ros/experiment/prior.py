@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Parameter
-from rsea_ros.experiment.hypothesis import NOTHING
+from rsea_ros.experiment.containment import NOTHING
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.unknowns import Unknown, idle, unknowns_of_effect

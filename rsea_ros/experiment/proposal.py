@@ -23,6 +23,8 @@ class DesignRequest:
     """The freedom of a design. rate: Hz. shortest, longest: s. refine: evaluations of the refinement.
 
     per_run: s of excitation that are as dear as one more run; little of it makes more and shorter runs.
+    test: 0 for a run that decides between all causes; else the run is to show the others where the first
+    seems known: chance with which it must, for it to be preferred to a longer one.
     Raises ParameterError for a rate outside RATES and for lengths that no run can have.
     """
 
@@ -34,6 +36,7 @@ class DesignRequest:
     refine: int = 24
     kinds: tuple[Kind, ...] = ("multisine", "chirp", "steps", "holds")
     per_run: float = 0.5
+    test: float = 0.0
 
     def __post_init__(self) -> None:
         low, high = RATES
@@ -58,8 +61,10 @@ class Proposal:
 
     duration: s, of the excitation; command: N m, at `rate` Hz, shape (n,), with rest around it. names,
     table: S_ij with i true and j its rival. hopeless: pairs that no shape tried separates. decided: expected
-    share that it decides; chances: that it decides, for each name, were it true; sharpened: nats by which it
-    narrows the parameters where one cause is left.
+    share that it decides, in a test of the cases in which the first cause is not true; chances: that it
+    decides, for each name, were it true; resolved: share that it decides of what is undecided without it and
+    some run separates; sharpened: nats by which it narrows the parameters where one cause
+    is left.
     expected, at_level: peaks of every quantity.
     """
 
@@ -72,6 +77,7 @@ class Proposal:
     hopeless: tuple[tuple[str, str], ...]
     decided: float
     chances: tuple[float, ...]
+    resolved: float
     sharpened: float
     peaks: Peaks
     tried: int

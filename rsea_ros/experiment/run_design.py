@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -59,7 +59,11 @@ _HOPE = 2.0
 """S that the longest run's data give a pair at best, below which no run is designed for it."""
 _FAR = 1e4
 """S of one linear step, above which a full fit of the rival would not bring it near nothing."""
+_SETTLED = 5e-3
+"""Share of undecided cases below which no run is worth playing."""
 _SMALLEST, _BISECTIONS = 0.01, 8
+_FURTHEST = 6
+"""Doublings of the torque limit up to which a torque that would show a cause is sought."""
 
 
 def check_commanded_by_torque(rig: Rig) -> None:
@@ -95,16 +99,42 @@ def propose(
     say("fitting rivals", 0.5)
     apart = _hopeless(rater, shapes, tables)
     trials = _trials(rater, shapes, apart, asked.shortest)
-    best = _worth_most(trials, asked.per_run)
+    best = _worth_most(trials, asked)
     say("refining", 0.6)
     shape, count = refine(best.shape, lambda s: _share(rater, s, best.length, apart), asked, say)
     tried = len(shapes) + len(trials) + count
     final = _final(rater, shape, best.length, apart, tried)
-    if final.decided >= _LEAST or best.length == asked.longest:
+    if final.decided >= _least(asked) or best.length == asked.longest:
         return final
-    trial = _worth_most(_trials(rater, shapes, apart, asked.longest), asked.per_run)
+    trial = _worth_most(_trials(rater, shapes, apart, asked.longest), asked)
     longest = _final(rater, trial.shape, trial.length, apart, tried + len(shapes))
     return max(longest, final, key=lambda p: p.decided)
+
+
+def torque_that_shows(
+    hypotheses: Sequence[Hypothesis],
+    asked: DesignRequest,
+    measured: Mapping[str, float],
+    run: Map = serial,
+) -> float | None:
+    """Return about what torque limit a test needs that shows the other causes, N m; None beyond _FURTHEST.
+
+    In the longest run, the other limits as they are, none of which may hold the torque back.
+    """
+    for k in range(1, _FURTHEST + 1):
+        torque = 2.0**k * asked.limits.torque
+        wider = replace(asked, limits=replace(asked.limits, torque=torque))
+        rater = ShapeRater(hypotheses, wider, noise_by_channel(hypotheses, measured), run)
+        shapes = [s for s in TRIED if s.kind in asked.kinds]
+        apart = np.eye(len(hypotheses), dtype=bool)
+        if max(_share(rater, s, asked.longest, apart) for s in shapes) >= asked.test:
+            return torque
+    return None
+
+
+def _least(asked: DesignRequest) -> float:
+    """Return the share that a run must be expected to decide to be preferred to a longer one."""
+    return asked.test or _LEAST
 
 
 @dataclass(frozen=True)
@@ -120,31 +150,33 @@ class _Trial:
         return self.share / (per_run + self.length)
 
 
-def _trials(
-    rater: ShapeRater, shapes: Sequence[Shape], apart: BoolArray, shortest: float
-) -> list[_Trial]:
+def _trials(rater: ShapeRater, shapes: Sequence[Shape], apart: BoolArray, shortest: float) -> list[_Trial]:
     """Return the shapes of every length from some seconds, up to one that could not be worth its seconds."""
     asked, trials = rater.asked, list[_Trial]()
     doublings = math.ceil(math.log2(asked.longest / shortest))
     for seconds in np.geomspace(shortest, asked.longest, doublings + 1):
         length = float(np.rint(seconds * asked.rate) / asked.rate)
-        best = _worth_most(trials, asked.per_run) if trials else None
-        if best and best.share >= _LEAST and best.per_second(asked.per_run) > 1.0 / (asked.per_run + length):
+        best = _worth_most(trials, asked) if trials else None
+        if (
+            best
+            and best.share >= _least(asked)
+            and best.per_second(asked.per_run) > 1.0 / (asked.per_run + length)
+        ):
             break
         possible = [s for s in shapes if length * asked.rate >= FEWEST[s.kind]]
         trials += [_trial(rater, s, length, apart) for s in possible]
     return trials
 
 
-def _worth_most(trials: Sequence[_Trial], per_run: float) -> _Trial:
-    """Return the trial that decides most per second; where none decides LEAST, the one that decides most.
+def _worth_most(trials: Sequence[_Trial], asked: DesignRequest) -> _Trial:
+    """Return the trial that decides most per second; where none decides enough, the one that decides most.
 
     Of several that decide nothing the longest, with the largest S of the likeliest two.
     """
-    enough = [t for t in trials if t.share >= _LEAST]
+    enough = [t for t in trials if t.share >= _least(asked)]
     if not enough:
         return max(trials, key=lambda t: (t.share, t.length, t.least))
-    return max(enough, key=lambda t: t.per_second(per_run))
+    return max(enough, key=lambda t: t.per_second(asked.per_run))
 
 
 def _share(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -> float:
@@ -153,10 +185,31 @@ def _share(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -> 
 
 def _trial(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -> _Trial:
     rows = likely_separations(rater.hypotheses, rater.responses(rater.within(shape, length)))
-    share = decided_share(rater.hypotheses, chances_decided(rater.hypotheses, rows, apart))
+    share = _decided(rater, chances_decided(rater.hypotheses, rows, apart))
     first, second = sorted(range(len(rows)), key=lambda k: -rater.hypotheses[k].probability)[:2]
     least = min(float(rows[first][:, second].mean()), float(rows[second][:, first].mean()))
     return _Trial(share, length, shape, least)
+
+
+def _decided(rater: ShapeRater, chances: FloatArray) -> float:
+    """Return the share of the cases that a run is expected to decide; in a test, of those it is for."""
+    first = 1 if rater.asked.test else 0
+    return decided_share(rater.hypotheses[first:], chances[first:])
+
+
+def _resolved(
+    rater: ShapeRater, chances: FloatArray, rows: Sequence[FloatArray], apart: BoolArray
+) -> float:
+    """Return the share that a run decides of the cases that are undecided without it; 1 for a single cause.
+
+    Without it: what is likely enough already, and what only a hopeless pair leaves open.
+    """
+    if len(chances) == 1:
+        return 1.0
+    nothing = [np.where(np.isfinite(r), 0.0, r) for r in rows]
+    already = _decided(rater, chances_decided(rater.hypotheses, nothing, apart))
+    open_, gained = 1.0 - already, _decided(rater, chances) - already
+    return max(gained, 0.0) / open_ if open_ > _SETTLED else 0.0
 
 
 def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
@@ -198,9 +251,10 @@ def _final(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray, tri
     nearer = np.divide(table, linear, out=np.ones_like(table), where=np.isfinite(table) & (linear > 0.0))
     rows = likely_separations(hypotheses, responses)
     chances = chances_decided(hypotheses, [r * n for r, n in zip(rows, nearer, strict=True)], apart)
-    share = decided_share(hypotheses, chances) if k > 1 else 1.0
+    share = _decided(rater, chances) if k > 1 else 1.0
     return Proposal(
-        shape, length, asked.rate, command, names, table, pairs, share, tuple(chances.tolist()), narrow,
+        shape, length, asked.rate, command, names, table, pairs, share, tuple(chances.tolist()),
+        _resolved(rater, chances, rows, apart), narrow,
         reached, tried, energy,
     )  # fmt: skip
 

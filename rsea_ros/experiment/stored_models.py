@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.containment import NOTHING
+from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.prior import problem_of, vector_at, weights_of
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.rig import Quantity, Rig
 from rsea_ros.normal import Z95
+from rsea_ros.signals import SENSED
 
 SPREAD = 0.2
 """Relative, one sigma: the doubt of a cause's parameter whose file states no interval."""
@@ -38,18 +40,46 @@ def model_of(rig: Rig) -> ModelFile:
 def hypotheses_from(models: Sequence[ModelFile]) -> list[Hypothesis]:
     """Return models as hypotheses; those without a probability share the rest equally.
 
-    Raises ParameterError for two models of one name and for less than one.
+    Raises ParameterError for two models of one name and for models of different machines.
     """
     names = [m.name for m in models]
     for name in names:
         if names.count(name) > 1:
             what = "without a cause" if name == NOTHING else f"with {name}"
             raise ParameterError(f"two models {what}, expected each cause once")
+    for model in models[1:]:
+        check_same_machine(models[0].rig, model.rig)
     total = sum(m.probability or 0.0 for m in models)
     unstated = sum(m.probability is None for m in models)
     rest = max(1.0 - total, 0.05) / unstated if unstated else 0.0
     shares = np.array([rest if m.probability is None else m.probability for m in models])
     return [_hypothesis(m, float(p)) for m, p in zip(models, shares / shares.sum(), strict=True)]
+
+
+def check_same_machine(first: Rig, other: Rig) -> None:
+    """Raise ParameterError for rigs that differ in what no cause changes: gear, ends, sensors, command."""
+    ours, theirs = _build(first), _build(other)
+    for what, value in ours.items():
+        if value != theirs[what]:
+            raise ParameterError(
+                f"models of different machines: {what} is {value} in {first.name} and {theirs[what]} in "
+                f"{other.name}, expected causes of one bench"
+            )
+
+
+def _build(rig: Rig) -> dict[str, str]:
+    """Return how a machine is built, in words: what the causes of one bench share."""
+    ratio = rig.values().get("gear.ratio")
+    sensors = [n for n in SENSED if rig.measures(n)]
+    return {
+        "the motion": "linear" if rig.linear else "rotary",
+        "the gear ratio": "none" if ratio is None else f"{ratio:g}",
+        "the spring": "rigid" if rig.rigid_spring else "compliant",
+        "what is clamped": ", ".join(sorted(rig.clamped)) or "nothing",
+        "the place of the sensors": f"{rig.ft_end}, {rig.encoder_end}",
+        "what is measured": ", ".join(sensors) or "nothing",
+        "the command": "a position" if rig.loop else "a torque",
+    }
 
 
 def _hypothesis(model: ModelFile, probability: float) -> Hypothesis:

@@ -109,7 +109,7 @@ class ExperimentNode:
         log.info(known_causes(round_.weighing))
         assert round_.proposal is not None
         log.info(
-            f"proposed: {shape_words(round_.proposal)}; {round_.proposal.decided:.0%} expected to be decided"
+            f"proposed: {shape_words(round_.proposal)}; {round_.proposal.resolved:.0%} expected to be decided"
         )
 
     def _play(self, proposal: Proposal) -> Record | None:

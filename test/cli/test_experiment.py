@@ -1,6 +1,7 @@
 """`rsea experiment`: a run that the excite node plays, or one line that says why there cannot be one."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,6 +54,30 @@ def test_an_impossible_run_is_refused_in_one_line(models, words, message, capsys
         status = error.code
     shown = capsys.readouterr().err
     assert status == 2 and message in shown and len(shown.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        ("emps", "the motion is rotary in paper_high_impedance and linear in emps"),
+        ("cycloidal", "the gear ratio is 502 in paper_high_impedance and 11 in cycloidal"),
+        ("bare_drive", "the spring is compliant in paper_high_impedance and rigid in bare_drive"),
+    ],
+)
+def test_models_of_different_machines_are_refused_in_one_line(models, other, message, tmp_path, capsys):
+    strange = tmp_path / "strange.yaml"
+    rig = replace(load_rig(other), known=frozenset(), effects=())
+    save_rig(rig.with_effect("torque_constant_error", gain=1.1), strange)
+    assert main(["experiment", models[0], str(strange), "--limits", "torque=5"]) == 2
+    shown = capsys.readouterr().err
+    assert f"models of different machines: {message}, expected causes of one bench" in " ".join(shown.split())
+    assert len(shown.splitlines()) == 1
+
+
+def test_a_run_that_narrows_nothing_is_said_so(models, tmp_path, capsys):
+    words = ["--limits", "torque=1e-9", "--longest", "1", "--refine", "0", "--out", str(tmp_path / "out")]
+    assert main(["experiment", models[0], *words]) == 0
+    assert "No run within the limits narrows the intervals of current loop lag" in capsys.readouterr().out
 
 
 def cause(**body):

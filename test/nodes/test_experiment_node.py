@@ -1,6 +1,7 @@
 """The experiment node asks before it plays, stops softly at any sample, and ignores a cancelled run."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ def ask(listener):
 def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(bench, start, listener, ask, tmp_path):
     commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
     health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
-    start("plant", rig=bench / "bench.yaml")
+    plant = start("plant", rig=bench / "bench.yaml")
     out = tmp_path / "out"
     node = start(
         "experiment", rig=RIG, bag=bench / "slow.mcap", causes="current_loop_lag", limits=f"torque={LIMIT}",
@@ -67,6 +68,7 @@ def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(bench, start, l
     said = json.loads((out / "experiment.json").read_text(encoding="utf-8"))
     assert said["end"] == "broken" and "cancel" in said["why"] and said["seconds"] == 0.0
     assert not list(out.glob("run-*"))
+    plant.kill()
 
 
 @pytest.mark.parametrize("name", ["run-2.mcap", "experiment.json"])
@@ -84,3 +86,87 @@ def test_excite_plays_the_file_of_a_run(tmp_path):
     (tmp_path / "run.csv").write_text(run_text(command, RATE), encoding="utf-8")
     played, rate = plan({"file": str(tmp_path / "run.csv")})
     assert played == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)
+
+
+@pytest.fixture
+def session(bench, start, listener, tmp_path):
+    """A function that starts a plant and a node that asks; the plant ends with the test."""
+    plants = []  # one of an earlier test would answer for one that was killed
+
+    def begin(**values):
+        commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
+        health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+        plant, out = start("plant", rig=bench / "bench.yaml"), tmp_path / "out"
+        node = start(
+            "experiment", rig=RIG, bag=bench / "slow.mcap", out=out,
+            causes="current_loop_lag", limits=f"torque={LIMIT}", **values,
+        )  # fmt: skip
+
+        def waits():
+            texts = [s.message for m in health for s in m.status if "experiment" in s.name]
+            return any("waits for ~/approve" in t for t in texts) or not node.is_running()
+
+        plants.append(plant)
+        listener.until(waits)
+        assert node.is_running(), node.output
+        return SimpleNamespace(plant=plant, node=node, out=out, commands=commands)
+
+    yield begin
+    for plant in plants:
+        plant.kill()
+
+
+def told(session):
+    """Return what a session left."""
+    return json.loads((session.out / "experiment.json").read_text(encoding="utf-8"))
+
+
+def until_it_plays(listener, session):
+    """Wait until a run is in the middle."""
+    listener.until(lambda: sum(m.effort[0] != 0.0 for m in session.commands) > 60)
+
+
+def test_a_run_that_is_declined_is_not_played(session, ask):
+    asked = session()
+    assert ask("decline").success
+    assert asked.node.wait() == 0, asked.node.output
+    said = told(asked)
+    assert said["end"] == "declined" and said["seconds"] == 0.0 and not asked.commands
+
+
+def test_an_interrupt_in_the_middle_of_a_run_commands_zero_and_keeps_nothing(session, ask, listener):
+    asked = session(longest=4.0, shortest=4.0)
+    assert ask("approve").success
+    until_it_plays(listener, asked)
+    assert asked.node.stop() == 130, asked.node.output
+    listener.until(lambda: asked.commands[-1].effort[0] == 0.0)
+    assert not list(asked.out.glob("run-*.mcap"))
+
+
+def test_a_bench_that_dies_in_the_middle_of_a_run_ends_the_session_and_teaches_nothing(
+    session, ask, listener
+):
+    asked = session(longest=4.0, shortest=4.0)
+    assert ask("approve").success
+    until_it_plays(listener, asked)
+    asked.plant.kill()
+    assert asked.node.wait() == 0, asked.node.output
+    said = told(asked)
+    late = "commands came too late" in said["why"]  # a loaded machine says this first
+    assert said["end"] == "broken" and ("no measurement" in said["why"] or late) and said["seconds"] == 0.0
+    listener.until(lambda: asked.commands[-1].effort[0] == 0.0)
+    assert not list(asked.out.glob("run-*.mcap"))
+
+
+def test_a_session_continues_with_its_runs(session, ask, bench, start, listener, tmp_path):
+    first = session()
+    assert ask("approve").success
+    run = first.out / "run-1.mcap"
+    listener.until(lambda: run.is_file() or not first.node.is_running())
+    assert first.node.wait() == 0, first.node.output
+    assert told(first)["end"] == "confirmed"
+    values = {"causes": "current_loop_lag", "limits": f"torque={LIMIT}", "out": tmp_path / "again"}
+    again = start("experiment", rig=RIG, bag=f"{bench / 'slow.mcap'},{run}", **values)
+    assert again.wait() == 0, again.output
+    said = json.loads((tmp_path / "again" / "experiment.json").read_text(encoding="utf-8"))
+    assert said["end"] == "confirmed" and said["seconds"] == 0.0

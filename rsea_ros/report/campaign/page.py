@@ -93,6 +93,6 @@ def _table(outcome: CampaignOutcome) -> str:
     for k, r in enumerate(outcome.rounds):
         order = sorted(r.weighing.probability.items(), key=lambda item: -item[1])
         possible = ", ".join(f"{plain_name(n)} {p:.2f}" for n, p in order[:_ROWS] if p >= _SHOWN)
-        run = "" if r.proposal is None else f"{shape_words(r.proposal)}; {r.proposal.decided:.0%} expected"
+        run = "" if r.proposal is None else f"{shape_words(r.proposal)}; {r.proposal.resolved:.0%} expected"
         rows.append(("first records" if not k else f"run {k}", possible, size(r.weighing, order[0][0]), run))
     return section("Run by run", table(("after", "possible", "size of the likeliest", "next run"), rows))

@@ -7,7 +7,7 @@ import math
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.experiment.campaign import CampaignOutcome
-from rsea_ros.experiment.hypothesis import NOTHING
+from rsea_ros.experiment.containment import NOTHING
 from rsea_ros.experiment.joint_weighing import RunWeighing
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.normal import Z95
@@ -59,6 +59,8 @@ def end_sentence(outcome: CampaignOutcome) -> str:
                 f"None of the causes explains the runs {spent}: the best, {plain_name(cause)}, leaves "
                 f"{outcome.weighing.left:.2f} times the noise"
             )
+        case "undecidable" if outcome.shared is not None:
+            return shared_words(outcome, f" {spent}")
         case "undecidable":
             return f"No further run would help: {_open(outcome)} remain possible {spent}"
         case "spent":
@@ -66,11 +68,19 @@ def end_sentence(outcome: CampaignOutcome) -> str:
         case "declined":
             return f"The next run was declined {spent}: {_open(outcome)} remain possible"
         case "broken":
-            return (
-                f"A run was aborted ({outcome.why}) and is not used; {_open(outcome)} remain possible"
-            )
+            return f"A run was aborted ({outcome.why}) and is not used; {_open(outcome)} remain possible"
         case _:
             return f"The session could not continue ({outcome.why}): {_open(outcome)} remain possible"
+
+
+def shared_words(outcome: CampaignOutcome, spent: str = "") -> str:
+    """Return which causes share the name, and what would tell them apart. spent: after what, in words."""
+    assert outcome.shared is not None
+    names, torque = outcome.shared.names, outcome.shared.torque
+    of = outcome.weighing.probability
+    head = " or ".join(f"{plain_name(n)} ({of[n]:.2f})" for n in names)
+    needed = "" if torque is None else f"; it takes at least about {torque:.2g} N·m"
+    return f"{head}: no run within the limits shows which{spent}{needed}"
 
 
 def _runs(outcome: CampaignOutcome) -> str:

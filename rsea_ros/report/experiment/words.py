@@ -6,12 +6,16 @@ import math
 
 from rsea_ros.experiment.advice import Advice, Proof
 from rsea_ros.experiment.chance_constraint import LEVEL
-from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.containment import NOTHING
+from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.experiment.run_limits import UNITS
 from rsea_ros.report import words
 from rsea_ros.units import plain
 from rsea_ros.wording import list_names
+
+_NARROWER = 1.01
+"""Factor below which a run does not narrow an interval."""
 
 
 def plain_name(name: str) -> str:
@@ -49,6 +53,8 @@ def _narrowing(hypothesis: Hypothesis, p: Proposal) -> str:
     if hypothesis.name == NOTHING:
         return "No cause is in doubt; a run can only narrow the intervals of the rig, and this one does most"
     count = len(hypothesis.cause_indices) or len(hypothesis.theta)
+    if math.exp(p.sharpened / count) < _NARROWER:
+        return f"No run within the limits narrows the intervals of {plain_name(hypothesis.name)}; the best"
     times = f"{math.exp(p.sharpened / count):.3g} times"
     if count == 1:
         return f"The next run narrows the interval of {plain_name(hypothesis.name)} {times}"
