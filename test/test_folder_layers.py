@@ -8,7 +8,7 @@ import pytest
 from import_graph import MODULES, ROOT, imports
 
 DIAGNOSIS = (
-    {"settings", "residual_peaks"},
+    {"settings", "residual_peaks", "stated_starts"},
     {"result", "data_split", "coherence", "screening"},
     {"score", "residual_analysis", "initial_guess"},
     {"problem_variants"},

@@ -117,9 +117,10 @@ def break_tie(
 ) -> tuple[M | None, tuple[M, ...]]:
     """Return the model to accept and those that do as well with no more parameters.
 
-    The best is the likeliest, the cost of leaving known values included. Of all that are not surely and
-    materially worse the simplest; of equals, the likeliest, each unknown paid for (an optional one, as the
-    time in which a drift settles, does not count in `size`).
+    The best is the likeliest, the cost of leaving known values included. The simplest is accepted of all that
+    are neither surely and materially worse, nor so far from known values that keeping them pays for the
+    best's unknowns; of equals, the likeliest, each unknown paid for (an optional one, as the time in which a drift
+    settles, does not count in `size`).
     """
     if not models:
         return None, ()
@@ -128,6 +129,8 @@ def break_tie(
     best = max(models, key=lambda m: likelier_by(m, least, far))
 
     def contends(m: M) -> bool:
+        if best.size > m.size and keeps_known_values(best, m, settings):
+            return False
         over = preference(best.validation, m.validation, rule=settings.acceptance)
         return not over.better or is_nearly_as_good(m, best, settings)
 

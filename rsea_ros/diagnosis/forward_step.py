@@ -2,7 +2,7 @@
 
 All are screened and the promising fitted on short pieces of the data; the best of those are fitted to all
 training blocks. Where none is acceptable, effects that the pieces overlooked are tried, then effects on the
-measured rotor angle, then two at once.
+measured rotor angle, then two at once. Two at once are also tried where the best fits only far from the rig.
 """
 
 from __future__ import annotations
@@ -12,15 +12,17 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from rsea_ros.diagnosis.candidate import Candidate, effect_size
+from rsea_ros.diagnosis.candidate import Candidate, effect_size, prior_cost
 from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.screening import ScreenedEffect
 from rsea_ros.diagnosis.selection import Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.stated_starts import is_off_rig
 from rsea_ros.diagnosis.step_fits import StepFits
 from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
+from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.workers import Pools
 from rsea_ros.progress import Progress
 
@@ -65,6 +67,9 @@ class ForwardStep:
             finalists += undecided
             models += self.fits.fit_all(undecided)
             chosen, equals = self._choose(self._acceptable(models))
+        if chosen is not None and is_off_rig(chosen.solution):
+            nearer = self._pairs_nearer_the_rig(chosen, close)
+            chosen, equals = self._choose([*self._acceptable(models), *nearer])
         trials = [self._far_behind(s) for s in _others(screened, finalists)]
         trials += [self._refusal(m, chosen) for m in models if m is not chosen]
         return StepResult(chosen, trials, equals)
@@ -115,13 +120,31 @@ class ForwardStep:
 
     def _pairs(self, firsts: Sequence[ScreenedEffect]) -> list[Candidate]:
         """Return acceptable models with two more effects, for where none helps alone and much is left."""
+        if not self.fits.is_far:
+            return []
+        return self._pairs_beside([self.fits.with_typical(first.effect) for first in firsts])
+
+    def _pairs_nearer_the_rig(
+        self, chosen: Candidate, close: Sequence[ScreenedEffect]
+    ) -> list[Candidate]:
+        """Return acceptable models with two more effects, the first of which leaves the rig's values less.
+
+        Where two effects are missing, a third may fit as well alone, but only far from the rig.
+        """
         rule, fits = self.settings.forward, self.fits
-        if len(self.current.causes) > rule.causes_beside_a_pair or not fits.is_far:
+        firsts = [fits.fitted(s) for s in close if s.cost < rule.clear * fits.on_pieces.cost]
+        costs = [prior_cost(s.problem, s.theta) for s in firsts]
+        ranked = sorted(zip(costs, range(len(firsts)), strict=True))
+        return self._pairs_beside([firsts[k] for cost, k in ranked if cost < rule.nearer * chosen.prior_cost])
+
+    def _pairs_beside(self, firsts: Sequence[Solution]) -> list[Candidate]:
+        """Return acceptable models with an effect beside each of the solutions on pieces."""
+        rule, fits = self.settings.forward, self.fits
+        if len(self.current.causes) > rule.causes_beside_a_pair:
             return []
         pairs: list[ScreenedEffect] = []
         for first in firsts[: rule.paired]:
-            seconds = fits.screen(fits.with_typical(first.effect))[: rule.paired]
-            pairs += fits.fit_pieces(seconds)
+            pairs += fits.fit_pieces(fits.screen(first)[: rule.paired])
         promising = sorted(
             (p for p in pairs if p.cost < rule.hope_two * fits.on_pieces.cost), key=lambda p: p.cost
         )

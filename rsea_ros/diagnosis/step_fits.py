@@ -28,6 +28,7 @@ from rsea_ros.diagnosis.problem_variants import (
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.screening import ScreenedEffect, best_guess, continue_fit, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.stated_starts import is_off_rig, stated_starts
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
@@ -103,6 +104,10 @@ class StepFits:
         base = self.on_pieces
         return solve(*add_effect(base.problem, base.theta, effect, dict(effect.typical)), iterations=0)
 
+    def fitted(self, screened: ScreenedEffect) -> Solution:
+        """Return the model on the pieces with an effect as fitted so far."""
+        return solve(screened.problem, screened.theta, iterations=0)
+
     def fit_pieces(self, screened: Iterable[ScreenedEffect]) -> list[ScreenedEffect]:
         """Fit screened effects to the short pieces."""
         return list(self.pools.fits.map(self._fit_pieces, screened))
@@ -167,9 +172,23 @@ class StepFits:
 
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
         self.say(f"fitting {screened.name}", 0.5)
+        starts = [screened.theta, *self._from_stated_values(screened)]
         iterations = self.settings.fits.piece_iterations
-        solution = solve(screened.problem, screened.theta, iterations=iterations)
-        return replace(screened, theta=solution.theta, cost=solution.cost)
+        ends = [solve(screened.problem, start, iterations=iterations) for start in starts]
+        best = min(ends, key=lambda s: s.cost)
+        return replace(screened, theta=best.theta, cost=best.cost)
+
+    def _from_stated_values(self, screened: ScreenedEffect) -> list[FloatArray]:
+        """Return where the best of an effect's starts at the rig's values leads in a few steps.
+
+        None where the current model keeps these values.
+        """
+        if not is_off_rig(self.on_pieces):
+            return []
+        starts = stated_starts(screened.problem, screened.theta, screened.effect)
+        few = self.settings.forward.screening_steps
+        tried = [solve(screened.problem, start, iterations=few) for start in starts]
+        return [min(tried, key=lambda s: s.cost).theta]
 
     def _fit_all(self, screened: ScreenedEffect) -> Candidate:
         self.say(f"fitting {screened.name} to all training blocks", 0.8)

@@ -108,7 +108,7 @@ def test_of_equal_models_the_simplest_is_accepted_and_those_as_simple_are_its_ri
     current = score(ft=20.0)
     simple = model(FRICTION, ft=1.0, prior_cost=3.0)
     likelier = model(GAP, ft=1.0, prior_cost=1.0)
-    larger = model("stribeck_friction", size=3, ft=1.0)
+    larger = model("stribeck_friction", size=3, parameters=9, ft=1.0)
     worse = model("hard_stop", ft=1.5)
     assert break_tie([simple, larger, likelier, worse], current) == (likelier, (simple,))
     assert break_tie([larger], current) == (larger, ())

@@ -88,6 +88,10 @@ class ForwardSettings:
     clear: float = number(
         0.5, "1", "of the current cost on pieces: where an effect leaves less, none is fitted on"
     )
+    nearer: float = number(
+        0.5, "1", "of the prior's cost of the chosen effect: how near to the rig another keeps its values",
+        "the second of a pair is sought beside those, where one effect fits only far from the rig",
+    )  # fmt: skip
     causes_beside_a_pair: int = number(
         1, "1", "causes beside which pairs are tried", "beside more of them, a pair fits whatever is left"
     )
