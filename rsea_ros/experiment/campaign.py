@@ -15,8 +15,9 @@ from rsea_ros.experiment.advice import Proof, proofs_of
 from rsea_ros.experiment.containment import NOTHING, may_contain
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.joint_weighing import RunWeighing, weigh
+from rsea_ros.experiment.needed_torque import torque_that_shows
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
-from rsea_ros.experiment.run_design import propose, torque_that_shows
+from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import largest_share
 from rsea_ros.experiment.run_shape import FEWEST
 from rsea_ros.identification.solver import Map, serial
