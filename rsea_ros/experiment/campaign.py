@@ -12,14 +12,14 @@ from typing import Literal
 
 from rsea_ros.errors import DeviceError, IdentificationError, ParameterError
 from rsea_ros.experiment.advice import Proof, proofs_of
-from rsea_ros.experiment.containment import NOTHING, may_contain
+from rsea_ros.experiment.containment import NOTHING
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.joint_weighing import RunWeighing, weigh
-from rsea_ros.experiment.needed_torque import torque_that_shows
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import largest_share
 from rsea_ros.experiment.run_shape import FEWEST
+from rsea_ros.experiment.shared_name import SharedName, shared_name
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -85,17 +85,6 @@ class Round:
 
     weighing: RunWeighing
     proposal: Proposal | None
-
-
-@dataclass(frozen=True)
-class SharedName:
-    """A cause and those that contain it, which no run within the limits would rather show than not.
-
-    names: the likeliest first. torque: N m, about the least limit with which a run would, None: none would.
-    """
-
-    names: tuple[str, ...]
-    torque: float | None
 
 
 @dataclass(frozen=True)
@@ -248,16 +237,11 @@ class Campaign:
     def _undecidable(
         self, session: _Session, possible: Sequence[Hypothesis], proofs: tuple[Proof, ...]
     ) -> CampaignOutcome:
-        """Return the outcome where no run tells more apart: a shared name if all that remain contain one."""
+        """Return the outcome where no run separates more: a shared name if all that remain contain one."""
         first, likely = possible[0].name, self.rules.likely
-        heard = [h for h in possible if h.name == first or h.addition or h.probability >= likely]
-        simple = _contained(heard)
-        if simple is None:
-            return session.conclude("undecidable", proofs)
-        asked, noise = replace(self.asked, test=self.rules.shown), session.weighing.cases[0].noise
-        richer = [h.beside(simple.name) for h in heard if h is not simple]
-        torque = torque_that_shows([simple, *richer], asked, noise, self.run)
-        shared = SharedName(tuple(h.name for h in heard), torque)
+        remain = [h for h in possible if h.name == first or h.addition is not None or h.probability >= likely]
+        asked = replace(self.asked, test=self.rules.shown)
+        shared = shared_name(remain, asked, session.weighing.cases[0].noise, self.run)
         return session.conclude("undecidable", proofs, shared=shared)
 
     def _is_worth(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
@@ -292,11 +276,3 @@ class Campaign:
         next_run = max(self.asked.shortest, max(FEWEST.values()) / self.asked.rate)
         left = seconds + next_run <= budget.seconds and energy < budget.energy
         return None if left and len(played) < budget.runs else "spent"
-
-
-def _contained(causes: Sequence[Hypothesis]) -> Hypothesis | None:
-    """Return the cause that every other of them may contain, None without such or without others."""
-    for cause in causes if len(causes) > 1 else ():
-        if all(may_contain(other.name, cause.name) for other in causes if other is not cause):
-            return cause
-    return None

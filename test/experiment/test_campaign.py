@@ -11,13 +11,15 @@ from independent.bench import Bench, record_command
 from independent.hidden import hide
 
 import rsea_ros.experiment.campaign
+import rsea_ros.experiment.shared_name
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import DeviceError, ParameterError
-from rsea_ros.experiment.campaign import Budget, Campaign, SharedName
+from rsea_ros.experiment.campaign import Budget, Campaign
 from rsea_ros.experiment.joint_weighing import middles_of_runs, weigh
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import RunLimits
+from rsea_ros.experiment.shared_name import SharedName
 from rsea_ros.experiment.weighed_causes import causes_from
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.model.rig_file import load_rig
@@ -157,7 +159,7 @@ def test_a_name_is_shared_where_no_run_would_show_a_richer_cause(
     weighing = KnownFriction()
     tried = replace(proposal, names=FRICTION, chances=(0.0, chance), duration=2.0, hopeless=())
     monkeypatch.setattr(rsea_ros.experiment.campaign, "weigh", lambda *_: weighing)
-    monkeypatch.setattr(rsea_ros.experiment.campaign, "torque_that_shows", lambda *_: 2.5)
+    monkeypatch.setattr(rsea_ros.experiment.shared_name, "torque_that_shows", lambda *_: 2.5)
     monkeypatch.setattr(rsea_ros.experiment.campaign, "proofs_of", lambda *_: ())
     outcome = Campaign(RIG, FRICTION, ASKED, lambda _: log, choose=lambda *_: tried).go([log], weighing)
     assert (outcome.end, len(outcome.rounds) - 1) == ("undecidable", runs)
