@@ -15,6 +15,7 @@ from rsea_ros.signals import FloatArray
 Json = dict[str, Any]
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 _DIGITS, _MOST_DIGITS = 5, 15
+"""Significant digits of a number, at least and at most: a double has 15."""
 
 
 @dataclass(frozen=True)
