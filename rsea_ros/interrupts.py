@@ -17,7 +17,7 @@ AGAIN = 0.1
 class Stopped(KeyboardInterrupt):
     """A signal asks this process to stop; code that handles Ctrl-C handles it.
 
-    status: 128 plus the number. note: what the work that it stopped has to say, empty for nothing.
+    status: 128 plus the number. note: what the stopped work reports, or empty.
     """
 
     note = ""

@@ -63,8 +63,8 @@ def run(args: argparse.Namespace) -> int:
     if not held:
         raise FleetError(f"{sources}: no recording, expected .mcap or .db3 files, or tables of the map")
     if not any(joints for _, joints in held):
-        found = f"{len(held)} recordings, of no joint of {args.map}, such as {held[0][0].url}"
-        raise FleetError(f"{sources}: {found}, expected paths that end as its bags")
+        what = f"{len(held)} recordings, of no joint of {args.map}, such as {held[0][0].url}"
+        raise FleetError(f"{sources}: {what}, expected paths that match its bags")
     summary = write_rows(args, args.out, held)
     print(summary.sentence())
     for line in _hints(args, summary, held):
@@ -82,15 +82,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _hints(args: argparse.Namespace, summary: RunSummary, held: Sequence[Held]) -> Iterator[str]:
-    """Yield what is likely a mistake of the map."""
+    """Yield what is likely a mistake in the map."""
     seen = {joint.name for _, joints in held for joint in joints}
     missing = [joint for joint in load_joints(args.map) if joint.name not in seen]
     for joint in missing[:MOST_SHOWN]:
-        yield f"no recording of {joint.name}: no path ends as its bags: {', '.join(joint.bags)}"
+        yield f"no recording of {joint.name}: no path matches its bags: {', '.join(joint.bags)}"
     if summary.unmapped:
         yield f"of no joint: {summary.example}{' and others' if summary.unmapped > 1 else ''}"
     if summary.undated:
-        yield "without a date no trend can be estimated: state as “date” in the map how paths hold it"
+        yield "without a date no trend can be estimated: state in the map, as “date”, how paths contain it"
 
 
 def bags_in(args: argparse.Namespace) -> list[Held]:
@@ -118,13 +118,13 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
         memory = None if args.serial or args.scheduler else _memory(args)
         limits = EngineLimits(memory, time=args.time_limit * MINUTE, pages=args.pages)
         place = executor(args, memory) if is_anything_new(store, held) else serial()
-        with _left_said(store, held), place as places, progress("fleet") as tell:
+        with _reporting_what_is_left(store, held), place as places, progress("fleet") as tell:
             return Engine(store, places, work, tell, limits).run(held)
 
 
 @contextmanager
-def _left_said(store: Store, held: Sequence[Held]) -> Iterator[None]:
-    """Let a signal that stops the block say how many recordings are left."""
+def _reporting_what_is_left(store: Store, held: Sequence[Held]) -> Iterator[None]:
+    """Let the report of a signal that stops the block say how many recordings are left."""
     from rsea_ros.fleet.plan import count_new
 
     try:
@@ -132,7 +132,7 @@ def _left_said(store: Store, held: Sequence[Held]) -> Iterator[None]:
     except Stopped as stop:
         with suppress(RseaError, OSError):
             number, all_of = count_new(store, held), sum(len(joints) for _, joints in held)
-            stop.note = f"{number} of {all_of} recordings are left, the same line goes on"
+            stop.note = f"{number} of {all_of} recordings are left, run the same line again"
         raise
 
 

@@ -34,24 +34,24 @@ def run(args: argparse.Namespace) -> int:
     if args.once:
         return FOUND if _look(args, bags_in(args), at_first=True) else 0
     seen: dict[str, str] = {}
-    at_first, said = True, ""
+    at_first, error_before = True, ""
     while True:
         try:
             held = bags_in(args)
             _look(args, [(bag, joints) for bag, joints in held if seen.get(bag.url) == bag.stamp], at_first)
-            seen, at_first, said = {bag.url: bag.stamp for bag, _ in held}, False, ""
+            seen, at_first, error_before = {bag.url: bag.stamp for bag, _ in held}, False, ""
         except BrokenPipeError:
             raise
         except (RseaError, OSError) as error:
             if at_first:
                 raise
-            said = _say_once(f"{error}", said)
+            error_before = _say_once(f"{error}", error_before)
         time.sleep(args.every)
 
 
-def _say_once(text: str, said: str) -> str:
-    """Print an error that the next look may not have, a share that is away, unless it was the last one."""
-    if text != said:
+def _say_once(text: str, before: str) -> str:
+    """Print an error that may pass, as of a share that is away, unless the look before had it; return it."""
+    if text != before:
         print(f"rsea fleet: {printable(text)}: looking again", file=sys.stderr, flush=True)
     return text
 

@@ -31,7 +31,7 @@ _REVOLUTIONS = 8
 _BINS = 1 << 13
 """Of these revolutions: 17 in a period of the fastest ripple."""
 _BINS_PER_TURN, _PADDED = 4, 8
-"""Sums in a revolution, of what varies over eight of them; points of the spectrum in one of its lines."""
+"""Sums in a revolution, of a product that varies over eight; points of the spectrum in one of its lines."""
 _APART = 6
 """Lines of 1/8 cycle between two peaks that count as two: over one revolution a peak is as wide."""
 _MOST_PEAKS = 2
@@ -44,12 +44,15 @@ def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dic
     if missing is None:
         return []
     position, torque = missing
-    cycles = _repetitions(position * rig["gear.ratio"], torque)
+    ratio = rig["gear.ratio"]
+    angle, torque = ratio * position, torque - np.mean(torque)
+    cycles = _repetitions(angle, torque)
     if isinstance(case.drive, Motion):
-        return [
-            _at_motion(case.drive, case.mask["motor_torque"], torque, c, rig["gear.ratio"]) for c in cycles
-        ]
-    return [_with_sine(position * rig["gear.ratio"], torque, c) for c in cycles]
+        keep = case.mask["motor_torque"]
+        sines = [_sine_along(case.drive, keep, torque, c * ratio) for c in cycles]
+    else:
+        sines = [sine_at(angle, torque, c) for c in cycles]
+    return [{"cycles_per_revolution": c, **sine} for c, sine in zip(cycles, sines, strict=True)]
 
 
 def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
@@ -62,28 +65,22 @@ def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> lis
     keep = case.mask["position"]
     angle = train_ratio(rig) * case.measured["position"][keep]
     error = residual_of(case, outputs, "position")[keep]
-    return [_with_sine(angle, error, c) for c in _repetitions(angle, error)]
+    error = error - np.mean(error)
+    return [{"cycles_per_revolution": c, **sine_at(angle, error, c)} for c in _repetitions(angle, error)]
 
 
-def _with_sine(angle: FloatArray, values: FloatArray, cycles: float) -> dict[str, float]:
-    return {"cycles_per_revolution": cycles, **sine_at(angle, values - np.mean(values), cycles)}
+def _sine_along(motion: Motion, keep: BoolArray, torque: FloatArray, pulsation: float) -> dict[str, float]:
+    """Return amplitude and phase (rad) of a sine of the angle in the torque missing along a filtered motion.
 
-
-def _at_motion(
-    motion: Motion, keep: BoolArray, torque: FloatArray, cycles: float, ratio: float
-) -> dict[str, float]:
-    """Return a ripple by the torque that is missing along a filtered motion.
-
-    The filter keeps of a ripple what passes slowly: the sine that is fitted is filtered alike.
+    The filter of the motion keeps only what passes slowly: the sine that is fitted is filtered alike.
     """
     period = float(motion.t[1] - motion.t[0])
-    waves = [smooth(wave(cycles * ratio * motion.q), period)[keep] for wave in (np.sin, np.cos)]
-    return {"cycles_per_revolution": cycles, **_sum_of(waves, torque - np.mean(torque))}
+    waves = [smooth(wave(pulsation * motion.q), period)[keep] for wave in (np.sin, np.cos)]
+    return _sum_of(waves, torque)
 
 
 def _repetitions(angle: FloatArray, values: FloatArray) -> list[float]:
-    """Return cycles per revolution of the strongest repetitions over an angle (rad)."""
-    values = values - np.mean(values)
+    """Return cycles per revolution of the strongest repetitions of zero-mean values over an angle (rad)."""
     cycles, power = _periodogram(angle, values)
     resolvable = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
     power = np.where(resolvable & (cycles < _MOST), power, 0.0)
@@ -91,9 +88,9 @@ def _repetitions(angle: FloatArray, values: FloatArray) -> list[float]:
 
 
 def _sharpened(angle: FloatArray, values: FloatArray, cycles: float) -> float:
-    """Return where within a line of 1/8 cycle a repetition is strongest, as sharply as the travel tells.
+    """Return where within a line of 1/8 cycle a repetition is strongest, as sharply as the travel resolves.
 
-    values exp(-i cycles angle) varies slowly with the angle: a spectrum of its sums over half revolutions.
+    values exp(-i cycles angle) varies slowly with the angle: a spectrum of its sums over quarter revolutions.
     """
     turns = (angle - angle.min()) / (2.0 * math.pi)
     travel = float(turns.max())

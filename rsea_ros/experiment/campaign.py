@@ -6,19 +6,20 @@ refuses. It raises DeviceError for a run that broke off, which is discarded, and
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from rsea_ros.errors import DeviceError, IdentificationError, ParameterError
 from rsea_ros.experiment.advice import Proof, proofs_of
-from rsea_ros.experiment.containment import NOTHING, may_contain
+from rsea_ros.experiment.containment import NOTHING
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.joint_weighing import RunWeighing, weigh
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
-from rsea_ros.experiment.run_design import propose, torque_that_shows
+from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import largest_share
 from rsea_ros.experiment.run_shape import FEWEST
+from rsea_ros.experiment.shared_name import SharedName, shared_name
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -28,10 +29,9 @@ End = Literal[
     "confirmed", "nothing_wrong", "unexplained", "undecidable", "spent", "declined", "broken", "failed"
 ]
 """confirmed: one cause. nothing_wrong: none is there. unexplained: no cause fits what the runs show.
-undecidable: no run tells more apart, by a proof that covers all, or the longest did not; or the likeliest
-cause shares its name with one that contains it. spent: the budget
-is. declined: a person said no. broken: a run broke off. failed: the runs could not be weighed, or no run was
-possible within the limits.
+undecidable: no run separates more, by a proof that covers all, or the longest did not; or the likeliest cause
+shares its name with one that contains it. spent: the budget is. declined: a person said no. broken: a run
+broke off. failed: the runs could not be weighed, or no run was possible within the limits.
 """
 Play = Callable[[Proposal], Record | None]
 
@@ -87,17 +87,6 @@ class Round:
 
 
 @dataclass(frozen=True)
-class SharedName:
-    """A cause and those that contain it, which no run within the limits would rather show than not.
-
-    names: the likeliest first. torque: N m, about the least limit with which a run would, None: none would.
-    """
-
-    names: tuple[str, ...]
-    torque: float | None
-
-
-@dataclass(frozen=True)
 class CampaignOutcome:
     """How the loop ended. proofs: of pairs that no run separates. records: those that count, the first ones
     included. why: the failure, in words. shared: None where no cause was as good as known.
@@ -133,6 +122,11 @@ class _Session:
     records: list[Record]
     weighing: RunWeighing
     rounds: list[Round] = field(default_factory=list)
+
+    @property
+    def noise(self) -> Mapping[str, float]:
+        """The noise by channel, as the first record shows it."""
+        return self.weighing.cases[0].noise
 
     def conclude(
         self, end: End, proofs: tuple[Proof, ...] = (), why: str = "", shared: SharedName | None = None
@@ -187,23 +181,13 @@ class Campaign:
             return session.conclude(end)
         if spent:
             return session.conclude(spent)
-        possible, noise = richer or self.possible(weighing), weighing.cases[0].noise
-        asked = replace(self._asked(session.rounds), test=self.rules.shown if richer else 0.0)
+        possible, is_test = richer or self.possible(weighing), bool(richer)
         try:
-            proposal = self.choose(possible, asked, noise, self.run, self.tell)
-            if not end and not self._is_worth(proposal, session.rounds) and proposal.duration < asked.longest:
-                asked = replace(asked, shortest=asked.longest)
-                proposal = self.choose(possible, asked, noise, self.run, self.tell)
+            proposal = self._design(session, possible, is_test)
         except ParameterError as error:
             return session.conclude("failed", why=str(error))
-        if end and self._shows_too_little(proposal, session.rounds):
-            proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
-            return self._undecidable(session, possible, proofs)
-        if not end and not self._is_worth(proposal, session.rounds):
-            proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
-            covered = any(p.covers_all and possible[0].name in p.pair for p in proofs)
-            if covered or self._played_longest(session.rounds):
-                return self._undecidable(session, possible, proofs)
+        if (outcome := self._hopeless_end(session, possible, proposal, is_test)) is not None:
+            return outcome
         self.hear(Round(weighing, proposal))
         try:
             record = self.play(proposal)
@@ -213,6 +197,28 @@ class Campaign:
             return session.conclude("declined")
         session.rounds.append(Round(weighing, proposal))
         session.records.append(record)
+        return None
+
+    def _design(self, session: _Session, possible: Sequence[Hypothesis], is_test: bool) -> Proposal:
+        """Return the next run; the longest where a shorter one is not worth playing."""
+        noise, rounds = session.noise, session.rounds
+        asked = replace(self._asked(rounds), test=self.rules.shown if is_test else 0.0)
+        proposal = self.choose(possible, asked, noise, self.run, self.tell)
+        if is_test or self._is_worth(proposal, rounds) or proposal.duration >= asked.longest:
+            return proposal
+        return self.choose(possible, replace(asked, shortest=asked.longest), noise, self.run, self.tell)
+
+    def _hopeless_end(
+        self, session: _Session, possible: Sequence[Hypothesis], proposal: Proposal, is_test: bool
+    ) -> CampaignOutcome | None:
+        """Return the outcome where no run within the limits would help, None where this one may."""
+        may_help = self._may_show if is_test else self._is_worth
+        if may_help(proposal, session.rounds):
+            return None
+        proofs = proofs_of(possible, proposal.hopeless, self.asked, session.noise, self.run)
+        is_covered = any(p.covers_all and possible[0].name in p.pair for p in proofs)
+        if is_test or is_covered or self._played_longest(session.rounds):
+            return self._undecidable(session, possible, proofs)
         return None
 
     def known_end(self, weighing: RunWeighing) -> End | None:
@@ -228,7 +234,7 @@ class Campaign:
     def _richer(self, session: _Session) -> list[Hypothesis]:
         """Return the best and the richer causes that fit as well, were not tested yet, and may be true.
 
-        None without such. A run tests a cause that it would rather have shown than not, were it true.
+        Empty without such. A run tests a cause that it would rather have shown than not, were it true.
         """
         weighing, played = session.weighing, [r.proposal for r in session.rounds if r.proposal is not None]
         seen = {n for p in played for n, c in zip(p.names, p.chances, strict=True) if c >= self.rules.shown}
@@ -236,27 +242,22 @@ class Campaign:
         rivals = [h for h in weighing.hypotheses(self.rules.possible) if h.name in names]
         return [weighing.hypotheses()[0], *rivals] if rivals else []
 
-    def _shows_too_little(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
-        """Return whether a test would show none of the richer causes, or not rather than show one.
+    def _may_show(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
+        """Return whether a test would rather show a richer cause than not.
 
-        One that may is played once, in the longest run.
+        One with a smaller chance is played too, unless a run of the longest length was.
         """
         chance = max(proposal.chances[1:])
-        return chance < self.rules.worth or (chance < self.rules.shown and self._played_longest(rounds))
+        return chance >= self.rules.shown or (chance >= self.rules.worth and not self._played_longest(rounds))
 
     def _undecidable(
         self, session: _Session, possible: Sequence[Hypothesis], proofs: tuple[Proof, ...]
     ) -> CampaignOutcome:
-        """Return the outcome where no run tells more apart: a shared name if all that remain contain one."""
+        """Return the outcome where no run separates more: a shared name if all that remain contain one."""
         first, likely = possible[0].name, self.rules.likely
-        heard = [h for h in possible if h.name == first or h.addition or h.probability >= likely]
-        simple = _contained(heard)
-        if simple is None:
-            return session.conclude("undecidable", proofs)
-        asked, noise = replace(self.asked, test=self.rules.shown), session.weighing.cases[0].noise
-        richer = [h.beside(simple.name) for h in heard if h is not simple]
-        torque = torque_that_shows([simple, *richer], asked, noise, self.run)
-        shared = SharedName(tuple(h.name for h in heard), torque)
+        remain = [h for h in possible if h.name == first or h.addition is not None or h.probability >= likely]
+        asked = replace(self.asked, test=self.rules.shown)
+        shared = shared_name(remain, asked, session.noise, self.run)
         return session.conclude("undecidable", proofs, shared=shared)
 
     def _is_worth(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
@@ -291,11 +292,3 @@ class Campaign:
         next_run = max(self.asked.shortest, max(FEWEST.values()) / self.asked.rate)
         left = seconds + next_run <= budget.seconds and energy < budget.energy
         return None if left and len(played) < budget.runs else "spent"
-
-
-def _contained(causes: Sequence[Hypothesis]) -> Hypothesis | None:
-    """Return the cause that every other of them may contain, None without such or without others."""
-    for cause in causes if len(causes) > 1 else ():
-        if all(may_contain(other.name, cause.name) for other in causes if other is not cause):
-            return cause
-    return None

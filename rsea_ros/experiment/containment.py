@@ -1,8 +1,8 @@
 """Which causes may contain a simpler one: Stribeck friction contains Coulomb friction.
 
-A cause may, where both act at the same place and have a size of the same unit: its main parameter is then the
-other's, those of equal name too, and a parameter that may be none is what it adds. Whether it does, shows the
-fit: it begins there, and counts where it leaves no more.
+A cause may contain another if both act at the same place and have a size of the same unit. Its main parameter
+is then that of the other, parameters of equal name are the same, and one that may be zero is what it adds.
+The fit shows whether it does contain it: it begins at the other, and must fit no worse.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ def shared_parameters(name: str, simpler: str) -> dict[str, str]:
     return same | {effect.main.name: other.main.name}
 
 
-def addition_to(simpler: str, name: str, unknowns: Sequence[str]) -> int | None:
-    """Return which unknown is what a cause adds to another; None where it cannot contain it.
+def addition_to(name: str, simpler: str, unknowns: Sequence[str]) -> int | None:
+    """Return the place of what a cause adds to another among the unknowns; None where it cannot contain it.
 
     unknowns: as `cause.parameter`.
     """

@@ -5,8 +5,8 @@ The logarithm of the evidence is Laplace's, with priors on the rig's values and 
     ln p(data | cause) = -C / (2 k) - (ln det(J'J / k + L) - ln det L) / 2
 
 C: cost of the fit, prior included; L: the prior's information; k: the variance that the best fit leaves, in
-units of the noise, not below 1. Of minima that leave about as much the one of the largest evidence counts: a
-narrow one that fits a little better says less than a wide one. (MacKay, Neural Computation 4, 1992.)
+units of the noise, not below 1. Of minima of about the same cost the one of the largest evidence counts: a
+narrow one that fits a little better is less likely than a wide one. (MacKay, Neural Computation 4, 1992.)
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ from rsea_ros.signals import FloatArray
 
 _SHARE = 0.15
 """Of a cause's typical size, where fits begin too."""
-_LITTLE, _CLOSE = 4.0, 1.5
-"""A fit whose cost lies between these, above the least and times the least, is begun once more."""
-_GAIN = 1e-4
-_ITERATIONS = 12
+_LITTLE = 4.0
+"""Cost above the least, up to which a fit counts as no worse."""
+_CLOSE = 1.5
+"""Times the least cost, up to which a fit is begun once more."""
+_GAIN, _ITERATIONS = 1e-4, 12
+"""Relative fall of the cost below which a fit ends, and its most steps."""
 
 
 def fit_cause(
@@ -56,20 +58,21 @@ def _smaller(name: str, guesses: Sequence[Guess]) -> list[Guess]:
 
 
 def repeat_fits(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
-    """Return the fits, those that left a little more than the best once more from the rig's values there.
+    """Return the fits, those that are close to the best also begun where others ended.
 
-    A fit that began far from the final values of the rig may stop in a local minimum, and a cause that
-    contains another may miss it: where the other is near the best, it is fitted from there as well.
+    A fit that began far from the final values of the rig may stop in a local minimum: one that is worse than
+    the best begins once more from the rig's values of the best. A cause that contains another may miss it:
+    it begins once more from the other, where that fits no worse than the best.
     """
     best, scale = min(fits.values(), key=lambda s: s.cost), scale_of(fits)
-    simpler = {n: f for n, f in fits.items() if n != NOTHING and f.cost < best.cost + _LITTLE}
+    good = {n: f for n, f in fits.items() if n != NOTHING and f.cost < best.cost + _LITTLE}
     rig = {u.name: float(v) for u, v in zip(best.problem.unknowns, best.theta, strict=True)}
     again = dict(fits)
     for name, fit in fits.items():
         if name == NOTHING or fit.cost >= _CLOSE * best.cost:
             continue
-        starts = [x for n, f in simpler.items() for x in _as_simpler(name, fit.problem, n, f)]
-        if best.cost + _LITTLE < fit.cost:
+        starts = [x for n, f in good.items() for x in _as_simpler(name, fit.problem, n, f)]
+        if fit.cost > best.cost + _LITTLE:
             pairs = zip(fit.problem.unknowns, fit.theta, strict=True)
             starts.append(np.array([rig.get(u.name, float(v)) for u, v in pairs]))
         others = [solve(fit.problem, x, iterations=_ITERATIONS, gain=_GAIN, run=run) for x in starts]
@@ -78,7 +81,7 @@ def repeat_fits(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
 
 
 def _likeliest(fits: Sequence[Solution], scale: float) -> Solution:
-    """Return the fit of the largest evidence, of those that leave at most a little more than the least."""
+    """Return the fit of the largest evidence, of those that are no worse than the best."""
     least = min(s.cost for s in fits)
     return max((s for s in fits if s.cost <= least + _LITTLE), key=lambda s: log_evidence(s, scale))
 
@@ -104,13 +107,13 @@ def log_evidence(solution: Solution, scale: float) -> float:
 
 
 def _as_simpler(name: str, problem: Problem, simpler: str, fit: Solution) -> list[FloatArray]:
-    """Return where a cause does what a simpler one does, with no more than the other has, if it can."""
+    """Return the start at which a cause does only what the fit of a simpler one does; none if it cannot."""
     if not may_contain(name, simpler):
         return []
-    found = {u.name: u.outer(float(v)) for u, v in zip(fit.problem.unknowns, fit.theta, strict=True)}
+    values = {u.name: u.outer(float(v)) for u, v in zip(fit.problem.unknowns, fit.theta, strict=True)}
     absent = {f"{name}.{p.name}": p.null for p in effect_named(name).parameters if math.isfinite(p.null)}
-    same = {f"{name}.{p}": found[f"{simpler}.{s}"] for p, s in shared_parameters(name, simpler).items()}
-    return [vector_at(problem, {}, found | absent | same)]
+    same = {f"{name}.{p}": values[f"{simpler}.{s}"] for p, s in shared_parameters(name, simpler).items()}
+    return [vector_at(problem, {}, values | absent | same)]
 
 
 def _best(problem: Problem, thetas: Sequence[FloatArray], run: Map) -> FloatArray:

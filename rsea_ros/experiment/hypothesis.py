@@ -55,9 +55,9 @@ class Hypothesis:
         return result
 
     def beside(self, simpler: str) -> Hypothesis:
-        """Return the cause, its size what it adds to a simpler one that it may contain."""
+        """Return the cause with what it adds to a simpler one as its size, if it may contain that one."""
         names = [u.name for u in self.problem.unknowns]
-        return replace(self, addition=addition_to(simpler, self.name, names))
+        return replace(self, addition=addition_to(self.name, simpler, names))
 
     def draws(self, count: int, rng: np.random.Generator) -> list[Rig]:
         """Return rigs whose values are drawn from their posterior."""
@@ -93,7 +93,7 @@ class Hypothesis:
     def _with_size(self, steps: FloatArray) -> FloatArray:
         """Return the values with the size of the cause moved by some steps, shape (m, n).
 
-        What is added at the cost of the rest of the cause ends where none of that is left.
+        What a cause adds takes the place of the rest of it, and stops where a parameter meets its bound.
         """
         spread = np.linalg.inv(self.information)[:, self._main]
         moves = np.outer(steps, spread / spread[self._main])
@@ -102,9 +102,8 @@ class Hypothesis:
             own = self.cause_indices
             room = np.where(moves > 0.0, high - self.theta, self.theta - low)[:, own]
             size = np.abs(moves[:, own])
-            moves = (
-                moves * np.min(np.divide(room, size, np.ones_like(size), where=size > room), axis=1)[:, None]
-            )
+            share = np.min(np.divide(room, size, np.ones_like(size), where=size > room), axis=1)
+            moves = share[:, None] * moves
         result: FloatArray = np.clip(self.theta + moves, low, high)
         return result
 
@@ -117,13 +116,13 @@ class Hypothesis:
         """Return whether the size of the cause may as well be none; on a logarithmic scale it never is."""
         away, sd = self._size()
         unknown = self.problem.unknowns[self._main]
-        may_be = self.addition is not None or unknown.start == effect_named(self.name).main.null
-        return may_be and abs(away) <= _SEEN * sd
+        can_be = self.addition is not None or unknown.start == effect_named(self.name).main.null
+        return can_be and abs(away) <= _SEEN * sd
 
     def _size(self) -> tuple[float, float]:
         """Return how far the size of the cause is from its prior's middle, and its standard deviation.
 
-        What is added, from none.
+        Where its size is what it adds to another: how far from zero.
         """
         unknown = self.problem.unknowns[self._main]
         middle = unknown.start if self.addition is None else 0.0

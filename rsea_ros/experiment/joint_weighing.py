@@ -28,7 +28,7 @@ HOPELESS = 1e-6
 
 @dataclass(frozen=True)
 class WeighedCause:
-    """A cause fitted to all records. log_evidence: see the module; left: RMS over the noise."""
+    """A cause fitted to all records. log_evidence: see fits.py; left: RMS over the noise."""
 
     name: str
     solution: Solution

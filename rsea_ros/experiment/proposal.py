@@ -23,8 +23,8 @@ class DesignRequest:
     """The freedom of a design. rate: Hz. shortest, longest: s. refine: evaluations of the refinement.
 
     per_run: s of excitation that are as dear as one more run; little of it makes more and shorter runs.
-    test: 0 for a run that decides between all causes; else the run is to show the others where the first
-    seems known: chance with which it must, for it to be preferred to a longer one.
+    test: 0 for a run that decides between all causes; else the run is a test, which is to show the others
+    although the first seems known: chance with which it must show them to be preferred to a longer one.
     Raises ParameterError for a rate outside RATES and for lengths that no run can have.
     """
 
@@ -63,9 +63,8 @@ class Proposal:
     table: S_ij with i true and j its rival. hopeless: pairs that no shape tried separates. decided: expected
     share that it decides, in a test of the cases in which the first cause is not true; chances: that it
     decides, for each name, were it true; resolved: share that it decides of what is undecided without it and
-    some run separates; sharpened: nats by which it narrows the parameters where one cause
-    is left.
-    expected, at_level: peaks of every quantity.
+    some run separates; sharpened: nats by which it narrows the parameters where one cause is left. peaks: of
+    every quantity. tried: shapes that were rated. energy: N^2 m^2 s, the integral of the squared command.
     """
 
     shape: Shape

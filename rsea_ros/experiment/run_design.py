@@ -3,16 +3,14 @@
 Shapes of every kind are tried, from the shortest run to the length that no chance of deciding could make
 worth its seconds; the best is refined by Nelder and Mead's method (scipy), which needs no smooth
 objective: gear friction and stops give none. Where full fits of the rivals leave it nothing to decide, the
-longest run is designed instead. Shapes are rated by simulation with the compiled step;
-separation.py has the measure. The final amplitude is the largest with which chance_constraint.py keeps all
-limits.
+longest run is designed instead. trials.py rates shapes by simulation with the compiled step; separation.py
+has the measure. The final amplitude is the largest with which chance_constraint.py keeps all limits.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -22,39 +20,21 @@ from rsea_ros.experiment.chance_constraint import Group, Peaks, ends_of, peaks, 
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.refine import refine
-from rsea_ros.experiment.run_shape import FEWEST, Shape
+from rsea_ros.experiment.run_shape import Shape
 from rsea_ros.experiment.separation import (
     chances_decided,
-    decided_share,
     information_gain,
     likely_separations,
     refit,
     separations,
 )
 from rsea_ros.experiment.shape_rater import INSIDE, ShapeRater, noise_by_channel
+from rsea_ros.experiment.trials import best_of, least_share, shapes_for, share_decided, trial_of, try_lengths
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import BoolArray, FloatArray
 
-TRIED: tuple[Shape, ...] = (
-    Shape("multisine", 1.0, low=0.5, high=8.0),
-    Shape("multisine", 1.0, low=0.5, high=40.0, tilt=0.5),
-    Shape("multisine", 1.0, low=2.0, high=25.0),
-    Shape("multisine", 1.0, low=10.0, high=100.0),
-    Shape("multisine", 0.5, bias=0.5, low=0.5, high=25.0),
-    Shape("multisine", 0.3, low=0.5, high=40.0, tilt=0.5),
-    Shape("chirp", 1.0, low=0.3, high=30.0),
-    Shape("chirp", 1.0, low=2.0, high=100.0),
-    Shape("steps", 1.0, hold=0.03),
-    Shape("steps", 1.0, hold=0.1),
-    Shape("steps", 1.0, hold=0.3),
-    Shape("holds", 1.0, hold=0.15),
-    Shape("steps", 0.3, bias=0.5, hold=0.2),
-)
-"""Where the search begins; amplitude and bias as shares of what the limits allow."""
-_LEAST = 0.05
-"""Share that a run must be expected to decide to be preferred to a longer one."""
 _HOPE = 2.0
 """S that the longest run's data give a pair at best, below which no run is designed for it."""
 _FAR = 1e4
@@ -62,8 +42,6 @@ _FAR = 1e4
 _SETTLED = 5e-3
 """Share of undecided cases below which no run is worth playing."""
 _SMALLEST, _BISECTIONS = 0.01, 8
-_FURTHEST = 6
-"""Doublings of the torque limit up to which a torque that would show a cause is sought."""
 
 
 def check_commanded_by_torque(rig: Rig) -> None:
@@ -91,115 +69,27 @@ def propose(
     rater = ShapeRater(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
     if len(hypotheses) == 1:
         return _sharpest(rater, say)
-    shapes = [s for s in TRIED if s.kind in asked.kinds]
+    shapes = shapes_for(asked)
     tables = []
     for k, shape in enumerate(shapes):
         say(f"trying {shape.kind}", 0.5 * k / len(shapes))
         tables.append(separations(hypotheses, rater.responses(rater.within(shape, asked.probe))))
     say("fitting rivals", 0.5)
     apart = _hopeless(rater, shapes, tables)
-    trials = _trials(rater, shapes, apart, asked.shortest)
-    best = _worth_most(trials, asked)
+    trials = try_lengths(rater, shapes, apart, asked.shortest)
+    best = best_of(trials, asked)
     say("refining", 0.6)
-    shape, count = refine(best.shape, lambda s: _share(rater, s, best.length, apart), asked, say)
+    shape, count = refine(best.shape, lambda s: trial_of(rater, s, best.length, apart).share, asked, say)
     tried = len(shapes) + len(trials) + count
     final = _final(rater, shape, best.length, apart, tried)
-    if final.decided >= _least(asked) or best.length == asked.longest:
+    if final.decided >= least_share(asked) or best.length == asked.longest:
         return final
-    trial = _worth_most(_trials(rater, shapes, apart, asked.longest), asked)
+    trial = best_of(try_lengths(rater, shapes, apart, asked.longest), asked)
     longest = _final(rater, trial.shape, trial.length, apart, tried + len(shapes))
     return max(longest, final, key=lambda p: p.decided)
 
 
-def torque_that_shows(
-    hypotheses: Sequence[Hypothesis],
-    asked: DesignRequest,
-    measured: Mapping[str, float],
-    run: Map = serial,
-) -> float | None:
-    """Return about what torque limit a test needs that shows the other causes, N m; None beyond _FURTHEST.
-
-    In the longest run, the other limits as they are, none of which may hold the torque back.
-    """
-    for k in range(1, _FURTHEST + 1):
-        torque = 2.0**k * asked.limits.torque
-        wider = replace(asked, limits=replace(asked.limits, torque=torque))
-        rater = ShapeRater(hypotheses, wider, noise_by_channel(hypotheses, measured), run)
-        shapes = [s for s in TRIED if s.kind in asked.kinds]
-        apart = np.eye(len(hypotheses), dtype=bool)
-        if max(_share(rater, s, asked.longest, apart) for s in shapes) >= asked.test:
-            return torque
-    return None
-
-
-def _least(asked: DesignRequest) -> float:
-    """Return the share that a run must be expected to decide to be preferred to a longer one."""
-    return asked.test or _LEAST
-
-
-@dataclass(frozen=True)
-class _Trial:
-    """A shape of a length (s), the share that it is expected to decide, the least S of the likeliest two."""
-
-    share: float
-    length: float
-    shape: Shape
-    least: float
-
-    def per_second(self, per_run: float) -> float:
-        return self.share / (per_run + self.length)
-
-
-def _trials(rater: ShapeRater, shapes: Sequence[Shape], apart: BoolArray, shortest: float) -> list[_Trial]:
-    """Return the shapes of every length from some seconds, up to one that could not be worth its seconds."""
-    asked, trials = rater.asked, list[_Trial]()
-    doublings = math.ceil(math.log2(asked.longest / shortest))
-    for seconds in np.geomspace(shortest, asked.longest, doublings + 1):
-        length = float(np.rint(seconds * asked.rate) / asked.rate)
-        best = _worth_most(trials, asked) if trials else None
-        if (
-            best
-            and best.share >= _least(asked)
-            and best.per_second(asked.per_run) > 1.0 / (asked.per_run + length)
-        ):
-            break
-        possible = [s for s in shapes if length * asked.rate >= FEWEST[s.kind]]
-        trials += [_trial(rater, s, length, apart) for s in possible]
-    return trials
-
-
-def _worth_most(trials: Sequence[_Trial], asked: DesignRequest) -> _Trial:
-    """Return the trial that decides most per second; where none decides enough, the one that decides most.
-
-    Of several that decide nothing the longest, with the largest S of the likeliest two.
-    """
-    enough = [t for t in trials if t.share >= _least(asked)]
-    if not enough:
-        return max(trials, key=lambda t: (t.share, t.length, t.least))
-    return max(enough, key=lambda t: t.per_second(asked.per_run))
-
-
-def _share(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -> float:
-    return _trial(rater, shape, length, apart).share
-
-
-def _trial(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -> _Trial:
-    rows = likely_separations(rater.hypotheses, rater.responses(rater.within(shape, length)))
-    share = _decided(rater, chances_decided(rater.hypotheses, rows, apart))
-    first, second = sorted(range(len(rows)), key=lambda k: -rater.hypotheses[k].probability)[:2]
-    least = min(float(rows[first][:, second].mean()), float(rows[second][:, first].mean()))
-    return _Trial(share, length, shape, least)
-
-
-def _decided(rater: ShapeRater, chances: FloatArray) -> float:
-    """Return the share of the cases that a run is expected to decide; in a test, of those it is for."""
-    first = 1 if rater.asked.test else 0
-    return decided_share(rater.hypotheses[first:], chances[first:])
-
-
-def _resolved(
-    rater: ShapeRater, chances: FloatArray, rows: Sequence[FloatArray], apart: BoolArray
-) -> float:
+def _resolved(rater: ShapeRater, chances: FloatArray, rows: Sequence[FloatArray], apart: BoolArray) -> float:
     """Return the share that a run decides of the cases that are undecided without it; 1 for a single cause.
 
     Without it: what is likely enough already, and what only a hopeless pair leaves open.
@@ -207,8 +97,8 @@ def _resolved(
     if len(chances) == 1:
         return 1.0
     nothing = [np.where(np.isfinite(r), 0.0, r) for r in rows]
-    already = _decided(rater, chances_decided(rater.hypotheses, nothing, apart))
-    open_, gained = 1.0 - already, _decided(rater, chances) - already
+    already = share_decided(rater, chances_decided(rater.hypotheses, nothing, apart))
+    open_, gained = 1.0 - already, share_decided(rater, chances) - already
     return max(gained, 0.0) / open_ if open_ > _SETTLED else 0.0
 
 
@@ -251,7 +141,7 @@ def _final(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray, tri
     nearer = np.divide(table, linear, out=np.ones_like(table), where=np.isfinite(table) & (linear > 0.0))
     rows = likely_separations(hypotheses, responses)
     chances = chances_decided(hypotheses, [r * n for r, n in zip(rows, nearer, strict=True)], apart)
-    share = _decided(rater, chances) if k > 1 else 1.0
+    share = share_decided(rater, chances) if k > 1 else 1.0
     return Proposal(
         shape, length, asked.rate, command, names, table, pairs, share, tuple(chances.tolist()),
         _resolved(rater, chances, rows, apart), narrow,
@@ -265,7 +155,7 @@ def limit_command(
     """Return a command as large as the limits allow for every possible bench, and its peaks.
 
     By bisection, because the worst response is not linear in the command. Raises
-    ParameterError where even a SMALLEST share of it breaks the limits.
+    ParameterError where even the share _SMALLEST of it breaks the limits.
     """
     low, high, best = math.log(_SMALLEST), 0.0, None
     scale = high
@@ -302,7 +192,7 @@ def _with_refits(rater: ShapeRater, command: FloatArray, table: FloatArray) -> F
 def _sharpest(rater: ShapeRater, say: Progress) -> Proposal:
     """Return the run that narrows the parameters of a single cause most (D-optimality)."""
     asked = rater.asked
-    shapes = [s for s in TRIED if s.kind in asked.kinds]
+    shapes = shapes_for(asked)
 
     def value(shape: Shape) -> float:
         command = rater.within(shape, asked.probe)

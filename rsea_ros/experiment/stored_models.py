@@ -48,7 +48,7 @@ def hypotheses_from(models: Sequence[ModelFile]) -> list[Hypothesis]:
             what = "without a cause" if name == NOTHING else f"with {name}"
             raise ParameterError(f"two models {what}, expected each cause once")
     for model in models[1:]:
-        check_same_machine(models[0].rig, model.rig)
+        _check_same_machine(models[0].rig, model.rig)
     total = sum(m.probability or 0.0 for m in models)
     unstated = sum(m.probability is None for m in models)
     rest = max(1.0 - total, 0.05) / unstated if unstated else 0.0
@@ -56,9 +56,9 @@ def hypotheses_from(models: Sequence[ModelFile]) -> list[Hypothesis]:
     return [_hypothesis(m, float(p)) for m, p in zip(models, shares / shares.sum(), strict=True)]
 
 
-def check_same_machine(first: Rig, other: Rig) -> None:
+def _check_same_machine(first: Rig, other: Rig) -> None:
     """Raise ParameterError for rigs that differ in what no cause changes: gear, ends, sensors, command."""
-    ours, theirs = _build(first), _build(other)
+    ours, theirs = _construction(first), _construction(other)
     for what, value in ours.items():
         if value != theirs[what]:
             raise ParameterError(
@@ -67,7 +67,7 @@ def check_same_machine(first: Rig, other: Rig) -> None:
             )
 
 
-def _build(rig: Rig) -> dict[str, str]:
+def _construction(rig: Rig) -> dict[str, str]:
     """Return how a machine is built, in words: what the causes of one bench share."""
     ratio = rig.values().get("gear.ratio")
     sensors = [n for n in SENSED if rig.measures(n)]

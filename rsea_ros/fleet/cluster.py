@@ -53,7 +53,7 @@ PER_WORKER = 3
 NAMES = 1000
 """Jobs after which Dask's cache of their names is emptied: it keeps the last 100 000, about 0.3 kB each."""
 _ADDRESS = re.compile(r"(\w+://)?(\[[0-9a-fA-F:]+\]|[^\s/:]+):\d+/?")
-"""HOST:PORT with or without a protocol: Dask looks a minute for anything else."""
+"""HOST:PORT with or without a protocol: Dask tries anything else for a minute."""
 CONNECT = "30s"
 COUNTED_EVERY = 10.0
 """s, after which the workers are counted anew: those of another cluster come and go."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -20,7 +20,7 @@ _PATIENCE = 60.0
 _SEARCH = 8.0
 """s that a running node may take to be seen: on a busy machine 3 s were not always enough."""
 _UNCHANGED = 0.5
-"""s after which a node has shown what it offers: its services are announced together."""
+"""s without a new service, after which a node has shown all that it offers."""
 _QUESTIONS = 3
 """Repetitions of a question whose answer was lost: a service may be seen before it sees who asks."""
 _MATCHING = 0.1
@@ -74,11 +74,12 @@ class Caller:
 
     def _discover(self, name: str, action: str) -> None:
         """Return when a node offers an action, or has offered nothing new for a while."""
-        deadline, offered, since = time.monotonic() + DISCOVERY, self.actions(name), time.monotonic()
-        while action not in offered and time.monotonic() < min(deadline, since + _UNCHANGED):
-            time.sleep(POLL)
-            before, offered = offered, self.actions(name)
-            since = since if offered == before else time.monotonic()
+        before, since = None, 0.0
+        for _ in _looks(DISCOVERY):
+            if (offered := self.actions(name)) != before:
+                before, since = offered, time.monotonic()
+            if action in offered or time.monotonic() >= since + _UNCHANGED:
+                return
 
     def _change(self, name: str, transition: str, number: int) -> str:
         request = ChangeState.Request()
@@ -148,7 +149,13 @@ class Caller:
 
 def _await(is_true: Callable[[], bool], patience: float) -> bool:
     """Return whether something becomes true while a graph is being discovered. patience: s."""
+    return any(is_true() for _ in _looks(patience))
+
+
+def _looks(patience: float) -> Iterator[None]:
+    """Yield at once, and every POLL for a time (s)."""
     deadline = time.monotonic() + patience
-    while not (done := is_true()) and time.monotonic() < deadline:
+    yield
+    while time.monotonic() < deadline:
         time.sleep(POLL)
-    return done
+        yield

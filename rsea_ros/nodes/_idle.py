@@ -18,10 +18,10 @@ from rsea_ros.nodes._pulse import FOR_EVER, Pulse
 
 
 def anything_to_do(node: Node, executor: Executor, pulse: Pulse) -> bool:
-    """Wait until a subscription, timer, client or service of an executor's node is ready, or for a pulse.
+    """Wait until an entity of an executor's node is ready, or for a pulse; return whether one is ready.
 
-    Return whether one is ready.
-    Events of publishers and subscriptions wake nobody; the executor sees to them when it runs next.
+    Entities are its subscriptions, timers, clients and services. Events of publishers and subscriptions wake
+    nobody; the executor sees to them when it runs next.
     """
     assert node.context.handle is not None
     with ExitStack() as held:

@@ -14,6 +14,7 @@ from rsea_ros.model.rig import Rig
 
 _EXPECTED = "expected an identification.json of rsea identify"
 
+
 def noise_from(rig: Rig, path: str) -> Noise:
     """Return the noise of a rig, measured where an identification.json is named.
 

@@ -1,8 +1,8 @@
 """Waits that a clock cannot hold up: another thread ends them, by the steady clock.
 
 The middleware may count the timeouts of its waits by the system clock (FastDDS built for glibc before
-2.30). Where that clock is set back by an hour, a wait of 0.1 s lasts an hour longer: no Ctrl-C ends the node,
-and its timers rest.
+2.30). If that clock is set back by an hour, a wait of 0.1 s lasts an hour longer: Ctrl-C does not end the
+node, and its timers rest.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ FOR_EVER = -1
 
 
 class Pulse:
-    """Triggers `guard` every period (s) until it is closed. One wait set has it alone."""
+    """Triggers `guard` every period (s) until it is closed. Only one wait set may hold it."""
 
     def __init__(self, node: Node, period: float) -> None:
         context = node.context.handle
@@ -30,7 +30,7 @@ class Pulse:
         self._thread.start()
 
     def close(self) -> None:
-        """Trigger it no more."""
+        """End the triggers."""
         self._is_over = True
         self._thread.join()
         self.guard.destroy_when_not_in_use()

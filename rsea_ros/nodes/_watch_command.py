@@ -102,7 +102,7 @@ class WatchCommand:
             self._client.get_parameters(list(LIMITS)).add_done_callback(partial(self._on_limits, bench))
 
     def _on_limits(self, bench: str, future: Any) -> None:
-        if bench != self._bench:  # it has left since
+        if bench != self._bench:  # that bench has left
             return
         values = [v.double_value if v.type else math.inf for v in future.result().values]
         torque, slew, growth = [*values, math.inf, math.inf, math.inf][:3]

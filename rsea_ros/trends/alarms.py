@@ -25,8 +25,9 @@ class Alarm:
     change from before or the cause's size now, with its 95 % interval; None for a fault. relative: size over
     the level before, NaN where none. confidence: 1 less the false discovery rate. recording, artefacts: of
     the first recording that shows it. share: of the days since then that name a cause or a fault.
-    from_first: the first recording shows it, so since_s is the latest at which it may have begun. status: of
-    a cause, as most of its diagnoses say; `one_of`: the data do not distinguish it from another.
+    from_first: the first recording shows it, so since_s is the latest at which it may have begun. growth: of
+    a cause's size. status: of a cause, as most of its diagnoses state it; `one_of`: the data do not
+    distinguish it from another.
     """
 
     key: str

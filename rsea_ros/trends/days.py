@@ -58,10 +58,9 @@ def day_means(series: Series, settings: TrendSettings) -> Days:
 
 
 def outliers(time_s: FloatArray, value: FloatArray, sd: FloatArray, most: float) -> BoolArray:
-    """Return which recordings lie farther than `most` standard deviations from what their neighbours say.
+    """Return which recordings lie farther than `most` standard deviations from their neighbours.
 
-    That is their median, and for a recording far from it their line too: at the end of a ramp the neighbours
-    lie on one side of it.
+    From their median, and from their line as well: at the end of a ramp all neighbours lie on one side.
     """
     if len(value) < _NEIGHBOURS:
         return np.zeros(len(value), bool)
@@ -76,7 +75,7 @@ def _are_far(off: FloatArray, sd: FloatArray, most: float) -> BoolArray:
 
 
 def _on_lines(time_s: FloatArray, value: FloatArray) -> FloatArray:
-    """Return what the line through the neighbours of each recording says of it (Theil 1950, Sen 1968)."""
+    """Return the line through the neighbours of each recording at its time (Theil 1950, Sen 1968)."""
     n = len(value)
     first = np.clip(np.arange(n) - _NEIGHBOURS // 2, 0, n - _NEIGHBOURS)
     near = first[:, None] + np.arange(_NEIGHBOURS)

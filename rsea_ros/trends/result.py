@@ -15,8 +15,6 @@ from rsea_ros.trends.settings import DAY
 
 State = Literal["steady", "changed", "trending", "undetermined"]
 """undetermined: the recordings do not excite the parameter enough to say anything of its course."""
-
-
 Growth = Literal["", "growing", "shrinking"]
 """Of the size of a cause; empty where it is steady or unknown."""
 _MANY, _LONG = 10, 28 * DAY

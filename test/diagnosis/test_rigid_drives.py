@@ -45,7 +45,7 @@ def cogging_record(seed):
 
 
 @pytest.mark.parametrize("seed", range(1, 7))
-def test_cogging_is_guessed_as_sharply_as_the_travel_tells(seed):
+def test_cogging_is_guessed_as_sharply_as_the_travel_resolves(seed):
     """Lines of 1/8 cycle were a hundredth off: a whole period over a hundred turns, and no fit found it."""
     rig, record = cogging_record(seed)
     case = case_from(record, rig)

@@ -46,11 +46,11 @@ def test_a_map_that_fits_no_recording_is_refused(run, tmp_path, folder):
 def test_a_joint_without_a_recording_is_named(run):
     status, out, _ = run(MAP)
     assert status == 0
-    assert "no recording of hip: no path ends as its bags: hip/*" in out
+    assert "no recording of hip: no path matches its bags: hip/*" in out
 
 
 def test_a_recording_of_no_joint_is_named(run, folder):
-    other = next(iter(sorted(folder.iterdir())))
+    other = min(folder.iterdir())
     _, out, _ = run(f"joints:\n  knee: {{rig: paper_high_impedance, bags: '{other.name}'}}\n")
     assert any(line.startswith("of no joint: ") and line.endswith(" and others") for line in out)
 
@@ -64,7 +64,7 @@ def test_rows_without_a_date_say_what_they_lack(run, monkeypatch):
     monkeypatch.setattr(task, "work", undated)
     _, out, _ = run(MAP)
     assert out[0].endswith("without a date")
-    assert any("state as “date” in the map" in line for line in out)
+    assert any("state in the map, as “date”" in line for line in out)
 
 
 def test_a_missing_list_is_named_once(run, tmp_path):
@@ -90,4 +90,4 @@ def test_a_signal_says_how_many_recordings_are_left(folder, tmp_path, monkeypatc
     with pytest.raises(Stopped) as caught:
         _fleet_run.write_rows(args, str(tmp_path / "new"), held)
     total = 2 * len(held)
-    assert caught.value.note == f"{total - 2} of {total} recordings are left, the same line goes on"
+    assert caught.value.note == f"{total - 2} of {total} recordings are left, run the same line again"

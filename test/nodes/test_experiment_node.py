@@ -40,54 +40,6 @@ def ask(listener):
     return lambda name: listener.call(f"/rsea/experiment/{name}")
 
 
-def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(bench, start, listener, ask, tmp_path):
-    commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
-    health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
-    plant = start("plant", rig=bench / "bench.yaml")
-    out = tmp_path / "out"
-    node = start(
-        "experiment", rig=RIG, bag=bench / "slow.mcap", causes="current_loop_lag", limits=f"torque={LIMIT}",
-        longest=4.0, out=out,
-    )  # fmt: skip
-
-    def says(text):
-        return any(text in s.message for m in health for s in m.status if "experiment" in s.name)
-
-    listener.until(lambda: says("waits for ~/approve") or not node.is_running())
-    assert node.is_running() and not commands, node.output
-    assert ask("approve").success
-    listener.until(lambda: sum(m.effort[0] != 0.0 for m in commands) > 60)
-    assert ask("cancel").success
-    listener.until(lambda: not node.is_running())
-    assert node.wait() == 0, node.output
-    efforts = np.array([m.effort[0] for m in commands])
-    ends = np.flatnonzero(efforts)[-1]
-    assert np.all(np.abs(efforts) <= LIMIT) and len(efforts) - ends > 3
-    last = np.abs(efforts[ends - 20 : ends + 1])
-    assert np.all(np.diff(last) <= 0.0) and last[-1] < 0.05 * max(last[0], 0.1)  # softly
-    said = json.loads((out / "experiment.json").read_text(encoding="utf-8"))
-    assert said["end"] == "broken" and "cancel" in said["why"] and said["seconds"] == 0.0
-    assert not list(out.glob("run-*"))
-    plant.kill()
-
-
-@pytest.mark.parametrize("name", ["run-2.mcap", "experiment.json"])
-def test_a_folder_with_another_session_is_refused_before_a_run(bench, start, name, tmp_path):
-    (tmp_path / name).write_text("earlier", encoding="utf-8")
-    values = {"causes": "current_loop_lag", "limits": f"torque={LIMIT}", "ask": False, "out": tmp_path}
-    node = start("experiment", rig=RIG, bag=bench / "slow.mcap", **values)
-    status, said = node.wait(), "\n".join(node.output)
-    assert status == 2 and f"{name}: exists already" in said, said
-    assert "proposed" not in said
-
-
-def test_excite_plays_the_file_of_a_run(tmp_path):
-    command = command_of(Shape("multisine", 4.0), 0.5, RATE)
-    (tmp_path / "run.csv").write_text(run_text(command, RATE), encoding="utf-8")
-    played, rate = plan({"file": str(tmp_path / "run.csv")})
-    assert played == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)
-
-
 @pytest.fixture
 def session(bench, start, listener, tmp_path):
     """A function that starts a plant and a node that asks; the plant ends with the test."""
@@ -116,9 +68,9 @@ def session(bench, start, listener, tmp_path):
         plant.kill()
 
 
-def told(session):
-    """Return what a session left."""
-    return json.loads((session.out / "experiment.json").read_text(encoding="utf-8"))
+def told(out):
+    """Return what a session left in a folder."""
+    return json.loads((out / "experiment.json").read_text(encoding="utf-8"))
 
 
 def until_it_plays(listener, session):
@@ -126,11 +78,47 @@ def until_it_plays(listener, session):
     listener.until(lambda: sum(m.effort[0] != 0.0 for m in session.commands) > 60)
 
 
+def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(session, ask, listener):
+    asked = session(longest=4.0)
+    commands = asked.commands
+    assert not commands, asked.node.output
+    assert ask("approve").success
+    until_it_plays(listener, asked)
+    assert ask("cancel").success
+    listener.until(lambda: not asked.node.is_running())
+    assert asked.node.wait() == 0, asked.node.output
+    efforts = np.array([m.effort[0] for m in commands])
+    ends = np.flatnonzero(efforts)[-1]
+    assert np.all(np.abs(efforts) <= LIMIT) and len(efforts) - ends > 3
+    last = np.abs(efforts[ends - 20 : ends + 1])
+    assert np.all(np.diff(last) <= 0.0) and last[-1] < 0.05 * max(last[0], 0.1)  # softly
+    said = told(asked.out)
+    assert said["end"] == "broken" and "cancel" in said["why"] and said["seconds"] == 0.0
+    assert not list(asked.out.glob("run-*"))
+
+
+@pytest.mark.parametrize("name", ["run-2.mcap", "experiment.json"])
+def test_a_folder_with_another_session_is_refused_before_a_run(bench, start, name, tmp_path):
+    (tmp_path / name).write_text("earlier", encoding="utf-8")
+    values = {"causes": "current_loop_lag", "limits": f"torque={LIMIT}", "ask": False, "out": tmp_path}
+    node = start("experiment", rig=RIG, bag=bench / "slow.mcap", **values)
+    status, said = node.wait(), "\n".join(node.output)
+    assert status == 2 and f"{name}: exists already" in said, said
+    assert "proposed" not in said
+
+
+def test_excite_plays_the_file_of_a_run(tmp_path):
+    command = command_of(Shape("multisine", 4.0), 0.5, RATE)
+    (tmp_path / "run.csv").write_text(run_text(command, RATE), encoding="utf-8")
+    played, rate = plan({"file": str(tmp_path / "run.csv")})
+    assert played == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)
+
+
 def test_a_run_that_is_declined_is_not_played(session, ask):
     asked = session()
     assert ask("decline").success
     assert asked.node.wait() == 0, asked.node.output
-    said = told(asked)
+    said = told(asked.out)
     assert said["end"] == "declined" and said["seconds"] == 0.0 and not asked.commands
 
 
@@ -151,7 +139,7 @@ def test_a_bench_that_dies_in_the_middle_of_a_run_ends_the_session_and_teaches_n
     until_it_plays(listener, asked)
     asked.plant.kill()
     assert asked.node.wait() == 0, asked.node.output
-    said = told(asked)
+    said = told(asked.out)
     late = "commands came too late" in said["why"]  # a loaded machine says this first
     assert said["end"] == "broken" and ("no measurement" in said["why"] or late) and said["seconds"] == 0.0
     listener.until(lambda: asked.commands[-1].effort[0] == 0.0)
@@ -164,9 +152,9 @@ def test_a_session_continues_with_its_runs(session, ask, bench, start, listener,
     run = first.out / "run-1.mcap"
     listener.until(lambda: run.is_file() or not first.node.is_running())
     assert first.node.wait() == 0, first.node.output
-    assert told(first)["end"] == "confirmed"
+    assert told(first.out)["end"] == "confirmed"
     values = {"causes": "current_loop_lag", "limits": f"torque={LIMIT}", "out": tmp_path / "again"}
     again = start("experiment", rig=RIG, bag=f"{bench / 'slow.mcap'},{run}", **values)
     assert again.wait() == 0, again.output
-    said = json.loads((tmp_path / "again" / "experiment.json").read_text(encoding="utf-8"))
+    said = told(tmp_path / "again")
     assert said["end"] == "confirmed" and said["seconds"] == 0.0

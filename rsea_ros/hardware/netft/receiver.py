@@ -111,7 +111,7 @@ class DatagramReceiver:
         """Drain the socket between calls, and repeat the request when nothing comes."""
         asked = time.monotonic()
         while not self._stop.is_set():
-            time.sleep(PAUSE)  # by the steady clock, as a wait of Python 3.10 for the event would not be
+            time.sleep(PAUSE)  # by the steady clock, unlike a wait for the event in Python 3.10
             self.drain()
             if time.monotonic() - max(asked, self._heard) > ASK_AGAIN:
                 self.send(STREAM)

@@ -14,7 +14,7 @@ from rsea_ros.signals import UNITS
 from rsea_ros.units import in_motion
 
 _END = 0.99
-"""Share of the upper bound from which a value stands for an endless one."""
+"""Share of the upper bound from which a value stands for infinity."""
 
 
 def times_noise(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
@@ -68,8 +68,7 @@ def rms_change(diagnosis: Diagnosis, channel: str) -> str:
 def sizes(cause: Cause) -> dict[str, CauseParameter]:
     """Return the parameters that say how large a cause is.
 
-    One at the endless value at which it does nothing is left out: a drift that is a straight line has no time
-    constant.
+    One that would be infinite is left out: a drift that is a straight line has no time constant.
     """
     effect = catalogue().get(cause.name)
     ends = {p.name: p.high for p in effect.parameters if p.optional and math.isinf(p.null)} if effect else {}

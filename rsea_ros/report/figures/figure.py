@@ -15,6 +15,7 @@ from rsea_ros.signals import FloatArray
 Json = dict[str, Any]
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 _DIGITS, _MOST_DIGITS = 5, 15
+"""Significant digits of a number, at least and at most: a double has 15."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,9 @@ class Figure:
 
 
 def numbers(values: FloatArray, step: float = 0.0) -> list[float | None]:
-    """Return values for JSON: five significant digits, None where not finite.
+    """Return values for JSON: at least five significant digits, None where not finite.
 
-    step: resolution that they keep at least, in their unit, where they are close to each other; 0 for none.
+    step: resolution to keep, in the unit of the values, where they are close to each other; 0 for none.
     """
     decimals = math.ceil(-math.log10(step)) if step > 0.0 else 0
     return [_short(float(v), decimals) if np.isfinite(v) else None for v in np.asarray(values, dtype=float)]

@@ -10,7 +10,7 @@ from rsea_ros.trends.weeks import Steps
 _MOST = 6
 """Months that find room on a phone."""
 _BEGIN, _END = 6.0, 96.0
-"""Percent of the width: a name before the one begins at its place, one behind the other has no room."""
+"""Percent of the width: a name before _BEGIN starts at its place, one behind _END has no room."""
 _STRIDES = (1, 2, 3, 6, 12, 24, 60, 120)
 
 

@@ -12,8 +12,6 @@ from rsea_ros.trends.settings import DAY
 from rsea_ros.trends.weeks import Steps
 
 _DAY = "%-d %b\n%Y"
-
-
 _FEW = 14
 """Days up to which each has its name: plotly would name their hours."""
 

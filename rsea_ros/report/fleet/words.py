@@ -99,7 +99,8 @@ def sentence(alarm: Alarm) -> str:
     if alarm.kind == "outlier":
         side = "above" if alarm.relative > 0.0 else "below"
         return f"{subject(alarm.about)} is {amount(alarm.relative)} {side} the median of the fleet"
-    since = f"since {day(alarm.since_s)}" if not alarm.from_first else "since the first recording"
+    start = "the first recording" if alarm.from_first else day(alarm.since_s)
+    since = f"since {start}"
     if alarm.kind == "fault":
         return f"{_plain(alarm.about)} in the data {since}"
     if alarm.kind == "cause":
@@ -108,8 +109,7 @@ def sentence(alarm: Alarm) -> str:
     if alarm.kind == "trend":
         way = "rising" if up else "falling"
         return f"{subject(alarm.about)} has been {way} {since}: {percent(alarm.relative)} so far"
-    from_on = f"from {day(alarm.since_s)} on" if not alarm.from_first else "from the first recording on"
-    return f"{subject(alarm.about)} {'rose' if up else 'fell'} by {amount(alarm.relative)} {from_on}"
+    return f"{subject(alarm.about)} {'rose' if up else 'fell'} by {amount(alarm.relative)} from {start} on"
 
 
 def cause_name(cause: Alarm | Appearance) -> str:
@@ -119,10 +119,10 @@ def cause_name(cause: Alarm | Appearance) -> str:
 
 def beginning(cause: Alarm | Appearance) -> str:
     """Return since when a joint has a cause, and whether it grows."""
-    growth = f"{cause.growth} " if cause.growth else ""
+    growth = cause.growth
     if cause.from_first:
-        return f"from the first recording on{', ' if growth else ''}{growth}".rstrip()
-    return f"appeared about {day(cause.since_s)}{' and is ' if growth else ''}{growth}".rstrip()
+        return f"from the first recording on{f', {growth}' if growth else ''}"
+    return f"appeared about {day(cause.since_s)}{f' and is {growth}' if growth else ''}"
 
 
 def size_now(cause: Alarm | Appearance) -> str:
