@@ -119,8 +119,8 @@ def break_tie(
 
     The best is the likeliest, the cost of leaving known values included. The simplest is accepted of all that
     are neither surely and materially worse, nor so far from known values that keeping them pays for the
-    best's unknowns; of equals, the likeliest, each unknown paid for (an optional one, as the time in which a drift
-    settles, does not count in `size`).
+    best's unknowns; of equals, the likeliest, each unknown paid for (an optional one, as the time in which
+    a drift settles, does not count in `size`).
     """
     if not models:
         return None, ()
