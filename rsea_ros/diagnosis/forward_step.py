@@ -61,15 +61,17 @@ class ForwardStep:
             models += self.fits.fit_all(overlooked)
         if self.fits.is_far and all(self._is_far(m) for m in self._acceptable(models)):
             models += self.fits.on_measured_angle()
-        chosen, equals = self._choose(self._acceptable(models) or self._pairs(finalists))
+        contenders = self._acceptable(models) or self._pairs(finalists)
+        chosen, equals = self._choose(contenders)
         if chosen is not None and any(m is chosen for m in models):
             undecided = self.fits.nearly_as_good(_others(close, finalists), chosen)
             finalists += undecided
             models += self.fits.fit_all(undecided)
-            chosen, equals = self._choose(self._acceptable(models))
+            contenders = self._acceptable(models)
+            chosen, equals = self._choose(contenders)
         if chosen is not None and is_off_rig(chosen.solution):
-            nearer = self._pairs_nearer_the_rig(chosen, close)
-            chosen, equals = self._choose([*self._acceptable(models), *nearer])
+            contenders += self._pairs_nearer_the_rig(chosen, close)
+            chosen, equals = self._choose(contenders)
         trials = [self._far_behind(s) for s in _others(screened, finalists)]
         trials += [self._refusal(m, chosen) for m in models if m is not chosen]
         return StepResult(chosen, trials, equals)
@@ -124,9 +126,7 @@ class ForwardStep:
             return []
         return self._pairs_beside([self.fits.with_typical(first.effect) for first in firsts])
 
-    def _pairs_nearer_the_rig(
-        self, chosen: Candidate, close: Sequence[ScreenedEffect]
-    ) -> list[Candidate]:
+    def _pairs_nearer_the_rig(self, chosen: Candidate, close: Sequence[ScreenedEffect]) -> list[Candidate]:
         """Return acceptable models with two more effects, the first of which leaves the rig's values less.
 
         Where two effects are missing, a third may fit as well alone, but only far from the rig.
