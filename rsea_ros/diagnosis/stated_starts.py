@@ -1,8 +1,8 @@
 """Starts of an effect's fit at the values that the rig states.
 
 A fit without the missing effect may carry a value far from the rig's, to imitate it: a lag of the motor's
-current becomes a damping of a hundred times the rotor's. A fit of the right effect that begins there can end
-in a poor minimum. From the stated values it does not.
+current becomes sixteen times the rotor's damping. A fit of the right effect that begins there can end in a
+poor minimum, where one that begins at the stated values does not.
 """
 
 from __future__ import annotations
