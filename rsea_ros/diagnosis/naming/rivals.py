@@ -33,6 +33,7 @@ from rsea_ros.diagnosis.naming.evidence import Claim
 from rsea_ros.diagnosis.score import Score, tempered_loss
 from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.diagnosis.stated_starts import is_off_rig
 from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
 
@@ -71,15 +72,17 @@ def weigh(
 ) -> Contest:
     """Return a contest of a claim with the effects tried beside the same model, or as good in its place.
 
-    Another cause that was accepted too is no rival, whichever of the two came first.
+    Another cause that was accepted too is no rival, whichever of the two came first. Where the accepted model
+    itself is far from the rig, the rig is doubtful: its values decide between no two causes.
     """
     accepted, settings = selection.last.causes, selection.last.settings
     rule = settings.evidence
     tried = [t for t in tried if t.name == claim.name or t.name not in accepted]
-    scores, weights = _race(tried, held_out, pools, settings)
+    trust = 0.0 if is_off_rig(selection.last.solution) else 1.0
+    scores, weights = _race(tried, held_out, pools, settings, trust)
     if sum(w >= rule.close_weight for w in weights) > 1:
         tried = _with_close_ones_fitted(tried, weights, selection, pools)
-        scores, weights = _race(tried, held_out, pools, settings)
+        scores, weights = _race(tried, held_out, pools, settings, trust)
     weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
         Claim(t.name, t.problem, t.theta, s, held_out.score_of(t.beside), weight_of[t.name])
@@ -89,7 +92,7 @@ def weigh(
     swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(accepted)]
     models = [selection.last, *swapped]
     tested = [held_out.score_of(m) for m in models]
-    priors, lengths = [m.prior_cost for m in models], [m.size for m in models]
+    priors, lengths = [trust * m.prior_cost for m in models], [m.size for m in models]
     among_swapped = _stack(tested, priors, lengths, settings)
     among_tried = weight_of.get(claim.name, 1.0)
     for model, with_it, weight in zip(swapped, tested[1:], among_swapped[1:], strict=True):
@@ -102,11 +105,11 @@ def weigh(
 
 
 def _race(
-    tried: Sequence[Trial], held_out: HeldOut, pools: Pools, settings: DiagnosisSettings
+    tried: Sequence[Trial], held_out: HeldOut, pools: Pools, settings: DiagnosisSettings, trust: float
 ) -> tuple[list[Score], list[float]]:
-    """Return the scores of trials and their weights."""
+    """Return the scores of trials and their weights. trust: share of the priors' cost that counts."""
     scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), tried))
-    priors = [prior_cost(t.problem, t.theta) for t in tried]
+    priors = [trust * prior_cost(t.problem, t.theta) for t in tried]
     return scores, _stack(scores, priors, [effect_size(t.name) for t in tried], settings)
 
 
