@@ -26,7 +26,7 @@ class Commanded(Driven):
 
     def __init__(self, bench, listener, name, begin):
         super().__init__(bench, listener, name, begin, {"autostart": True})
-        self.torque, self._over = 10.0, threading.Event()
+        self.torque, self.children, self._over = 10.0, (), threading.Event()
         self._thread = threading.Thread(target=self._command, daemon=True)
         self._thread.start()
 
@@ -46,7 +46,10 @@ class Commanded(Driven):
         return None if fault in (None, "none") else fault
 
     def ready(self):
-        """Wait until the motor has all of its torque and no fault is latched."""
+        """Wait until the motor has all of its torque and no fault is latched; find the driver's processes.
+
+        A search for them takes ten cycles on a busy machine, and the fault is to come at once.
+        """
         self.torque = 10.0
 
         def drive():
@@ -56,6 +59,8 @@ class Commanded(Driven):
             return self.goal() == (self.counts(10.0), True) and not self.latched()
 
         self._listener.until(drive)
+        found = subprocess.run(["pgrep", "-P", str(self.process.pid)], capture_output=True, text=True)
+        self.children = tuple(int(pid) for pid in found.stdout.split())
 
     def clear(self):
         """Clear the fault, by a reboot where that is necessary; return the answers."""
@@ -64,11 +69,6 @@ class Commanded(Driven):
             answers.append(self.trigger("reboot"))
         self._health.clear()
         return answers
-
-    def children(self):
-        """The processes that the driver has started."""
-        process_list = subprocess.run(["pgrep", "-P", str(self.process.pid)], capture_output=True, text=True)
-        return [int(pid) for pid in process_list.stdout.split()]
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,7 @@ def silence(wire):
 
 
 def kill_supervisor(wire):
-    for pid in wire.children():
+    for pid in wire.children:
         os.kill(pid, signal.SIGKILL)
 
 
