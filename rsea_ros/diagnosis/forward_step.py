@@ -7,7 +7,8 @@ measured rotor angle, then two at once. Two at once are also tried where the bes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -18,10 +19,10 @@ from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.screening import ScreenedEffect
 from rsea_ros.diagnosis.selection import Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.stated_starts import is_off_rig
 from rsea_ros.diagnosis.step_fits import StepFits
 from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
+from rsea_ros.identification.off_rig import is_off_rig
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.workers import Pools
 from rsea_ros.progress import Progress
@@ -124,27 +125,28 @@ class ForwardStep:
         """Return acceptable models with two more effects, for where none helps alone and much is left."""
         if not self.fits.is_far:
             return []
-        return self._pairs_beside([self.fits.with_typical(first.effect) for first in firsts])
+        return self._pairs_beside(firsts, self.fits.with_typical)
 
     def _pairs_nearer_the_rig(self, chosen: Candidate, close: Sequence[ScreenedEffect]) -> list[Candidate]:
         """Return acceptable models with two more effects, the first of which leaves the rig's values less.
 
         Where two effects are missing, a third may fit as well alone, but only far from the rig.
         """
-        rule, fits = self.settings.forward, self.fits
-        firsts = [fits.fitted(s) for s in close if s.cost < rule.clear * fits.on_pieces.cost]
-        costs = [prior_cost(s.problem, s.theta) for s in firsts]
-        ranked = sorted(zip(costs, range(len(firsts)), strict=True))
-        return self._pairs_beside([firsts[k] for cost, k in ranked if cost < rule.nearer * chosen.prior_cost])
+        rule, most = self.settings.forward, self.settings.forward.clear * self.fits.on_pieces.cost
+        away = {s.name: prior_cost(s.problem, s.theta) for s in close if s.cost < most}
+        nearer = [s for s in close if away.get(s.name, math.inf) < rule.nearer * chosen.prior_cost]
+        return self._pairs_beside(sorted(nearer, key=lambda s: away[s.name]), self.fits.with_fitted)
 
-    def _pairs_beside(self, firsts: Sequence[Solution]) -> list[Candidate]:
-        """Return acceptable models with an effect beside each of the solutions on pieces."""
+    def _pairs_beside(
+        self, firsts: Sequence[ScreenedEffect], with_first: Callable[[ScreenedEffect], Solution]
+    ) -> list[Candidate]:
+        """Return acceptable models with an effect beside one of the first. with_first: on the pieces."""
         rule, fits = self.settings.forward, self.fits
         if len(self.current.causes) > rule.causes_beside_a_pair:
             return []
         pairs: list[ScreenedEffect] = []
         for first in firsts[: rule.paired]:
-            pairs += fits.fit_pieces(fits.screen(first)[: rule.paired])
+            pairs += fits.fit_pieces(fits.screen(with_first(first))[: rule.paired])
         promising = sorted(
             (p for p in pairs if p.cost < rule.hope_two * fits.on_pieces.cost), key=lambda p: p.cost
         )

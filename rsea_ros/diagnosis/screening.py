@@ -20,7 +20,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns, power, solve
-from rsea_ros.identification.unknowns import start_vector
+from rsea_ros.identification.unknowns import start_vector, theta_with
 from rsea_ros.signals import FloatArray
 
 _DAMPING = 1e-6
@@ -121,10 +121,7 @@ def continue_fit(screened: ScreenedEffect, rule: ForwardSettings) -> ScreenedEff
 
 def with_values(current: Solution, values: Mapping[str, float]) -> Solution:
     """Return a solution with some of its unknowns at other values; itself when none of them differs."""
-    theta = current.theta.copy()
-    for i, unknown in enumerate(current.problem.unknowns):
-        if unknown.name in values:
-            theta[i] = unknown.inner(values[unknown.name])
+    theta = theta_with(current.problem.unknowns, current.theta, values)
     return current if (theta == current.theta).all() else replace(current, theta=theta)
 
 

@@ -28,12 +28,13 @@ from rsea_ros.diagnosis.problem_variants import (
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.screening import ScreenedEffect, best_guess, continue_fit, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.stated_starts import is_off_rig, stated_starts
+from rsea_ros.diagnosis.stated_starts import stated_starts
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
 from rsea_ros.identification.alternatives import add_effect
+from rsea_ros.identification.off_rig import is_off_rig
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, power, solve
 from rsea_ros.identification.unknowns import apply, idle, start_vector, unknowns_of_effect
@@ -99,12 +100,12 @@ class StepFits:
             screened = list(self.pools.fits.map(lambda s: continue_fit(s, rule), screened))
         return sorted(screened, key=lambda s: s.cost)
 
-    def with_typical(self, effect: Effect) -> Solution:
+    def with_typical(self, screened: ScreenedEffect) -> Solution:
         """Return the current model on the pieces with an effect of typical size, not fitted."""
-        base = self.on_pieces
+        base, effect = self.on_pieces, screened.effect
         return solve(*add_effect(base.problem, base.theta, effect, dict(effect.typical)), iterations=0)
 
-    def fitted(self, screened: ScreenedEffect) -> Solution:
+    def with_fitted(self, screened: ScreenedEffect) -> Solution:
         """Return the model on the pieces with an effect as fitted so far."""
         return solve(screened.problem, screened.theta, iterations=0)
 

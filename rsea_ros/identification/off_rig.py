@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from rsea_ros.identification.determined import IDENTIFIABLE_SHARE
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import CLOCKS, ParameterEstimate
+from rsea_ros.identification.solver import Solution
 
 FAR = 3.0
 """Stated spreads of a value: one right rig in 400 lies further off by chance."""
@@ -15,6 +16,13 @@ FAR = 3.0
 def is_off(spreads: float, told_by_data: float) -> bool:
     """Return whether a value is surely not the rig's: far from it, and determined by the data."""
     return abs(spreads) > FAR and told_by_data >= IDENTIFIABLE_SHARE
+
+
+def is_off_rig(solution: Solution) -> bool:
+    """Return whether a fit has taken some value of the rig that far, determined by the data or not."""
+    stated = solution.problem.rig.free()
+    unknowns = zip(solution.problem.unknowns, solution.theta, strict=True)
+    return any(u.name in stated and u.sigmas(float(t)) > FAR for u, t in unknowns)
 
 
 def off_rig(parameters: Iterable[ParameterEstimate]) -> tuple[Remark, ...]:

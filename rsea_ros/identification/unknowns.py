@@ -217,6 +217,14 @@ def vector_of(unknowns: Sequence[Unknown], rig: Rig) -> FloatArray:
     return np.array([u.inner(values.get(u.name, u.start)) for u in unknowns])
 
 
+def theta_with(
+    unknowns: Sequence[Unknown], theta: FloatArray, values: Mapping[str, float]
+) -> FloatArray:
+    """Return theta with other values (SI) of the unknowns that are named."""
+    coordinates = zip(unknowns, theta, strict=True)
+    return np.array([u.inner(values[u.name]) if u.name in values else float(t) for u, t in coordinates])
+
+
 def with_effect(rig: Rig, name: str, parameters: Mapping[str, float]) -> Rig:
     """Return the rig with one more effect acting."""
     effect_named(name).vector(parameters)

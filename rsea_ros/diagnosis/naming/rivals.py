@@ -33,7 +33,7 @@ from rsea_ros.diagnosis.naming.evidence import Claim
 from rsea_ros.diagnosis.score import Score, tempered_loss
 from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.diagnosis.stated_starts import is_off_rig
+from rsea_ros.identification.off_rig import is_off_rig
 from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
 
