@@ -53,7 +53,6 @@ from rsea_ros.records.record import FloatArray
 
 ROTOR = "rotor.reflected_inertia"
 
-__all__ = ["BEYOND", "NOTHING", "PURE", "ErrorFlag", "ErrorSettings", "edge_of"]
 
 VERDICTS = ("no torque", "pure", "beyond")
 """In the order of NOTHING, PURE, BEYOND."""
