@@ -7,13 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from msg_adapters.bags import BagPath, read_contents
+from msg_adapters.bags import (
+    BagPath,
+    FieldSamples,
+    check_finite,
+    note_repeats,
+    on_the_clock_of_the_command,
+    read_contents,
+)
 from msg_adapters.cdr import Block
-from msg_adapters.checks import FieldSamples, check_finite, note_repeats, on_the_clock_of_the_command
 from msg_adapters.contents import Contents, Messages
-from msg_adapters.decoding import Decoded
-from msg_adapters.inferred import is_inferred
-from msg_adapters.reported_faults import DIAGNOSTICS, tell_health
+from msg_adapters.decoding import DIAGNOSTICS, Decoded, is_inferred, tell_health
 from msg_adapters.topic_map import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.documents.wording import brief, did_you_mean
 from rsea_ros.errors import BagError
@@ -40,7 +44,7 @@ def read_record(
     Samples out of order are sorted by their stamps. Damaged messages are left out. The record's faults list
     all damage, and the faults in the bag's /diagnostics.
     strict: refuse records to which no model can be fitted (missing command or measurement, NaN in the
-    command), and correct the stamps (rsea_ros/records/stamps.py). Otherwise gaps, jumps of the clock and repeats are
+    command), and correct the stamps (records/stamps.py). Otherwise gaps, jumps of the clock and repeats are
     returned unchanged, as NaN of a measurement always is.
     Raises BagError with file, topic, field, value and expectation.
     """
