@@ -66,15 +66,15 @@ class Decoded:
 
     def tell_empty(self, topic: str, report: Contents) -> None:
         """Report a field that some messages leave empty although they have the other fields."""
-        for field, filled in self.filled.items():
+        for name, filled in self.filled.items():
             beside = [
-                other for name, other in self.filled.items() if name != field and (other & filled).any()
+                other for key, other in self.filled.items() if key != name and (other & filled).any()
             ]
             lacking = np.zeros(len(filled), bool)
             for other in beside:
                 lacking |= other & ~filled
             if count := int(lacking.sum()):
-                detail = f"{field} is empty, first in message {int(np.argmax(lacking))}"
+                detail = f"{name} is empty, first in message {int(np.argmax(lacking))}"
                 report.tell("empty_fields", topic, detail, count, "messages", count / len(filled))
 
 

@@ -8,9 +8,9 @@ import pkgutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
+from pathlib import Path
 from types import MappingProxyType
 
-import rsea_ros.effects as package
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import ParameterError
@@ -71,5 +71,5 @@ def look_alikes(name: str, effects: Iterable[Effect]) -> list[Effect]:
 
 @lru_cache(maxsize=1)
 def _own_names() -> frozenset[str]:
-    names = (m.name for m in pkgutil.iter_modules(package.__path__))
+    names = (m.name for m in pkgutil.iter_modules([str(Path(__file__).parent)]))
     return frozenset(n for n in names if n not in _NOT_EFFECTS and not n.startswith("_"))

@@ -1,4 +1,4 @@
-"""What a result replaces lies aside in a locked folder until all names stand; a crash's leftovers are put back.
+"""What a result replaces lies aside in a locked folder until all stands; a crash's leftovers are put back.
 
 A file lies under its name in a locked folder beside its destination. A killed writer leaves it there; the
 next run on the same place puts it back.
