@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 DOOR = {
     "DiagnosisSettings": "diagnosis.settings",
     "Observer": "model.observer.observer",
-    "Record": "signals",
+    "Record": "records.record",
     "Rig": "model.rig",
     "RseaError": "errors",
     "TorqueController": "control.controller",

@@ -8,51 +8,19 @@ from pathlib import Path
 import pytest
 from import_graph import MODULES, ROOT, imports, name_of
 
-YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-STAMPS = {
-    "coarse_clock", "coverage", "held_commands", "held_samples", "lost_commands", "mixed_rows", "stamps",
-    "stamp_gaps", "stamp_order", "torque_edge",
-}  # fmt: skip
-FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "spectra", "version"} | STAMPS
-BASE = FACTS | {"progress", "setting", "wording", "plugins"} | FILES | YAML
+BASE = {"errors", "records", "documents", "outputs", "plugins", "processes", "progress", "version"}
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 AROUND = {"laws", "experiment", "health", "trends", "exports"}
 OWN = {
     "errors": set(),
-    "signals": {"errors", "arrays"},
-    "spectra": {"signals"},
-    "coarse_clock": {"signals"},
-    "coverage": {"signals"},
-    "held_commands": {"signals", "lost_commands"},
-    "lost_commands": {"signals"},
-    "held_samples": {"signals"},
-    "mixed_rows": {"signals"},
-    "stamps": {"errors", "signals", *(STAMPS - {"stamps"})},
-    "stamp_gaps": {"signals", "stamp_order"},
-    "stamp_order": {"signals"},
-    "torque_edge": {"signals"},
-    "fault_kinds": set(),
-    "fast_length": set(),
-    "normal": set(),
     "progress": set(),
-    "setting": set(),
-    "wording": set(),
     "version": set(),
-    "plugins": {"errors"},
-    "interrupts": set(),
     "processes": set(),
-    "locked_folder": set(),
-    "replaced": {"locked_folder"},
-    "files": {"errors", "interrupts", "replaced"},
-    "staging": {"files", "locked_folder", "replaced"},
-    "new_files": {"errors", "files", "interrupts", "replaced", "staging"},
-    "units": set(),
-    "decimal_number": set(),
-    "keys": set(),
-    "checked": {"errors", "units", "wording"},
-    "strict_yaml": {"errors", "decimal_number", "wording"},
-    "compiler": {"compiler_cache"},
+    "compiler": set(),
+    "plugins": {"errors"},
+    "documents": {"errors"},
+    "records": {"errors", "documents"},
+    "outputs": {"errors", "processes"},
     "effects": BASE | {"compiler"},
     "model": BASE | {"effects", "compiler"},
     "identification": BASE | {"effects", "model"},
@@ -64,7 +32,7 @@ OWN = {
     "experiment": BASE | {"effects", "model", "identification", "checks", "diagnosis"},
     "health": BASE | {"effects", "model"},
     "trends": BASE,
-    "fleet": CORE | {"trends", "report", "library", "msg_adapters", "one_thread"},
+    "fleet": CORE | {"trends", "report", "library", "msg_adapters"},
     "exports": BASE | {"effects", "model", "design"},
     "paper": BASE | {"effects", "model", "identification", "design"},
     "watch": BASE,
@@ -72,17 +40,14 @@ OWN = {
     "hardware": BASE,
     "hardware.simulated": BASE | {"model"},
     "msg_adapters": BASE,
-    "arrays": {"errors", "signals", "units"},
-    "one_thread": set(),
     "report": CORE | AROUND | {"paper"},
     "library": CORE | AROUND | {"report", "msg_adapters"},
-    "nodes": CORE | AROUND | {"hardware", "report", "msg_adapters", "one_thread", "watch"},
+    "nodes": CORE | AROUND | {"hardware", "report", "msg_adapters", "watch"},
     "cli": CORE
     | AROUND
-    | {"paper", "hardware", "report", "msg_adapters", "nodes", "one_thread", "fleet", "watch", "benchmark"},
+    | {"paper", "hardware", "report", "msg_adapters", "nodes", "fleet", "watch", "benchmark"},
     "__main__": {"cli"},
     "__init__": CORE | {"library"},
-    "compiler_cache": set(),
 }
 """Layers of this project that a layer may import beside itself."""
 
@@ -100,7 +65,8 @@ MESSAGES = {
     "std_srvs",
 }
 FOREIGN = {
-    "strict_yaml": {"yaml"},
+    "documents": {"yaml"},
+    "records": {"numpy"},
     "compiler": {"numba"},
     "effects": NUMERIC,
     "model": NUMERIC,
@@ -118,20 +84,7 @@ FOREIGN = {
     "paper": NUMERIC,
     "watch": {"tornado"},
     "benchmark": {"numpy"},
-    "signals": {"numpy"},
-    "spectra": {"numpy"},
-    "arrays": {"numpy"},
     "library": {"numpy", "plotly", "rich"},
-    "coarse_clock": {"numpy"},
-    "coverage": {"numpy"},
-    "stamps": {"numpy"},
-    "stamp_gaps": {"numpy"},
-    "held_commands": {"numpy"},
-    "lost_commands": {"numpy"},
-    "held_samples": {"numpy"},
-    "mixed_rows": {"numpy"},
-    "stamp_order": {"numpy"},
-    "torque_edge": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression", "asteval"}
     | {"pyarrow"}
