@@ -83,8 +83,8 @@ def code_lines(text):
             skipped.update(range(node.body[0].lineno, node.body[0].end_lineno + 1))
         elif isinstance(node, (ast.Import, ast.ImportFrom)):
             skipped.update(range(node.lineno, node.end_lineno + 1))
-    lines = enumerate(text.splitlines(), 1)
-    return sum(1 for k, line in lines if k not in skipped and line.strip() and not line.strip().startswith("#"))
+    kept = (line.strip() for k, line in enumerate(text.splitlines(), 1) if k not in skipped)
+    return sum(1 for line in kept if line and not line.startswith("#"))
 
 
 def import_lines(text):
