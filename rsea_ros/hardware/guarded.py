@@ -18,12 +18,13 @@ from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.hardware.together import cycle
 
 BUSY = "clear_fault or reboot is under way, expected it to be over"
+STOPPED = DeviceFault("stopped", detail="the service stop was called")
 
 
 class GuardedDevice:
     """Reads and writes once a cycle; errors become latched faults, never exceptions.
 
-    enabled: whether commands pass. cycles: `failed_reads`, `failed_writes` of the cycles so far.
+    interlock: fault, stop and activity. cycles: `failed_reads`, `failed_writes` of the cycles so far.
     away: whether another thread uses the device for longer than a cycle; cycles then leave it alone.
     lifted: limits that do not apply, of what a simulation does not have.
     spring: turns a measured deflection into a wrench where no sensor measures one; None: no such wrench.
@@ -33,7 +34,7 @@ class GuardedDevice:
         self.device, self.guard = device, Guard(limits, 1.0 / rate)
         self._limits = limits
         self._spring = spring
-        self.enabled = False
+        self.interlock = self.guard.interlock
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
         self.lifted: list[str] = []
@@ -43,8 +44,13 @@ class GuardedDevice:
 
     @property
     def fault(self) -> DeviceFault | None:
-        """The latched fault."""
-        return self.guard.fault
+        """The latched fault, or the stop."""
+        return self.guard.fault or (STOPPED if self.interlock.stopped else None)
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it is active: commands pass unless there is a fault."""
+        return self.interlock.enabled
 
     def open(self, *, unprotected: bool = False) -> None:
         """Open the device; check its protection against a dead host, and that each limit can be applied.
@@ -134,19 +140,28 @@ class GuardedDevice:
         return torque
 
     def enable(self) -> None:
-        """Switch the torque on, at zero. Raises DeviceError while a fault is latched."""
-        if self.guard.fault is not None:
-            raise DeviceError(f"fault {self.guard.fault}, expected clear_fault first")
+        """Switch the torque on, at zero. Raises DeviceError where there is a fault or a stop, or one comes."""
+        asked = self.interlock.number()
+        self.interlock.check()
         with self._turn:
             if self.away:
                 raise DeviceError(BUSY)
-            self.guard.clear()
-            self.device.enable()
-            self.enabled = True
+            self.guard.restart()
+            try:
+                self.device.enable()
+                self.interlock.enable(asked)
+            except DeviceError:
+                with suppress(DeviceError):
+                    self._switch_off()
+                raise
+
+    def stop(self) -> None:
+        """End the torque with the next cycle, until a clear that is called later."""
+        self.interlock.stop()
 
     def disable(self) -> None:
         """Command zero torque and switch it off. The thread that uses the device does it while it is away."""
-        self.enabled = False
+        self.interlock.disable()
         with self._turn:
             self.guard.torque = 0.0
             if not self.away:
@@ -163,17 +178,19 @@ class GuardedDevice:
             self._taring = False
 
     def clear(self) -> bool:
-        """Reconnect if necessary and clear the fault; return whether there was one.
+        """Reconnect if necessary, end fault and stop; return whether there was one.
 
-        Raises DeviceError while its cause is present, checked by a reading.
+        Raises DeviceError while the cause is present, checked by a reading, and for what came meanwhile.
         """
-        if self.guard.fault is None:
+        if self.fault is None:
             return False
+        asked = self.interlock.number()
         self._alone(self._recover)
+        self.interlock.end_stop(asked)
         return True
 
     def reboot(self) -> None:
-        """Restart the actuator; the fault is forgotten, the torque is on as before, at zero.
+        """Restart the actuator; the fault is forgotten, not a stop; the torque is on as before, at zero.
 
         Raises DeviceError, with a fault latched and the torque off, where a reading has a fault all the same.
         """
@@ -234,14 +251,15 @@ class GuardedDevice:
         with self._turn:
             if self.away:
                 raise DeviceError(BUSY)
-            self.away = True
+            self.away, began = True, self.interlock.number()
         try:
             work()
             for losses in self._losses.values():
                 losses.clear()
             if self.enabled:
                 self.device.enable()
-            self.guard.clear()
+            self.guard.restart()
+            self.interlock.end_fault(began)
         finally:
             with self._turn:
                 self.away = False

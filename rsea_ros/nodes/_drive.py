@@ -14,7 +14,7 @@ from rsea_ros.hardware.together import Shared, cycle
 from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
 
-CLOCK_STEP, STOPPED = "clock_step", "stopped"
+CLOCK_STEP = "clock_step"
 
 
 class CommandSource(Protocol):
@@ -64,9 +64,9 @@ class DriverCycle:
                 self._deaf -= 1
 
     def stop(self) -> None:
-        """End the torque with the next cycle, until the fault is cleared; commands so far are forgotten."""
+        """End the torque with the next cycle, until a later clear; commands so far are forgotten."""
         with self.deaf():
-            self.guarded.guard.trip(DeviceFault(STOPPED, detail="the service stop was called"))
+            self.guarded.stop()
 
     def _see_to_the_clock(self, by: int) -> None:
         """Drop the commands from before the system clock was set: nobody knows which are of now.

@@ -152,7 +152,7 @@ class DriverNode(ManagedEntity):
     def close(self) -> None:
         """Zero torque, devices closed, topics removed; also without any."""
         for joint in self.joints:
-            joint.guarded.enabled = False
+            joint.guarded.interlock.disable()
         self._jobs.join(PATIENCE)
         try:
             if self._cycle is not None:
@@ -197,7 +197,7 @@ class DriverNode(ManagedEntity):
     def _halt(self) -> None:
         """End the torque with the next cycle, since the process is to end."""
         for joint in self.joints:
-            joint.guarded.guard.halted = True
+            joint.guarded.interlock.halted = True
 
     def _step(self, stamp: int) -> None:
         """Run a cycle of the devices and publish the readings."""

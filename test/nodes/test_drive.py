@@ -171,7 +171,7 @@ def test_stop_ends_the_torque_until_it_is_cleared(world):
 
 
 def test_a_halt_ends_the_torque_in_the_next_cycle(world):
-    world.guarded.guard.halted = True
+    world.guarded.interlock.halted = True
     assert world.cycles(3, 10.0) == [0.0] * 3
 
 
