@@ -19,6 +19,13 @@ from rsea_ros.hardware.together import cycle
 
 BUSY = "clear_fault or reboot is under way, expected it to be over"
 STOPPED = DeviceFault("stopped", detail="the service stop was called")
+UNOBEYED = {
+    "motor_state", "effort", "velocity", "position", "position_step", "deflection", "ft_torque", "power",
+    "current",
+}  # fmt: skip
+"""Causes after which the motor is switched off: a goal of zero stops one in another mode not at all."""
+STEP = 2.0
+"""Times the velocity limit: a position that changes faster has jumped, the fault `velocity` comes before."""
 
 
 class GuardedDevice:
@@ -32,13 +39,13 @@ class GuardedDevice:
 
     def __init__(self, device: Device, limits: Limits, rate: float, spring: Spring | None = None) -> None:
         self.device, self.guard = device, Guard(limits, 1.0 / rate)
-        self._limits = limits
+        self._limits, self._period = limits, 1.0 / rate
         self._spring = spring
         self.interlock = self.guard.interlock
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
         self.lifted: list[str] = []
-        self._taring = self.away = self._inferred = False
+        self._taring = self.away = self._inferred = self._off_due = False
         self._turn = threading.Lock()
         self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
 
@@ -123,9 +130,30 @@ class GuardedDevice:
         self._losses["read"].take(lost=False)
         if state.acknowledged_late:
             self._losses["write"].take_back()
+        before, self.state = self.state, state
+        latched = self.guard.fault
+        if fault := self._step(before, state):
+            self.guard.trip(fault)
         self.guard.look(state)
-        self.state = state
+        fault = self.guard.fault
+        if state.motor_trouble or (fault is not None and fault is not latched and fault.cause in UNOBEYED):
+            self._off_due = True
         return state
+
+    def _step(self, before: State | None, state: State) -> DeviceFault | None:
+        """Return the fault of a position that has jumped since the reading before."""
+        if before is None:
+            return None
+        time = max(1e-9 * (state.stamp - before.stamp), self._period)
+        step, most = abs(state.position - before.position), STEP * self.guard.limits.velocity * time
+        return DeviceFault("position_step", step, most, "rad", f"in {time:.3g} s") if step > most else None
+
+    def switch_off_if_due(self) -> None:
+        """Switch a motor off that may not obey its goal, after a cycle in which it answered."""
+        if self._off_due:
+            with suppress(DeviceError):
+                self._switch_off()
+                self._off_due = False
 
     def write(self, wanted: float, age: float | None) -> float:
         """Write a torque (N m) within the limits, zero when not enabled; return it. age: see Guard."""
@@ -140,7 +168,7 @@ class GuardedDevice:
         return torque
 
     def enable(self) -> None:
-        """Switch the torque on, at zero. Raises DeviceError where there is a fault or a stop, or one comes."""
+        """Switch the torque on, at zero. Raises DeviceError with a fault or a stop, also one that comes."""
         asked = self.interlock.number()
         self.interlock.check()
         with self._turn:
@@ -212,7 +240,8 @@ class GuardedDevice:
 
     def _check(self) -> None:
         """Raise DeviceError where a reading has a fault, which is latched."""
-        fault = complaint(self.guard.limits, self._patiently())
+        state = self._patiently()
+        fault = self._step(self.state, state) or complaint(self.guard.limits, state)
         if fault is not None:
             self.guard.trip(fault)
             raise DeviceError(f"{fault} is still there, expected it to be over")
@@ -254,6 +283,7 @@ class GuardedDevice:
             self.away, began = True, self.interlock.number()
         try:
             work()
+            self._off_due = False
             for losses in self._losses.values():
                 losses.clear()
             if self.enabled:
