@@ -159,8 +159,11 @@ class GuardedDevice:
         """Write a torque (N m) within the limits, zero when not enabled; return it. age: see Guard."""
         torque = self.guard.allowed_torque(wanted, age if self.enabled and not self._taring else None)
         try:
-            self.device.protection.beat(torque != 0.0)
+            if torque != 0.0:
+                self.device.protection.beat(True)
             self.device.write(torque)
+            if torque == 0.0:
+                self.device.protection.beat(False)
         except DeviceError as error:
             self._count_failure("write", error)
         else:

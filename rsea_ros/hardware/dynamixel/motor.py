@@ -9,7 +9,7 @@ from dataclasses import asdict
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply, PortLost
-from rsea_ros.hardware.dynamixel.bus import Bus
+from rsea_ros.hardware.dynamixel.bus import ALERT, Bus
 from rsea_ros.hardware.dynamixel.control_tables import TABLES, ControlTable, TorqueConstant, error_names
 from rsea_ros.hardware.dynamixel.frames import frame
 from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, own_limits
@@ -22,7 +22,7 @@ from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection, Supervised
 TORQUE_MODE, ACKNOWLEDGE_ALL = 0, 2
 RETURN_DELAY_UNIT = 2e-6
 WATCHDOG_UNIT = 0.02
-WRITE = 0x03
+WRITE, STATUS = 0x03, 0x55
 BOOT_TIME, BOOT_POLL = 5.0, 0.02
 AS_CONFIGURED = "as it was at configure (another one needs cleanup and configure)"
 
@@ -247,9 +247,9 @@ class Motor:
     def _supervise(self) -> None:
         """Start a supervisor for a motor without a watchdog, and a new one for one that is dead."""
         if isinstance(self.protection, Supervised):
-            self.protection.guard(
-                self.port.descriptor, stop_frames(self.control_table, self._settings.identity)
-            )
+            identity = self._settings.identity
+            replies = [frame(identity, bytes([STATUS, error])) for error in (0, ALERT)]
+            self.protection.guard(self.port.descriptor, stop_frames(self.control_table, identity), replies)
 
 
 def stop_frames(table: ControlTable, identity: int) -> list[bytes]:

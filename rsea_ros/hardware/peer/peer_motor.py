@@ -34,8 +34,8 @@ class Mechanism(Protocol):
 class EmulatedMotor:
     """One motor. torque_constant: N m at the output per A, 0: its model's. origin: counts at 0 rad.
 
-    history: every write to it, as (clock in ns, `acting_goal`, whether torque is on), the newest `kept`; in
-    other modes than that of torque, where no write makes the torque, also each turn of the bench.
+    history: every write to it, as (clock in ns, `acting_goal`, whether torque is on), the newest `kept`; also
+    where a torque begins or ends by itself, in other modes than that of torque.
     """
 
     def __init__(
@@ -87,7 +87,9 @@ class EmulatedMotor:
             self.put("goal", 0)
             self._act(now)
         elif self.get("mode") != TORQUE_MODE and self.get("torque_enable"):
-            self._act(now)
+            self._plant.write(self.torque())
+            if not self.history or (self.history[-1][1] != 0) != (self.acting_goal() != 0):
+                self._act(now)
 
     def hold(self, now: int) -> None:
         """Begin in another mode, as after power-on: at rest, where it stands."""
