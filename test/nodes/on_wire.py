@@ -15,7 +15,10 @@ from rsea_ros.nodes._qos import COMMAND
 from test.nodes.stalls import every, is_stall
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENT = {"rate": 100.0, "latency": 0.1, "ft_timeout": 0.5, "command_timeout": 5.0, "autostart": True}
+PATIENT = {
+    "rate": 100.0, "latency": 0.1, "ft_timeout": 0.5, "command_timeout": 5.0, "autostart": True,
+    "resume": True,
+}  # fmt: skip
 """A machine that is busy with other tests must not look like a fault."""
 WAIT = 55.0
 """s for what normally takes one: the driver starts and compiles beside other tests."""

@@ -25,7 +25,7 @@ class Commanded(Driven):
     """A driver that a thread commands at 280 Hz. torque: N m; None: nothing."""
 
     def __init__(self, bench, listener, name, begin):
-        super().__init__(bench, listener, name, begin, {"autostart": True})
+        super().__init__(bench, listener, name, begin, {"autostart": True, "resume": True})
         self.torque, self.children, self._over = 10.0, (), threading.Event()
         self._thread = threading.Thread(target=self._command, daemon=True)
         self._thread.start()

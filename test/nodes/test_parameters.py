@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.interrupts import STOPPING
+from rsea_ros.interrupts import ENDING
 from rsea_ros.nodes._parameters import NodeParameter, _refuse_unknown
 from test.nodes.conftest import as_argument
 
@@ -99,10 +99,11 @@ def assert_refused(name, lines):
 @pytest.fixture
 def signals():
     """Restore what signals do, which a node changes."""
-    before = {number: signal.getsignal(number) for number in STOPPING}
+    before = {number: signal.getsignal(number) for number in ENDING}
     yield
     for number, action in before.items():
-        signal.signal(number, action)
+        if action is not None:
+            signal.signal(number, action)
 
 
 @pytest.mark.parametrize("name", sorted(WRONG.keys() - set(PROCESSES)))
