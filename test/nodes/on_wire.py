@@ -78,6 +78,11 @@ class Driven:
         """Call a Trigger service."""
         return self.call(Trigger, service, Trigger.Request())
 
+    def request(self, service):
+        """Call a Trigger service; return the future of its answer. For one that was called before."""
+        client = self._listener._clients[f"/{self.name}/driver/{service}"]
+        return client.call_async(Trigger.Request())
+
     def change(self, transition):
         """Ask for a transition of the lifecycle."""
         request = ChangeState.Request(transition=Transition(id=transition))

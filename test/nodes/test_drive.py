@@ -170,6 +170,22 @@ def test_stop_ends_the_torque_until_it_is_cleared(world):
     assert world.guarded.fault.cause == "stopped"
 
 
+@pytest.mark.parametrize("first", [10.0, 0.0])
+def test_after_autostart_the_first_command_is_zero_or_a_fault(first):
+    """A driver that was killed and started again under a stream of commands went on with the torque."""
+    world = World()
+    world.drive.zero_first = True
+    world.activate()
+    world.cycles(30)
+    world.cycle(first)
+    assert world.cycles(30, 10.0)[-1] == (0.0 if first else 10.0)
+    if first:
+        assert "restarted: the first command since autostart is 10 N·m" in str(world.guarded.fault)
+        with world.drive.deaf():
+            world.guarded.clear()
+        assert world.cycles(30, 10.0)[-1] == 10.0
+
+
 def test_a_halt_ends_the_torque_in_the_next_cycle(world):
     world.guarded.interlock.halted = True
     assert world.cycles(3, 10.0) == [0.0] * 3
