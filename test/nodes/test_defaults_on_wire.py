@@ -124,6 +124,7 @@ def test_a_fault_ends_the_torque_within_its_cycles_and_is_over_by_its_service(wi
         since = wire.bench.ask("torque")["t"]
         provoke(wire)
         fault = listener.until(wire.latched)
+        listener.until(lambda: 0 in wire.goal())
         writes = [goal != 0 and on for _, goal, on in wire.bench.log(since)["torque"]]
         end(wire)
         if fault.startswith(cause):
