@@ -28,7 +28,7 @@ from distributed.utils import silence_logging_cmgr
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.scheduler_extensions import embedded_extensions
-from rsea_ros.interrupts import deaf_to_interrupts
+from rsea_ros.processes import deaf_to_interrupts
 
 SETTINGS: Mapping[str, Any] = {
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,

@@ -9,7 +9,7 @@ import numpy as np
 from ruptures.base import BaseCost
 from ruptures.detection import Pelt
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 Piece = Literal["level", "line"]
 """What a piece is: a level, or a level with a slope."""
