@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -25,7 +25,7 @@ from bench.driver_stream import stream
 from bench.driver_timing import timing
 from bench.sections import choose, parser_of
 
-SECTIONS: dict[str, Callable[[argparse.Namespace, Path], list[tuple[str, str, str]]]] = {
+SECTIONS: dict[str, Callable[[argparse.Namespace, Path], Iterable[tuple[str, str, str]]]] = {
     "timing": timing,
     "loss": loss,
     "faults": faults,

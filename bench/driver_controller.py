@@ -68,6 +68,7 @@ FREE = Kind("free", "paper_moving_output", 4.7, 4.0)
 """4.7 N m: a motor of 68 N m cannot make more on a free end."""
 PATIENT = {"lost_cycles": 100, "ft_timeout": 1.0, "command_timeout": 1.0}
 """Limit of the driver on a machine whose terminals stall: the error is then that between stalls."""
+START = {"autostart": "true", "resume": "true"}
 TRIES = 3
 """Of a quiet trial in which the wire itself lost the replies."""
 MEASURED, ATTEMPTS = 3, 8
@@ -133,7 +134,7 @@ def _trial(
         bench.hurry(priority + 1 if priority else 50)
         kept.enter_context(hurried_wire(priority and priority - 1))
         first, last = _processors(priority)
-        parameters = {**bench.parameters(), "baud": 4_000_000, "autostart": "true", "rig": kind.rig}
+        parameters = {**bench.parameters(), "baud": 4_000_000, **START, "rig": kind.rig}
         both = {"rate": rate, "realtime_priority": priority}
         parameters.update(both, cpu_affinity=first, **patient)
         nodes.enter_context(run_node_process("driver", 0, **parameters))
@@ -179,7 +180,7 @@ def _lateness_fault(rate: float, priority: int, folder: Path) -> tuple[str, str,
     place.mkdir()
     torques = Torques(outside)
     with ExitStack() as kept:
-        parameters = {"rate": rate, "autostart": "true", "realtime_priority": priority}
+        parameters = {"rate": rate, **START, "realtime_priority": priority}
         kept.enter_context(run_node_process("driver", 0, **parameters))
         process, file = kept.enter_context(noted_controller(place, rate, realtime_priority=priority))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)

@@ -10,15 +10,17 @@ answer the question: it is repeated, and the repeats are reported.
 from __future__ import annotations
 
 import argparse
+import os
+import signal
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
 from bench.driver_loop import Loop
+from bench.driver_requests import requests
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.limits import DeviceFault
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._devices import limits_of
 from rsea_ros.nodes.driver import TABLE
@@ -64,6 +66,11 @@ def reads(name: str, value: float, right: float, within: float = QUICK) -> Trial
     return Trial(("set", {name: value}), ("set", {name: right}), within=within)
 
 
+def paces(rate: float, latched: bool = True) -> Trial:
+    """Return a trial of an F/T sensor whose record rate (Hz) is changed."""
+    return Trial(("ft_rate", {"rate": rate}), ("ft_rate", {"rate": 1000.0}), within=20.0, latched=latched)
+
+
 def host(what: str, within: float, service: str = "clear") -> Trial:
     """Return a trial of an event in the driver itself, given by a function of this file."""
     return Trial(("host", {"what": what}), None, service, within)
@@ -107,6 +114,15 @@ FAULTS: dict[str, Trial] = {
     "supply at 17 V": reads("voltage", 170, 240),
     "torque switched off": reads("torque_enable", 0, 0, SLOW),
     "mode changed": reads("mode", 3, 0, SLOW),
+    "mode changed to velocity, turning": Trial(
+        ("set", {"mode": 1, "goal_velocity": 3000}), ("set", {"mode": 0}), within=SLOW
+    ),
+    "position jumps by 0.5 rad": reads("homing_offset", 40_000, 0),
+    "two motors of one ID": misbehaves(twin=True),
+    "bit rate of the motor changed": reads("baud", 1, 3, QUICK + 3.0),
+    "F/T rate 7000 Hz": paces(7000.0, latched=False),
+    "F/T rate 500 Hz": paces(500.0, latched=False),
+    "F/T rate 50 Hz": paces(50.0),
     "voltage sag": Trial(("sag", {"voltage": 15.0}), ("set", {"voltage": 240}), "reboot"),
     "F/T saturated": complains(0x8002_0000),
     "F/T supply out of range": complains(0x8800_0000),
@@ -125,6 +141,7 @@ FAULTS: dict[str, Trial] = {
     "F/T gap of 1000 records": Trial(("ft_gap", {"records": 1000}), None, latched=False),
     "F/T gap of 2 million records": Trial(("ft_gap", {"records": 2_000_000}), None, latched=False),
     "driver stands still for 0.3 s": host("stand_still", 120.0),
+    "supervisor stands still": host("stop_supervisor", 280.0),
     "supervisor killed": host("kill_supervisor", 40.0),
     "service stop": host("stop", QUICK),
     "asked to end by a signal": host("halt", QUICK)._replace(latched=False),
@@ -141,9 +158,8 @@ FAULTS: dict[str, Trial] = {
 }  # fmt: skip
 
 
-def faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
-    """Provoke each fault several times."""
-    rows = []
+def faults(args: argparse.Namespace, folder: Path) -> Iterator[tuple[str, str, str]]:
+    """Provoke each fault several times, then the requests and motors of driver_requests.py."""
     with RemoteBench(folder / "tty") as bench:
         bench.hurry()
         loop = Loop(bench, RATE, limits=limits_of({p.name: p.default for p in TABLE}))
@@ -160,9 +176,9 @@ def faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]
             text = text + f"{median(cycles):g} cycles, " if trial.latched else ""
             told = f"latched {latched} of {RUNS} {cause or '-'}, ends by {ends}"
             told += f"; {again} done again: {why}" if again else ""
-            rows.append((name, asked, f"{'ok  ' if good else 'NOT '} {text}{told}"))
+            yield name, asked, f"{'ok  ' if good else 'NOT '} {text}{told}"
         loop.device.close()
-    return rows
+    yield from requests(folder)
 
 
 def _runs(loop: Loop, bench: RemoteBench, trial: Trial) -> tuple[list[Run], int, str]:
@@ -202,7 +218,9 @@ def _once(loop: Loop, bench: RemoteBench, trial: Trial) -> Run:
         ramped += 1
     for _ in range(6):
         loop.cycle(10.0, age)
-    ended = next((t for t, goal, on in bench.log(begun)["torque"] if goal == 0 or not on), begun)
+    log = bench.log(begun)["torque"]
+    acted = max((at for at, (_, goal, on) in enumerate(log) if goal and on), default=-1)
+    ended = log[acted + 1][0] if acted + 1 < len(log) else log[-1][0] if log else begun
     if trial.right is not None:
         bench.ask(trial.right[0], **trial.right[1])
     if trial.service == "reboot":
@@ -210,17 +228,18 @@ def _once(loop: Loop, bench: RemoteBench, trial: Trial) -> Run:
     return Run((ended - begun) * RATE / 1e9, ramped, cause, _recover(loop, trial.service))
 
 
-def _kill_supervisor(loop: Loop) -> None:
+def _signal_supervisor(loop: Loop, number: int) -> None:
     supervisor = loop.device.protection._supervisor  # type: ignore[attr-defined]
     assert supervisor is not None
-    supervisor._end._process.kill()  # type: ignore[attr-defined]
+    os.kill(supervisor._end._process.pid, number)  # type: ignore[attr-defined]
 
 
 HOST: dict[str, Callable[[Loop], float | None]] = {
     "stand_still": lambda loop: time.sleep(0.3),
-    "kill_supervisor": _kill_supervisor,
-    "stop": lambda loop: loop.guarded.guard.trip(DeviceFault("stopped")),
-    "halt": lambda loop: setattr(loop.guarded.guard, "halted", True),
+    "kill_supervisor": lambda loop: _signal_supervisor(loop, signal.SIGKILL),
+    "stop_supervisor": lambda loop: _signal_supervisor(loop, signal.SIGSTOP),
+    "stop": lambda loop: loop.guarded.stop(),
+    "halt": lambda loop: setattr(loop.guarded.interlock, "halted", True),
     "silence": lambda loop: 1.0 / RATE,
     "reboot": lambda loop: loop.device._motor.bus.reboot(),
 }
@@ -229,7 +248,7 @@ HOST: dict[str, Callable[[Loop], float | None]] = {
 
 def _recover(loop: Loop, service: str) -> str:
     """Call the service until it ends the fault; return its answer."""
-    loop.guarded.guard.halted = False
+    loop.guarded.interlock.halted = False
     for attempt in range(1, 6):
         try:
             getattr(loop.guarded, service)()

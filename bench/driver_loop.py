@@ -23,6 +23,7 @@ class Loop:
     def __init__(self, bench: RemoteBench, rate: float, *, lost_cycles: int = 3, ft_timeout: float = 0.01,
                  latency: float = 0.0, limits: Limits | None = None) -> None:  # fmt: skip
         limits = limits or Limits(68.0, lost_cycles=lost_cycles)
+        self.bench = bench
         self.device = DynamixelNetft(
             Motor(MotorConnection(bench.port, 4_000_000, latency=latency or usual_latency(rate))),
             SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, ft_timeout), limits, STIFFNESS,

@@ -1,15 +1,18 @@
-"""Random faults at random instants, several at once, beside a monitor that knows one rule of the torque.
+"""Random faults and requests at random instants, several at once, beside a monitor that knows one rule.
 
-No torque unless active, commanded in the last 100 ms, without fault. The seed of a violation repeats the
-faults; it does not repeat stalls of the machine. A torque that the bench has kept while it stood still
-itself, by its own account, is counted apart: a motor does not stand still, and no driver could have
-reached it.
+No torque unless active, commanded in the last 100 ms, without fault, and without a stop that no clear which
+began later has ended. Services run in a thread of their own, as those of the node, and all else goes on
+meanwhile. A motor in another mode is seen within a second; only then is its torque judged. The seed of a
+violation repeats the faults; it does not repeat stalls of the machine. A torque that the bench has kept while
+it stood still itself, by its own account, is counted apart: a motor does not stand still, and no driver could
+have reached it.
 """
 
 from __future__ import annotations
 
 import argparse
 import random
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -23,7 +26,12 @@ from rsea_ros.nodes._devices import limits_of
 from rsea_ros.nodes.driver import TABLE
 
 RATE = 280.0
-CALM = {"drop": 0.0, "delay": 0.0, "corrupt": 0.0, "wrong_crc": 0.0, "silent": False, "ft_silent": False}
+CALM = {
+    "drop": 0.0, "delay": 0.0, "corrupt": 0.0, "wrong_crc": 0.0, "silent": False, "ft_silent": False,
+    "twin": False,
+}  # fmt: skip
+MODE_SEEN = 1_200_000_000
+"""ns of cycles after which a driver has switched off a motor in another mode."""
 LIMITS = limits_of({p.name: p.default for p in TABLE})
 LONGEST, GRACE = 100_000_000, 50_000_000
 """ns for which a command allows a torque, and after a fault: its cycle, the ramp, a lost write."""
@@ -39,7 +47,10 @@ class Watched:
         self.violations: list[str] = []
         self.excused: list[str] = []
         self.happened: deque[str] = deque(maxlen=6)
-        self.seen = self.faults = 0
+        self.seen = self.faults = self.stops = 0
+        self.stopped, self.cleared = -1, -1
+        self.service: threading.Thread | None = None
+        self.mode_changed = -MODE_SEEN
         self.looked = self.begun = time.monotonic_ns()
 
     def cycle(self) -> None:
@@ -63,16 +74,22 @@ class Watched:
         active, fault, since, commanded = (
             self.loop.guarded.enabled, self.loop.guarded.fault, self.since, self.commanded,
         )  # fmt: skip
+        stopped, cleared = self.stopped, self.cleared
         goal, on = self.bench.torque()
         now = time.monotonic_ns()
         held_up, self.looked = now - self.looked, now
-        if not goal or not on:
+        served = self.service is not None and self.service.is_alive()
+        if served and now - self.mode_changed < MODE_SEEN:
+            self.mode_changed = now
+        if not goal or not on or now - self.mode_changed < MODE_SEEN:
             return
         self.seen += 1
         if not active:
             self._violated("torque while not active", held_up)
         elif now - commanded > LONGEST + GRACE:
             self._violated(f"commanded {(now - commanded) / 1e6:.0f} ms ago", held_up)
+        elif cleared < stopped < now - GRACE and not served:
+            self._violated(f"stopped {(now - stopped) / 1e6:.0f} ms ago", held_up)
         elif fault is not None and now - since > LONGEST + GRACE:
             self._violated(f"{fault} for {(now - since) / 1e6:.0f} ms", held_up)
 
@@ -94,7 +111,13 @@ class Watched:
             ("temperature", lambda: self.bench.ask("set", temperature=self.dice.choice((30, 90)))),
             ("torque off", lambda: self.bench.ask("set", torque_enable=0)),
             ("alert", lambda: self.bench.ask("alert", bits=32)), ("disable", self.loop.guarded.disable),
-            ("no commands", self._quiet), *(("recover", self._recover),) * 3,
+            ("mode", self._change_mode),
+            ("twin", lambda: self._misbehave(twin=True)),
+            ("jump", lambda: self.bench.ask("set", homing_offset=self.dice.choice((0, 30_000)))),
+            ("other limits", lambda: self.bench.ask("set", torque_limit=self.dice.choice((300, 620)))),
+            ("no commands", self._quiet), *(("stop", self._stop),) * 3,
+            *((name, lambda name=name: self._call(name)) for name in ("clear", "reboot", "enable")),
+            *(("recover", self._recover),) * 4,
         )  # fmt: skip
         name, event = self.dice.choice(events)
         begun = time.monotonic_ns()
@@ -109,17 +132,34 @@ class Watched:
     def _quiet(self) -> None:
         self.silent = self.dice.randrange(100)
 
+    def _change_mode(self) -> None:
+        self.bench.ask("set", mode=self.dice.choice((1, 3)))
+        self.mode_changed = time.monotonic_ns()
+
+    def _stop(self) -> None:
+        self.loop.guarded.stop()
+        self.stopped, self.stops = time.monotonic_ns(), self.stops + 1
+
     def _recover(self) -> None:
         self.bench.ask("misbehave", **CALM)
-        self.bench.ask("set", temperature=30, voltage=240)
+        self.bench.ask("set", temperature=30, voltage=240, torque_limit=620, homing_offset=0)
+        self._call("clear", "reboot", "clear", "enable")
+
+    def _call(self, *services: str) -> None:
+        """Call services one after the other in a thread, unless one is under way."""
+        if self.service is None or not self.service.is_alive():
+            self.service = threading.Thread(target=self._serve, args=(services,), daemon=True)
+            self.service.start()
+
+    def _serve(self, services: tuple[str, ...]) -> None:
         guarded = self.loop.guarded
-        if guarded.fault is not None:
+        for name in services:
+            if name == "reboot" and len(services) > 1 and guarded.fault is None:
+                continue
+            asked = time.monotonic_ns()
             with suppress(DeviceError):
-                guarded.clear()
-        if guarded.fault is not None:
-            guarded.reboot()
-        if not guarded.enabled:
-            guarded.enable()
+                if getattr(guarded, name)() is not False and name == "clear":
+                    self.cleared = max(self.cleared, asked)
 
 
 def random_faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
@@ -130,10 +170,13 @@ def random_faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str
             watched.cycle()
             watched.look()
         bench.ask("misbehave", **CALM)
+        if watched.service is not None:
+            watched.service.join()
         with suppress(DeviceError):
             watched.loop.device.close()
     what = f"{args.minutes:g} min of random faults, seed {args.seed}: violations"
     first = f": {' | '.join(watched.violations[:5])}" if watched.violations else ""
-    told = f"{len(watched.violations)}{first}; {watched.faults} faults, torque in {watched.seen} cycles"
+    told = f"{len(watched.violations)}{first}; {watched.faults} faults, {watched.stops} stops"
+    told += f", torque in {watched.seen} cycles"
     told += f"; the bench itself stood still under torque {len(watched.excused)} times"
     return [(what, "0", told)]

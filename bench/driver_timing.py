@@ -45,7 +45,8 @@ def timing(args: argparse.Namespace, folder: Path) -> list[Row]:
 
 
 def _at(rate: float, seconds: float, priority: int, folder: Path) -> list[Row]:
-    patient = {"autostart": True, "lost_cycles": 100, "ft_timeout": 1.0, "command_timeout": 10.0}
+    patient = {"lost_cycles": 100, "ft_timeout": 1.0, "command_timeout": 10.0}
+    patient |= {"autostart": True, "resume": True}
     with RemoteBench(folder / "tty") as bench, hurried_wire(priority and priority - 1):
         if priority:
             bench.hurry(priority + 1)

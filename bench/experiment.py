@@ -200,7 +200,8 @@ def wire(out):
     values = {"bag": out / "slow.mcap", "out": out / "session", "limits": "torque=15", "ask": False}
     values |= {"causes": "current_loop_lag,command_delay", "longest": 4.0, "rig": "paper_high_impedance"}
     with Processes(out / "log", 77) as nodes, RemoteBench(out / "tty", "--rig", out / "bench.yaml") as bench:
-        nodes.start("driver", {**bench.parameters(), **patience(), **EXCITED, "autostart": True})
+        start = {"autostart": True, "resume": True}
+        nodes.start("driver", {**bench.parameters(), **patience(), **EXCITED, **start})
         nodes.start("experiment", values)
         deadline = time.monotonic() + 120.0
         while not (abs(bench.torque()[0]) > 5) and time.monotonic() < deadline:

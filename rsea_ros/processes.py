@@ -51,6 +51,15 @@ def _follow() -> None:
 
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_LEFT_ALONE = (
+    *("KILL", "STOP"),  # nobody can handle these
+    *("SEGV", "BUS", "FPE", "ILL"),  # a handler would return to what failed
+    *("CHLD", "CONT", "TSTP", "TTIN", "TTOU", "URG", "WINCH", "INFO"),  # these end nothing
+    *("PIPE", "XFSZ"),  # Python ignores these: the call that failed raises
+)
+_NUMBERS = {getattr(signal, f"SIG{name}", 0) for name in _LEFT_ALONE}
+ENDING = tuple(sorted(int(number) for number in signal.valid_signals() if number not in _NUMBERS))
+"""All signals that end a process which does not handle them, and that it can handle."""
 AGAIN = 0.1
 """s after which a stop is asked for again that code which cannot pass on an exception has swallowed."""
 
@@ -58,14 +67,23 @@ AGAIN = 0.1
 class Stopped(KeyboardInterrupt):
     """A signal asks this process to stop; code that handles Ctrl-C handles it.
 
-    status: 128 plus the number. note: what the stopped work reports, or empty.
+    status: BASE plus the number. note: what the stopped work reports, or empty.
     """
 
     note = ""
+    BASE = 128
 
     def __init__(self, number: int) -> None:
-        super().__init__(signal.Signals(number).name)
-        self.number, self.status = number, 128 + number
+        super().__init__(_name(number))
+        self.number, self.status = number, self.BASE + number
+
+
+def _name(number: int) -> str:
+    """Return the name of a signal; those between SIGRTMIN and SIGRTMAX have none."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 class Stops:

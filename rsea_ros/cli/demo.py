@@ -139,7 +139,8 @@ def source(nodes: Processes, out: Path, args: argparse.Namespace) -> Iterator[st
         yield "plant"
         return
     with RemoteBench(out / "tty", "--rig", rig, "--seed", args.seed) as bench:
-        nodes.start("driver", {**bench.parameters(), **patience(), **EXCITED, "rig": RIG, "autostart": True})
+        start = {"rig": RIG, "autostart": True, "resume": True}
+        nodes.start("driver", {**bench.parameters(), **patience(), **EXCITED, **start})
         yield "driver"
     faults = [line for line in nodes.log("driver").read_text().splitlines() if "[ERROR]" in line]
     if faults:

@@ -79,7 +79,7 @@ class Device(Protocol):
         """Connect, with no torque."""
 
     def enable(self) -> None:
-        """Switch the torque on, at zero."""
+        """Switch the torque on, at zero. Raises DeviceError for another actuator than the opened one, too."""
 
     def read(self) -> State:
         """Return the newest reading."""

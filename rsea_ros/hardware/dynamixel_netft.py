@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from rsea_ros.hardware.device import State, Wrench
 from rsea_ros.hardware.dynamixel.encoder import BusEncoder, EncoderConnection
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
+from rsea_ros.hardware.dynamixel.sample import MotorSample, Unwrapper
 from rsea_ros.hardware.limits import Limits, check_limits
 from rsea_ros.hardware.netft.sensor import ForceTorqueSensor, SensorConnection
 from rsea_ros.hardware.protection import Protection
@@ -39,7 +41,7 @@ class DynamixelNetft:
         self._sensor = ForceTorqueSensor(sensor) if sensor is not None else None
         self._limits, self._stiffness, self._absolute = limits, stiffness, absolute
         self._epoch = 0
-        self.origin = 0.0
+        self.origin, self._counts = 0.0, Unwrapper()
         self._waiting: list[tuple[int, Wrench]] = []
         self._trouble = ""
         self._last: State | None = None
@@ -57,7 +59,8 @@ class DynamixelNetft:
             check_limits(self._limits, self._motor.torque_limit, self._stiffness)
             assert self._motor.limits is not None
             check_own_limits(self._limits, self._motor.limits, self._motor.control_table.name)
-            sample = self._motor.bus.patiently(self._motor.read)
+            self._counts.restart()
+            sample = self._motor.bus.patiently(self._read_motor)
             self.origin = 0.0 if self._absolute else sample.position
             if self._encoder is not None:
                 self._encoder.open(sample, absolute=self._absolute)
@@ -77,7 +80,7 @@ class DynamixelNetft:
         The sensor's socket is emptied while the motor answers, and of the rest after that.
         """
         try:
-            sample = self._motor.read(self._sensor.gather if self._sensor is not None else None)
+            sample = self._read_motor(self._sensor.gather if self._sensor is not None else None)
             deflection = math.nan if self._encoder is None else self._encoder.deflection(sample)
         finally:
             self._take_wrenches()
@@ -101,6 +104,12 @@ class DynamixelNetft:
             acknowledged_late=self._motor.acknowledged_late,
         )
         return self._last
+
+    def _read_motor(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
+        """Return a sample whose position goes on where the motor's counts wrap round."""
+        sample = self._motor.read(meanwhile)
+        turn = 2.0 * math.pi / self._motor.control_table.pulses
+        return replace(sample, position=self._counts.take(sample.counts) * turn)
 
     def _take_wrenches(self) -> None:
         """Keep the sensor's wrenches until a reading includes them, also after a lost reply."""

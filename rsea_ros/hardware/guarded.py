@@ -18,12 +18,20 @@ from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.hardware.together import cycle
 
 BUSY = "clear_fault or reboot is under way, expected it to be over"
+STOPPED = DeviceFault("stopped", detail="the service stop was called")
+UNOBEYED = {
+    "motor_state", "effort", "velocity", "position", "position_step", "deflection", "ft_torque", "power",
+    "current",
+}  # fmt: skip
+"""Causes after which the motor is switched off: a goal of zero stops one in another mode not at all."""
+STEP = 2.0
+"""Times the velocity limit: a position that changes faster has jumped, the fault `velocity` comes before."""
 
 
 class GuardedDevice:
     """Reads and writes once a cycle; errors become latched faults, never exceptions.
 
-    enabled: whether commands pass. cycles: `failed_reads`, `failed_writes` of the cycles so far.
+    interlock: fault, stop and activity. cycles: `failed_reads`, `failed_writes` of the cycles so far.
     away: whether another thread uses the device for longer than a cycle; cycles then leave it alone.
     lifted: limits that do not apply, of what a simulation does not have.
     spring: turns a measured deflection into a wrench where no sensor measures one; None: no such wrench.
@@ -31,20 +39,25 @@ class GuardedDevice:
 
     def __init__(self, device: Device, limits: Limits, rate: float, spring: Spring | None = None) -> None:
         self.device, self.guard = device, Guard(limits, 1.0 / rate)
-        self._limits = limits
+        self._limits, self._period = limits, 1.0 / rate
         self._spring = spring
-        self.enabled = False
+        self.interlock = self.guard.interlock
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
         self.lifted: list[str] = []
-        self._taring = self.away = self._inferred = False
+        self._taring = self.away = self._inferred = self._off_due = False
         self._turn = threading.Lock()
         self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
 
     @property
     def fault(self) -> DeviceFault | None:
-        """The latched fault."""
-        return self.guard.fault
+        """The latched fault, or the stop."""
+        return self.guard.fault or (STOPPED if self.interlock.stopped else None)
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it is active: commands pass unless there is a fault."""
+        return self.interlock.enabled
 
     def open(self, *, unprotected: bool = False) -> None:
         """Open the device; check its protection against a dead host, and that each limit can be applied.
@@ -117,16 +130,40 @@ class GuardedDevice:
         self._losses["read"].take(lost=False)
         if state.acknowledged_late:
             self._losses["write"].take_back()
+        before, self.state = self.state, state
+        latched = self.guard.fault
+        if fault := self._step(before, state):
+            self.guard.trip(fault)
         self.guard.look(state)
-        self.state = state
+        fault = self.guard.fault
+        if state.motor_trouble or (fault is not None and fault is not latched and fault.cause in UNOBEYED):
+            self._off_due = True
         return state
+
+    def _step(self, before: State | None, state: State) -> DeviceFault | None:
+        """Return the fault of a position that has jumped since the reading before."""
+        if before is None:
+            return None
+        time = max(1e-9 * (state.stamp - before.stamp), self._period)
+        step, most = abs(state.position - before.position), STEP * self.guard.limits.velocity * time
+        return DeviceFault("position_step", step, most, "rad", f"in {time:.3g} s") if step > most else None
+
+    def switch_off_if_due(self) -> None:
+        """Switch a motor off that may not obey its goal, after a cycle in which it answered."""
+        if self._off_due:
+            with suppress(DeviceError):
+                self._switch_off()
+                self._off_due = False
 
     def write(self, wanted: float, age: float | None) -> float:
         """Write a torque (N m) within the limits, zero when not enabled; return it. age: see Guard."""
         torque = self.guard.allowed_torque(wanted, age if self.enabled and not self._taring else None)
         try:
-            self.device.protection.beat(torque != 0.0)
+            if torque != 0.0:
+                self.device.protection.beat(True)
             self.device.write(torque)
+            if torque == 0.0:
+                self.device.protection.beat(False)
         except DeviceError as error:
             self._count_failure("write", error)
         else:
@@ -134,19 +171,28 @@ class GuardedDevice:
         return torque
 
     def enable(self) -> None:
-        """Switch the torque on, at zero. Raises DeviceError while a fault is latched."""
-        if self.guard.fault is not None:
-            raise DeviceError(f"fault {self.guard.fault}, expected clear_fault first")
+        """Switch the torque on, at zero. Raises DeviceError with a fault or a stop, also one that comes."""
+        asked = self.interlock.number()
+        self.interlock.check()
         with self._turn:
             if self.away:
                 raise DeviceError(BUSY)
-            self.guard.clear()
-            self.device.enable()
-            self.enabled = True
+            self.guard.restart()
+            try:
+                self.device.enable()
+                self.interlock.enable(asked)
+            except DeviceError:
+                with suppress(DeviceError):
+                    self._switch_off()
+                raise
+
+    def stop(self) -> None:
+        """End the torque with the next cycle, until a clear that is called later."""
+        self.interlock.stop()
 
     def disable(self) -> None:
         """Command zero torque and switch it off. The thread that uses the device does it while it is away."""
-        self.enabled = False
+        self.interlock.disable()
         with self._turn:
             self.guard.torque = 0.0
             if not self.away:
@@ -163,17 +209,19 @@ class GuardedDevice:
             self._taring = False
 
     def clear(self) -> bool:
-        """Reconnect if necessary and clear the fault; return whether there was one.
+        """Reconnect if necessary, end fault and stop; return whether there was one.
 
-        Raises DeviceError while its cause is present, checked by a reading.
+        Raises DeviceError while the cause is present, checked by a reading, and for what came meanwhile.
         """
-        if self.guard.fault is None:
+        if self.fault is None:
             return False
+        asked = self.interlock.number()
         self._alone(self._recover)
+        self.interlock.end_stop(asked)
         return True
 
     def reboot(self) -> None:
-        """Restart the actuator; the fault is forgotten, the torque is on as before, at zero.
+        """Restart the actuator; the fault is forgotten, not a stop; the torque is on as before, at zero.
 
         Raises DeviceError, with a fault latched and the torque off, where a reading has a fault all the same.
         """
@@ -195,7 +243,8 @@ class GuardedDevice:
 
     def _check(self) -> None:
         """Raise DeviceError where a reading has a fault, which is latched."""
-        fault = complaint(self.guard.limits, self._patiently())
+        state = self._patiently()
+        fault = self._step(self.state, state) or complaint(self.guard.limits, state)
         if fault is not None:
             self.guard.trip(fault)
             raise DeviceError(f"{fault} is still there, expected it to be over")
@@ -234,14 +283,16 @@ class GuardedDevice:
         with self._turn:
             if self.away:
                 raise DeviceError(BUSY)
-            self.away = True
+            self.away, began = True, self.interlock.number()
         try:
             work()
+            self._off_due = False
             for losses in self._losses.values():
                 losses.clear()
             if self.enabled:
                 self.device.enable()
-            self.guard.clear()
+            self.guard.restart()
+            self.interlock.end_fault(began)
         finally:
             with self._turn:
                 self.away = False

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from rsea_ros.documents.units import plain
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
+from rsea_ros.hardware.interlock import Interlock
 
 COMMAND_TIMEOUT = "command_timeout"
 HEARD_LATE = 3
@@ -112,18 +113,16 @@ def complaint(limits: Limits, state: State) -> DeviceFault | None:
 
 
 class Guard:
-    """Keeps the torque within limits, and at zero once a fault is latched.
+    """Keeps the torque within limits, and at zero while the interlock has a fault or a stop.
 
-    fault: the first one since it was cleared. limited: commands that were cut. halted: whether the end
-    of the program was requested: from then on there is no torque and no fault.
+    limited: commands that were cut.
     """
 
     def __init__(self, limits: Limits, period: float) -> None:
         self.limits, self._period = limits, period
-        self.fault: DeviceFault | None = None
+        self.interlock = Interlock()
         self.limited = 0
         self.torque = 0.0
-        self.halted = False
         self._ramp = self._ramp_from = self._room = 0.0
         self._written: deque[float] = deque(maxlen=HEARD_LATE)
         self._missed = 0
@@ -131,18 +130,27 @@ class Guard:
         self._measured: set[str] = set()
         self._complete = False
 
+    @property
+    def fault(self) -> DeviceFault | None:
+        """The latched fault: the first one since it was cleared."""
+        return self.interlock.fault
+
     def trip(self, fault: DeviceFault) -> None:
         """Latch a fault, unless there is one; any but late commands also ends the ramp of those."""
-        if self.fault is None:
-            self.fault = fault
+        if self.interlock.trip(fault):
             self._ramp_from = abs(self.torque)
             self._ramp = self._ramp_from * self._period / max(self.limits.ramp, self._period)
         elif fault.cause != COMMAND_TIMEOUT:
             self._ramp_from = 0.0
 
     def clear(self) -> None:
-        """Clear the fault. The torque restarts softly from zero."""
-        self.fault, self.torque, self._room, self._missed = None, 0.0, 0.0, 0
+        """Clear the faults until now. The torque restarts softly from zero."""
+        self.interlock.end_fault(self.interlock.number())
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin softly from zero torque."""
+        self.torque, self._room, self._missed = 0.0, 0.0, 0
         self._written.clear()
 
     def look(self, state: State) -> None:
@@ -183,7 +191,7 @@ class Guard:
         limits = self.limits
         if self.fault is None and age is not None and age > limits.command_timeout and self.torque != 0.0:
             self.trip(DeviceFault(COMMAND_TIMEOUT, 1e3 * age, 1e3 * limits.command_timeout, "ms"))
-        if self.halted:
+        if self.interlock.halted or self.interlock.stopped:
             self.torque = 0.0
         elif self.fault is None:
             self._open(age)

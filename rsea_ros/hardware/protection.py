@@ -49,16 +49,17 @@ class Supervised(Protection):
         """SUPERVISOR between `guard` and `release`, else NONE."""
         return NONE if self._supervisor is None else SUPERVISOR
 
-    def guard(self, descriptor: int, frames: Sequence[bytes]) -> None:
+    def guard(self, descriptor: int, frames: Sequence[bytes], replies: Sequence[bytes] = ()) -> None:
         """Let a supervisor watch, a new one where the last is dead.
 
-        frames: bytes that end the torque when they are written to the descriptor. Raises SupervisorLost.
+        frames: bytes that end the torque when they are written to the descriptor. replies: what the device
+        sends to acknowledge one of them; the supervisor repeats it until then. Raises SupervisorLost.
         """
         if self._supervisor is not None and not self._supervisor.alive():
             self._supervisor.close()
             self._supervisor = None
         if self._supervisor is None:
-            self._supervisor = Supervisor(descriptor, self._within, frames, self._service)
+            self._supervisor = Supervisor(descriptor, self._within, frames, replies, self._service)
 
     def beat(self, armed: bool | None = None) -> None:
         """Beat. Raises SupervisorLost, HeldUp."""

@@ -1,11 +1,13 @@
 """A process that outlives the driver: when the driver ends or hangs, it sends the frames that stop the motor.
 
 Run as a file of its own with nothing but the standard library:
-supervisor.py DESCRIPTOR TIMEOUT_S FRAME_HEX… with the driver's beats on stdin: `a` torque is on, `d` it is
-off, `q` all is well, end. End of input without `q` is the death of the driver, by whatever signal.
+supervisor.py DESCRIPTOR TIMEOUT_S FRAME_HEX… [-- REPLY_HEX…] with the driver's beats on stdin: `a` torque is
+on, `d` it is off, `q` all is well, end. End of input without `q` is the death of the driver, by whatever
+signal. Each beat is answered on stdout. Frames go out again until the motor has acknowledged each with a
+REPLY, where there are any; a motor that does not is reported to the system log.
 supervisor.py --listen SOCKET is the same as a service, which survives anything that kills driver and children
 together (a control group, a container, a login): a driver connects to the Unix socket, sends a line
-{"timeout": S, "frames": [HEX, …]} with the descriptor of its port, and its beats.
+{"timeout": S, "frames": [HEX, …], "replies": [HEX, …]} with the descriptor of its port, and its beats.
 """
 
 from __future__ import annotations
@@ -17,11 +19,14 @@ import select
 import signal
 import socket
 import sys
+import syslog
 import threading
 import time
 
 REPEAT, SPACING = 20, 0.005
 """How often the frames go out, and every how many s: one may collide with the motor's last answer."""
+PATIENCE, HANG = 3.0, 0.1
+"""s in which the motor of a dead driver, of one that hangs, may acknowledge them, as one that is booting."""
 
 
 def hurry() -> None:
@@ -33,24 +38,47 @@ def hurry() -> None:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(os.sched_get_priority_max(os.SCHED_FIFO)))
 
 
-def send(descriptor: int, frames: list[bytes]) -> None:
-    """Send every frame, one after the other with a pause for the motor's answer."""
-    for frame in frames:
+class Line:
+    """The port of a motor. replies: what acknowledges a frame; none: nothing does."""
+
+    def __init__(self, descriptor: int, frames: list[bytes], replies: list[bytes]) -> None:
+        self._descriptor, self._frames, self._replies = descriptor, frames, replies
+
+    def stop(self, again: int, patience: float = 0.0) -> bool:
+        """Send all frames some times, then for so many s, until each is acknowledged; return whether."""
+        end = time.monotonic() + patience
+        while True:
+            done = [self._send(frame) for frame in self._frames]
+            again -= 1
+            if all(done) or (again <= 0 and time.monotonic() > end):
+                return all(done)
+
+    def _send(self, frame: bytes) -> bool:
+        """Send a frame and wait for its answer; return whether it is acknowledged."""
+        end = time.monotonic() + SPACING / len(self._frames)
+        heard = b""
         try:
-            os.write(descriptor, frame)
+            os.write(self._descriptor, frame)
+            while (left := end - time.monotonic()) > 0.0:
+                if not self._replies:
+                    time.sleep(left)
+                elif select.select((self._descriptor,), (), (), left)[0]:
+                    heard += os.read(self._descriptor, 4096)
+                    if any(reply in heard for reply in self._replies):
+                        return True
         except OSError:
-            return
-        time.sleep(SPACING / len(frames))
+            time.sleep(max(0.0, end - time.monotonic()))
+        return False
 
 
-def watch(inlet: int, descriptor: int, timeout: float, frames: list[bytes]) -> None:
-    """Follow the beats until they end."""
+def watch(inlet: int, outlet: int, line: Line, timeout: float, *, acknowledged: bool) -> None:
+    """Follow the beats until they end. acknowledged: whether the motor's answers are waited for."""
     armed = False
     while True:
         ready, _, _ = select.select((inlet,), (), (), timeout)
         if not ready:
             if armed:
-                send(descriptor, frames)
+                line.stop(1, min(timeout, HANG) if acknowledged else 0.0)
             continue
         try:
             beats = os.read(inlet, 4096)
@@ -59,21 +87,31 @@ def watch(inlet: int, descriptor: int, timeout: float, frames: list[bytes]) -> N
         if beats.endswith(b"q"):
             return
         if not beats:
-            for _ in range(REPEAT):
-                send(descriptor, frames)
+            if not line.stop(REPEAT, PATIENCE if acknowledged else 0.0) and acknowledged:
+                report("the driver has died, and the motor has not acknowledged zero torque: cut its supply")
             return
+        with contextlib.suppress(OSError):  # nobody reads that any more
+            os.write(outlet, b"e")
         armed = beats.endswith(b"a")
+
+
+def report(text: str) -> None:
+    """Tell whoever can still be told."""
+    syslog.syslog(syslog.LOG_CRIT, f"rsea supervisor: {text}")
+    with contextlib.suppress(OSError):
+        os.write(2, f"supervisor: {text}\n".encode())
 
 
 def serve(connection: socket.socket) -> None:
     """Watch one driver over its connection until it is gone."""
     with connection:
-        line, (descriptor, *_), _, _ = socket.recv_fds(connection, 65536, 1)
-        order = json.loads(line)
+        words, (descriptor, *_), _, _ = socket.recv_fds(connection, 65536, 1)
+        order = json.loads(words)
         connection.sendall(b"ready\n")
         try:
-            frames = [bytes.fromhex(text) for text in order["frames"]]
-            watch(connection.fileno(), descriptor, float(order["timeout"]), frames)
+            frames, replies = (list(map(bytes.fromhex, order.get(n, []))) for n in ("frames", "replies"))
+            place, line = connection.fileno(), Line(descriptor, frames, replies)
+            watch(place, place, line, float(order["timeout"]), acknowledged=bool(replies))
         finally:
             os.close(descriptor)
 
@@ -98,8 +136,11 @@ def main() -> None:
         return listen(sys.argv[2])
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
-    descriptor, timeout, *frames = sys.argv[1:]
-    watch(0, int(descriptor), float(timeout), [bytes.fromhex(text) for text in frames])
+    descriptor, timeout, *words = sys.argv[1:]
+    at = words.index("--") if "--" in words else len(words)
+    frames, replies = (list(map(bytes.fromhex, part)) for part in (words[:at], words[at + 1 :]))
+    line = Line(int(descriptor), frames, replies)
+    watch(0, 1, line, float(timeout), acknowledged=bool(replies))
 
 
 if __name__ == "__main__":

@@ -30,9 +30,9 @@ def cycle(
     """Write the torques of all joints, then read all; return the reading of each, None of one without.
 
     wanted: torque (N m) and age of its command (s) of each, see GuardedDevice. A reading that trips a fault
-    zeroes that joint's torque at once. The write comes first, so that a command takes effect as near to the
-    start of its cycle as can be. A joint whose device is being switched, cleared or rebooted is left out,
-    and holds up no other.
+    zeroes that joint's torque at once, and a motor that may not obey is switched off. The write comes first,
+    so that a command takes effect as near to the start of its cycle as can be. A joint whose device is being
+    switched, cleared or rebooted is left out, and holds up no other.
     """
     with ExitStack() as kept:
         taken = [joint.take(kept) for joint in joints]
@@ -48,4 +48,7 @@ def cycle(
                 joint.write(0.0, age)
         for bus in buses:
             bus.send()
+        for joint, state in zip(joints, states, strict=True):
+            if state is not None:
+                joint.switch_off_if_due()
         return states

@@ -7,7 +7,7 @@ import signal
 import threading
 from collections.abc import Callable
 
-from rsea_ros.processes import STOPPING
+from rsea_ros.processes import ENDING
 
 
 class SignalListener:
@@ -36,5 +36,5 @@ class SignalListener:
 
     def _listen(self) -> None:
         while numbers := os.read(self._outlet, 64):
-            if set(STOPPING).intersection(numbers):
+            if set(ENDING).intersection(numbers):
                 self._react()

@@ -29,6 +29,7 @@ class CommandQueue:
     one without a stamp, or further than 0.3 s from now, when it arrives (`unstamped`, of these `off` by
     their stamp). A command that takes effect at once overtakes earlier waiting ones. Not-a-number is
     dropped (`refused`). 50 ms after the last command the torque is zero (`expired` counts how often).
+    first: the first one (N m) since the last `clear`, whether it ever took effect or not.
     strict, as in front of a real machine: a stamp further than 0.3 s from now is `refused` too, unless there
     is none, and the last torque stays in force: the machine's limits end it.
     """
@@ -40,6 +41,7 @@ class CommandQueue:
         self._taken_until = self._from = 0
         self._newest: int | None = None
         self.torque, self.furthest = 0.0, 0.0
+        self.first: float | None = None
         self.late = self.unstamped = self.off = self.refused = self.expired = self.dropped = 0
 
     def add(self, stamp: int, torque: float, now: int) -> None:
@@ -59,6 +61,7 @@ class CommandQueue:
                 stamp = now
             elif stamp < self._taken_until:
                 self.late += 1
+            self.first = torque if self.first is None else self.first
             if stamp <= now:
                 self._waiting = [w for w in self._waiting if w.when <= now]
             self._waiting.append(PendingCommand(max(stamp, self._taken_until), torque, now))
@@ -100,7 +103,7 @@ class CommandQueue:
     def clear(self, since: int = 0) -> None:
         """Drop all commands; the torque is zero. since: ns; commands from before are dropped also later."""
         with self._lock:
-            self._waiting, self._newest, self.torque = [], None, 0.0
+            self._waiting, self._newest, self.torque, self.first = [], None, 0.0, None
             self._from = max(self._from, since)
 
     def values(self, now: int) -> dict[str, object]:

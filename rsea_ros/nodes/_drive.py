@@ -14,7 +14,7 @@ from rsea_ros.hardware.together import Shared, cycle
 from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
 
-CLOCK_STEP, STOPPED = "clock_step", "stopped"
+CLOCK_STEP, RESTARTED = "clock_step", "restarted"
 
 
 class CommandSource(Protocol):
@@ -29,14 +29,15 @@ class CommandSource(Protocol):
 class DriverCycle:
     """A guarded device, driven by a source's commands. rate: Hz. anchor: the clock of stamps and ages.
 
-    lock: held while a cycle takes a command and the device gets it.
+    lock: held while a cycle takes a command and the device gets it. zero_first: whether a first command that
+    is a torque is a fault: nobody has asked for it since the driver died and was started again.
     """
 
     def __init__(self, guarded: GuardedDevice, source: CommandSource, anchor: Anchor, rate: float) -> None:
         self.guarded, self._source, self.anchor = guarded, source, anchor
         self._period = round(SECOND / rate)
         self.lock = threading.Lock()
-        self._deaf = 0
+        self._deaf, self.zero_first = 0, False
 
     def wanted_torque(self, stamp: int, by: int) -> tuple[float, float | None]:
         """Return the torque (N m) that is in force from this cycle on (its stamp rounded), and its age (s).
@@ -48,6 +49,8 @@ class DriverCycle:
         self._source.poll(self.anchor)
         commands, now = self._source.commands, self.anchor.now()
         commands.take(max(stamp, now - self._period) + self._period // 2)
+        if self.zero_first and commands.first is not None:
+            self._check_zero(commands.first)
         return commands.torque, None if self._deaf else commands.age(now)
 
     @contextmanager
@@ -64,9 +67,16 @@ class DriverCycle:
                 self._deaf -= 1
 
     def stop(self) -> None:
-        """End the torque with the next cycle, until the fault is cleared; commands so far are forgotten."""
+        """End the torque with the next cycle, until a later clear; commands so far are forgotten."""
         with self.deaf():
-            self.guarded.guard.trip(DeviceFault(STOPPED, detail="the service stop was called"))
+            self.guarded.stop()
+
+    def _check_zero(self, torque: float) -> None:
+        """Latch a fault where the first command since autostart is a torque."""
+        self.zero_first = False
+        if torque != 0.0:
+            detail = f"the first command since autostart is {torque:.4g} N·m, expected 0 N·m or resume:=true"
+            self.guarded.guard.trip(DeviceFault(RESTARTED, detail=detail))
 
     def _see_to_the_clock(self, by: int) -> None:
         """Drop the commands from before the system clock was set: nobody knows which are of now.

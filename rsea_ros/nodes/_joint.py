@@ -64,10 +64,14 @@ class DrivenJoint:
         """Note the cycle, whose times are reported with this joint's health."""
         self._cycle = cycle
 
-    def enable(self) -> None:
-        """Switch the torque on and let commands through, from the next one on. Raises DeviceError."""
+    def enable(self, *, zero_first: bool = False) -> None:
+        """Switch the torque on and let commands through, from the next one on. Raises DeviceError.
+
+        zero_first: whether that one must be zero.
+        """
         assert self.drive is not None
         with self.drive.deaf():
+            self.drive.zero_first = zero_first
             self.guarded.enable()
 
     def close(self) -> None:

@@ -22,7 +22,7 @@ from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._parameters import NodeParameter, declare, usage
 from rsea_ros.nodes._pulse import Pulse
 from rsea_ros.nodes._sockets import publish_by_sockets
-from rsea_ros.processes import STOPPING, Stopped
+from rsea_ros.processes import ENDING, STOPPING, Stopped
 
 NAMESPACE = "rsea"
 SUCCESS, BAD_INPUT = 0, 2
@@ -57,7 +57,8 @@ def run_node(
 ) -> int:
     """Run one node in this process and return the exit status.
 
-    endless: a stop is the regular end; otherwise it is an interruption (status 128 plus the signal).
+    endless: a signal of STOPPING is the regular end; any other end by a signal is an interruption (status
+    128 plus its number).
     more: parameters beside those of the table, from the given ones. waits_for_nobody: see _sockets.py.
     An error that the user can correct is one line in the log and status 2.
     """
@@ -72,7 +73,7 @@ def run_node(
             get_logger(name).warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
         node = _make(kind, name)
         done = _work(node, make(node, declare(node, table, more)), stop)
-        return SUCCESS if done or endless else stop.status
+        return SUCCESS if done or (endless and stop.is_regular) else stop.status
     except Stopped as stopped:
         return stopped.status
     except (RseaError, OSError) as error:
@@ -87,7 +88,10 @@ class _Stop:
 
     def __init__(self) -> None:
         self.status = 0
-        for number in STOPPING:
+        self._numbers = [
+            n for n in ENDING if n in STOPPING or signal.getsignal(n) is signal.SIG_DFL  # no other handler
+        ]
+        for number in self._numbers:
             signal.signal(number, self._ask)
 
     @property
@@ -95,12 +99,17 @@ class _Stop:
         """Whether a signal has arrived."""
         return self.status > 0
 
+    @property
+    def is_regular(self) -> bool:
+        """Whether it was one that asks a process to stop."""
+        return self.status - Stopped.BASE in STOPPING
+
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self.status = Stopped(number).status
 
     def interrupt(self) -> None:
         """From now on signals raise Stopped."""
-        for number in STOPPING:
+        for number in self._numbers:
             signal.signal(number, _raise)
 
 

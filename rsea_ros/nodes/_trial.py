@@ -80,7 +80,7 @@ class LiveRun:
 
     def __init__(self, ears: Ears, player: Player) -> None:
         self._ears, self._player = ears, player
-        self._over_at, self._why = 0.0, ""
+        self._over_at, self._why, self._begun = 0.0, "", time.monotonic()
         self._rest = max(_TAIL, SHORTEST + _TAIL - len(player.command) / player.rate)
         ears.begin(self._fail)
 
@@ -88,6 +88,10 @@ class LiveRun:
         """Go softly to zero; the run counts for nothing. why: the first reason stays."""
         self._why = self._why or why
         self._player.stop()
+
+    def waits(self) -> float:
+        """Return for how long it has waited for its bench, s; 0 once it plays."""
+        return 0.0 if self._player.started else time.monotonic() - self._begun
 
     def over(self) -> bool:
         """Return whether the run and its recording are over; stops it where the bench falls silent."""

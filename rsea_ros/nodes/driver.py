@@ -41,6 +41,9 @@ TABLE = (
     NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
     NodeParameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 1_000_000_000),
     NodeParameter("autostart", False, "whether to configure and activate at once", whole=True),
+    NodeParameter(
+        "resume", False, "whether its first command then may be a torque, as after a restart", whole=True
+    ),
     *REALTIME,
     JOINTS,
     *SAFETY,
@@ -83,8 +86,10 @@ class DriverNode(ManagedEntity):
         self._cycle: Cycle | None = None
         self._combined: Combined | None = None
         node.add_managed_entity(self)
+        self._zero_first = values["autostart"] and not values["resume"]
         if values["autostart"] and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             node.trigger_activate()
+        self._zero_first = False
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the devices and begin to publish their measurements."""
@@ -109,7 +114,7 @@ class DriverNode(ManagedEntity):
         """Switch the torque on and let commands through, from the next one on; not with a fault latched."""
         try:
             for joint in self.joints:
-                joint.enable()
+                joint.enable(zero_first=self._zero_first)
         except RseaError as error:
             self._node.get_logger().error(joint.with_name(f"not activated: {error}"))
             self._disable([each for each in self.joints if each.guarded.enabled])
@@ -152,7 +157,7 @@ class DriverNode(ManagedEntity):
     def close(self) -> None:
         """Zero torque, devices closed, topics removed; also without any."""
         for joint in self.joints:
-            joint.guarded.enabled = False
+            joint.guarded.interlock.disable()
         self._jobs.join(PATIENCE)
         try:
             if self._cycle is not None:
@@ -197,7 +202,7 @@ class DriverNode(ManagedEntity):
     def _halt(self) -> None:
         """End the torque with the next cycle, since the process is to end."""
         for joint in self.joints:
-            joint.guarded.guard.halted = True
+            joint.guarded.interlock.halted = True
 
     def _step(self, stamp: int) -> None:
         """Run a cycle of the devices and publish the readings."""

@@ -50,6 +50,9 @@ TABLE = (
     NodeParameter("per_run", 0.5, "excitation as dear as one more run; 0: least excitation", "s", 0.0, 600.0),
     NodeParameter("rate", 280.0, "commands a second", "Hz", *RATES),
     NodeParameter("ask", True, "wait for ~/approve before each run; false: play at once"),
+    NodeParameter(
+        "approval", 10.0, "in which an approved run begins, or is to be approved again", "s", 0.1, 600.0
+    ),
     NodeParameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
     NodeParameter(
         "out", DEFAULT, "directory of the results; the default: the first of -2, -3, … that is new"
@@ -115,25 +118,32 @@ class ExperimentNode:
         """In the loop's thread: request approval, play the run, return its record; None if declined."""
         with self._changed:
             self._proposal, self._answer = proposal, None if self._values["ask"] else True
-            self._changed.wait_for(lambda: self._answer is not None or self._cancelled)
-            if self._cancelled or not self._answer:
-                self._proposal = None
-                return None
-            self._changed.wait_for(lambda: self._proposal is None)
-            trial, self._trial = self._trial, None
-        assert trial is not None
+            self._changed.wait_for(self._is_answered)
+            self._proposal, trial, self._trial = None, self._trial, None
+        if trial is None:
+            return None
         record = trial.record()
         self._runs += 1
         write_record(record, self._out / f"run-{self._runs}.mcap")
         return record
 
+    def _is_answered(self) -> bool:
+        """Return whether the proposed run is over, or will not be played."""
+        refused = self._answer is False or (bool(self._cancelled) and self._trial is None)
+        return self._proposal is None or refused
+
     def _look(self) -> None:
-        """In the executor: begin an approved run, end one that is over."""
+        """In the executor: begin an approved run, end one that is over or whose approval has expired."""
         with self._changed:
-            if self._proposal is None or not self._answer:
+            if self._proposal is None or not self._answer or self._is_answered():
                 return
             if self._trial is None:
                 self._trial = LiveRun(self._ears, self._player(self._proposal))
+            elif self._values["ask"] and self._trial.waits() > self._values["approval"]:
+                self._trial.close()
+                self._trial = self._answer = None
+                text = f"no bench within {self._values['approval']:g} s: the approval has expired"
+                self._node.get_logger().warning(text)
             elif self._trial.over():
                 self._trial.close()
                 self._proposal = None

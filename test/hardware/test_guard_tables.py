@@ -26,7 +26,7 @@ def torques(limiter, *commands):
 
 def test_a_new_guard_commands_zero_and_has_no_fault():
     new = guard()
-    assert (new.torque, new.limited, new.fault, new.halted) == (0.0, 0, None, False)
+    assert (new.torque, new.limited, new.fault, new.interlock.is_free) == (0.0, 0, None, False)
 
 
 def test_a_step_of_torque_is_limited_by_default():
@@ -70,7 +70,7 @@ def test_the_fault_of_late_commands_says_how_late_in_ms():
 def test_at_the_end_of_the_program_the_torque_is_zero_without_a_fault():
     limiter = guard()
     limiter.allowed_torque(9.0, 0.0)
-    limiter.halted = True
+    limiter.interlock.halted = True
     assert torques(limiter, (9.0, 0.0), (9.0, None)) == [0.0, 0.0]
     assert limiter.fault is None
 
@@ -248,7 +248,7 @@ def test_a_ramp_is_not_taken_for_a_missed_torque():
     limiter.trip(DeviceFault("ft"))
     for _ in range(5):
         limiter.look(reading(10.0))
-    limiter.fault = None
+    limiter.interlock.fault = None
     limiter.look(reading(10.0))
     assert limiter.fault is None
 

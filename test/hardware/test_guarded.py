@@ -116,7 +116,7 @@ def test_a_cycle_writes_then_reads_and_beats_before_each(joint, device):
     state = joint.cycle(9.0, 0.0)
     assert device.log == ["beat True", "write 4", "beat", "read"]
     assert joint.state is state and state.stamp == 1
-    assert joint.write(0.0, 0.0) == 0.0 and device.log[-2:] == ["beat False", "write 0"]
+    assert joint.write(0.0, 0.0) == 0.0 and device.log[-2:] == ["write 0", "beat False"]
 
 
 @pytest.mark.parametrize("value", [0.01, math.nan])
@@ -134,7 +134,7 @@ def test_a_deflection_is_measured_where_a_reading_has_one(joint, device, value):
 def test_no_torque_gets_through_before_it_is_enabled(device):
     joint = GuardedDevice(device, Limits(64.0), 64.0)
     assert joint.write(9.0, 0.0) == 0.0
-    assert device.log == ["beat False", "write 0"]
+    assert device.log == ["write 0", "beat False"]
 
 
 def test_a_reading_beyond_a_limit_ends_the_torque_in_the_same_cycle(joint, device):
@@ -143,7 +143,7 @@ def test_a_reading_beyond_a_limit_ends_the_torque_in_the_same_cycle(joint, devic
     device.log.clear()
     joint.cycle(9.0, 0.0)
     assert joint.fault.cause == "temperature"
-    assert device.log == ["beat True", "write 8", "beat", "read", "beat False", "write 0"]
+    assert device.log == ["beat True", "write 8", "beat", "read", "write 0", "beat False"]
 
 
 @pytest.mark.parametrize(("method", "what"), [("read", "failed_reads"), ("write", "failed_writes")])

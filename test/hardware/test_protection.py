@@ -1,11 +1,7 @@
 """Protection against a dead host: of every device, asked when it is opened; devices from outside."""
 
 import math
-import os
-import signal
-import threading
 import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -14,10 +10,9 @@ from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits, complaint
 from rsea_ros.hardware.outside import options_of, outside_device
-from rsea_ros.hardware.protection import NONE, PROCESS, SUPERVISOR
+from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.hardware.spring_sensor import Spring
-from rsea_ros.hardware.supervised import SupervisorLost
 from rsea_ros.model.rig_file import load_rig
 
 TOY = Path(__file__).with_name("toy_device.py")
@@ -145,34 +140,6 @@ def test_a_deflection_that_is_not_measured_stays_a_fault_until_it_is_again(toy):
     assert loop.fault is not None and device.torque == 0.0
     device.deflection_known = True
     assert loop.clear() and loop.cycle(10.0, 0.0).inferred and loop.fault is None
-
-
-def test_a_supervisor_that_stands_still_is_lost_before_its_pipe_blocks_the_cycle(toy):
-    """The beats filled the pipe, and the cycle waited under torque for a process that was stopped."""
-    device = toy(supervised="yes", watchdog=1.0)
-    loop = guard(device)
-    loop.open()
-    child = device.protection._supervisor._end._process
-    os.kill(child.pid, signal.SIGSTOP)
-    ended = threading.Event()
-
-    def beat():
-        with suppress(SupervisorLost):
-            for k in range(100_000):
-                device.protection.beat(k % 2 == 0)
-            pytest.fail("nobody takes the beats")
-        ended.set()
-
-    thread = threading.Thread(target=beat, daemon=True)
-    thread.start()
-    try:
-        assert ended.wait(5.0)
-        device.protection.guard(device.near.fileno(), [b"stop\n"])
-        assert child.poll() is not None and device.protection.kind == SUPERVISOR
-    finally:
-        if child.poll() is None:
-            os.kill(child.pid, signal.SIGCONT)
-        thread.join(5.0)
 
 
 def test_a_reading_that_is_not_finite_is_a_fault(toy):

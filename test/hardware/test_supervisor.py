@@ -1,6 +1,8 @@
 """The supervisor of a motor: a process of its own that the machine's other work must not hold up."""
 
 import os
+import signal
+import socket
 import subprocess
 import sys
 import time
@@ -8,6 +10,7 @@ import time
 import pytest
 
 from rsea_ros.hardware import supervisor
+from test.hardware.conftest import Loop, well_behaved
 
 
 def may_hurry():
@@ -32,3 +35,48 @@ def test_it_runs_before_all_other_processes_where_it_may(listens, tmp_path):
     process.communicate()
     os.close(reader)
     os.close(writer)
+
+
+FRAMES, REPLY = (b"zero", b"off!"), b"done"
+
+
+@pytest.mark.parametrize("ignored", [0, 50])
+def test_it_repeats_its_frames_until_the_motor_has_acknowledged_them(ignored):
+    """It sent them 20 times, whatever the motor answered, and nobody knew whether one had arrived."""
+    motor, port = socket.socketpair()
+    words = [str(port.fileno()), "0.1", *(frame.hex() for frame in FRAMES), "--", REPLY.hex()]
+    process = subprocess.Popen(
+        [sys.executable, "-I", "-S", supervisor.__file__, *words],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=(port.fileno(),),
+    )  # fmt: skip
+    process.stdin.write(b"a")
+    process.stdin.flush()
+    assert process.stdout.read(1) == b"e", "it echoes"
+    process.stdin.close()  # the driver is dead
+    port.close()
+    heard = []
+    while frame := motor.recv(4):
+        heard.append(frame)
+        if len(heard) > ignored:
+            motor.send(b"noise" + REPLY)
+    assert process.wait(10.0) == 0
+    process.stdout.close()
+    motor.close()
+    assert set(heard) == set(FRAMES) and len(heard) <= ignored + 2 + 2 * (ignored > 0)
+
+
+def test_a_supervisor_that_stands_still_is_noticed_within_a_second(benches):
+    """Nobody did for 20 s, in which the driver had no guard."""
+    well_behaved(benches())
+    loop = Loop(benches())
+    loop.guarded.enable()
+    loop.cycles(5, 10.0)
+    child = loop.device.protection._supervisor._end._process
+    os.kill(child.pid, signal.SIGSTOP)
+    loop.until_fault(10.0, most=280)
+    assert "no answer for" in str(loop.guarded.fault) and loop.guarded.fault.cause == "supervisorlost"
+    loop.cycles(2, 10.0)
+    assert loop.bench.torque()[0] == 0
+    loop.guarded.clear()
+    assert loop.cycles(3, 10.0) == [10.0] * 3 and child.poll() is not None
+    loop.close()

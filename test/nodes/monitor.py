@@ -35,7 +35,7 @@ class Monitor:
 
 
 class FakeMotor:
-    """A device without a wire that makes its torque at once. broken: raised by every answer."""
+    """A device without a wire that makes its torque at once. during: done in each recover."""
 
     protection = Protection(BUS_WATCHDOG, WATCHDOG)
 
@@ -43,7 +43,17 @@ class FakeMotor:
         self.goal, self.on, self.away, self.refusing = 0.0, False, False, ""
         self.reading = {}
         self.during = None
-        self._heard = 0.0
+        self._heard, self._once = 0.0, {}
+
+    def at(self, moment, act):
+        """Act within the next call of a method; return a list that has its name once that is done."""
+        self._once[moment] = act, []
+        return self._once[moment][1]
+
+    def _reached(self, moment):
+        act, done = self._once.pop(moment, (lambda: None, []))
+        done.append(moment)
+        act()
 
     def watch(self, now):
         """The motor's own watchdog: without a host for 100 ms its goal is zero."""
@@ -59,14 +69,17 @@ class FakeMotor:
         self._answer()
 
     def enable(self):
+        self._reached("enable")
         self._answer()
         self.goal, self.on = 0.0, True
 
     def disable(self):
+        self._reached("disable")
         self._answer()
         self.goal, self.on = 0.0, False
 
     def read(self):
+        self._reached("read")
         self._answer()
         made = self.goal if self.on else 0.0
         return State(0, **({"position": 0.0, "velocity": 0.0, "motor_torque": made} | self.reading))
@@ -79,6 +92,7 @@ class FakeMotor:
         pass
 
     def recover(self):
+        self._reached("recover")
         if self.during:
             self.during()
         self._answer()

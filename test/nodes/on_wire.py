@@ -15,7 +15,10 @@ from rsea_ros.nodes._qos import COMMAND
 from test.nodes.stalls import every, is_stall
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENT = {"rate": 100.0, "latency": 0.1, "ft_timeout": 0.5, "command_timeout": 5.0, "autostart": True}
+PATIENT = {
+    "rate": 100.0, "latency": 0.1, "ft_timeout": 0.5, "command_timeout": 5.0, "autostart": True,
+    "resume": True,
+}  # fmt: skip
 """A machine that is busy with other tests must not look like a fault."""
 WAIT = 55.0
 """s for what normally takes one: the driver starts and compiles beside other tests."""
@@ -74,6 +77,11 @@ class Driven:
     def trigger(self, service):
         """Call a Trigger service."""
         return self.call(Trigger, service, Trigger.Request())
+
+    def request(self, service):
+        """Call a Trigger service; return the future of its answer. For one that was called before."""
+        client = self._listener._clients[f"/{self.name}/driver/{service}"]
+        return client.call_async(Trigger.Request())
 
     def change(self, transition):
         """Ask for a transition of the lifecycle."""

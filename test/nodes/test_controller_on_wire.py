@@ -27,7 +27,8 @@ class Wire:
     def __init__(self, bench, start, listener):
         self.bench, self.listener = bench, listener
         spaces = {"__ns": "/wired"}
-        self.driver = start("driver", remaps=spaces, **bench.parameters(), baud=4_000_000, autostart=True)
+        started = {"autostart": True, "resume": True, "baud": 4_000_000}
+        self.driver = start("driver", remaps=spaces, **bench.parameters(), **started)
         self.controller = start("controller", remaps=spaces)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.wrenches = listener.hear(WrenchStamped, "/wired/ft", MEASUREMENT)

@@ -25,7 +25,7 @@ class Commanded(Driven):
     """A driver that a thread commands at 280 Hz. torque: N m; None: nothing."""
 
     def __init__(self, bench, listener, name, begin):
-        super().__init__(bench, listener, name, begin, {"autostart": True})
+        super().__init__(bench, listener, name, begin, {"autostart": True, "resume": True})
         self.torque, self.children, self._over = 10.0, (), threading.Event()
         self._thread = threading.Thread(target=self._command, daemon=True)
         self._thread.start()
@@ -88,13 +88,13 @@ def silence(wire):
     wire.torque = None
 
 
-def kill_supervisor(wire):
-    for pid in wire.children:
-        os.kill(pid, signal.SIGKILL)
+def supervisor(number):
+    return lambda wire: [os.kill(pid, number) for pid in wire.children]
 
 
 CALM = ask("misbehave", silent=False, drop=0.0, delay=0.0, ft_silent=False, ft_stuck=False)
-HEALTHY = ask("set", temperature=32, voltage=240, mode=0)
+HEALTHY = ask("set", temperature=32, voltage=240, mode=0, homing_offset=0)
+MOVED = ("effort", "motor_state", "velocity", "deflection", "ft_torque")
 FAULTS = {
     "no reply": (ask("misbehave", silent=True), CALM, "no_reply", 5),
     "every reply 20 ms late": (ask("misbehave", delay=1.0, late=0.02), CALM, "no_reply", 5),
@@ -102,13 +102,16 @@ FAULTS = {
     "supply too low": (ask("set", voltage=190), HEALTHY, "voltage", 2),
     "torque switched off": (ask("set", torque_enable=0), HEALTHY, ("effort", "motor_state"), 1),
     "mode changed": (ask("set", mode=3), HEALTHY, ("effort", "motor_state"), SECOND),
+    "mode changed, turning": (ask("set", mode=1, goal_velocity=3000), HEALTHY, MOVED, SECOND),
+    "position jumps": (ask("set", homing_offset=40_000), HEALTHY, "position_step", 2),
     "alert": (ask("alert", bits=32), HEALTHY, "hardware_error", 1),
     "F/T saturated": (ask("ft_status"), ask("ft_status", bits=0), "ft", 3),
     "F/T silent": (ask("misbehave", ft_silent=True), CALM, "ft", 8),
     "F/T stands still": (ask("misbehave", ft_stuck=True), CALM, "ft: all six values", MOST_STUCK),
     "F/T restarted": (ask("ft_restart"), CALM, "ft", 90),
     "commands cease": (silence, CALM, "command_timeout", 25),
-    "supervisor killed": (kill_supervisor, CALM, "supervisorlost", 8),
+    "supervisor killed": (supervisor(signal.SIGKILL), CALM, "supervisorlost", 8),
+    "supervisor stands still": (supervisor(signal.SIGSTOP), CALM, "supervisorlost", SECOND),
 }
 """How it is provoked and ended, the cause that is latched, the most writes of a torque until then."""
 
@@ -121,17 +124,46 @@ def test_a_fault_ends_the_torque_within_its_cycles_and_is_over_by_its_service(wi
         since = wire.bench.ask("torque")["t"]
         provoke(wire)
         fault = listener.until(wire.latched)
+        listener.until(lambda: 0 in wire.goal())
         writes = [goal != 0 and on for _, goal, on in wire.bench.log(since)["torque"]]
         end(wire)
         if fault.startswith(cause):
             break
         assert is_stall(fault) or fault.startswith("command_timeout"), fault
     assert fault.startswith(cause)
-    zero = writes.index(False) if False in writes else len(writes)
-    assert zero <= most, writes
-    assert not any(writes[zero:]), "a torque acts after the fault"
+    acted = max((at for at, acts in enumerate(writes, 1) if acts), default=0)
+    assert acted <= most, writes
     listener.until(lambda: wire.clear()[-1].success)
     wire.ready()
+
+
+def test_a_stop_while_a_clear_waits_for_the_sensor_holds_until_a_later_clear(wire, listener):
+    """It was acknowledged and forgotten: when the clear was over, 10 N m acted."""
+    wire.ready()
+    wire.bench.ask("misbehave", ft_silent=True)
+    listener.until(wire.latched)
+    clear = wire.request("clear_fault")
+    listener.until(lambda: clear.done() or wire.trigger("stop").success)
+    assert not clear.done()
+    CALM(wire)
+    assert "stop was called meanwhile" in listener.until(lambda: clear.done() and clear.result()).message
+    since = wire.bench.ask("torque")["t"]
+    wire._health.clear()
+    fault = listener.until(wire.latched)
+    assert fault.startswith("stopped") or is_stall(fault), fault
+    assert not any(goal and on for _, goal, on in wire.bench.log(since)["torque"])
+
+
+@pytest.mark.parametrize("service", ["clear_fault", "reboot"])
+def test_another_motor_of_the_same_id_is_not_switched_on(wire, listener, service):
+    wire.ready()
+    wire.bench.ask("set", temperature=90)
+    listener.until(wire.latched)
+    since = wire.bench.ask("set", temperature=32, torque_limit=500)["t"]
+    answer = wire.trigger(service)
+    assert not answer.success and "expected 9.99" in answer.message
+    assert not any(on and goal for _, goal, on in wire.bench.log(since)["torque"]) and not wire.goal()[1]
+    wire.bench.ask("set", torque_limit=620)
 
 
 def test_the_first_torque_after_a_fault_is_small(wire):

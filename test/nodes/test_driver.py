@@ -139,7 +139,7 @@ def spied(listener, make_driver, monkeypatch):
     spy = Spy()
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spy})
     values = {parameter.name: parameter.default for parameter in driver.TABLE}
-    given = {"rate": 200.0, "autostart": True, "command_timeout": 5.0}
+    given = {"rate": 200.0, "autostart": True, "resume": True, "command_timeout": 5.0}
     program, node = make_driver("spied", values | given)
     publisher = listener.node.create_publisher(JointState, "/spied/torque_command", COMMAND)
 
@@ -210,7 +210,7 @@ def test_two_actuators_each_follow_only_their_own_commands(listener, monkeypatch
     spies = {name: Spy() for name in ("left", "right")}
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"][:-5]]})
     values = {parameter.name: parameter.default for parameter in driver.TABLE} | {
-        "rate": 200.0, "autostart": True, "command_timeout": 5.0, "effort_limit": 0.0,
+        "rate": 200.0, "autostart": True, "resume": True, "command_timeout": 5.0, "effort_limit": 0.0,
     }  # fmt: skip
     made, topic = [], {}
     for name in spies:

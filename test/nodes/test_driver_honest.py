@@ -34,7 +34,8 @@ class Shimmed:
         self.set_clock(0)
         self.preloaded = preload(folder, self.step)
         program = DRIVER if self.preloaded else in_python() + DRIVER
-        values = {**bench.parameters(), "baud": 4_000_000, "autostart": True, "joint": "left_knee"}
+        start = {"autostart": True, "resume": True, "joint": "left_knee"}
+        values = {**bench.parameters(), "baud": 4_000_000, **start}
         words = [w for k, v in values.items() for w in ("-p", f"{k}:={str(v).lower() if v is True else v}")]
         self.process = subprocess.Popen(
             [sys.executable, "-c", program, "--ros-args", *words, "-r", "__ns:=/honest"],

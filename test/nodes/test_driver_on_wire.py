@@ -236,7 +236,7 @@ def test_after_a_lifecycle_shutdown_the_torque_is_zero_and_off(bench, start, lis
 @pytest.mark.parametrize(
     ("model", "number", "status", "end"),
     [
-        (54025, signal.SIGTERM, 0, (0, False)),
+        (54025, signal.SIGXCPU, 128 + signal.SIGXCPU, (0, False)),
         (54024, signal.SIGKILL, -signal.SIGKILL, (0, False)),
         (54025, signal.SIGKILL, -signal.SIGKILL, (0, True)),
     ],

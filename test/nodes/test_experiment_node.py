@@ -114,8 +114,12 @@ def test_excite_plays_the_file_of_a_run(tmp_path):
     assert played == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)
 
 
-def test_a_run_that_is_declined_is_not_played(session, ask):
-    asked = session()
+def test_an_approval_without_a_bench_expires_and_a_run_that_is_declined_is_not_played(session, ask, listener):
+    """An approved run waited without limit, and began when a driver appeared."""
+    asked = session(approval=0.2)
+    asked.plant.kill()
+    assert ask("approve").success
+    listener.until(lambda: any("the approval has expired" in line for line in asked.node.output))
     assert ask("decline").success
     assert asked.node.wait() == 0, asked.node.output
     said = told(asked.out)

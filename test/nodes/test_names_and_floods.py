@@ -17,7 +17,7 @@ from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
 from test.nodes.test_driver import Spy
 
 VALUES = {parameter.name: parameter.default for parameter in driver.TABLE} | {
-    "rate": 200.0, "autostart": True, "command_timeout": 5.0, "effort_limit": 0.0,
+    "rate": 200.0, "autostart": True, "resume": True, "command_timeout": 5.0, "effort_limit": 0.0,
 }  # fmt: skip
 
 

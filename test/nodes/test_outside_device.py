@@ -10,7 +10,8 @@ from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 
 TOY = Path(__file__).resolve().parents[1] / "hardware" / "toy_device.py"
 VALUES = {parameter.name: parameter.default for parameter in driver.TABLE} | {
-    "device": "toy", "rate": 200.0, "autostart": True, "command_timeout": 5.0, "deflection_limit": 0.0,
+    "device": "toy", "rate": 200.0, "autostart": True, "resume": True, "command_timeout": 5.0,
+    "deflection_limit": 0.0,
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import yaml
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._parameters import NodeParameter, _refuse_unknown
-from rsea_ros.processes import STOPPING
+from rsea_ros.processes import ENDING
 from test.nodes.conftest import as_argument
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
@@ -99,10 +99,11 @@ def assert_refused(name, lines):
 @pytest.fixture
 def signals():
     """Restore what signals do, which a node changes."""
-    before = {number: signal.getsignal(number) for number in STOPPING}
+    before = {number: signal.getsignal(number) for number in ENDING}
     yield
     for number, action in before.items():
-        signal.signal(number, action)
+        if action is not None:
+            signal.signal(number, action)
 
 
 @pytest.mark.parametrize("name", sorted(WRONG.keys() - set(PROCESSES)))

@@ -78,7 +78,8 @@ class Leg:
     def __init__(self, bench, start, listener, patient=PATIENT):
         self.bench, self.listener = bench, listener
         ids = {f"{joint}.id": k + 1 for k, joint in enumerate(JOINTS)}
-        known = {**bench.parameters(), **X, "baud": 4_000_000, "autostart": True, "joints": list(JOINTS)}
+        known = {**bench.parameters(), **X, "baud": 4_000_000, "autostart": True, "resume": True}
+        known["joints"] = list(JOINTS)
         sensor = {"hip.ft_host": "127.0.0.1"}
         self.process = start("driver", {"__ns": "/leg"}, **known, **patient, **ids, **sensor)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
@@ -190,7 +191,7 @@ def test_all_torques_are_zero_before_the_first_motor_is_closed(listener, monkeyp
         monkeypatch.setattr(spy, "close", lambda name=name: order.append((name, "closed")))
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"]]})
     node = LifecycleNode("ended", namespace="ended")
-    program = driver.DriverNode(node, values_of(joints=["hip", "knee"], autostart=True))
+    program = driver.DriverNode(node, values_of(joints=["hip", "knee"], autostart=True, resume=True))
     program._cycle.stop()
     order.clear()
     program.close()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.bus import Bus
 from rsea_ros.hardware.dynamixel.port import SerialPort
-from rsea_ros.hardware.dynamixel.sample import MotorSample
+from rsea_ros.hardware.dynamixel.sample import MotorSample, Unwrapper
 
 SPRING, LINK = "spring", "link"
 SIZE = 4
@@ -38,7 +38,7 @@ class BusEncoder:
         self._settings = settings
         self._bus = Bus(port, settings.identity, "encoder")
         self._bus.latency = settings.latency
-        self._zero, self._longer = 0.0, 0
+        self._zero, self._longer, self._counts = 0.0, 0, Unwrapper()
 
     @property
     def errors(self) -> Counter[str]:
@@ -48,6 +48,7 @@ class BusEncoder:
     def open(self, sample: MotorSample, *, absolute: bool) -> None:
         """Check that it answers. sample: of now. absolute: its zero counts. Raises NoReply, Refused."""
         self._zero = 0.0
+        self._counts.restart()
         zero = self._bus.patiently(lambda: self.deflection(sample))
         self._zero = 0.0 if absolute else zero
 
@@ -64,7 +65,7 @@ class BusEncoder:
             self._longer ^= 1
             raise
         instant = (begin + time.monotonic_ns()) // 2
-        counts = int.from_bytes(data[:SIZE], "little", signed=True)
+        counts = self._counts.take(int.from_bytes(data[:SIZE], "little", signed=True))
         angle = counts * 2.0 * math.pi / self._settings.pulses
         if self._settings.place == SPRING:
             return angle - self._zero

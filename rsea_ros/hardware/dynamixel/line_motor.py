@@ -20,10 +20,10 @@ class LineMotor(Motor):
         super().__init__(settings, line.port)
         self._line, self._id = line, settings.identity
 
-    def open(self) -> None:
+    def _set_up(self) -> None:
         """Join the line and be set up, torque off. Raises DeviceError, also for a motor of another series."""
         self._line.join(self._id, self.close)
-        super().open()
+        super()._set_up()
         self._line.admit(self._id, self.control_table, self.bus.return_delay)
 
     def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:

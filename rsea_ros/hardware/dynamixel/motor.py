@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply, PortLost
-from rsea_ros.hardware.dynamixel.bus import Bus
+from rsea_ros.hardware.dynamixel.bus import ALERT, Bus
 from rsea_ros.hardware.dynamixel.control_tables import TABLES, ControlTable, TorqueConstant, error_names
 from rsea_ros.hardware.dynamixel.frames import frame
 from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, own_limits
@@ -21,8 +22,9 @@ from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection, Supervised
 TORQUE_MODE, ACKNOWLEDGE_ALL = 0, 2
 RETURN_DELAY_UNIT = 2e-6
 WATCHDOG_UNIT = 0.02
-WRITE = 0x03
+WRITE, STATUS = 0x03, 0x55
 BOOT_TIME, BOOT_POLL = 5.0, 0.02
+AS_CONFIGURED = "as it was at configure (another one needs cleanup and configure)"
 
 
 class Motor:
@@ -43,6 +45,7 @@ class Motor:
         self.acknowledged_late, self._unanswered = False, -1
         self.table: ControlTable | None = None
         self.limits: OwnLimits | None = None
+        self._known: Mapping[str, object] | None = None
         self.torque_constant = TorqueConstant(math.nan, math.nan, math.nan, "")
 
     @property
@@ -59,18 +62,50 @@ class Motor:
 
     def open(self) -> None:
         """Open the port, check who answers, switch the torque off, set torque mode, read the limits."""
+        self._known = None
+        self._set_up()
+
+    def _set_up(self) -> None:
+        """Do the work of `open`, also for a motor that was lost: it must be the same one then."""
         if not self._shared:
             self.port.open()
-        self.table = table = _table(self.bus.patiently(self.bus.ping), self._settings)
+        self.table = table = _table(self._model(), self._settings)
         self.torque_constant = _constant(table, self._settings)
         self.bus.set(table.status_level, ACKNOWLEDGE_ALL)
-        self.limits = limits = own_limits(self.bus, table)
-        self.protection = self._protection(table, limits)
-        self._stop()
-        self.bus.return_delay = RETURN_DELAY_UNIT * limits.return_delay
-        if limits.operating_mode != TORQUE_MODE:
-            self.bus.set(table.operating_mode, TORQUE_MODE)
+        self.limits = own_limits(self.bus, table)
+        self.protection = self._protection(table, self.limits)
+        self.bus.return_delay = RETURN_DELAY_UNIT * self.limits.return_delay
+        self._identify()
         self._supervise()
+
+    def _identify(self) -> None:
+        """Switch the torque off, compare motor and settings with those of `open`, set torque mode.
+
+        Raises DeviceError for another motor, or one with other settings: they are checked at `open`.
+        """
+        table, found = self.control_table, {"model": self._model()}
+        self._stop()
+        self.limits = own_limits(self.bus, table)
+        found |= asdict(self.limits)
+        mode = found.pop("operating_mode")
+        self._check_same(found)
+        self._known = found
+        if mode != TORQUE_MODE:
+            self.bus.set(table.operating_mode, TORQUE_MODE)
+
+    def _model(self) -> int:
+        """Return the model number of the motor that answers. Raises DeviceError for another than before."""
+        model = self.bus.patiently(self.bus.ping)
+        self._check_same({"model": model})
+        return model
+
+    def _check_same(self, found: Mapping[str, object]) -> None:
+        """Raise DeviceError where something is not as at `open`."""
+        known = self._known or found
+        if changed := [name for name in found if found[name] != known[name]]:
+            words = "; ".join(f"{name} {found[name]}, expected {known[name]}" for name in changed)
+            where = f"motor ID {self._settings.identity} on {self._settings.path}"
+            raise DeviceError(f"{where}: {words}, {AS_CONFIGURED}")
 
     def _protection(self, table: ControlTable, limits: OwnLimits) -> Protection | Supervised:
         """Return the motor's own watchdog where model and firmware have one, else a supervisor."""
@@ -86,9 +121,9 @@ class Motor:
         return not isinstance(self.protection, Supervised)
 
     def enable(self) -> None:
-        """Switch the torque on, at zero, with a watchdog. Raises DeviceError."""
+        """Switch the torque on, at zero, with a watchdog. Raises DeviceError, also for another motor."""
         table = self.control_table
-        self._stop()
+        self._identify()
         kept = [("torque_enable", table.torque_enable, 1)]
         kept.append(("operating_mode", table.operating_mode, TORQUE_MODE))
         if self._watched:
@@ -151,13 +186,18 @@ class Motor:
         return current * self.torque_constant.value
 
     def recover(self) -> None:
-        """Open the port again if it is lost; raises DeviceError while the motor reports a hardware error."""
+        """Open the port again if it is lost, and see that it is the same motor, torque off.
+
+        Raises DeviceError, also while the motor reports a hardware error.
+        """
         try:
             self.control_table  # noqa: B018  a motor that was away when the port was opened again is not set up
             self.bus.patiently(self.bus.ping)
         except DeviceError:
             self.close()
-            self.open()
+            self._set_up()
+        else:
+            self._identify()
         self._supervise()
         error = self.bus.patiently(lambda: self.bus.get(self.control_table.hardware_error))
         if error:
@@ -177,7 +217,7 @@ class Motor:
                 if time.monotonic() > deadline:
                     raise
         self.close()
-        self.open()
+        self._set_up()
 
     def close(self) -> None:
         """Zero torque, off, port closed; where the motor does not acknowledge it, the supervisor stays."""
@@ -207,9 +247,9 @@ class Motor:
     def _supervise(self) -> None:
         """Start a supervisor for a motor without a watchdog, and a new one for one that is dead."""
         if isinstance(self.protection, Supervised):
-            self.protection.guard(
-                self.port.descriptor, stop_frames(self.control_table, self._settings.identity)
-            )
+            identity = self._settings.identity
+            replies = [frame(identity, bytes([STATUS, error])) for error in (0, ALERT)]
+            self.protection.guard(self.port.descriptor, stop_frames(self.control_table, identity), replies)
 
 
 def stop_frames(table: ControlTable, identity: int) -> list[bytes]:

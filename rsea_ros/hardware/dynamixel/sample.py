@@ -8,6 +8,23 @@ from dataclasses import dataclass
 from rsea_ros.hardware.dynamixel.control_tables import ControlTable
 
 
+class Unwrapper:
+    """Counts of an encoder that go on where their 4 bytes wrap round."""
+
+    def __init__(self) -> None:
+        self._last: int | None = None
+
+    def restart(self) -> None:
+        """Take the next counts as they are."""
+        self._last = None
+
+    def take(self, counts: int) -> int:
+        """Return the counts nearest to the last ones, modulo 2^32."""
+        last = counts if self._last is None else self._last
+        self._last = last + (counts - last + (1 << 31)) % (1 << 32) - (1 << 31)
+        return self._last
+
+
 @dataclass(frozen=True)
 class MotorSample:
     """instant: middle of the transaction, monotonic ns. counts: of the encoder. position rad, velocity rad/s,

@@ -67,7 +67,7 @@ class ForceSensor:
         elif command == STOP:
             self._client = None
         elif command == SET_BIAS:
-            self._bias, self._client = list(self._counts), None
+            self._bias = list(self._counts)
         elif command == RESET_LATCH:
             self.status = 0 if self.status == 0x8001_0000 else self.status
 
@@ -92,6 +92,10 @@ class ForceSensor:
         """Leave out so many records at once."""
         self._rdt, self._ft = self._rdt + records, self._ft + records
         self.gone += records
+
+    def set_rate(self, rate: float) -> None:
+        """Send so many records a second (Hz) from now on; the page is that of before, as at its settings."""
+        self._period = round(1e9 / rate)
 
     def restart(self) -> None:
         """Switch the box off and on: nobody listens, the counters and the bias are gone."""

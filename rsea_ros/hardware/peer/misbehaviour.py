@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import operator
 import random
 from dataclasses import dataclass, field
+
+HEAD, EQUAL = 9, 14
+"""Bytes of a reply before its data; the longest, that of a ping, which two motors of one model send alike."""
 
 
 @dataclass
 class Misbehaviour:
     """drop, delay, corrupt, truncate, wrong_crc: shares of the motor's replies. late: of the delay, s.
 
-    unstuffed, silent: whether. ft_drop: share of the sensor's records; ft_silent: whether it sends none;
-    ft_stuck: whether they repeat one value, while the counters go on.
+    unstuffed, silent: whether. twin: whether a second motor of the same ID answers at the same time, with
+    other measurements; a line that two drive is low where either is. ft_drop: share of the sensor's records;
+    ft_silent: whether it sends none; ft_stuck: whether they repeat one value, while the counters go on.
     """
 
     drop: float = 0.0
@@ -22,6 +27,7 @@ class Misbehaviour:
     wrong_crc: float = 0.0
     unstuffed: bool = False
     silent: bool = False
+    twin: bool = False
     ft_drop: float = 0.0
     ft_silent: bool = False
     ft_stuck: bool = False
@@ -45,6 +51,9 @@ class Misbehaviour:
         """Return a reply as it goes onto the wire: empty when it is dropped."""
         if self.happens("silent") or self.happens("drop"):
             return b""
+        if len(packet) > EQUAL and self.happens("twin"):
+            twin = bytes(37 * at % 256 for at in range(len(packet) - HEAD))
+            packet = packet[:HEAD] + bytes(map(operator.and_, packet[HEAD:], twin))
         if self.happens("wrong_crc"):
             packet = packet[:-1] + bytes((packet[-1] ^ 0x5A,))
         if self.happens("corrupt"):

@@ -17,6 +17,9 @@ class EmulatedEncoder(EmulatedMotor):
         super().__init__(ENCODER.number, plant, origin=origin, kept=kept)
         self.put("id", IDENTITY)
 
+    def serve(self, now: int) -> None:
+        """Do nothing: it has no torque that could be taken away."""
+
     def torque(self) -> float:
         """Return none."""
         return 0.0

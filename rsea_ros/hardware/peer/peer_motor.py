@@ -10,7 +10,9 @@ from rsea_ros.hardware.device import State
 from rsea_ros.hardware.peer.registers import EEPROM, ENCODER, MODELS, READ_ONLY, TABLE_SIZE
 
 FAILED, UNKNOWN, RANGE, LENGTH, LIMIT, ACCESS = 1, 2, 4, 5, 6, 7
-TORQUE_MODE = 0
+TORQUE_MODE, VELOCITY_MODE, PWM_MODE = 0, 1, 16
+VELOCITY_BAND, POSITION_BAND = 0.2, 0.05
+"""rad/s, rad off the goal at which the loops of the other modes make all of their torque."""
 WATCHDOG_UNIT = 20_000_000
 """ns"""
 TRIPPED = -1
@@ -32,7 +34,8 @@ class Mechanism(Protocol):
 class EmulatedMotor:
     """One motor. torque_constant: N m at the output per A, 0: its model's. origin: counts at 0 rad.
 
-    history: every write to it, as (clock in ns, goal in counts, whether torque is on), the newest `kept`.
+    history: every write to it, as (clock in ns, `acting_goal`, whether torque is on), the newest `kept`; also
+    where a torque begins or ends by itself, in other modes than that of torque.
     """
 
     def __init__(
@@ -67,6 +70,11 @@ class EmulatedMotor:
         self.memory[register.address : register.address + register.size] = data
 
     @property
+    def rate(self) -> int:
+        """The number of its bit rate; 0 where it has none."""
+        return self.get("baud") if "baud" in self.model.registers else 0
+
+    @property
     def alert(self) -> bool:
         """Whether the hardware error status is set."""
         return self.get("hardware_error") != 0
@@ -78,6 +86,17 @@ class EmulatedMotor:
             self.put("watchdog", TRIPPED)
             self.put("goal", 0)
             self._act(now)
+        elif self.get("mode") != TORQUE_MODE and self.get("torque_enable"):
+            self._plant.write(self.torque())
+            if not self.history or (self.history[-1][1] != 0) != (self.acting_goal() != 0):
+                self._act(now)
+
+    def hold(self, now: int) -> None:
+        """Begin in another mode, as after power-on: at rest, where it stands."""
+        self._measure(now)
+        for name, value in (("goal_position", self.get("position")), ("goal_velocity", 0), ("goal_pwm", 0)):
+            if name in self.model.registers:
+                self.put(name, value)
 
     def read(self, now: int, address: int, length: int) -> tuple[int, bytes]:
         """Return error code and bytes, with measurements updated."""
@@ -136,12 +155,31 @@ class EmulatedMotor:
         self._act(now)
 
     def torque(self) -> float:
-        """Return the torque that acts, N m."""
-        on = self.get("torque_enable") and self.get("mode") == TORQUE_MODE and not self._is_tripped()
-        return self.get("goal") * self.model.ampere * self._constant if on else 0.0
+        """Return the torque that acts, N m: in other modes that of a loop which obeys no goal current."""
+        if not self.get("torque_enable") or self._is_tripped():
+            return 0.0
+        unit, mode = self.model.ampere * self._constant, self.get("mode")
+        if mode == TORQUE_MODE:
+            return self.get("goal") * unit
+        if mode == PWM_MODE:
+            share = self.get("goal_pwm") / self.model.registers["goal_pwm"].high
+        elif mode == VELOCITY_MODE:
+            wanted = self.get("goal_velocity") * self.model.radian_per_second
+            share = (wanted - self._plant.read().velocity) / VELOCITY_BAND
+        else:
+            state, turn = self._plant.read(), 2 * math.pi / self.model.counts_per_turn
+            goal = (self.get("goal_position") - self._origin - self.get("homing_offset")) * turn
+            share = (goal - state.position) / POSITION_BAND - state.velocity / (10.0 * VELOCITY_BAND)
+        return max(-1.0, min(1.0, share)) * self.get("torque_limit") * unit
+
+    def acting_goal(self) -> int:
+        """Return the goal current in counts; in another mode the one that would make the torque that acts."""
+        if self.get("mode") == TORQUE_MODE or not self.get("torque_enable"):
+            return self.get("goal")
+        return round(self.torque() / self._constant / self.model.ampere)
 
     def _act(self, now: int) -> None:
-        entry = (now, self.get("goal"), bool(self.get("torque_enable")))
+        entry = (now, self.acting_goal(), bool(self.get("torque_enable")))
         self.history.append(entry)
         self._plant.write(self.torque())
 

@@ -22,8 +22,8 @@ class LineRequests:
     """`{"do": NAME, …}`; the answer has `t`, the clock (ns) at which it was done, or `error`.
 
     misbehave (fields of Misbehaviour), set (items of the control table), alert (bits), sag (voltage in V),
-    vanish, appear, ft_gap (records), ft_restart, ft_status (bits), model, firmware (number),
-    watch (keep F/T records), torque (goal, whether it is on), log, pauses, quit.
+    vanish, appear (name), ft_gap (records), ft_restart, ft_rate (rate in Hz), ft_status (bits), model,
+    firmware (number), watch (keep F/T records), torque (goal, whether it is on), log, pauses, quit.
 
     pauses: when the bench itself was held up until, and for how long, ns. `motor` in any request: its place
     on the line, 0 where it is not said.
@@ -44,13 +44,14 @@ class LineRequests:
         self.pauses: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._does: dict[str, Callable[[int, Request], object]] = {
             "misbehave": self._misbehave, "set": self._set, "alert": self._alert, "sag": self._sag,
-            "vanish": lambda now, r: bus.vanish(), "appear": lambda now, r: bus.appear(),
+            "vanish": lambda now, r: bus.vanish(), "appear": lambda now, r: bus.appear(r.get("name", "")),
             "ft_gap": lambda now, r: sensor.gap(int(r["records"])),
             "ft_restart": lambda now, r: sensor.restart(),
+            "ft_rate": lambda now, r: sensor.set_rate(float(r["rate"])),
             "ft_status": self._ft_status, "model": self._model, "firmware": self._firmware,
             "watch": self._watch, "log": self._log,
             "pauses": lambda now, r: [pause for pause in self.pauses if pause[0] >= int(r.get("since", 0))],
-            "torque": lambda now, r: [self._motor.get("goal"), bool(self._motor.get("torque_enable"))],
+            "torque": lambda now, r: [self._motor.acting_goal(), bool(self._motor.get("torque_enable"))],
         }  # fmt: skip
 
     def serve(self, now: int) -> bool:
@@ -89,6 +90,9 @@ class LineRequests:
             setattr(self._wrong, name, request[name])
 
     def _set(self, now: int, request: Request) -> None:
+        """Set items; a mode begins at rest unless its goal is set, too. The torque acts at once."""
+        if "mode" in request:
+            self._motor.hold(now)
         for name in set(request) - {"do"}:
             self._motor.put(name, int(request[name]))
 

@@ -38,26 +38,28 @@ class EmulatedBus:
         self._listener = RequestParser()
         self._waiting: list[tuple[int, bytes]] = []
         self._busy_until = [0] * len(motors)
+        self._rates = [motor.rate for motor in motors]
         self.sent: deque[tuple[int, int, bytes]] = deque(maxlen=kept)
         self.unknown = 0
         self.descriptor = -1
         self.appear()
 
-    def appear(self) -> None:
-        """Plug the adapter in."""
+    def appear(self, name: str = "") -> None:
+        """Plug the adapter in. name: of the file that it gets then, where that is another one."""
         if self.descriptor >= 0:
             return
         self.descriptor, self._far = os.openpty()
         tty.setraw(self._far)
         os.set_blocking(self.descriptor, False)
+        self._link = self._path.with_name(name) if name else self._path
         aside = self._path.with_name(f"{PREFIX}{secrets.token_hex(4)}")
         aside.symlink_to(os.ttyname(self._far))
-        aside.replace(self._path)
+        aside.replace(self._link)
 
     def vanish(self) -> None:
         """Pull the adapter out: the port hangs up and its name is gone."""
         if self.descriptor >= 0:
-            self._path.unlink(missing_ok=True)
+            self._link.unlink(missing_ok=True)
             os.close(self._far)
             os.close(self.descriptor)
             self.descriptor = -1
@@ -105,8 +107,12 @@ class EmulatedBus:
                     self._reply(now, motor, UNKNOWN)
 
     def _awake(self, now: int) -> list[EmulatedMotor]:
-        """Return the motors that are not booting."""
-        return [motor for motor, end in zip(self._motors, self._busy_until, strict=True) if now >= end]
+        """Return the motors that hear the host: not booting, and at the bit rate that they had at first."""
+        return [
+            motor
+            for motor, end, rate in zip(self._motors, self._busy_until, self._rates, strict=True)
+            if now >= end and rate == motor.rate
+        ]
 
     def _motor_of(self, now: int, identity: int) -> EmulatedMotor | None:
         return next((motor for motor in self._awake(now) if motor.get("id") == identity), None)

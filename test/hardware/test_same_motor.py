@@ -1,0 +1,102 @@
+"""What is looked at before a motor is switched on again, and what a fault leaves switched on."""
+
+import math
+
+import pytest
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.dynamixel.sample import Unwrapper
+from rsea_ros.hardware.limits import DeviceFault, Limits
+from test.hardware.conftest import Loop, well_behaved
+
+OTHER = {
+    "another model": (("model", {"number": 54025}), ("model", {"number": 54024}), "model 54025"),
+    "another current limit": (("set", {"torque_limit": 100}), ("set", {"torque_limit": 620}), "current 1.6"),
+}
+SERVICES = ("clear", "reboot", "enable")
+
+
+@pytest.mark.parametrize("name", OTHER)
+@pytest.mark.parametrize("service", SERVICES)
+def test_a_motor_that_is_not_the_configured_one_stays_off(loop, name, service):
+    """clear_fault said that it was done, and another motor of the same ID made up to 10 N m."""
+    (wrong, how), (right, back), told = OTHER[name]
+    loop.guarded.guard.trip(DeviceFault("ft"))
+    loop.cycles(2, 10.0)
+    if service == "enable":
+        loop.guarded.clear()
+        loop.guarded.disable()
+    since = loop.bench.ask(wrong, **how)["t"]
+    with pytest.raises(DeviceError, match=f"{told}.*as it was at configure"):
+        getattr(loop.guarded, service)()
+    loop.cycles(3, 10.0)
+    on = name == "another model" and service == "clear"  # nobody knows where to switch that one off
+    assert loop.bench.torque() == (0, on)
+    assert not any(goal for _, goal, _ in loop.bench.log(since)["torque"])
+    loop.bench.ask(right, **back)
+    if service == "enable":
+        loop.guarded.enable()
+    else:
+        loop.guarded.clear()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+
+
+MODES = {
+    "velocity": {"mode": 1, "goal_velocity": 3000},
+    "position": {"mode": 3},
+    "PWM": {"mode": 16, "goal_pwm": 900},
+}
+
+
+@pytest.mark.parametrize(
+    ("loop", "mode"), [(54024, "velocity"), (54024, "position"), (54025, "PWM")], indirect=["loop"]
+)
+def test_a_motor_in_another_mode_is_switched_off_for_a_goal_of_zero_does_not_stop_it(loop, mode):
+    """The torque went on after the fault; the bench hid that, for its motor made none outside torque mode."""
+    since = loop.bench.ask("set", **MODES[mode])["t"]
+    loop.until_fault(10.0)
+    loop.cycles(3, 10.0)
+    assert loop.guarded.fault.cause in ("motor_state", "effort", "velocity", "deflection", "ft_torque")
+    assert loop.bench.torque() == (0, False)
+    acted = [goal for _, goal, on in loop.bench.log(since)["torque"] if goal and on]
+    assert acted, "the bench makes the torque of that mode"
+    loop.guarded.clear()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+    assert loop.device._motor.bus.get(loop.device._motor.control_table.operating_mode) == 0
+
+
+def test_counts_go_on_where_the_encoder_wraps_round(benches):
+    """The position jumped by 26 900 rad, and the motor kept its 10 N m."""
+    bench = benches()
+    well_behaved(bench)
+    bench.ask("set", homing_offset=2**31 - 1234 - 4)
+    try:
+        loop = Loop(bench, Limits(68.0, velocity=5.0, deflection=math.inf))
+        loop.guarded.enable()
+        loop.cycles(60, 10.0)
+        positions = [state.position for state in loop.states]
+        turn = 2.0 * math.pi / 501_923
+        assert max(positions) > 5 * turn, "it has passed the end of 31 bits"
+        assert max(map(abs, positions)) < 0.1 and loop.guarded.fault is None
+        loop.close()
+    finally:
+        bench.ask("set", homing_offset=0)
+
+
+def test_a_position_that_jumps_is_a_fault_and_ends_the_torque(loop):
+    limits = Limits(68.0, velocity=5.0, deflection=math.inf)
+    loop.guarded.guard.limits = limits
+    loop.bench.ask("set", homing_offset=40_000)  # 0.5 rad
+    assert loop.until_fault(10.0) <= 3
+    assert loop.guarded.fault.cause == "position_step" and loop.bench.torque() == (0, False)
+    loop.bench.ask("set", homing_offset=0)
+    loop.cycles(2, 0.0)
+    loop.guarded.clear()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+
+
+@pytest.mark.parametrize("first", [0, 2**31 - 2, -(2**31)])
+def test_unwrapped_counts_follow_any_walk(first):
+    walk = [first + step for step in (0, 3, 2, -5, 1000, -10**6, 2**30)]
+    unwrapper = Unwrapper()
+    assert [unwrapper.take((c + 2**31) % 2**32 - 2**31) - walk[0] for c in walk] == [c - first for c in walk]
