@@ -133,7 +133,7 @@ FOREIGN = {
     "stamp_order": {"numpy"},
     "torque_edge": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
-    "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression", "asteval"}
+    "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"}
     | {"pyarrow"}
     | MESSAGES,
     "report": {"numpy", "plotly", "rich", "schemdraw"},
