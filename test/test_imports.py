@@ -112,7 +112,7 @@ FOREIGN = {
     "laws": NUMERIC,
     "experiment": NUMERIC,
     "health": NUMERIC,
-    "trends": {"numpy", "scipy", "ruptures"},
+    "trends": {"numpy", "scipy"},
     "fleet": {"numpy", "dask", "distributed", "fsspec", "pyarrow", "duckdb", "yaml"},
     "exports": NUMERIC | {"mujoco", "fmpy", "pythonfmu3"},
     "paper": NUMERIC,
@@ -121,7 +121,7 @@ FOREIGN = {
     "signals": {"numpy"},
     "spectra": {"numpy"},
     "arrays": {"numpy"},
-    "library": {"numpy", "plotly", "rich"},
+    "library": {"numpy", "rich"},
     "coarse_clock": {"numpy"},
     "coverage": {"numpy"},
     "stamps": {"numpy"},
@@ -136,7 +136,7 @@ FOREIGN = {
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"}
     | {"pyarrow"}
     | MESSAGES,
-    "report": {"numpy", "plotly", "rich", "schemdraw"},
+    "report": {"numpy", "rich"},
     "nodes": {"numpy", "rclpy", "rich", "yaml"},
     "cli": {"numpy", "rich", "rclpy", "yaml"},
 }

@@ -1,9 +1,9 @@
 """Expressions of columns: `0.12 * i_q - 0.4 * sign(omega)`, `derivative(phi)`, `column("tau [Nm]") * gain`.
 
-The syntax tree is held against a list (numbers, names, + - * / **, and calls of the functions below), and what
-is on the list is computed node by node. So attributes, subscripts, texts, comprehensions, lambdas and imports
-are never evaluated, numbers are doubles, and an expression takes SIZE passes over the samples at most. Its
-values are real and finite, or holes of its columns, or it is refused (decisions 0130, 0191).
+The syntax tree is held against a list (numbers, names, + - * / **, and calls of the functions below), and
+what is on the list is computed node by node. So attributes, subscripts, texts, comprehensions, lambdas and
+imports are never evaluated, numbers are doubles, and an expression takes at most SIZE passes over samples.
+Its values are real and finite, or holes of its columns, or it is refused (decision 0130).
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def _check_call(node: ast.Call) -> None:
 
 
 def _value(node: ast.AST, columns: Mapping[str, FloatArray], t: FloatArray) -> Any:
-    """Return what a node of a checked tree is: a double, or one for each sample; NaN where a column has a hole.
+    """Return what a node of a checked tree is: a double, or one a sample; NaN where a column has a hole.
 
     Raises ValueError where it is no real number.
     """

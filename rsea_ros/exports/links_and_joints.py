@@ -16,6 +16,7 @@ from rsea_ros.exports.chain import Chain, Joint, Link, chain_of
 from rsea_ros.exports.others import finite_sizes, without_null_effects
 from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.rig import Rig
+from rsea_ros.wording import printable
 
 Frame = Callable[[str], tuple[xml.Element, xml.Element]]
 """Takes the name of a rig, gives the root of a document and the element in it that holds links and joints."""
@@ -134,4 +135,4 @@ def _comment(represented: tuple[Represented, ...], omitted: tuple[Omitted, ...])
 
 def _text(root: xml.Element) -> str:
     xml.indent(root)
-    return '<?xml version="1.0"?>\n' + xml.tostring(root, encoding="unicode") + "\n"
+    return '<?xml version="1.0"?>\n' + printable(xml.tostring(root, encoding="unicode")) + "\n"
