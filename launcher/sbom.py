@@ -1,4 +1,4 @@
-"""Print what the locks install as a bill of materials, CycloneDX 1.6: python launcher/sbom.py [NAME…] > sbom.json.
+"""Print what the locks install as a bill of materials, CycloneDX 1.6: launcher/sbom.py [NAME…] > sbom.json.
 
 NAME: of a lock in requirements/; all of them unless named.
 """
