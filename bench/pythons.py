@@ -3,7 +3,7 @@
     python bench/pythons.py                    all versions from 3.10 to 3.14 on this machine
     python bench/pythons.py --only 3.13
 
-Nodes are left out, because the wheels of ROS 2 exist for one Python. A missing version counts as untried.
+Nodes are left out: .ci/run tries them, on GitHub with each version. A missing version counts as untried.
 """
 
 from __future__ import annotations
