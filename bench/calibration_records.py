@@ -27,7 +27,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 FAMILIES = ("open", "second", "loop", "second", "sea", "second", "rigid", "second")
 """Plants in the order in which records are made; `second` judges the others."""

@@ -29,9 +29,9 @@ from rsea_ros.benchmark.dataset import MANIFEST, VERSION, manifest_text, table_t
 from rsea_ros.benchmark.truth import RecordTruth, truth_hash, truth_text
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_text
-from rsea_ros.new_files import Destination, NewFiles, check_free, write_text
+from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_text
 from rsea_ros.progress import Progress
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 RIG = "paper_high_impedance"
 GROUPS = {

@@ -28,7 +28,7 @@ from independent.hidden import (
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
 
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 PAIRS = (
     ("coulomb_friction", "structural_resonance"),

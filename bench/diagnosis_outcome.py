@@ -16,8 +16,8 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.records.record import Record
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.signals import Record
 
 ERROR = "error"
 OUTSIDE = ("off_catalogue", "taken_out", "unsearched")

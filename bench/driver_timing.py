@@ -24,7 +24,7 @@ from bench.reception import Reception
 from msg_adapters.ros import JointState
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import MEASUREMENT
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 Row = tuple[str, str, str]
 SETTLE, LATE = 4.0, 0.3

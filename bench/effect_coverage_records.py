@@ -25,7 +25,7 @@ from independent.hidden import hide
 from independent.severities import drawn_parameters
 from independent.solvers import _pieces, _rk4
 
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 RIG_VALUES = {
     "rotor.reflected_inertia": "j_m",

@@ -51,7 +51,7 @@ from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
 from rsea_ros.identification.workers import worker_pools  # noqa: E402
 from rsea_ros.model.rig_file import load_rig, save_rig  # noqa: E402
 from rsea_ros.model.simulation import synthesize  # noqa: E402
-from rsea_ros.signals import Channel  # noqa: E402
+from rsea_ros.records.record import Channel  # noqa: E402
 
 LIMITS = {
     "full": RunLimits(torque=25.0, velocity=2.0, deflection=0.04),

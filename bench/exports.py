@@ -35,7 +35,7 @@ from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, rig_names
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 NOMINAL = 0.1
 """Times the sensor's noise."""

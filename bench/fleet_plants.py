@@ -14,7 +14,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))  # the second
 from independent.bench import Bench, drawn_bench, record_command
 from independent.excitations import RATE
 
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 COULOMB = 1.0
 """N m of dry friction that a healthy joint has."""

@@ -32,7 +32,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RseaError
 from rsea_ros.library.diagnosed import diagnose
 from rsea_ros.library.identified import identify
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 SAMPLE = Path(__file__).with_name("fleet_trends_played.json")
 TRIED = (

@@ -30,7 +30,7 @@ from rsea_ros.health.cusum import Cusum, threshold
 from rsea_ros.health.look import events_of
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 EVERY, RATES = 3.0, (100.0, 10.0, 1.0, 1e-3)
 CLEAN, WORN = 300.0, 60.0

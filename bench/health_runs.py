@@ -21,8 +21,8 @@ from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.rig import EffectSetting, Quantity, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.normal import Z95
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 RATE, PIECE = 280.0, 60.0
 DOUBT: Mapping[str, float] = {

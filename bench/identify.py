@@ -26,7 +26,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 ROOT = Path(__file__).resolve().parents[1]
 RATE, DURATION = 280.0, 160.0

@@ -26,7 +26,7 @@ from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 RATE, OFF, SETTLE = 280.0, 1.08, 84
 """Hz; true values over those of the rig; samples at the start that no fit uses."""

@@ -15,7 +15,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import measure, simulate
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 CHANNELS = ("ft", "position", "velocity", "motor_torque", "deflection")
 OF_SPRING = ("ft", "deflection")

@@ -22,7 +22,7 @@ from scipy.signal import lfilter
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RIG = "paper_high_impedance"
 COLOURED = {"ft": 0.06, "position": 1.5e-5}

@@ -36,7 +36,7 @@ from rsea_ros.laws.learn import learn
 from rsea_ros.laws.result import LawResult
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 
 def main(argv: Sequence[str] | None = None) -> int:

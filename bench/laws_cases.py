@@ -28,7 +28,7 @@ from rsea_ros.effects.signal_table import Port
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0
 RIG, FREE = "paper_high_impedance", "paper_moving_output"

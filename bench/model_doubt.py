@@ -34,7 +34,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 NARROW = 0.003
 """Of a value: a wider interval would show the noise, not the simulations."""

@@ -31,7 +31,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.model.train import TRAINS
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 LOW, HIGH, TOP = 0.5, 130.0, 100.0
 """Hz: of the sweep, and up to where the two must agree."""

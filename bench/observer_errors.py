@@ -14,7 +14,7 @@ from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.observer import Noise, Observer, noise_of, observe
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 RATE, SECONDS, SETTLE = 280.0, 8.0, 0.5
 RIGS = ("paper_high_impedance", "paper_moving_output", "prototype_knee", "separate_stiffnesses",

@@ -13,7 +13,7 @@ from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, synthesize
-from rsea_ros.signals import Channel, FloatArray
+from rsea_ros.records.record import Channel, FloatArray
 
 PARTS = (0.1, 0.5, 0.9, 0.95, 1.05, 1.1, 1.5, 2.0)
 CHUNK = 280 * 600

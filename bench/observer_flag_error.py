@@ -16,7 +16,7 @@ from rsea_ros.model.pure_torque_error import BEYOND, PURE, ErrorFlag, ErrorSetti
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 BAND = 0.2
 """Part of the tolerance, either way, within which the flag may say either."""

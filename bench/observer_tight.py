@@ -17,7 +17,7 @@ from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 SAMPLES, WARM, REPEATS, RATE = 3000, 600, 5, 1000.0
 

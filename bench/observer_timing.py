@@ -26,7 +26,7 @@ from bench.observer_node import MARK
 from bench.reception import Reception
 from msg_adapters.ros import JointState, WrenchStamped
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 ROOT = Path(__file__).resolve().parents[1]
 SETTLE = 3.0

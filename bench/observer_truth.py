@@ -20,7 +20,7 @@ from rsea_ros.model.equations import C, H, P, mechanics
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build, measure, run
 from rsea_ros.model.structure import with_structure
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 
 @dataclass(frozen=True)

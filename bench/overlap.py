@@ -27,7 +27,7 @@ from json_log import append_to_log, read_log
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 MECHANISMS = (
     ("coulomb_friction", "asymmetric_friction", "load_dependent_friction"),

@@ -23,7 +23,7 @@ from scipy.io import loadmat
 from scipy.signal import butter, lfilter
 from second_order import NAMES, simulate_run
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 NONE = np.zeros(0)
 SEA_VALUES = {"inertia": 0.957, "damping": 26.088, "stiffness": 1530.456, "spring_damping": 3.0}

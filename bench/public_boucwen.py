@@ -15,7 +15,7 @@ from bench.public_fit import DATA, RIGS, Score, case_of, error_from, fit_rig, re
 from bench.public_hdf5 import arrays
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 RATE, TORQUE = 750.0, 0.2
 SETTLED, TRIED = 300, 4096

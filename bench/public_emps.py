@@ -24,7 +24,7 @@ from rsea_ros.identification.identify import identify
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 FILES = ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")
 MAPS = [RIGS.parents[1] / "config" / "imports" / f"emps_{run}.yaml" for run in ("identification", "pulses")]

@@ -19,7 +19,7 @@ from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate_drive
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "realdata"
 RIGS = Path(__file__).resolve().parent / "public_rigs"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _ROOT, _ENTRY, _LAYOUT, _CONTINUED, _GROUP_CACHED = 56, 40, 0x8, 0x10, 1
 

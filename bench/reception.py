@@ -15,7 +15,7 @@ from msg_adapters.cdr import STAMP
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._mailbox import Polled
 from rsea_ros.nodes._waiter import Waiter
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 PATIENCE = 120.0
 TICK = 0.1

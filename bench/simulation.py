@@ -23,7 +23,7 @@ from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate_drive, synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 DURATION, RATE = 160.0, 280.0
 FRICTION = EffectSetting("coulomb_friction", {"torque": 3.0})

@@ -37,7 +37,7 @@ from rsea_ros.control.trials import amplitude_of, disturbed_rig
 from rsea_ros.control.uncertainty import BenchVariant, variant_rig
 from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 Step = Callable[[float, float, float], float]
 """(ft, velocity, desired) -> command."""

@@ -12,10 +12,10 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from rsea_ros import DOOR  # noqa: E402
+from rsea_ros.documents.units import plain  # noqa: E402
 from rsea_ros.effects import scale  # noqa: E402
 from rsea_ros.effects._page import EffectPage  # noqa: E402
 from rsea_ros.effects.catalogue import catalogue  # noqa: E402
-from rsea_ros.units import plain  # noqa: E402
 
 project = "rsea_ros"
 author = "The rsea_ros founders"

@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 from msg_adapters import mcap_file, metadata, sqlite_file
 from msg_adapters.compression import ERRORS, ZSTD_MAGIC, Allowance, unpack_file, unpack_message
 from msg_adapters.contents import AND, Contents, Messages
+from rsea_ros.documents.wording import brief
 from rsea_ros.errors import BagError
-from rsea_ros.wording import brief
 
 SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
     ".mcap": mcap_file.scan,

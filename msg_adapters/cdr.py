@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from msg_adapters.topic_map import WRENCH
 from rsea_ros.errors import BagError
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 ByteMatrix = npt.NDArray[np.uint8]
 

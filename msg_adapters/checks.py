@@ -9,7 +9,7 @@ import numpy as np
 
 from msg_adapters.contents import Contents
 from rsea_ros.errors import BagError
-from rsea_ros.signals import Fault, FloatArray, IntArray
+from rsea_ros.records.record import Fault, FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from rsea_ros.signals import Fault
+from rsea_ros.records.record import Fault
 
 AND = " and "
 """Between the types of a topic that has several."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from msg_adapters.cdr import Block, blocks
 from msg_adapters.contents import Contents, Messages
-from rsea_ros.signals import BoolArray, FloatArray, IntArray
+from rsea_ros.records.record import BoolArray, FloatArray, IntArray
 
 _SECOND = 1_000_000_000
 _PADDING = 4

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from msg_adapters.cdr import HEADER
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 

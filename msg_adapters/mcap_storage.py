@@ -35,8 +35,8 @@ from msg_adapters.mcap_records import (
     STATISTICS_HEAD,
 )
 from msg_adapters.remarks import NAME as REMARKS
-from rsea_ros.files import create, write_at
-from rsea_ros.signals import IntArray
+from rsea_ros.outputs.files import create, write_at
+from rsea_ros.records.record import IntArray
 
 CHUNK_SIZE = 1 << 20
 MESSAGE_RECORD = struct.Struct("<BQHIQQ")

@@ -13,8 +13,8 @@ from msg_adapters import yaml_text
 from msg_adapters.contents import Contents
 from msg_adapters.remarks import Remarks, remarks_of
 from msg_adapters.yaml_text import NotUnderstood
+from rsea_ros.documents.wording import brief
 from rsea_ros.errors import BagError
-from rsea_ros.wording import brief
 
 NAME = "metadata.yaml"
 ROOT = "rosbag2_bagfile_information"

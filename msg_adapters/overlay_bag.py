@@ -8,7 +8,7 @@ from pathlib import Path
 
 from msg_adapters.records import write_records
 from msg_adapters.topic_map import TopicMap
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 
 def write_overlay(records: Mapping[str, Record], path: str | Path) -> None:

@@ -11,8 +11,8 @@ import struct
 from collections.abc import Sequence
 
 from msg_adapters.cdr import STAMP, MessageLayout, layout_of
+from rsea_ros.documents.wording import brief
 from rsea_ros.errors import ParameterError
-from rsea_ros.wording import brief
 
 SECOND = 1_000_000_000
 LONGEST = 65_536

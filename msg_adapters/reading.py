@@ -15,11 +15,11 @@ from msg_adapters.decoding import Decoded
 from msg_adapters.inferred import is_inferred
 from msg_adapters.reported_faults import DIAGNOSTICS, tell_health
 from msg_adapters.topic_map import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
+from rsea_ros.documents.wording import brief, did_you_mean
 from rsea_ros.errors import BagError
-from rsea_ros.signals import Channel, FloatArray, IntArray, Record
-from rsea_ros.stamp_order import far_apart, in_order, stray_fault
-from rsea_ros.stamps import repair_stamps
-from rsea_ros.wording import brief, did_you_mean
+from rsea_ros.records.record import Channel, FloatArray, IntArray, Record
+from rsea_ros.records.stamp_order import far_apart, in_order, stray_fault
+from rsea_ros.records.stamps import repair_stamps
 
 _MOST_NAMED = 20
 """Topics or joints that a message lists."""
@@ -40,7 +40,7 @@ def read_record(
     Samples out of order are sorted by their stamps. Damaged messages are left out. The record's faults list
     all damage, and the faults in the bag's /diagnostics.
     strict: refuse records to which no model can be fitted (missing command or measurement, NaN in the
-    command), and correct the stamps (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock and repeats are
+    command), and correct the stamps (rsea_ros/records/stamps.py). Otherwise gaps, jumps of the clock and repeats are
     returned unchanged, as NaN of a measurement always is.
     Raises BagError with file, topic, field, value and expectation.
     """

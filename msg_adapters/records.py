@@ -14,7 +14,7 @@ from msg_adapters.remarks import Remarks
 from msg_adapters.topic_map import AXES, FIELDS, TYPES, TopicMap, sign_and_index
 from msg_adapters.writing import BagWriter
 from rsea_ros.errors import BagError
-from rsea_ros.signals import FloatArray, IntArray, Record
+from rsea_ros.records.record import FloatArray, IntArray, Record
 
 JOINT = "joint"
 LATEST = 2.0**31

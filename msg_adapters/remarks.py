@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rsea_ros.signals import Fault
-from rsea_ros.wording import brief
+from rsea_ros.documents.wording import brief
+from rsea_ros.records.record import Fault
 
 NAME = "rsea"
 NOTES, FAULTS = "rsea_notes", "rsea_faults"

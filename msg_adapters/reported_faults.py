@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from msg_adapters.cdr import Walk
 from msg_adapters.contents import Contents, Messages
-from rsea_ros.wording import brief
+from rsea_ros.documents.wording import brief
 
 DIAGNOSTICS = "/diagnostics"
 TYPE = "diagnostic_msgs/msg/DiagnosticArray"

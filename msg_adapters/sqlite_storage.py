@@ -10,8 +10,8 @@ from pathlib import Path
 
 from msg_adapters.definitions import definition
 from msg_adapters.metadata import VERSION
-from rsea_ros.files import create
-from rsea_ros.signals import IntArray
+from rsea_ros.outputs.files import create
+from rsea_ros.records.record import IntArray
 
 TABLES = """
 CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from rsea_ros.signals import IntArray
+from rsea_ros.records.record import IntArray
 
 
 class Storage(Protocol):

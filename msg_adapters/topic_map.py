@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import BagError, ParameterError
-from rsea_ros.wording import did_you_mean, quote
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"

@@ -20,11 +20,11 @@ from msg_adapters.remarks import Remarks
 from msg_adapters.sqlite_storage import SqliteStorage
 from msg_adapters.storage import Storage
 from msg_adapters.topic_map import check_topic
-from rsea_ros import files
 from rsea_ros.errors import BagError, OutputError
-from rsea_ros.interrupts import hold_signals
-from rsea_ros.signals import IntArray
-from rsea_ros.staging import Stage, make_stage
+from rsea_ros.outputs import files
+from rsea_ros.outputs.new_files import Stage, make_stage
+from rsea_ros.processes import hold_signals
+from rsea_ros.records.record import IntArray
 
 STORAGES: Mapping[str, tuple[str, Callable[[Path], Storage]]] = {
     "mcap": (".mcap", McapStorage),

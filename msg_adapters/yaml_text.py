@@ -7,8 +7,8 @@ from typing import Any
 
 import yaml
 
+from rsea_ros.documents.wording import brief, no_utf_8
 from rsea_ros.errors import BagError
-from rsea_ros.wording import brief, no_utf_8
 
 LARGEST = 1_000_000
 DEEPEST = 30

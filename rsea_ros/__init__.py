@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rsea_ros.model.prediction_errors import predict
     from rsea_ros.model.rig import Rig
     from rsea_ros.model.rig_file import load_rig
-    from rsea_ros.signals import Record
+    from rsea_ros.records.record import Record
 
 DOOR = {
     "DiagnosisSettings": "diagnosis.settings",

@@ -16,7 +16,7 @@ from xdist.scheduler import LoadFileScheduling
 from xdist.workermanage import WorkerController
 
 import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
-from rsea_ros.compiler_cache import trusted_cache
+from rsea_ros.compiler import trusted_cache
 
 sys.path.append(str(Path(__file__).parent))  # import_graph, which is no test
 

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 from numba.core import config
 
-from rsea_ros import compiler, compiler_cache
-from rsea_ros.compiler import _own_cache, njit
-from rsea_ros.compiler_cache import SHARED, cache_folder, shared_key, trusted_cache
+from rsea_ros import compiler
+from rsea_ros import compiler as compiler_cache
+from rsea_ros.compiler import SHARED, _own_cache, cache_folder, njit, shared_key, trusted_cache
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "rsea_ros"
@@ -277,7 +277,7 @@ import sys
 import numpy as np
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 t = np.arange(20) / 280.0
 synthesize(load_rig("paper_high_impedance"), Channel(t, t))
 print(sorted({"numba.np.linalg", "numba.np.npyimpl", "scipy.fft", "scipy.special"} & set(sys.modules)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.held_samples import repeats_of
+from rsea_ros.records.holds import repeats_of
 
 VALUES = np.random.default_rng(2).standard_normal(400)
 

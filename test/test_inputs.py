@@ -22,7 +22,7 @@ from rsea_ros.model.extent import bound_values, check_extent
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import drive_of, synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import rsea_ros as rsea
-from rsea_ros.signals import Channel
-from rsea_ros.stamps import repair_stamps
+from rsea_ros.records.record import Channel
+from rsea_ros.records.stamps import repair_stamps
 
 RIG = rsea.load_rig("paper_high_impedance")
 SOUND = rsea.simulate(RIG, 15.0 * np.random.default_rng(1).standard_normal(4200))

@@ -10,11 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from rsea_ros import files, replaced
-from rsea_ros.locked_folder import LEFT_AFTER, make_locked, name_of
-from rsea_ros.new_files import Destination, NewFiles, check_free
-from rsea_ros.replaced import KIND, put_back
-from rsea_ros.staging import make_stage, remove_left
+from rsea_ros.outputs import files, replaced
+from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, make_stage, remove_left
+from rsea_ros.outputs.replaced import KIND, LEFT_AFTER, make_locked, name_of, put_back
 
 CALLS = ("link", "rename", "fsync", "unlink", "rmdir")
 

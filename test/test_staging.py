@@ -13,13 +13,12 @@ from pathlib import Path
 import pytest
 
 from msg_adapters import BagWriter
-from rsea_ros.files import give_names
-from rsea_ros.locked_folder import LEFT_AFTER, PREFIX, name_of
-from rsea_ros.new_files import NewFiles
-from rsea_ros.staging import KIND, make_stage, remove_left
+from rsea_ros.outputs.files import give_names
+from rsea_ros.outputs.new_files import KIND, NewFiles, make_stage, remove_left
+from rsea_ros.outputs.replaced import LEFT_AFTER, PREFIX, name_of
 
 KILLED = (
-    "import os, signal, sys; from pathlib import Path; from rsea_ros.staging import make_stage\n"
+    "import os, signal, sys; from pathlib import Path; from rsea_ros.outputs.new_files import make_stage\n"
     "stage = make_stage(Path(sys.argv[1]))\n"
     "(stage.path / 'report.html').write_text('half of it')\n"
     "os.kill(os.getpid(), signal.SIGKILL)"
@@ -132,7 +131,7 @@ def test_files_put_aside_can_be_removed_only_once_all_new_ones_have_their_names(
         path.mkdir()
         (path / "file").write_text(path.name)
     seen = []
-    monkeypatch.setattr("rsea_ros.files.remove", seen.append)
+    monkeypatch.setattr("rsea_ros.outputs.files.remove", seen.append)
     give_names([(source, target)], force=True)
     (aside,) = seen
     assert (aside / "target" / "file").read_text() == "target"

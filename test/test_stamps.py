@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import ChannelError
-from rsea_ros.signals import Channel, Record
-from rsea_ros.stamp_order import far_apart, jumps_back
-from rsea_ros.stamps import repair_stamps
+from rsea_ros.records.record import Channel, Record
+from rsea_ros.records.stamp_order import far_apart, jumps_back
+from rsea_ros.records.stamps import repair_stamps
 
 PERIOD = 1 / 280
 COUNT = 2000

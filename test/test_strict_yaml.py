@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rsea_ros.documents.strict_yaml import DEEPEST, LARGEST, dump, parse, read
 from rsea_ros.errors import FieldError
-from rsea_ros.strict_yaml import DEEPEST, LARGEST, dump, parse, read
 
 REFUSED = {
     "a: 1\nb: 2\na: 3": r"line 3: key 'a' stands twice, first in line 1",

@@ -10,9 +10,9 @@ from rsea_ros.checks.check import check_record
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel, Record
-from rsea_ros.stamps import repair_stamps
-from rsea_ros.torque_edge import INSIDE, behind_the_edge
+from rsea_ros.records.holds import INSIDE, behind_the_edge
+from rsea_ros.records.record import Channel, Record
+from rsea_ros.records.stamps import repair_stamps
 
 H, COUNT = 1 / 280, 2800
 RNG = np.random.default_rng(5)

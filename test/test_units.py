@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import rsea_ros as rsea
+from rsea_ros.documents.units import same_unit
 from rsea_ros.model.rig_fields import FIELDS
 from rsea_ros.model.rig_file import load_rig, save_rig
-from rsea_ros.signals import UNITS
-from rsea_ros.units import same_unit
+from rsea_ros.records.record import UNITS
 
 WAYS = {
     "N m": ["Nm", "N*m", "N·m", "N.m", "N-m", "N⋅m", " N  m "],

@@ -19,7 +19,7 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.errors import RigError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, simulate_drive
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RIG_OF = {"sea": "paper_high_impedance", "joint": "pendulum", "drive": "emps"}
 TORQUE, ANGLE = 2000.0, 0.02

@@ -24,8 +24,8 @@ import numpy as np
 
 from msg_adapters.tables.column_table import Table, checked_lengths, index_of
 from msg_adapters.tables.elements import place_of
-from rsea_ros.signals import FloatArray
-from rsea_ros.wording import quote
+from rsea_ros.documents.wording import quote
+from rsea_ros.records.record import FloatArray
 
 PROGRAM = Path(__file__).with_name("_child.py")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.coarse_clock import even_behind_ticks
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
+from rsea_ros.records.stamps import even_behind_ticks
 
 LONG = 1.5
 """Where the clock moved this many times its usual tick, whole ticks passed without a sample."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rsea_ros.signals import FloatArray
-from rsea_ros.wording import did_you_mean, quote
+from rsea_ros.documents.wording import did_you_mean, quote
+from rsea_ros.records.record import FloatArray
 
 LARGEST = 100_000_000
 """Numbers in all columns that are asked for: 0.8 GB."""

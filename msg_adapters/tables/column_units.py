@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from rsea_ros.units import same_unit
-from rsea_ros.wording import quote
+from rsea_ros.documents.units import same_unit
+from rsea_ros.documents.wording import quote
 
 FACTORS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
-from rsea_ros.wording import brief, quote
+from rsea_ros.documents.wording import brief, quote
+from rsea_ros.records.record import FloatArray
 
 LONGEST, SIZE = 1000, 200
 """Characters, and parts of the syntax tree."""

@@ -27,9 +27,9 @@ from msg_adapters.tables.elements import choose_element, is_open
 from msg_adapters.tables.layout import DELIMITERS
 from msg_adapters.tables.map_keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
 from msg_adapters.tables.map_terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
-from rsea_ros import strict_yaml
+from rsea_ros.documents import strict_yaml
+from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import FieldError, ImportMapError
-from rsea_ros.wording import list_names, quote
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from msg_adapters.tables.column_table import Table
 from msg_adapters.tables.column_units import LINEAR, canonical, unit
 from msg_adapters.tables.import_map import ImportMap, RowFilter
 from msg_adapters.tables.map_terms import ChannelTerm
+from rsea_ros.documents.units import in_motion, plain
 from rsea_ros.errors import ImportMapError
-from rsea_ros.signals import UNITS, BoolArray, Channel, Fault, FloatArray, Record
-from rsea_ros.units import in_motion, plain
+from rsea_ros.records.record import UNITS, BoolArray, Channel, Fault, FloatArray, Record
 
 UNDATED = 1e8
 """Stamps below this (s, three years after 1970) have no date: the file's clock starts near zero."""

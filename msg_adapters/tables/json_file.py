@@ -17,8 +17,8 @@ import numpy as np
 from msg_adapters.tables.child import finite_table
 from msg_adapters.tables.column_table import Table, check_size, index_of
 from msg_adapters.tables.elements import ElementAddress, place_of
-from rsea_ros.signals import FloatArray
-from rsea_ros.wording import brief, no_utf_8, quote
+from rsea_ros.documents.wording import brief, no_utf_8, quote
+from rsea_ros.records.record import FloatArray
 
 LARGEST_FILE = 200_000_000
 """Bytes: read as a whole, they take about eight times as much memory."""

@@ -11,9 +11,9 @@ from msg_adapters.tables.column_units import CHANNELS, FACTORS, LINEAR, unit
 from msg_adapters.tables.elements import choose_element
 from msg_adapters.tables.expression import Expression, parse
 from msg_adapters.tables.map_keys import TERM
+from rsea_ros.documents.fields import NEEDED, Key
+from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import FieldError
-from rsea_ros.keys import NEEDED, Key
-from rsea_ros.wording import list_names, quote
 
 PER_JOINT = {"sign": 1, "scale": 1, "constant": 0}
 """Keys that may have a number for each joint, and their values where they are left out."""

@@ -15,8 +15,8 @@ from numpy.lib import format as npy
 from msg_adapters.tables.child import finite_table
 from msg_adapters.tables.column_table import LARGEST, Table, index_of
 from msg_adapters.tables.elements import ElementAddress, place_of
-from rsea_ros.signals import FloatArray
-from rsea_ros.wording import brief
+from rsea_ros.documents.wording import brief
+from rsea_ros.records.record import FloatArray
 
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, KeyError, SyntaxError)

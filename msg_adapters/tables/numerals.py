@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from rsea_ros.decimal_number import is_decimal
+from rsea_ros.documents.strict_yaml import is_decimal
 
 _FORTRAN = re.compile(r"([-+]?[0-9.]+)[dD]([-+]?[0-9]+)")
 _COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eEdD][-+]?[0-9]+)?")

@@ -14,9 +14,9 @@ from msg_adapters.tables.elements import base_and_index, number_in
 from msg_adapters.tables.layout import BLANKS, TextLayout, counts, index_in, layout_of
 from msg_adapters.tables.numerals import has_decimal_comma, numeral
 from msg_adapters.tables.text_lines import blocks_of_lines
-from rsea_ros.decimal_number import is_decimal
-from rsea_ros.signals import FloatArray
-from rsea_ros.wording import brief, quote
+from rsea_ros.documents.strict_yaml import is_decimal
+from rsea_ros.documents.wording import brief, quote
+from rsea_ros.records.record import FloatArray
 
 MISSING = {"", "-", "--", "na", "n/a", "#n/a", "nan", "nil", "none", "null"}
 """What stands, in small letters, where there is no value."""

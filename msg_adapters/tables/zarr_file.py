@@ -20,8 +20,8 @@ from msg_adapters.tables.child import finite_table
 from msg_adapters.tables.column_table import Table, check_size, index_of
 from msg_adapters.tables.elements import place_of
 from msg_adapters.tables.zarr_store import ARRAY, ArrayStore, open_zarr
-from rsea_ros.signals import FloatArray
-from rsea_ros.wording import quote
+from rsea_ros.documents.wording import quote
+from rsea_ros.records.record import FloatArray
 
 _LARGEST_HEADER = 1 << 16
 _LARGEST_CHUNK = 1 << 31

@@ -9,8 +9,8 @@ from typing import Any
 
 from rsea_ros.benchmark.dataset import Dataset
 from rsea_ros.benchmark.documents import json_object, read_text, text_of
+from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import BenchmarkError
-from rsea_ros.wording import did_you_mean
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from rsea_ros.benchmark.documents import read_json, read_text, text_of
 from rsea_ros.errors import BenchmarkError
-from rsea_ros.signals import UNITS, Channel, Record
+from rsea_ros.records.record import UNITS, Channel, Record
 
 VERSION = "1"
 """Of the rules and of the way records are drawn; scores of different versions are not comparable."""

@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from rsea_ros.documents.wording import no_utf_8, quote
 from rsea_ros.errors import BenchmarkError
-from rsea_ros.wording import no_utf_8, quote
 
 text_of = quote
 

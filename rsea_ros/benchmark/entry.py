@@ -10,7 +10,7 @@ from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.diagnosis.step_fits import StepFits
 from rsea_ros.identification.workers import worker_pools
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 
 def diagnosis_answer(record: Record, rig: Rig) -> Answer:

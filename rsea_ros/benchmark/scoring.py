@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.benchmark.answers import Answer
 from rsea_ros.benchmark.truth import RecordTruth
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 NAMED = 0.5
 """Probability from which an effect counts as named: likelier hidden than not."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rsea_ros.checks.finding import Finding
-from rsea_ros.signals import BoolArray, Channel, FloatArray, IntArray, Record
+from rsea_ros.records.record import BoolArray, Channel, FloatArray, IntArray, Record
 
 _LARGE = 10.0
 """Times the largest usual step: a motion has no step so much larger than those beside it."""

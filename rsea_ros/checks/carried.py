@@ -11,12 +11,12 @@ from rsea_ros.checks.finding import Findings
 from rsea_ros.checks.running_clock import at_rates
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.checks.usable import require_motion
+from rsea_ros.documents.wording import list_names
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, Record
-from rsea_ros.stamps import repair_stamps
-from rsea_ros.wording import list_names
+from rsea_ros.records.record import Channel, Record
+from rsea_ros.records.stamps import repair_stamps
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
           "clipping", "nan", "coarse_steps", "early_torque", "held_samples",

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.fast_length import next_fast_length
-from rsea_ros.signals import BoolArray, ComplexArray, FloatArray, IntArray
-from rsea_ros.spectra import segment_spectra
+from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray, IntArray
+from rsea_ros.records.spectra import next_fast_length, segment_spectra
 
 _SEGMENTS = 5
 """A record is cut into segments of a fifth: slow ramps still have their line, and nine of them overlap."""

@@ -42,8 +42,8 @@ from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.pace import is_too_fast
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, Fault, Record
-from rsea_ros.stamps import repair_stamps
+from rsea_ros.records.record import Channel, Fault, Record
+from rsea_ros.records.stamps import repair_stamps
 
 Wrench = Callable[[], Mapping[str, Channel]]
 """Reads the other axes of the wrench, by their names for --axis."""

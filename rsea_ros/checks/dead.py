@@ -11,7 +11,7 @@ from rsea_ros.checks.moved_spans import is_commanded
 from rsea_ros.checks.slow_lag import lag_behind
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import MEASURED, Channel, Fault, Record
+from rsea_ros.records.record import MEASURED, Channel, Fault, Record
 
 _VISIBLE = 3.0
 """Times the sensor's noise: a smaller signal than that may well be lost in it."""

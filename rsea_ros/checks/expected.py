@@ -13,7 +13,7 @@ from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
 from rsea_ros.model.pace import is_too_fast
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 MOST_STEPS = 40.0
 """Times as many periods as samples in the command: a record of gaps, which no simulation should fill."""

@@ -21,11 +21,11 @@ from rsea_ros.checks.frozen import (
 )
 from rsea_ros.checks.moved_spans import is_commanded
 from rsea_ros.checks.rounded_stamps import rounded_stamps
-from rsea_ros.held_samples import repeats_of
 from rsea_ros.identification.quantum import FEW, step_of
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
-from rsea_ros.stamps import repair_stamps
+from rsea_ros.records.holds import repeats_of
+from rsea_ros.records.record import BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.records.stamps import repair_stamps
 
 _AROUND = 10
 _SPIKE = 12.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from rsea_ros.model.rig_choice import RigChoice
-from rsea_ros.signals import BoolArray, Fault
+from rsea_ros.records.record import BoolArray, Fault
 
 Light = Literal["green", "amber", "red"]
 LIGHTS: tuple[Light, ...] = ("green", "amber", "red")

@@ -8,7 +8,7 @@ import numpy as np
 
 from rsea_ros.checks.moved_spans import MotionBeside, motion_beside, witness_of
 from rsea_ros.identification.quantum import step_of
-from rsea_ros.signals import MEASURED, BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.record import MEASURED, BoolArray, Channel, FloatArray, Record
 
 SMALLEST_SHARE = 1e-3
 """Of a channel's samples: fewer repeats are no fault."""

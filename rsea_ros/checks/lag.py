@@ -14,8 +14,8 @@ from numpy.fft import irfft, rfft
 
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding
-from rsea_ros.fast_length import next_fast_length
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
+from rsea_ros.records.spectra import next_fast_length
 
 REACH = 2.0
 """s, either way."""

@@ -18,7 +18,7 @@ from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import Unknown, clocks
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import drive_of
-from rsea_ros.signals import Channel, FloatArray, IntArray, Record
+from rsea_ros.records.record import Channel, FloatArray, IntArray, Record
 
 _LEAST_MISFIT = 0.5
 _BLOCKS = 40

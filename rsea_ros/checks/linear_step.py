@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.checks.linear_rows import LinearisedRows, LinearSetting, LinearState
 from rsea_ros.identification.unknowns import Unknown, start_vector
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _OFFSET_DOUBT, _DRIFT_DOUBT, _GAIN_DOUBT = 0.05, 1e-3, 0.25
 """One sigma before: s, s/s, 1."""

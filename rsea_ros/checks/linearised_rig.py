@@ -24,8 +24,8 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.problem import Problem, case_from, channels_that_tell
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
-from rsea_ros.normal import Z95
-from rsea_ros.signals import SENSED, BoolArray, FloatArray, Record
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import SENSED, BoolArray, FloatArray, Record
 
 _ROUNDS = 6
 _PARTS = (1.0, 0.5, 0.25, 0.1)

@@ -21,7 +21,7 @@ from rsea_ros.checks.gains import inertia_spread
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _COHERENT = 0.5
 _FEWEST, _MOST = 6, 0.4

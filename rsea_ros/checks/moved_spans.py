@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
 
 WITNESSES = {
     "position": ("ft", "velocity", "motor_torque", "command"),

@@ -9,7 +9,7 @@ import numpy as np
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 _LARGE, _FAR = 1.0, 3.0
 """Times the largest torque of the run: a zero that was never set; an offset that no zero explains."""

@@ -18,7 +18,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.identification.responses import model_responses
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector, unknowns_of_rig
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import BoolArray, ComplexArray, FloatArray
+from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray
 
 MODEL_ERROR = 0.1
 """Of ln R: what a linear model leaves of a good bench with friction and play."""

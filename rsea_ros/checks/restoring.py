@@ -14,7 +14,7 @@ from rsea_ros.checks.gain_findings import RIGHT_RIG
 from rsea_ros.errors import RseaError
 from rsea_ros.model.inverse import Motion, motion_from
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 _FALLS = 0.55
 """Of what is left of the torque: with a spring or pendulum that is there, less is left."""

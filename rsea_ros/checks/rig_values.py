@@ -20,7 +20,7 @@ from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
 
 _STEPS = 8
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.identification.even_stamps import SCATTER
-from rsea_ros.signals import Channel, Fault, FloatArray
+from rsea_ros.records.record import Channel, Fault, FloatArray
 
 _STEPS = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5)
 """s, to which loggers round."""

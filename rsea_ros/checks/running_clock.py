@@ -18,7 +18,7 @@ from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.checks.linear_findings import JOINT, SURE, drift_finding
 from rsea_ros.checks.linearised_rig import LinearisedFit, Number
 from rsea_ros.identification.lag_line import BLOCK, LEAST_RISE, SCATTER, LagLine, lag_line
-from rsea_ros.signals import SENSED, Channel, Record
+from rsea_ros.records.record import SENSED, Channel, Record
 
 _STEEPEST = 1.8e-3
 """s/s. The lag is followed from block to block up to 2 ms/s; no line near that is trusted."""

@@ -13,7 +13,7 @@ from rsea_ros.checks.moved_spans import at_rest
 from rsea_ros.checks.stamp_findings import natural_frequency
 from rsea_ros.identification.noise import noise_floor
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import UNITS, Channel, Record
+from rsea_ros.records.record import UNITS, Channel, Record
 
 _MOSTLY = 0.5
 _WORTH_TELLING = 0.02

@@ -15,7 +15,7 @@ from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.lag import NEAR, REACH, clear_lag, lag_of
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 _SLOW = 0.6
 """Of the commands' rate: a faster channel is compared at its periods."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from rsea_ros.checks.channel_spectra import Quotient, usable
 from rsea_ros.checks.finding import Finding
-from rsea_ros.signals import SENSED, ComplexArray, FloatArray
+from rsea_ros.records.record import SENSED, ComplexArray, FloatArray
 
 _MOST = 60
 """Samples of the longest average that is tried."""

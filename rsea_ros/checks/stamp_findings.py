@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.held_commands import with_held_commands, words_on_steps
 from rsea_ros.model.pace import AS_SECONDS, FAST, SKIPPED_START, SLOW, is_slow, is_too_fast
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, Fault, Record
-from rsea_ros.stamp_gaps import polls_unevenly
+from rsea_ros.records.holds import with_held_commands, words_on_steps
+from rsea_ros.records.record import Channel, Fault, Record
+from rsea_ros.records.stamp_order import polls_unevenly
 
 _RED_SHARE = 0.2
 """Of a channel's samples: more bad ones make the channel, not some samples, doubtful."""

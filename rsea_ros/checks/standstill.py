@@ -6,7 +6,7 @@ import numpy as np
 
 from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.moved_spans import moves
-from rsea_ros.signals import SENSED, BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.record import SENSED, BoolArray, Channel, FloatArray, Record
 
 _LONGEST, _SHARE = 1.0, 0.1
 """s, and share of the record: a shorter standstill is one of friction at a turn of the command."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 
 def unused_sentence(record: Record, rig: Rig) -> str:

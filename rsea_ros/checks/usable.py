@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.checks.moved_spans import is_still
+from rsea_ros.documents.units import plain
 from rsea_ros.errors import IdentificationError
-from rsea_ros.fault_kinds import FAULT_KINDS
 from rsea_ros.model.pace import check_pace
-from rsea_ros.signals import UNITS, Channel, Record
-from rsea_ros.units import plain
+from rsea_ros.records.fault_kinds import FAULT_KINDS
+from rsea_ros.records.record import UNITS, Channel, Record
 
 _FEWEST = 0.1
 """Of a channel's stamps: where fewer rise the clock stood, and the messages were not each sent ten times."""

@@ -14,7 +14,7 @@ from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import add_force, path
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import RseaError
-from rsea_ros.new_files import check_free, write_text
+from rsea_ros.outputs.new_files import check_free, write_text
 from rsea_ros.progress import Progress
 
 if TYPE_CHECKING:

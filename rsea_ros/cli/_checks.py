@@ -13,8 +13,8 @@ from rsea_ros.cli._lines import say
 from rsea_ros.model.inverse import is_inverse, require_position
 from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
+from rsea_ros.records.record import Record
 from rsea_ros.report.check.terminal import warnings
-from rsea_ros.signals import Record
 
 
 def check_records(

@@ -18,7 +18,7 @@ from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.joints import Diagnose, load_joints
 from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.time_limit import TIME_LIMIT
-from rsea_ros.interrupts import Stopped
+from rsea_ros.processes import Stopped
 
 if TYPE_CHECKING:
     from rsea_ros.fleet.plan import Held

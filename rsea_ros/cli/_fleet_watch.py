@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from rsea_ros.cli._fleet_run import add_work, bags_in, check_options, write_rows
 from rsea_ros.cli._output import FOUND
+from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.wording import printable
 
 if TYPE_CHECKING:
     from rsea_ros.fleet.plan import Held

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rsea_ros import strict_yaml
+from rsea_ros.documents import strict_yaml
+from rsea_ros.documents.wording import did_you_mean, list_names
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import rig_folders
-from rsea_ros.wording import did_you_mean, list_names
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import rig_folders
-from rsea_ros.wording import did_you_mean
 
 
 def map_names() -> list[str]:

@@ -14,7 +14,7 @@ from types import TracebackType
 
 from rsea_ros.cli._node_process import POLL, start, stop
 from rsea_ros.errors import RseaError
-from rsea_ros.interrupts import hold_signals
+from rsea_ros.processes import hold_signals
 
 ROOT = Path(__file__).resolve().parents[2]
 

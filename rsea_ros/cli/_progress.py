@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rsea_ros.wording import printable
+from rsea_ros.documents.wording import printable
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from io import TextIOWrapper
 from typing import Any, TextIO
 
-from rsea_ros.wording import printable
+from rsea_ros.documents.wording import printable
 
 _ASCII = {
     "·": "*", "×": "x", "±": "+-", "−": "-", "–": "-", "…": "...", "²": "^2", "³": "^3", "µ": "u",

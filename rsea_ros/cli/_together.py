@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.cli._node_process import POLL, start, stop
-from rsea_ros.interrupts import hold_signals
+from rsea_ros.processes import hold_signals
 
 
 def together(nodes: Mapping[str, Sequence[str]]) -> int:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from msg_adapters.topic_map import AXES, ROLES, TopicMap
 from rsea_ros.errors import ParameterError
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 
 def add_topic_options(parser: argparse.ArgumentParser) -> None:

@@ -17,7 +17,7 @@ from rsea_ros.cli._output import FOUND
 from rsea_ros.cli._runs import add_rig, add_runs, rig_choice
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.errors import RseaError
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 if TYPE_CHECKING:
     from rsea_ros.checks.finding import Findings

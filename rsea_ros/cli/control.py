@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rsea_ros.cli._output import add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._runs import RIG
-from rsea_ros.new_files import NewFiles
+from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report.file_names import CONTROL_JSON, REPORT
 
 if TYPE_CHECKING:

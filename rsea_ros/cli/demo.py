@@ -16,7 +16,6 @@ import numpy as np
 
 from msg_adapters import read_record
 from msg_adapters.bags import read_contents
-from rsea_ros import strict_yaml
 from rsea_ros.cli._columns import columns
 from rsea_ros.cli._graph import parameters_of_bench
 from rsea_ros.cli._lines import say
@@ -26,13 +25,14 @@ from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._ros import need_ros
 from rsea_ros.cli._runs import RIG
+from rsea_ros.documents import strict_yaml
+from rsea_ros.documents.units import plain
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
-from rsea_ros.new_files import unused_path
+from rsea_ros.outputs.new_files import unused_path
 from rsea_ros.report.fault_words import fault_lines
-from rsea_ros.units import plain
 
 HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and write a report"
 EXAMPLE = "rsea demo --out first_demo"

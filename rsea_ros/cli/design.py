@@ -11,7 +11,7 @@ from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
 from rsea_ros.design.requirement import Requirement, check_magnitude
 from rsea_ros.model.train import TRAINS
-from rsea_ros.new_files import NewFiles
+from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report.file_names import DESIGN_JSON, REPORT
 
 HELP = "compute spring stiffness and spring rate from torque, bandwidth and inertia by the paper's method"

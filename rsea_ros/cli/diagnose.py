@@ -16,8 +16,8 @@ from rsea_ros.cli._runs import OFF_RIG, add_rig, add_runs, off_rig, rig_choice
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
+from rsea_ros.records.record import Record
 from rsea_ros.report.file_names import DIAGNOSIS, DIAGNOSIS_JSON, MODEL
-from rsea_ros.signals import Record
 
 HELP = "find the causes of the simulation error: name, size, gain, extended model"
 EXAMPLE = "rsea diagnose run.mcap --rig my_bench.yaml --out results"

@@ -14,7 +14,7 @@ from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, prin
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import FieldError, ParameterError
-from rsea_ros.new_files import Destination, NewFiles
+from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.report.file_names import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MODEL, REPORT
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ NO_RUN = "no_run"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
+    from rsea_ros.documents.units import plain
     from rsea_ros.experiment.run_limits import UNITS
-    from rsea_ros.units import plain
 
     units = ", ".join(f"{name} ({plain(unit)})" for name, unit in UNITS.items())
     add = parser.add_argument
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
 
 def models_in(path: str) -> list[ModelFile]:
     """Return the causes of a model.yaml, a rig, or a diagnosis.json beside its model.yaml."""
-    from rsea_ros import strict_yaml
+    from rsea_ros.documents import strict_yaml
     from rsea_ros.experiment.diagnosis_document import models_of
     from rsea_ros.experiment.stored_models import model_of
     from rsea_ros.model.rig_file import load_rig
@@ -141,9 +141,9 @@ def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -
 
 
 def _print(advice: Advice, report: Path) -> None:
+    from rsea_ros.documents.units import plain
     from rsea_ros.report.experiment.words import limit_rows, plain_name, proof_words, verdict
     from rsea_ros.report.wrapped_lines import LABEL
-    from rsea_ros.units import plain
 
     say(verdict(advice))
     for h in advice.hypotheses:

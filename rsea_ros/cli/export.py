@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 from rsea_ros.cli._lines import say
 from rsea_ros.cli._numbers import positive
 from rsea_ros.cli._output import FOUND, add_force, path
-from rsea_ros.new_files import check_free, write_file
+from rsea_ros.outputs.new_files import check_free, write_file
 
 if TYPE_CHECKING:
     from rsea_ros.exports.difference import Difference
     from rsea_ros.exports.represented import Export
     from rsea_ros.exports.verification import Verification
     from rsea_ros.model.rig import Rig
-    from rsea_ros.signals import FloatArray
+    from rsea_ros.records.record import FloatArray
 
 HELP = "convert a rig to MuJoCo, FMI, URDF, SDF, Isaac Lab or BAM, and list the parts left out"
 EXAMPLE = "rsea export --mjcf paper_high_impedance --out bench.xml"
@@ -139,7 +139,7 @@ def _lines(made: Export, rig: Rig, out: Path, verified: Verification) -> list[st
 
 
 def _apart(one: Difference) -> str:
-    from rsea_ros.units import plain
+    from rsea_ros.documents.units import plain
 
     return (
         f"{one.channel} differs by {one.times_noise:.3g} times the sensor's noise "

@@ -14,7 +14,7 @@ from rsea_ros.cli._numbers import whole_numbers
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import OutputError
-from rsea_ros.new_files import Destination, NewFiles, check_free
+from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
 
 HELP = "convert a measurement (CSV, MAT, Parquet, NPZ, JSON, zarr) to a bag by a map of its columns"
 EXAMPLE = "rsea import run.csv --map map.yaml --out run"

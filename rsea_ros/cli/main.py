@@ -18,10 +18,10 @@ from rsea_ros.cli import _lines
 from rsea_ros.cli._columns import columns
 from rsea_ros.cli._compiling import compilation_announced
 from rsea_ros.cli._shown import show_controls
+from rsea_ros.documents.wording import did_you_mean, printable
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.interrupts import Stopped, Stops
+from rsea_ros.processes import Stopped, Stops
 from rsea_ros.report.wrapped_lines import wrap
-from rsea_ros.wording import did_you_mean, printable
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
 _HELP, _VERSION = ("-h", "--help"), "--version"

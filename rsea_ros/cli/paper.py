@@ -11,12 +11,12 @@ from rsea_ros.cli._numbers import whole_number
 from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
-from rsea_ros.new_files import Destination, NewFiles, check_free
+from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
 from rsea_ros.report.file_names import PAPER_JSON, REPORT
 
 if TYPE_CHECKING:
+    from rsea_ros.records.record import Record
     from rsea_ros.report.paper.page import PaperTests
-    from rsea_ros.signals import Record
 
 HELP = "recompute every equation, table and figure of the paper beside the printed value"
 EXAMPLE = "rsea paper --out paper"
@@ -114,8 +114,8 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.model.simulation import synthesize
     from rsea_ros.paper.moving_output import RATE, moving_output
+    from rsea_ros.records.record import Channel
     from rsea_ros.report.paper.page import PaperTests
-    from rsea_ros.signals import Channel
 
     def bag(name: str, record: Record) -> Record:
         return through_bag(new.stage(f"{name}.mcap"), record)

@@ -17,9 +17,9 @@ from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.model.prediction_errors import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.new_files import check_free, write_text
+from rsea_ros.outputs.new_files import check_free, write_text
+from rsea_ros.records.stamps import repair_stamps
 from rsea_ros.report.json_values import fault_json, numbers
-from rsea_ros.stamps import repair_stamps
 
 HELP = "simulate a model on the commands of a bag and print its errors as JSON"
 EXAMPLE = "rsea predict results/model.yaml other_run.mcap"

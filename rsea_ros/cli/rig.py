@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _new(args: argparse.Namespace) -> int:
     from rsea_ros.model.rig_file import load_rig, rig_folders
-    from rsea_ros.new_files import check_free, write_text
+    from rsea_ros.outputs.new_files import check_free, write_text
 
     if not args.name.isidentifier():
         raise ParameterError(f"name {args.name!r}, expected letters, digits and _, such as left_knee")
@@ -64,7 +64,7 @@ def _check(args: argparse.Namespace) -> int:
 
 def _row(rig: Rig, name: str) -> tuple[str, ...]:
     """Return name, number, unit, spread and source of a value."""
-    from rsea_ros.units import plain
+    from rsea_ros.documents.units import plain
 
     doubt = f"+-{100.0 * rig.spread(name):g} %" if name in rig.free() else "fixed"
     return name, f"{rig[name]:.6g}", plain(rig.unit(name)), doubt, rig.quantities[name].source
@@ -72,8 +72,8 @@ def _row(rig: Rig, name: str) -> tuple[str, ...]:
 
 def remarks(rig: Rig) -> list[str]:
     """Return a summary of the rig: moving ends, fitted values, sensors."""
+    from rsea_ros.documents.wording import list_names
     from rsea_ros.model.rig_fields import END_NAMES
-    from rsea_ros.wording import list_names
 
     ends = [f"{end} {'moves' if rig.end_is_free(end) else 'is clamped'}" for end in END_NAMES]
     noisy = [f"{name} ({sensor.noise:g})" for name, sensor in rig.sensors.items() if sensor.noise > 0.0]

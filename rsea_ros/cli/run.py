@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from rsea_ros.cli._ros import need_ros
+from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError
-from rsea_ros.wording import did_you_mean
 
 HELP = "start a node, as `ros2 run rsea_ros NODE` does, or your own program"
 EXAMPLE = "rsea run plant rig:=pendulum rate:=500.0"

@@ -13,7 +13,8 @@ from rsea_ros.cli._lines import say
 from rsea_ros.cli._numbers import whole_number
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
-from rsea_ros.decimal_number import is_decimal
+from rsea_ros.documents.strict_yaml import is_decimal
+from rsea_ros.documents.wording import quote
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.excitation import JOINT, KINDS, ExcitationSettings, check_limits, excitation
@@ -21,9 +22,8 @@ from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.new_files import check_free
-from rsea_ros.signals import Channel
-from rsea_ros.wording import quote
+from rsea_ros.outputs.new_files import check_free
+from rsea_ros.records.record import Channel
 
 HELP = "simulate a rig and write a bag, with any effect of the catalogue switched on"
 EXAMPLE = "rsea simulate paper_high_impedance --effect backlash:gap=0.004 --out worn"

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from rsea_ros.errors import RseaError
-from rsea_ros.interrupts import Stopped
+from rsea_ros.processes import Stopped
 
 HELP = "run the tests; further arguments go to pytest (paths are relative to the repository)"
 EXAMPLE = "rsea test test/cli -x"

@@ -34,7 +34,7 @@ from rsea_ros.control.sampled import sample_rig
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import design
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 FOLLOWED = 0.25
 """Of the largest torque: the most that the link's motion may take."""

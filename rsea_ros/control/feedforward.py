@@ -23,7 +23,7 @@ import numpy as np
 
 from rsea_ros.control.sampled import FT, Sampled
 from rsea_ros.errors import ParameterError
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 MOST_MOVES = 8
 JUMPY = -0.5

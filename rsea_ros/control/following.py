@@ -17,7 +17,7 @@ from rsea_ros.control.loads import lock
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 UNLIMITED = TorqueLimits(torque=1e6, slew=1e12, ramp=0.0)
 SINES = (1.0, 2.0, 3.0, 5.0, 10.0, 15.0, 20.0, 27.0, 35.0, 50.0, 70.0, 120.0, 200.0, 400.0)

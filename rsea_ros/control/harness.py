@@ -11,7 +11,7 @@ from rsea_ros.control.grid import Grid
 from rsea_ros.control.lateness import Lateness
 from rsea_ros.model.plant import Plant, PlantSample
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 PARTS = 10
 """Of a period, between which the simulation distinguishes instants."""

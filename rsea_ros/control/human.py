@@ -23,7 +23,7 @@ from rsea_ros.model.outputs import Output
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.transfer import read
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 ARM = {"inertia": 0.1, "damping": 1.0, "stiffness": 20.0}
 """kg m^2, N m s/rad, N m/rad."""

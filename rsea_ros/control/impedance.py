@@ -23,7 +23,7 @@ from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)

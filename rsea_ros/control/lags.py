@@ -12,7 +12,7 @@ from rsea_ros.control.sampled import FT, Sampled, responses
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 
 def lag_responses(rig: Rig, plant: Sampled, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:

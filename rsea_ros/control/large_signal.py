@@ -13,7 +13,7 @@ import numpy.typing as npt
 from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 HIGHEST = 400.0
 LOWEST = 0.01

@@ -26,7 +26,7 @@ import numpy as np
 from rsea_ros.control.law import FeedbackLaw
 from rsea_ros.control.motion import LOCKED, Stretch, Yielding
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 MEMORY = 0.5
 """s; two and a half periods of 5 Hz."""

@@ -26,7 +26,7 @@ from rsea_ros.control.sampled import LINK
 from rsea_ros.control.synthesis import SOFT, ControllerDesign, DesignLimits, grid
 from rsea_ros.control.uncertainty import Uncertainty, corners, family
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import BoolArray, ComplexArray, FloatArray
+from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray
 
 INERTIAS, DAMPINGS = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 0.2, 0.4)
 """Parts of J_m and b_m that are tried. Half of b_m is the least that a bench of the set has."""

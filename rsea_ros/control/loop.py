@@ -6,7 +6,7 @@ import numpy as np
 
 from rsea_ros.control.law import FeedbackLaw, FeedbackState, feedback, hold
 from rsea_ros.control.sampled import FT, VELOCITY, Sampled, z_of
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 
 def actions(law: FeedbackLaw, hz: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -15,7 +15,7 @@ import math
 import numpy as np
 from scipy.linalg import expm
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 SLOW = 2.0 * math.pi * 1.5
 """w_1, rad/s: below 1.5 Hz the motion of the load is left to feedback."""

@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from rsea_ros.control.sampled import z_of
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 ALONG: FloatArray = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
 AHEAD = 2

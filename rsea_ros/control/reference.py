@@ -19,7 +19,7 @@ from rsea_ros.control.learning import CREEP, Learning
 from rsea_ros.control.motion import Yielding
 from rsea_ros.control.sampled import FT, POSITION, VELOCITY, Sampled
 from rsea_ros.effects._friction import mean_tanh
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _mean_tanh: Callable[[float, float, float], tuple[float, float]] = mean_tanh.py_func
 

@@ -13,7 +13,7 @@ from rsea_ros.model.equations import PORTS
 from rsea_ros.model.outputs import Output
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.transfer import read
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 FT, VELOCITY, POSITION, LINK = range(4)
 

@@ -22,7 +22,7 @@ from rsea_ros.control.sampled import FT
 from rsea_ros.control.synthesis import ControllerDesign, grid
 from rsea_ros.control.uncertainty import Uncertainty, corners, family, mode_of
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 NEAR = ("free x 0.5", "free x 1", "free x 2")
 """The loads about the free one that a band shows."""

@@ -32,7 +32,7 @@ from rsea_ros.control.sampled import FT, sample_rig
 from rsea_ros.control.uncertainty import Family, Uncertainty, corners, family
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 LOWEST = 0.04
 """Hz, where the grid of frequencies begins."""

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from rsea_ros.control.lags import lag_responses
 from rsea_ros.control.sampled import FT, sample_rig, z_of
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from rsea_ros.control.prediction import prediction_response, smoothed_response
 from rsea_ros.control.settings import CORNER
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 SMALLEST = 0.02
 """Hz, from which on passivity is looked at."""

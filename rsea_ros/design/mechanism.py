@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 Values = float | FloatArray
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rsea_ros import strict_yaml
-from rsea_ros.checked import mapping, number, only_keys, text, unit
+from rsea_ros.documents import strict_yaml
+from rsea_ros.documents.fields import mapping, number, only_keys, text, unit
+from rsea_ros.documents.units import plain
+from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.model.rig_file import rig_folders
 from rsea_ros.model.train import TRAINS, Train, rotor_turns, spin_inertia
-from rsea_ros.units import plain
-from rsea_ros.wording import did_you_mean, quote
 
 FILE = "motor_gear_units.yaml"
 UNITS: Mapping[str, str] = {

@@ -23,11 +23,11 @@ from collections.abc import Mapping
 from xml.etree import ElementTree as xml
 
 from rsea_ros.design.mesh import Mesh, mesh_of
+from rsea_ros.documents.units import STANDARD_GRAVITY
+from rsea_ros.documents.wording import printable
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia
 from rsea_ros.model.rig import Rig
-from rsea_ros.units import STANDARD_GRAVITY
-from rsea_ros.wording import printable
 
 STEP = 5e-5
 """s, fixed step of the engine."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rsea_ros.documents.units import plain
 from rsea_ros.errors import ParameterError
-from rsea_ros.units import plain
 
 _LARGEST = 45.0
 _RANGE = (1e-9, 1e6)

@@ -13,7 +13,7 @@ from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.design.spring_design import SpringDesign, least_stiffness, spring_design
 from rsea_ros.model.bandwidth import undamped_band
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 SPREADS: Mapping[str, float] = MappingProxyType(
     {"rate": 0.05, "arm": 0.005, "spring_radius": 0.04, "inertia": 0.05, "motor": 0.05}

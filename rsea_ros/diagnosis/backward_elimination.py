@@ -33,7 +33,7 @@ from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.identification.workers import Pools
 from rsea_ros.model.rig_fields import FIELDS
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 def eliminate_backwards(

@@ -13,8 +13,8 @@ from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.identification.unknowns import Unknown
-from rsea_ros.normal import Z95
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)

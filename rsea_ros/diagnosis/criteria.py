@@ -20,7 +20,7 @@ from rsea_ros.diagnosis.result import Reason, Status, Verdict
 from rsea_ros.diagnosis.score import Score, bootstrap_means, likelier_by
 from rsea_ros.diagnosis.settings import DEFAULT, AcceptanceSettings, DiagnosisSettings, FloorSettings
 from rsea_ros.identification.silent import silent_channels
-from rsea_ros.signals import Fault
+from rsea_ros.records.record import Fault
 
 
 class Scored(Protocol):

@@ -19,7 +19,7 @@ import numpy as np
 from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings, DiagnosisSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
-from rsea_ros.signals import BoolArray, FloatArray, IntArray
+from rsea_ros.records.record import BoolArray, FloatArray, IntArray
 
 TRAIN, VALIDATION, TEST = (0, 1), (2,), (3,)
 """Half of the blocks train: fits need data most; validation and tests share the rest."""

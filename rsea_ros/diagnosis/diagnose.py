@@ -36,7 +36,7 @@ from rsea_ros.model.extent import bound_values
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
-from rsea_ros.signals import MEASURED, Record
+from rsea_ros.records.record import MEASURED, Record
 
 
 def diagnose(

@@ -20,7 +20,7 @@ from rsea_ros.identification.unknowns import apply
 from rsea_ros.identification.workers import Pools
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Fault, FloatArray, Record
+from rsea_ros.records.record import Fault, FloatArray, Record
 
 
 @dataclass(frozen=True)

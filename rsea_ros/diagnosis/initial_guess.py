@@ -28,8 +28,8 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import WELL_KNOWN
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
-from rsea_ros.spectra import power_density
+from rsea_ros.records.record import FloatArray
+from rsea_ros.records.spectra import power_density
 
 _SEGMENT = 1024
 """Samples of a segment of the spectrum in which a mode is looked for: at 280 Hz lines of 0.27 Hz, a third of

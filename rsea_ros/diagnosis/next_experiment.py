@@ -22,7 +22,7 @@ from rsea_ros.identification.solver import Solution, bounded_step, jacobian
 from rsea_ros.identification.unknowns import apply, start_vector
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import UNITS, FloatArray
+from rsea_ros.records.record import UNITS, FloatArray
 
 
 @dataclass(frozen=True)

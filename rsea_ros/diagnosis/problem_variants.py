@@ -14,7 +14,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.model.drive import Drive, coarser
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 def on_blocks(

@@ -12,8 +12,8 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.identification.residual_bins import edges_of, rms_in
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
-from rsea_ros.spectra import power_density
+from rsea_ros.records.record import FloatArray
+from rsea_ros.records.spectra import power_density
 
 _SHOWN_ABOVE = 1.25
 """Times the noise. It steers what is shown, no verdict."""

@@ -14,7 +14,7 @@ from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_choice import RigChoice
-from rsea_ros.signals import Fault, FloatArray
+from rsea_ros.records.record import Fault, FloatArray
 
 Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]
 Reason = Literal[

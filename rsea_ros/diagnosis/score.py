@@ -19,7 +19,7 @@ from rsea_ros.diagnosis.coherence import missed_response
 from rsea_ros.diagnosis.data_split import block_length, blocks_of, part
 from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns, power, solve
 from rsea_ros.identification.unknowns import start_vector, theta_with
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _DAMPING = 1e-6
 """Of the curvature: keeps apart what the data do not. Numerical: far below that of any unknown that shows."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from rsea_ros.diagnosis.candidate import Candidate
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)

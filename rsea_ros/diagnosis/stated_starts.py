@@ -10,7 +10,7 @@ from __future__ import annotations
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import theta_with
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 def stated_starts(problem: Problem, theta: FloatArray, effect: Effect) -> list[FloatArray]:

@@ -39,7 +39,7 @@ from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, power, solve
 from rsea_ros.identification.unknowns import apply, idle, start_vector, unknowns_of_effect
 from rsea_ros.identification.workers import Pools
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from rsea_ros.identification.solver import Map
 from rsea_ros.model.drive import LONGEST_STEP, Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import build
-from rsea_ros.signals import BoolArray, FloatArray, IntArray
+from rsea_ros.records.record import BoolArray, FloatArray, IntArray
 
 _ROUNDING = 1e-6
 """Of a slot: so much less is a whole one."""

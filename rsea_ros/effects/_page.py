@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
+from rsea_ros.documents.units import plain
 from rsea_ros.effects.effect import Effect, Parameter
 from rsea_ros.effects.equation import without_equation
 from rsea_ros.effects.scale import powers_of
-from rsea_ros.units import plain
 
 
 @dataclass(frozen=True)

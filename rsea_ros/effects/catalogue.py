@@ -11,10 +11,10 @@ from functools import lru_cache
 from types import MappingProxyType
 
 import rsea_ros.effects as package
+from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import ParameterError
 from rsea_ros.plugins import plugin_constant, plugin_files
-from rsea_ros.wording import did_you_mean, quote
 
 _NOT_EFFECTS = {
     "catalogue", "compensable", "effect", "equation", "guess", "parameter", "scale", "signal_table"

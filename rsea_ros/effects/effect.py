@@ -14,14 +14,14 @@ from typing import Any, Literal
 from numba import types
 
 from rsea_ros.compiler import cfunc
+from rsea_ros.documents.units import with_unit
+from rsea_ros.documents.wording import quote
 from rsea_ros.effects.compensable import Compensable
 from rsea_ros.effects.guess import Guess, Guesses
 from rsea_ros.effects.parameter import Parameter as Parameter  # files of effects import it from here
 from rsea_ros.effects.scale import Scale
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
-from rsea_ros.units import with_unit
-from rsea_ros.wording import quote
 
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 _SIGNATURE = types.void(_POINTER, _POINTER, _POINTER)

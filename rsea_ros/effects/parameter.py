@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from rsea_ros.documents.units import with_unit
 from rsea_ros.effects.scale import Scale, widest
-from rsea_ros.units import with_unit
 
 _WIDENED = {"s", "Hz"}
 """Units of lags and modes: what a record shows goes with its samples, how large it is does not."""

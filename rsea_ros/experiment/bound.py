@@ -20,7 +20,7 @@ from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command,
 from rsea_ros.identification.excitation import ramp_ends
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, serial, solve
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _LENGTH = 1.0
 """s of a sine, of which the first is left to settle by its ramp; low frequencies get a period."""

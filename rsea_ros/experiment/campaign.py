@@ -23,7 +23,7 @@ from rsea_ros.experiment.shared_name import SharedName, shared_name
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 End = Literal[
     "confirmed", "nothing_wrong", "unexplained", "undecidable", "spent", "declined", "broken", "failed"

@@ -20,7 +20,7 @@ from scipy.stats import norm
 from rsea_ros.experiment.hypothesis import Hypothesis, motion
 from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 LEVEL = 1.0 - 1e-5
 """Probability with which all limits hold, over the causes and what is known of their numbers."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.checked import interval, mapping, number, text
+from rsea_ros.documents.fields import interval, mapping, number, text
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError
 from rsea_ros.experiment.containment import NOTHING

@@ -22,7 +22,7 @@ from rsea_ros.experiment.containment import NOTHING, may_contain, shared_paramet
 from rsea_ros.experiment.prior import vector_at, weights_of
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Map, Solution, power, solve
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _SHARE = 0.15
 """Of a cause's typical size, where fits begin too."""

@@ -15,7 +15,7 @@ from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.drive import coarser, drive_from
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import simulate_drive
-from rsea_ros.signals import SENSED, Channel, FloatArray, Record
+from rsea_ros.records.record import SENSED, Channel, FloatArray, Record
 
 _SEEN = 3.0
 """Standard deviations from none at all, from which the size of a cause counts as known."""

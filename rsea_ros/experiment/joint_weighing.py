@@ -20,7 +20,7 @@ from rsea_ros.experiment.prior import problem_of
 from rsea_ros.identification.problem import Case, case_from
 from rsea_ros.identification.solver import Map, Solution, power, serial
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import BoolArray, FloatArray, Record
+from rsea_ros.records.record import BoolArray, FloatArray, Record
 
 HOPELESS = 1e-6
 """Probability below which a cause is not fitted again to further records."""

@@ -10,7 +10,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 SHORTEST = 4.2
 """s of a record, rest included, that the diagnosis takes."""

@@ -15,7 +15,7 @@ from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.unknowns import Unknown, idle, unknowns_of_effect
 from rsea_ros.model.rig import EffectSetting, Rig
-from rsea_ros.signals import MEASURED, FloatArray
+from rsea_ros.records.record import MEASURED, FloatArray
 
 _SIZES = 1.0
 """One sigma of the size of a cause around none at all, in what its catalogue calls typical."""

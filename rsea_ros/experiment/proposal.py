@@ -10,7 +10,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.chance_constraint import Peaks
 from rsea_ros.experiment.run_limits import RunLimits
 from rsea_ros.experiment.run_shape import FEWEST, Kind, Shape
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 RATES = (50.0, 1000.0)
 """Hz, least and most commands a second: the rates of the nodes that play a run."""

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_shape import Shape
 from rsea_ros.progress import Progress
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 def refine(

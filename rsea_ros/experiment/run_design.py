@@ -33,7 +33,7 @@ from rsea_ros.experiment.trials import best_of, least_share, shapes_for, share_d
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
-from rsea_ros.signals import BoolArray, FloatArray
+from rsea_ros.records.record import BoolArray, FloatArray
 
 _HOPE = 2.0
 """S that the longest run's data give a pair at best, below which no run is designed for it."""

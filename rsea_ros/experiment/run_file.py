@@ -8,7 +8,7 @@ import numpy as np
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.excitation import FEWEST_SAMPLES
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 HEAD = "t,command"
 _UNEVEN = 1e-3

@@ -8,11 +8,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from rsea_ros.decimal_number import is_decimal
+from rsea_ros.documents.strict_yaml import is_decimal
+from rsea_ros.documents.units import plain
+from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import ParameterError
-from rsea_ros.signals import FloatArray
-from rsea_ros.units import plain
-from rsea_ros.wording import did_you_mean, quote
+from rsea_ros.records.record import FloatArray
 
 UNITS: Mapping[str, str] = {
     "torque": "N m",

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from rsea_ros.identification.excitation import NYQUIST_SHARE, ExcitationSettings, chirp, ramp_ends
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 Kind = Literal["multisine", "chirp", "steps", "holds"]
 RAMP = 0.25

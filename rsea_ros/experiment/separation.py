@@ -18,7 +18,7 @@ from scipy.special import ndtr
 from rsea_ros.experiment.hypothesis import Hypothesis, Response
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map, jacobian, power, serial
-from rsea_ros.signals import BoolArray, FloatArray
+from rsea_ros.records.record import BoolArray, FloatArray
 
 SURE = float(np.log(19.0))
 """Logarithm of the odds that confirm a cause: 0.95 to 0.05."""

@@ -12,7 +12,7 @@ from rsea_ros.experiment.run_limits import largest_share, of_command, of_respons
 from rsea_ros.experiment.run_shape import Shape, command_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map
-from rsea_ros.signals import MEASURED, FloatArray
+from rsea_ros.records.record import MEASURED, FloatArray
 
 INSIDE = 0.9
 """Share of the limits that shapes use during the search, where only the likeliest values are simulated."""

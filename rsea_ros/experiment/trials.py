@@ -12,7 +12,7 @@ from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_shape import FEWEST, Shape
 from rsea_ros.experiment.separation import chances_decided, decided_share, likely_separations
 from rsea_ros.experiment.shape_rater import ShapeRater
-from rsea_ros.signals import BoolArray, FloatArray
+from rsea_ros.records.record import BoolArray, FloatArray
 
 _TRIED: tuple[Shape, ...] = (
     Shape("multisine", 1.0, low=0.5, high=8.0),

@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
-from rsea_ros.signals import UNITS, Channel, FloatArray, Record
+from rsea_ros.records.record import UNITS, Channel, FloatArray, Record
 
 RATE = 250.0
 """Hz, of the commands that are played."""

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
-from rsea_ros.files import write_new
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.model.simulation import build
+from rsea_ros.outputs.files import write_new
 
 STEP = 1e-4
 """s. Any step will do to see whether the rig can be built."""

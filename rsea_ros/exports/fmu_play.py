@@ -9,9 +9,9 @@ import numpy as np
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.exports.difference import CHANNELS, RATE
-from rsea_ros.files import write_new
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.outputs.files import write_new
+from rsea_ros.records.record import FloatArray
 
 
 def play_fmu(archive: bytes, rig: Rig, command: FloatArray) -> dict[str, FloatArray]:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from rsea_ros.documents.wording import in_docstring
 from rsea_ros.exports.others import finite_sizes, omitted_effects, omitted_parts, without_null_effects
 from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.equations import gear_inertia
 from rsea_ros.model.rig import Rig
-from rsea_ros.wording import in_docstring
 
 PHYSICS_STEP = 0.005
 """s, of Isaac Lab's examples; a line of the file that its user changes."""

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree as xml
 
+from rsea_ros.documents.wording import printable
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import Chain, Joint, Link, chain_of
 from rsea_ros.exports.others import finite_sizes, without_null_effects
 from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.rig import Rig
-from rsea_ros.wording import printable
 
 Frame = Callable[[str], tuple[xml.Element, xml.Element]]
 """Takes the name of a rig, gives the root of a document and the element in it that holds links and joints."""

@@ -12,7 +12,7 @@ from rsea_ros.design.mujoco_model import STEP
 from rsea_ros.errors import ParameterError
 from rsea_ros.exports.difference import RATE
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 PIECE = 100
 """Commands that are played in one call, which serves no signal until it returns."""

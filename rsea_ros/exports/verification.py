@@ -13,7 +13,7 @@ from rsea_ros.exports.fmu_play import play_fmu
 from rsea_ros.exports.mujoco_play import play_mujoco
 from rsea_ros.exports.represented import Export
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 PLAYERS: Mapping[str, Callable[..., Any]] = MappingProxyType({"mjcf": play_mujoco, "fmu": play_fmu})
 NO_NOISE = "the rig states no sensor noise, expected sensors.ft.noise or another"

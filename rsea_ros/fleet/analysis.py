@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros import strict_yaml
 from rsea_ros.checks.carried import with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.faults import check
 from rsea_ros.checks.signal_findings import band
 from rsea_ros.checks.usable import check_diagnosable, require_motion
+from rsea_ros.documents import strict_yaml
+from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.read_recording import JointRecording, read_run
@@ -28,11 +29,10 @@ from rsea_ros.model.pace import check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
+from rsea_ros.records.record import UNITS, Fault, Record
 from rsea_ros.report.file_names import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODEL, REPORT
 from rsea_ros.report.identification.json import identification_json
 from rsea_ros.report.json_values import finite, json_text
-from rsea_ros.signals import UNITS, Fault, Record
-from rsea_ros.units import with_unit
 
 _MAIN = ("ft", "deflection", "position", "velocity")
 """Channels that show how well a fit is; the first that a recording has stands in the row."""

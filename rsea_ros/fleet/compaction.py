@@ -16,7 +16,7 @@ import pyarrow.compute as pc
 
 from rsea_ros.fleet.row import write_table
 from rsea_ros.fleet.store_keys import metadata, read
-from rsea_ros.new_files import Destination, NewFiles
+from rsea_ros.outputs.new_files import Destination, NewFiles
 
 _PART = "part-"
 _REPLACES = b"rsea.replaces"

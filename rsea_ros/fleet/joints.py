@@ -12,15 +12,14 @@ from typing import Any, Literal, cast, get_args
 
 from msg_adapters.tables import ImportMap, load_map
 from msg_adapters.topic_map import TopicMap
-from rsea_ros import strict_yaml
-from rsea_ros.checked import mapping, only_keys, text
+from rsea_ros.documents import strict_yaml
+from rsea_ros.documents.fields import mapping, names, only_keys, text
+from rsea_ros.documents.wording import quote
 from rsea_ros.errors import FieldError, RseaError
 from rsea_ros.fleet.dated_paths import names_a_day
 from rsea_ros.fleet.fleet_error import JointMapError
 from rsea_ros.fleet.joint_keys import JOINT, MAP, TOPIC
-from rsea_ros.keys import names
 from rsea_ros.model.rig_file import load_rig, rig_folders, rig_text
-from rsea_ros.wording import quote
 
 Diagnose = Literal["misfit", "always", "never"]
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
-from rsea_ros.interrupts import STOPPING, deaf_to_interrupts
+from rsea_ros.processes import STOPPING, deaf_to_interrupts
 
 PER_WORKER = 2
 """Jobs in flight for each worker: one that runs, and one that waits here."""

@@ -16,7 +16,7 @@ from msg_adapters.topic_map import ROLES
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.dated_paths import date_in
 from rsea_ros.fleet.joints import MappedJoint
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 _DATED_NS = 10**17
 """Stamps below (1973) count since a machine's start, not since 1970."""

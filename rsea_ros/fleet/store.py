@@ -20,12 +20,12 @@ from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
 
-from rsea_ros.files import make_folder
 from rsea_ros.fleet.compaction import compact, compact_loose, finish, take_out
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.row import SCHEMA, Row, analysis_of, month_of, write
 from rsea_ros.fleet.store_keys import known_rows
-from rsea_ros.new_files import Destination, NewFiles, write_text
+from rsea_ros.outputs.files import make_folder
+from rsea_ros.outputs.new_files import Destination, NewFiles, write_text
 
 MARK = "store.json"
 LOCK = ".lock"

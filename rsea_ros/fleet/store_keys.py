@@ -10,9 +10,9 @@ from typing import Any
 import pyarrow as pa
 from pyarrow import parquet
 
+from rsea_ros.documents.wording import brief
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.row import COLUMNS, key_of
-from rsea_ros.wording import brief
 
 EXPECTED_FILES = "expected whole Parquet files: remove the damaged one, and the next run makes its rows anew"
 _LONGEST = 120

@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from rsea_ros.documents.wording import brief
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.row import Row, analysis_of, empty
@@ -21,7 +22,6 @@ from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relist
 from rsea_ros.fleet.store import TaskOutcome
 from rsea_ros.fleet.time_limit import OutOfTime, limit_time
 from rsea_ros.identification.workers import on_cores
-from rsea_ros.wording import brief
 
 _LONGEST = 500
 """Characters of a reason."""

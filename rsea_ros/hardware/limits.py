@@ -7,9 +7,9 @@ from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rsea_ros.documents.units import plain
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
-from rsea_ros.units import plain
 
 COMMAND_TIMEOUT = "command_timeout"
 HEARD_LATE = 3

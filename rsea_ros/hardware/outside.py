@@ -7,10 +7,10 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from rsea_ros.documents.wording import quote
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import Device
 from rsea_ros.plugins import plugin_constant, plugin_files
-from rsea_ros.wording import quote
 
 EXTRA_PATH = "RSEA_DEVICES"
 """Environment variable: files or folders of them, separated like PATH, each file with a DEVICE."""

@@ -15,7 +15,7 @@ from rsea_ros.model.drive import steps_per_sample
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import build, measure, run
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 SECOND = 1_000_000_000
 

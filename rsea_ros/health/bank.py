@@ -20,7 +20,7 @@ from rsea_ros.model.observer.batch import BatchObserver
 from rsea_ros.model.observer.log import FT, STATE
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 CHANNELS = ("position", "ft", "motor_torque")
 HEAVY = 8.0

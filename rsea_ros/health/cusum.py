@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 HOUR = 3600.0
 SHARE = 0.34

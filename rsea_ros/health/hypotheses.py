@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.rig import EffectSetting, Rig
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
 
 FACTOR = "friction.factor"
 GAINS = ("torque_constant_error.gain", "ft_gain_error.gain")

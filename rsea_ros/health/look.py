@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rsea_ros.model.observer.log import COMMAND, FT, STATE
-from rsea_ros.signals import FloatArray, IntArray, Record
+from rsea_ros.records.record import FloatArray, IntArray, Record
 
 FILTER_SETTLING, LENGTH = 0.25, 1.0
 """s. Ten time constants of the disturbance's filter; long beside them, short beside a movement."""

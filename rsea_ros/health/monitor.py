@@ -20,7 +20,7 @@ from rsea_ros.health.sensors import Sensors
 from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 JUMP = 1.0
 """s. Stamps that jump so far, either way, are of another run or of a clock that was set: looks begin anew."""

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.health.hypotheses import ChangeHypothesis
-from rsea_ros.normal import Z95
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import FloatArray
 
 MEMORY = 60.0
 """Looks that an estimate remembers."""

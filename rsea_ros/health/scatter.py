@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.health.bank import CHANNELS, LookEvidence
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 SCALES = 0.3, 3.0
 """Standard deviations that the innovations of a right model may have beside those that the rig promises."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.model.observer.log import COMMAND, FT, STATE
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 SAMPLES, TIME = 10, 0.05
 """Equal values, and s of them, that are no chance while something else moves."""

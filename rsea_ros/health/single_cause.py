@@ -22,8 +22,8 @@ from rsea_ros.health.look import Look
 from rsea_ros.model.observer.batch import BatchObserver
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
-from rsea_ros.normal import Z95
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import FloatArray
 
 FREEDOM = 4.0
 WHITE = 2.5 * 0.19366

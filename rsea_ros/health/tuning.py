@@ -19,8 +19,8 @@ from rsea_ros.health.look import Look
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
-from rsea_ros.normal import Z95
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import FloatArray
 
 _CERTAIN = 1e-6
 """Doubt of what has none, in its smallest change: such a parameter does not move."""

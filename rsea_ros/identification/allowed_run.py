@@ -15,7 +15,7 @@ from rsea_ros.model.drive import drive_from
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.simulation import simulate_drive
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 SLOWEST, FASTEST = 50.0, 1000.0
 """Hz, of the node excite."""

@@ -25,7 +25,7 @@ from rsea_ros.identification.solver import Map, Solution, solve
 from rsea_ros.identification.unknowns import idle, start_vector, unknowns_of_effect, with_effect
 from rsea_ros.identification.workers import Pools
 from rsea_ros.model.inverse import is_inverse
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 LAWS = ("torque_constant_error", "command_delay", "current_loop_lag", "coulomb_friction", "ft_gain_error")
 """What is wrong most often and biases the values of the rig most, one number each."""

@@ -16,7 +16,7 @@ from rsea_ros.identification.confidence import Confidence, inverse_of
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, clock_columns
 from rsea_ros.identification.unknowns import clocks
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 
 def with_even_clocks(

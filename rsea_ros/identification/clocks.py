@@ -25,7 +25,7 @@ from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Map, Solution, clock_columns, serial, solve
 from rsea_ros.identification.unknowns import Unknown, clock_rates, clocks, start_vector
 from rsea_ros.model.inverse import is_inverse
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 ASKED = 3.5
 """Standard deviations from which a clock is asked for: one of six in 360 records where all are right."""

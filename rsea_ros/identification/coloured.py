@@ -17,7 +17,7 @@ from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.spectra import HANN, OVERLAP, TOP, SpectralShape, segment_spectra, shape_of
 from rsea_ros.identification.witnesses import witnesses
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 _LONG, _SHORT = 1024, 512
 _STEADY_BANDS = (0.4, 3.0, 10.0, 40.0)

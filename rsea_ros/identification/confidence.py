@@ -22,8 +22,8 @@ from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig_fields import FIELDS
-from rsea_ros.normal import Z95
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import FloatArray, IntArray
 
 _WEAK = 100.0
 """Of the prior's information: below it forward differences may take curvature for information."""

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 Determined = Literal["yes", "in part", "no"]
 IDENTIFIABLE_SHARE = 0.5

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.documents.units import in_motion
 from rsea_ros.identification.confidence import Confidence, interval
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
-from rsea_ros.units import in_motion
+from rsea_ros.records.record import FloatArray
 
 
 def errors_by_channel(

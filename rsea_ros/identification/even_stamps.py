@@ -19,7 +19,7 @@ from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Solution
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 SCATTER = 0.005
 """Of a period, RMS: what scatters less is taken as stamped right."""

@@ -13,9 +13,9 @@ from types import MappingProxyType
 
 import numpy as np
 
+from rsea_ros.documents.units import plain
 from rsea_ros.errors import ParameterError
-from rsea_ros.signals import FloatArray, IntArray
-from rsea_ros.units import plain
+from rsea_ros.records.record import FloatArray, IntArray
 
 NYQUIST_SHARE = 0.95
 """No excitation goes above this share of half the sample rate."""

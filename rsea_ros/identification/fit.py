@@ -32,7 +32,7 @@ from rsea_ros.identification.unknowns import (
 )
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import MEASURED, FloatArray
+from rsea_ros.records.record import MEASURED, FloatArray
 
 _REWEIGHTINGS = 3
 _OTHER_NOISE = 1.1

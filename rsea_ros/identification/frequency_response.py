@@ -19,7 +19,7 @@ from rsea_ros.identification.response_lines import Lines
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.identification.unfold import unfold
 from rsea_ros.identification.welch import suits, welch
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 HIGHEST = 0.45
 """Of the sample rate: above it an image is as large as the response itself."""

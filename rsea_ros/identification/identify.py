@@ -44,7 +44,7 @@ from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.prediction_errors import fit_percent
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 
 def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = None) -> Identification:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsea_ros.setting import number
+from rsea_ros.documents.setting import number
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.model.inverse import FEWEST, smooth
 from rsea_ros.model.position_loop import loop_parameters
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 _SLOW = 0.05
 """Of the RMS speed: below it the sign of the speed is not determined."""

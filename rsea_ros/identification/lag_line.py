@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rsea_ros.identification.unknowns import FASTEST
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 BLOCK = 1.0
 """s. At 500 ppm the lag changes by half a millisecond in it."""

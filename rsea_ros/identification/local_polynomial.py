@@ -16,7 +16,7 @@ from numpy.fft import rfft
 
 from rsea_ros.identification.resample import Aligned, AtRestError
 from rsea_ros.identification.response_lines import Lines, detrend, widen
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 _UNKNOWNS = 6
 _TINY = 1e-300

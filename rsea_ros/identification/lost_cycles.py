@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.identification.result import Identification, Overlay
-from rsea_ros.signals import Fault
-from rsea_ros.stamp_gaps import GAP
+from rsea_ros.records.record import Fault
+from rsea_ros.records.stamp_order import GAP
 
 KIND = "lost_cycles"
 _FEWEST = 10

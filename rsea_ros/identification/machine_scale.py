@@ -12,7 +12,7 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.position_loop import loop_parameters
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 LARGEST = 0.999
 """Quantile that is taken for the largest value: a few samples may be outliers."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.identification.problem import Case, Problem, weighted_residual
 from rsea_ros.identification.solver import Solution
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 def misfit_ratios(solution: Solution) -> dict[str, float]:

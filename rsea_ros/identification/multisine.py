@@ -15,7 +15,7 @@ from numpy.fft import rfft
 from rsea_ros.identification.periodicity import Periods
 from rsea_ros.identification.resample import Aligned
 from rsea_ros.identification.response_lines import Lines, widen
-from rsea_ros.signals import ComplexArray, FloatArray, IntArray
+from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
 
 _EXCITED = 1e-2
 _SMOOTHED = 9

@@ -18,7 +18,7 @@ from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.quantum import step_of
 from rsea_ros.identification.spectra import segment_spectra
 from rsea_ros.model.rig import Sensor
-from rsea_ros.signals import BoolArray, Channel, ComplexArray, FloatArray, IntArray, Record
+from rsea_ros.records.record import BoolArray, Channel, ComplexArray, FloatArray, IntArray, Record
 
 _TINY = 1e-300
 _LONGEST, _SEGMENTS = 512, 8

@@ -17,7 +17,7 @@ from rsea_ros.identification.noise import top_of_band
 from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 _WHITE_DOUBT = 1.5
 """Relative standard deviation of the RMS of white noise read off the top of the band, times sqrt(samples).

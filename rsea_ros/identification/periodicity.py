@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.fft import irfft, rfft
 
-from rsea_ros.fast_length import next_fast_length
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
+from rsea_ros.records.spectra import next_fast_length
 
 FEWEST_PERIODS = 3
 """One settles, two separate noise from signal."""

@@ -22,7 +22,7 @@ from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.signals import BoolArray, FloatArray, Record
+from rsea_ros.records.record import BoolArray, FloatArray, Record
 
 FEWEST = 64
 """Samples of a channel: fewer show no spectrum, so no noise to weigh them by."""

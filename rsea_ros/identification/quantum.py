@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 FEW = 0.2
 """Share of the samples: with more different values than that, a channel has no steps worth the name."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import LARGEST
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 
 def check_usable(record: Record) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
 
 _FEWEST = 32
 _STEADY = 1e-3

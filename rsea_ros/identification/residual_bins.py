@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 def edges_of(values: FloatArray, count: int, *, equal: bool) -> FloatArray:

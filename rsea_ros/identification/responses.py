@@ -16,7 +16,7 @@ from rsea_ros.model.equations import Mechanics
 from rsea_ros.model.position_loop import close_loop
 from rsea_ros.model.propagator import encoder_row, read_row, state_space
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray, Record
+from rsea_ros.records.record import ComplexArray, FloatArray, Record
 
 
 def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:

@@ -12,7 +12,7 @@ from rsea_ros.identification.silent import silent_channels
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_choice import RigChoice
-from rsea_ros.signals import SENSED, ComplexArray, Fault, FloatArray
+from rsea_ros.records.record import SENSED, ComplexArray, Fault, FloatArray
 
 Verdict = Literal["adequate", "misfit", "not_identifiable"]
 """Whether the model fits down to the noise, and if so, whether the data determine any of its values."""

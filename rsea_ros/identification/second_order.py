@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 _ITERATIONS = 60
 _CONVERGED = 1e-10

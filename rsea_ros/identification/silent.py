@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rsea_ros.fault_kinds import MASKED
-from rsea_ros.signals import Fault
+from rsea_ros.records.fault_kinds import MASKED
+from rsea_ros.records.record import Fault
 
 
 def silent_channels(faults: Iterable[Fault]) -> tuple[str, ...]:

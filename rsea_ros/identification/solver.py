@@ -16,7 +16,7 @@ from scipy.linalg.blas import dger
 
 from rsea_ros.identification.problem import Problem, simulate_cases
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _DIFFERENCE = 1e-4
 _CLOCK_DIFFERENCE = 1e-6

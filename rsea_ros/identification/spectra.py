@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.fft import irfft, rfft
 
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 OVERLAP = 1.056
 """Segments that overlap by half, over as many independent ones (Welch, IEEE Trans. AU-15, 1967)."""

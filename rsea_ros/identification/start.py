@@ -17,7 +17,7 @@ from rsea_ros.identification.responses import model_response
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.identification.unknowns import apply, start_vector, unknowns_of_rig
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _LINES = 60
 """Of each response, evenly spread on a logarithmic scale."""

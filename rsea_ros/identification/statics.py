@@ -11,7 +11,7 @@ import numpy as np
 
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 SLOW = 1.0
 """Hz. RMS frequency of a command up to which inertia and damping count for nothing."""

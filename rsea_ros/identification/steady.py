@@ -9,7 +9,7 @@ from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import BoolArray, Record
+from rsea_ros.records.record import BoolArray, Record
 
 
 def with_even_clocks(

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 
 from rsea_ros.identification.resample import Aligned
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 _ORDERS = np.arange(1, 5)
 _FACTORIALS = np.array([1.0, 1.0, 2.0, 6.0, 24.0])

@@ -12,7 +12,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect, Parameter
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_fields import FIELDS, LEAST_SIZE
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 CLOCK, CLOCK_RATE = "clock", "clock_rate"
 RATE_DOUBT, FASTEST = 50.0, 500.0

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.fft import rfft
 
-from rsea_ros.fast_length import next_fast_length
 from rsea_ros.identification.resample import Aligned
 from rsea_ros.identification.response_lines import Lines, detrend, widen
-from rsea_ros.signals import ComplexArray, FloatArray, IntArray
+from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
+from rsea_ros.records.spectra import next_fast_length
 
 LONGEST_SEGMENT = 16.0
 """s. Long against what the actuator remembers, so that segments leak little."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _SHARP = 0.05
 """Of a signal's RMS: the width of its sign's step."""

@@ -21,7 +21,7 @@ from rsea_ros.identification.steady import with_even_clocks
 from rsea_ros.model.extent import bound_values
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 FITTED = (*TRAIN, *VALIDATION)
 

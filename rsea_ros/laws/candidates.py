@@ -28,7 +28,7 @@ from rsea_ros.laws.terms import (
     wave_terms,
 )
 from rsea_ros.laws.variables import Variables
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _DEGREE = 2
 

@@ -14,7 +14,7 @@ from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
 from rsea_ros.laws.result import Tried
 from rsea_ros.laws.sparse_regression import MOST_TERMS, SparseLaw, paths, simplest, standard_error
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 MATTERS = 0.02
 """Smallest gain that is written down: 1 - RMS(with) / RMS(without)."""

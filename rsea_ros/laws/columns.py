@@ -18,7 +18,7 @@ from rsea_ros.laws.missing import MissingTorque, missing_torque
 from rsea_ros.laws.terms import PORTS, Place
 from rsea_ros.laws.variables import Variables, variables_along, variables_of
 from rsea_ros.model.inverse import Motion, smooth
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 GROUPS = 8
 """Groups of neighbouring blocks of each set, between which the spread of a gain is seen."""

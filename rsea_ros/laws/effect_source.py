@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from rsea_ros.documents.wording import in_docstring
 from rsea_ros.effects.effect import Claims
 from rsea_ros.laws.body import FARTHER, body_of, curve_body, is_limited, states_of
 from rsea_ros.laws.law import Law
 from rsea_ros.laws.law_text import about_of, equation_of
 from rsea_ros.laws.variable_places import READS, letters_of, words_of
-from rsea_ros.wording import in_docstring
 
 _WIDE = 10.0
 """Times the fitted value: bounds of another fit."""

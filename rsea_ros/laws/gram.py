@@ -14,7 +14,7 @@ import numpy as np
 
 from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.laws.columns import GROUPS, ResidualRows
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 _RIDGE = 1e-6
 """Of each column's power: keeps columns apart that the data do not."""

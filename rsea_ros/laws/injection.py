@@ -21,7 +21,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.sampling import sample
 from rsea_ros.model.simulation import Machine, build, run
 from rsea_ros.model.step import OUTPUTS, Calls
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _SHARE = 1e-3
 """Of the largest command: the torque whose answer is taken; a linear rig answers alike to any."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.laws.terms import CREEP, Place, Term
 from rsea_ros.laws.variables import Variables
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from rsea_ros.laws.refinement import effect_from, register
 from rsea_ros.laws.result import LawResult, WrittenLaw
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.progress import Progress
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 
 def learn(

@@ -13,7 +13,7 @@ from rsea_ros.laws.law import Law
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.simulation import simulate_drive
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _LONGEST = 10.0
 """s of the record that are simulated."""

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from rsea_ros.compiler import njit
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 RING = 512
 """Values that a delay keeps: a quarter of a second at the usual step."""

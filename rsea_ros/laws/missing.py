@@ -26,7 +26,7 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.laws.injection import Injector
 from rsea_ros.laws.terms import Place
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,12 @@ from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Effect
-from rsea_ros.files import write_new
 from rsea_ros.identification.confidence import confidence_of, interval
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, solve
 from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect
 from rsea_ros.model.rig import EffectSetting
+from rsea_ros.outputs.files import write_new
 from rsea_ros.plugins import plugin_constant
 
 _ITERATIONS = 12

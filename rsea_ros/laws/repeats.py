@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import periodogram, welch
 
 from rsea_ros.diagnosis.residual_peaks import interpolate_peak, peaks
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _MOST = 400.0
 """Cycles over the travel at most: more than that no record resolves."""

@@ -10,7 +10,7 @@ from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.law import Law
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_choice import RigChoice
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)

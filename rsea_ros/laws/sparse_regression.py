@@ -15,7 +15,7 @@ import numpy as np
 from rsea_ros.laws.candidates import TermCandidate
 from rsea_ros.laws.gram import FOLDS, SELECTION, Gram
 from rsea_ros.laws.terms import Place
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 MOST_TERMS = 5
 _RIDGE = 1e-7

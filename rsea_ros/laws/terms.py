@@ -17,7 +17,7 @@ from typing import Literal, cast
 import numpy as np
 
 from rsea_ros.effects.signal_table import Port
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 Memory = Literal["", "lag", "delay", "dahl", "play", "heat", "ring"]
 Place = Literal["command", "motor", "gear", "spring", "load", "ft", "encoder"]

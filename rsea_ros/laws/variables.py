@@ -19,7 +19,7 @@ from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.inverse import Motion
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from rsea_ros.checks.finding import Finding, Findings, Light
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.progress import Progress
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -83,7 +83,7 @@ class Diagnosed:
         force: replace existing results; without it they raise OutputError.
         """
         from msg_adapters.overlay_bag import write_overlay
-        from rsea_ros.new_files import Destination
+        from rsea_ros.outputs.new_files import Destination
         from rsea_ros.report.diagnosis.files import write_diagnosis
 
         return write_diagnosis(self.result, self.record, Destination(Path(directory), force), write_overlay)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsea_ros import units
+from rsea_ros.documents import units
 from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.library.data_frames import parameter_frame, plain
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.progress import Progress
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -70,7 +70,7 @@ class Fit:
 
         force: replace existing results; without it they raise OutputError.
         """
-        from rsea_ros.new_files import Destination
+        from rsea_ros.outputs.new_files import Destination
         from rsea_ros.report.identification.files import write_results
 
         return write_results(self.result, Destination(Path(directory), force))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.signals import MEASURED, Channel, Record
+from rsea_ros.records.record import MEASURED, Channel, Record
 
 
 def records_of(data: Record | Sequence[Record]) -> list[Record]:

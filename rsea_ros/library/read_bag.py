@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from msg_adapters import TopicMap, read_record
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 
 def read_bag(

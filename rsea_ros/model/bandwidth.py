@@ -16,7 +16,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.train import spin_inertia
 from rsea_ros.model.transfer import Fraction, distal_over_proximal, distal_per_proximal
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 if TYPE_CHECKING:
     from control import TransferFunction

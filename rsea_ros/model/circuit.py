@@ -31,7 +31,7 @@ import numpy as np
 from rsea_ros.model.equations import PORTS, rotor_inertia, train_ratio
 from rsea_ros.model.netlist import GROUND, Element, Kind, NodalSolution, nodal_analysis
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 Part = tuple[str, Kind, float]
 

@@ -19,7 +19,7 @@ from rsea_ros.model.pace import AS_SECONDS, check_slow
 from rsea_ros.model.restarts import Restart, restarts
 from rsea_ros.model.rig import Hold
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 LONGEST_STEP = 4.5e-4
 """s. The step is a whole fraction of the command's period and not longer than this."""

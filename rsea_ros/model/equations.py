@@ -25,7 +25,7 @@ import numpy as np
 from rsea_ros.errors import RigError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.train import rotor_turns
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 H, G, C, D, P = range(5)
 COORDINATES = 5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 LARGEST = 1e30
 """In any unit: a larger number is not a measurement, and squares and sums of it overflow."""

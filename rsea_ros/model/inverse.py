@@ -21,7 +21,6 @@ import numpy as np
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
-from rsea_ros.lost_commands import AT_EDGE
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.extent import check_extent
 from rsea_ros.model.pace import SKIPPED_START, check_slow
@@ -30,7 +29,8 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
 from rsea_ros.model.structure import with_structure
-from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.holds import AT_EDGE
+from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
 
 CUT_OFF = 20.0
 """Hz, of the Butterworth filter of fourth order that runs both ways over motion and torque."""

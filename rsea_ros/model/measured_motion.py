@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 AT_REST = 0.5
 """Of the whole record's standard deviation: a first sample below it is of a bench that started from rest."""

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 Kind = Literal["stiffness", "inertia", "damping", "source", "transformer"]
 GROUND = "0"

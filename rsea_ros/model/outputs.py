@@ -29,7 +29,7 @@ from rsea_ros.model.equations import (
     owners,
 )
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 Sees = Literal["spring_and_damper", "element"]
 """Torque at the spring end: K_s + b_s s, as a sensor in series with the spring has it, or K_s alone, the

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 SLOW, LONGEST_SLOW = 4.0, 900.0
 """Hz of the fastest channel below which a record is slow, and s of the longest slow record: stamps in ms make

@@ -7,7 +7,7 @@ import math
 from rsea_ros.errors import ChannelError
 from rsea_ros.model import firmware_loop
 from rsea_ros.model.rig import PositionLoop, Rig
-from rsea_ros.signals import ComplexArray, Record
+from rsea_ros.records.record import ComplexArray, Record
 
 
 def loop_parameters(rig: Rig) -> tuple[float, ...]:

@@ -20,7 +20,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from rsea_ros.model.equations import Mechanics, mechanics, train_ratio
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.step import Linear
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _DIFFERENCES = {
     st.GEAR_ANGLE: (-1.0, 1.0, 0.0, 0.0, 0.0),

@@ -48,8 +48,8 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_structure import check_two_torques
 from rsea_ros.model.structure import with_structure
 from rsea_ros.model.transfer import Fraction
-from rsea_ros.normal import Z90
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.normal import Z90
+from rsea_ros.records.record import FloatArray
 
 ROTOR = "rotor.reflected_inertia"
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rsea_ros.compiler import njit
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 DAMPING = math.sqrt(2.0)
 SEEN = 0.45

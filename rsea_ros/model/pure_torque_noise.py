@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rsea_ros.model.pure_torque_filter import DAMPING
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 def split(a: FloatArray, b: FloatArray, c: FloatArray, r: FloatArray, corner: float, dt: float) -> FloatArray:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rsea_ros.compiler import njit
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 LENGTH = 8192
 """Samples that a window can hold: 0.8 s at 10 kHz."""

@@ -11,7 +11,7 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 
 def in_phase(rig: Rig, record: Record) -> Rig:

@@ -7,7 +7,7 @@ import numpy as np
 from rsea_ros.model.equations import PORTS, mechanics
 from rsea_ros.model.outputs import Output
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 
 def frequency_response(rig: Rig, output: Output, hz: FloatArray, port: str = "gear") -> ComplexArray:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.lost_commands import PERIODS, SHORTEST, lost_commands
 from rsea_ros.model.measured_motion import state_at
-from rsea_ros.signals import BoolArray, FloatArray, Record
+from rsea_ros.records.holds import PERIODS, SHORTEST, lost_commands
+from rsea_ros.records.record import BoolArray, FloatArray, Record
 
 Restart = tuple[int, tuple[float, float]]
 """Step of a drive before which it begins anew, and position (rad) and velocity (rad/s) there."""

@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
 
+from rsea_ros.documents.units import plain, with_unit
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
 from rsea_ros.model.rig_fields import FIELDS, check_value, unit_of
 from rsea_ros.model.rig_structure import check_structure
 from rsea_ros.model.train import Train
-from rsea_ros.signals import FloatArray
-from rsea_ros.units import plain, with_unit
+from rsea_ros.records.record import FloatArray
 
 CLOCK_DOUBT = 1e-4
 """s, one sigma of the time offset of a sensor if the rig states none."""

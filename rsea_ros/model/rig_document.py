@@ -10,9 +10,10 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from rsea_ros.checked import interval, mapping, number, only_keys, switch, text, unit
+from rsea_ros.documents.fields import interval, mapping, names, number, only_keys, switch, text, unit
+from rsea_ros.documents.units import plain
+from rsea_ros.documents.wording import quote
 from rsea_ros.errors import FieldError, RigError
-from rsea_ros.keys import names
 from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import HOLDS, EffectSetting, Hold, PositionLoop, Quantity, Rig
 from rsea_ros.model.rig_fields import END_NAMES, FIELDS, LOOP_FIELDS, LOOP_LIMITS, Field, check_value
@@ -25,8 +26,6 @@ from rsea_ros.model.rig_keys import (
     TOP,
 )
 from rsea_ros.model.rig_sensors import sensors_from
-from rsea_ros.units import plain
-from rsea_ros.wording import quote
 
 
 def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RigError
-from rsea_ros.units import with_unit
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Limits of the size of a nonzero value; beyond them the equations have no accurate digit."""

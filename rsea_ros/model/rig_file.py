@@ -10,13 +10,13 @@ import sysconfig
 from collections.abc import Mapping
 from pathlib import Path
 
-from rsea_ros import strict_yaml
+from rsea_ros.documents import strict_yaml
+from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import FieldError, OutputError, RigError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_to_document import rig_to_document
-from rsea_ros.new_files import write_text
-from rsea_ros.wording import did_you_mean, quote
+from rsea_ros.outputs.new_files import write_text
 
 
 def rig_path(name_or_path: str | Path) -> Path:

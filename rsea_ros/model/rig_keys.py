@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from rsea_ros.keys import NEEDED, Key, table
+from rsea_ros.documents.fields import NEEDED, Key, table
+from rsea_ros.documents.units import plain
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.model.rig_fields import END_NAMES, FIELDS, LOOP_FIELDS, LOOP_LIMITS, Field
 from rsea_ros.model.train import TRAINS
-from rsea_ros.signals import UNITS
-from rsea_ros.units import plain
+from rsea_ros.records.record import UNITS
 
 _END = {
     "inertia": "inertia of the load",

@@ -6,13 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.checked import mapping, number, only_keys, switch, unit
+from rsea_ros.documents.fields import mapping, names, number, only_keys, switch, unit
+from rsea_ros.documents.units import plain
 from rsea_ros.errors import RigError
-from rsea_ros.keys import names
 from rsea_ros.model.rig import CLOCK_DOUBT, Sensor
 from rsea_ros.model.rig_keys import CLOCK, CLOCK_RATE, SENSOR
-from rsea_ros.signals import UNITS
-from rsea_ros.units import plain
+from rsea_ros.records.record import UNITS
 
 _LATEST = 0.01
 """s. A clock further off than this is no clock error but a delay of the bench."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from rsea_ros.model.rig import CLOCK_DOUBT, Quantity, Rig, Sensor
 from rsea_ros.model.rig_fields import FIELDS
-from rsea_ros.signals import UNITS
+from rsea_ros.records.record import UNITS
 
 
 def rig_to_document(rig: Rig) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.compiler import njit
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 @njit(cache=True, nogil=True)

@@ -29,7 +29,7 @@ from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
 from rsea_ros.model.structure import with_structure
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 _AFTER_DELAY = 1
 """Order of a position loop at its port: its targets come late, and what it asks is limited and lags."""

@@ -20,7 +20,7 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.model.compiled_call import call
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 OUTPUTS = ("position", "velocity", "motor_torque", "ft", "deflection")
 

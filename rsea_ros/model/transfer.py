@@ -18,7 +18,7 @@ from rsea_ros.model import outputs, propagator
 from rsea_ros.model.equations import PORTS, mechanics
 from rsea_ros.model.outputs import Output, Sees
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 if TYPE_CHECKING:  # python-control takes a second to import, which a node that starts need not wait for
     from control import StateSpace, TransferFunction

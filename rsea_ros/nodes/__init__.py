@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from types import TracebackType
 
-from rsea_ros.one_thread import one_thread_for_blas
+from rsea_ros.processes import one_thread_for_blas
 
 one_thread_for_blas()  # before numpy is imported by any node
 

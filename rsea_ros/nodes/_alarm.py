@@ -7,7 +7,7 @@ import signal
 import threading
 from collections.abc import Callable
 
-from rsea_ros.interrupts import STOPPING
+from rsea_ros.processes import STOPPING
 
 
 class SignalListener:

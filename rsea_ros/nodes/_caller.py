@@ -10,9 +10,9 @@ from typing import Any
 from rclpy.node import Node
 
 from msg_adapters.ros import ChangeState, GetAvailableTransitions, GetState, Trigger
+from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.nodes._visitor import DISCOVERY, POLL, absolute, spin
-from rsea_ros.wording import did_you_mean
 
 _TRIGGER, _CHANGE_STATE = "std_srvs/srv/Trigger", "lifecycle_msgs/srv/ChangeState"
 _PATIENCE = 60.0

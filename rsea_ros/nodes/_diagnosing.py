@@ -9,15 +9,15 @@ from pathlib import Path
 from msg_adapters.overlay_bag import write_overlay
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError
 from rsea_ros.model.rig import Rig
-from rsea_ros.new_files import Destination
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
+from rsea_ros.outputs.new_files import Destination
+from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.file_names import REPORT
-from rsea_ros.signals import Record
-from rsea_ros.units import with_unit
 
 _POLL = 0.02
 """s that the executor rests between two looks at a thread that still works."""

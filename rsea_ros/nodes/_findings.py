@@ -10,12 +10,12 @@ from datetime import datetime, timezone
 from rclpy.node import Node
 
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, statuses_message
+from rsea_ros.documents.units import with_unit
 from rsea_ros.health.codes import TABLE
 from rsea_ros.health.health_finding import HealthFinding
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import STEADY
 from rsea_ros.nodes._qos import COMMAND
-from rsea_ros.units import with_unit
 
 SEVERE = ("RSEA_SENSOR_FROZEN", "RSEA_SENSOR_MISSING")
 """Codes whose level is ERROR: nobody must trust what such a sensor says."""

@@ -14,7 +14,7 @@ from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import RECORD
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 LAG = SECOND // 10
 """ns that one topic may come later than another and still be put in its place."""

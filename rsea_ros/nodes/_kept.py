@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from msg_adapters import BagWriter
-from rsea_ros.new_files import unused_path
 from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.outputs.new_files import unused_path
 
 
 class Message(NamedTuple):

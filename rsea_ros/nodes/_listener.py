@@ -11,9 +11,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from msg_adapters.ros import message_text, message_type
+from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._visitor import DISCOVERY, POLL, absolute, spin
-from rsea_ros.wording import did_you_mean
 
 _ROS_TOPICS = ("/rosout", "/parameter_events")
 

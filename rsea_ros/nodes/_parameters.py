@@ -11,9 +11,9 @@ from rclpy.node import Node
 
 from msg_adapters.ros import parameter_descriptor
 from msg_adapters.topic_map import AXES
+from rsea_ros.documents.units import plain
+from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError
-from rsea_ros.units import plain
-from rsea_ros.wording import did_you_mean
 
 Value = bool | int | float | str | list[str]
 

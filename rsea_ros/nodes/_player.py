@@ -13,7 +13,7 @@ from rclpy.publisher import Publisher
 from msg_adapters.ros import JointState, stamp_of, torque_command_message
 from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, MEASUREMENT, await_arrival
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 CLOSING_ZEROS = 3
 MARGIN = SECOND // 100

@@ -16,13 +16,13 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.interrupts import STOPPING, Stopped
 from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._parameters import NodeParameter, declare, usage
 from rsea_ros.nodes._pulse import Pulse
 from rsea_ros.nodes._sockets import publish_by_sockets
-from rsea_ros.wording import printable
+from rsea_ros.processes import STOPPING, Stopped
 
 NAMESPACE = "rsea"
 SUCCESS, BAD_INPUT = 0, 2

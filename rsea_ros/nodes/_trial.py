@@ -18,7 +18,7 @@ from rsea_ros.experiment.opinion import SHORTEST
 from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND, RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._tap import Tap
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 BROKEN = {"commands_left_out", "late_commands", "lost_messages", "watchdog_trips"}
 """Faults of a record that say that its commands did not act as planned."""

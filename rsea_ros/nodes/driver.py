@@ -16,6 +16,7 @@ from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, ManagedEntity, TransitionCallbackReturn
 
+from rsea_ros.documents.wording import printable
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
 from rsea_ros.nodes._alarm import SignalListener
@@ -33,7 +34,6 @@ from rsea_ros.nodes._joints import JOINTS, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
 from rsea_ros.nodes._run import run_node
-from rsea_ros.wording import printable
 
 TABLE = (
     NodeParameter("device", "simulated", f"what to drive: {', '.join(DEVICES)}, or one of RSEA_DEVICES"),

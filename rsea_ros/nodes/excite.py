@@ -17,7 +17,7 @@ from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import JOINT, NodeParameter
 from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._run import run_node
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 TABLE = (
     NodeParameter("file", "", "run.csv of rsea experiment to play instead; empty: what follows"),

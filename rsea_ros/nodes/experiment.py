@@ -24,19 +24,19 @@ from rsea_ros.experiment.proposal import LONGEST, RATES, DesignRequest, Proposal
 from rsea_ros.experiment.run_limits import limits_from
 from rsea_ros.experiment.weighed_causes import USUAL, causes_from
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.new_files import Destination, unused_path
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._trial import Ears, LiveRun
+from rsea_ros.outputs.new_files import Destination, unused_path
+from rsea_ros.records.record import Record
 from rsea_ros.report.campaign.files import check_session_free, write_campaign
 from rsea_ros.report.campaign.words import end_sentence, known_causes
 from rsea_ros.report.diagnosis.files import write_diagnosis
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.experiment.words import shape_words
-from rsea_ros.signals import Record
 
 DEFAULT = "out/experiment"
 TABLE = (

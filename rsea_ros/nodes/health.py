@@ -13,6 +13,7 @@ from typing import Any
 
 from rclpy.node import Node
 
+from rsea_ros.documents.units import with_unit
 from rsea_ros.health.health_finding import HealthFinding
 from rsea_ros.health.monitor import Monitor
 from rsea_ros.health.settings import WatchSettings
@@ -26,7 +27,6 @@ from rsea_ros.nodes._kept import Keeper, Ring
 from rsea_ros.nodes._model_noise import noise_from
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._run import NAMESPACE, run_node
-from rsea_ros.units import with_unit
 
 TABLE = (
     NodeParameter(

@@ -17,22 +17,22 @@ from msg_adapters.contents import Contents
 from msg_adapters.reading import record_from
 from msg_adapters.ros import Trigger, message_type
 from msg_adapters.topic_map import ROLES, TYPES, TopicMap
+from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.new_files import check_free, unused_path
 from rsea_ros.nodes._diagnosing import Diagnosing
 from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
+from rsea_ros.outputs.new_files import check_free, unused_path
+from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.file_names import IDENTIFICATION
 from rsea_ros.report.identification.words import verdict_sentence
-from rsea_ros.signals import Record
-from rsea_ros.units import with_unit
 
 DEFAULT = "out/identify"
 TABLE = (

@@ -13,12 +13,12 @@ from rclpy.node import Node
 from msg_adapters import BagWriter
 from msg_adapters.ros import message_type
 from msg_adapters.topic_map import JOINT_STATE, WRENCH
-from rsea_ros.new_files import unused_path
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
+from rsea_ros.outputs.new_files import unused_path
 
 TOPICS = {
     "torque_command": JOINT_STATE,

@@ -22,7 +22,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.train import TRAINS, Train
 from rsea_ros.paper import formulas
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 HZ: FloatArray = np.geomspace(0.5, 140.0, 60)
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from rsea_ros.documents.units import STANDARD_GRAVITY
 from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.train import Train
 from rsea_ros.paper import formulas
-from rsea_ros.units import STANDARD_GRAVITY
 
 TABLE_2: Mapping[str, tuple[str, str]] = MappingProxyType(
     {

@@ -13,7 +13,7 @@ from rsea_ros.model import outputs
 from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _HZ: FloatArray = np.geomspace(0.1, 140.0, 400)
 

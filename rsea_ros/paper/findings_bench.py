@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.documents.units import STANDARD_GRAVITY
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import inner_inertia, pure_torque_bandwidth, undamped_band
 from rsea_ros.model.response import frequency_response
@@ -18,7 +19,6 @@ from rsea_ros.model.spring import spring_radius
 from rsea_ros.paper import claims, formulas
 from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
 from rsea_ros.paper.paper_finding import PaperFinding
-from rsea_ros.units import STANDARD_GRAVITY
 
 
 def identification() -> Iterator[PaperFinding]:

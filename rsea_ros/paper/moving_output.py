@@ -19,7 +19,7 @@ from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.paper.rival_models import Rival, compare
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 NOISE = 30.0
 """N m, standard deviation (the paper prints N)."""

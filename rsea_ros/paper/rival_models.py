@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.prediction_errors import Comparison, predict
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 
 @dataclass(frozen=True)

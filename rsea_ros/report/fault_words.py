@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rsea_ros.fault_kinds import MASKED
+from rsea_ros.documents.wording import list_names
+from rsea_ros.records.fault_kinds import MASKED
+from rsea_ros.records.record import Fault
 from rsea_ros.report import words
-from rsea_ros.signals import Fault
-from rsea_ros.wording import list_names
 
 
 def fault(*alike: Fault) -> str:

@@ -7,8 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from rsea_ros.records.record import Fault
 from rsea_ros.report.provenance import Provenance
-from rsea_ros.signals import Fault
 
 
 def with_provenance(contents: Mapping[str, Any], provenance: Provenance | None) -> dict[str, Any]:

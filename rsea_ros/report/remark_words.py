@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
+from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.remark import Code, Remark
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.report import words
-from rsea_ros.wording import list_names
 
 _TORQUE_BY_MOTOR_CONSTANT = (
     "No F/T sensor takes part in this fit, so every torque is known only through the motor constant: "

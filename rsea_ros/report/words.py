@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rsea_ros.units import plain
+from rsea_ros.documents.units import plain
 
 CHANNELS = {
     "command": "commanded motor torque",

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.normal import MAD_TO_SD, Z95
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.normal import MAD_TO_SD, Z95
+from rsea_ros.records.record import FloatArray
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Growth, Interval, Trend
 from rsea_ros.trends.settings import DAY, TrendSettings

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 from rsea_ros.trends.series import BoolArray, Series, Table
 
 NULLS: Mapping[str, float] = {"gain": 1.0}

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 from rsea_ros.trends.days import Days
 from rsea_ros.trends.regression import Kind, Regression, scan, term
 

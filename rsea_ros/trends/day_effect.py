@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 from rsea_ros.trends.days import Days
 from rsea_ros.trends.settings import TrendSettings
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rsea_ros.normal import MAD_TO_SD, Z95
+from rsea_ros.records.normal import MAD_TO_SD, Z95
 from rsea_ros.trends.result import Outlier, Trend
 from rsea_ros.trends.settings import TrendSettings
 from rsea_ros.trends.significance import adjust, two_sided_p

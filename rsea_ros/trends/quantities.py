@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.normal import Z95
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import FloatArray
 from rsea_ros.trends.course import Course, StepOrRamp, date_range
 from rsea_ros.trends.regression import Regression, term
 from rsea_ros.trends.result import Interval

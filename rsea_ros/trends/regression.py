@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _LARGEST = 1e10
 """Entry of an inverse of scaled normal equations from which columns count as dependent."""

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.series import Series
 from rsea_ros.trends.settings import DAY

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 Piece = Literal["level", "line"]
 """What a piece is: a level, or a level with a slope."""

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtri, stdtr
 from scipy.stats import t
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _SMALLEST = 1e-280
 _SUREST = 37.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
 from rsea_ros.trends.course import Course
 from rsea_ros.trends.quantities import Dated, level_row, slope_row
 from rsea_ros.trends.result import Interval

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
 from rsea_ros.trends.course import Course
 from rsea_ros.trends.course_search import Tested
 from rsea_ros.trends.quantities import (

@@ -14,7 +14,7 @@ from rsea_ros.checks.check import check_record
 from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.linearised_rig import Number
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = load_rig("paper_high_impedance")
 

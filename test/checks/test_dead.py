@@ -20,7 +20,7 @@ from rsea_ros.checks.faults import clipping
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Fault
+from rsea_ros.records.record import Channel, Fault
 
 RIG = load_rig("paper_high_impedance")
 BENCH = drawn_bench(np.random.default_rng(2))

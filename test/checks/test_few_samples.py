@@ -8,8 +8,8 @@ import pytest
 import rsea_ros as rsea
 from rsea_ros.checks.check import check_record
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel
-from rsea_ros.stamps import repair_stamps
+from rsea_ros.records.record import Channel
+from rsea_ros.records.stamps import repair_stamps
 
 RIG = "paper_high_impedance"
 

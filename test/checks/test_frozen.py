@@ -13,7 +13,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = load_rig("paper_high_impedance")
 RATE, LENGTH = 280.0, 12.0

@@ -12,7 +12,7 @@ from independent.severities import drawn_parameters
 
 from rsea_ros.checks.check import check_record
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = load_rig("paper_high_impedance")
 

@@ -12,7 +12,7 @@ from rsea_ros.checks.check import check_record
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = load_rig("paper_high_impedance")
 U = excitation("white_noise", ExcitationSettings(rate=280.0, duration=6.0, seed=1))

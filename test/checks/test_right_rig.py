@@ -13,7 +13,7 @@ from rsea_ros.checks.check import check_record
 from rsea_ros.checks.gain_findings import RIGHT_RIG
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0
 

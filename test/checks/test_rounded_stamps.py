@@ -13,7 +13,7 @@ from rsea_ros.checks.check import check_record
 from rsea_ros.checks.rounded_stamps import rounded_stamps
 from rsea_ros.cli.main import main
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = "paper_high_impedance"
 

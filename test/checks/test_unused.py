@@ -11,7 +11,7 @@ from rsea_ros.checks.carried import with_check_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.cli.main import main
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 SENTENCE = "a rig without a spring makes no use of velocity, ft"
 

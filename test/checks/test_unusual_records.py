@@ -16,7 +16,7 @@ from rsea_ros.checks.moved_spans import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.statics import statics_of
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RIG = load_rig("paper_high_impedance")
 T = np.arange(2000) / 280.0

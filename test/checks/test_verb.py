@@ -10,7 +10,7 @@ from independent.bench import drawn_bench, record_run
 
 from msg_adapters import write_record
 from rsea_ros.cli.main import main
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 
 @pytest.fixture(scope="module")

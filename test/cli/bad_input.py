@@ -10,7 +10,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 from rsea_ros.cli.main import main
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -10,7 +10,7 @@ import pytest
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1] / "msg_adapters")]
 

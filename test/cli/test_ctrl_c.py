@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from bad_input import ROOT, rsea
 
-from rsea_ros.interrupts import deaf_to_interrupts
+from rsea_ros.processes import deaf_to_interrupts
 
 LONG = ("simulate", "paper_high_impedance", "--duration", "600", "--out")
 

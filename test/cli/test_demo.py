@@ -18,7 +18,7 @@ from rsea_ros.cli import demo
 from rsea_ros.cli._processes import Processes
 from rsea_ros.errors import RseaError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Fault, Record
+from rsea_ros.records.record import Channel, Fault, Record
 
 ROOT = Path(__file__).resolve().parents[2]
 DOMAIN = int(os.environ["ROS_DOMAIN_ID"])

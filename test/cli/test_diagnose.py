@@ -21,7 +21,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE, DURATION, FRICTION = 280.0, 16.0, 3.0
 NAMES = ["diagnosis.json", "model.yaml", "overlay.mcap", "report.html"]

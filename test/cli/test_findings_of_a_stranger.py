@@ -13,7 +13,7 @@ from rsea_ros.cli._shown import show_controls
 from rsea_ros.cli.main import FAULT, main
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import rig_path
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = "paper_high_impedance"
 

@@ -14,7 +14,7 @@ from rsea_ros.cli import main as cli
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import OutputError
 from rsea_ros.model.rig_file import load_rig, rig_names
-from rsea_ros.new_files import NewFiles
+from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report.check.terminal import check_lines
 
 

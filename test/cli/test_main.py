@@ -18,8 +18,8 @@ import pytest
 from numpy.linalg import LinAlgError
 
 from rsea_ros.cli import main as cli
+from rsea_ros.documents.wording import printable
 from rsea_ros.errors import BagError, DeviceError
-from rsea_ros.wording import printable
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from writing_verbs import OLD, WRITERS, contents, prepare
 
-import rsea_ros.files as files
-import rsea_ros.replaced as replaced
+import rsea_ros.outputs.files as files
+import rsea_ros.outputs.replaced as replaced
 from rsea_ros.cli.main import main
 
 STEPS = ("open", "pwrite", "fsync", "link", "rename")

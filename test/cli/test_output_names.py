@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from writing_verbs import OLD, RIG, WRITERS, contents, prepare
 
-import rsea_ros.files as files
+import rsea_ros.outputs.files as files
 from msg_adapters import read_record, write_record
 from rsea_ros.cli.main import main
 from rsea_ros.errors import OutputError

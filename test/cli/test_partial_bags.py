@@ -13,7 +13,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.cli.diagnose import readable
 from rsea_ros.cli.main import main
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = "paper_high_impedance"
 

@@ -11,7 +11,7 @@ import pytest
 import rsea_ros as rsea
 from msg_adapters import write_record
 from rsea_ros.cli.main import main
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 ASKED = "are the stamps in s"
 RIGS = ("paper_high_impedance", "emps", "pd_joint")

@@ -21,6 +21,7 @@ from rsea_ros.fleet import store_columns
 from rsea_ros.identification import identify
 from rsea_ros.laws import learn
 from rsea_ros.model.rig_choice import RigChoice
+from rsea_ros.records.record import Record
 from rsea_ros.report import file_names
 from rsea_ros.report.control import json as control_json
 from rsea_ros.report.control import page as control_page
@@ -34,7 +35,6 @@ from rsea_ros.report.identification import files as results
 from rsea_ros.report.law import files as law_files
 from rsea_ros.report.paper import json as paper_json
 from rsea_ros.report.paper import page as paper_page
-from rsea_ros.signals import Record
 
 RIG = "paper_high_impedance"
 MAP = "time: {column: t, unit: s}\nchannels:\n  command: {column: u, unit: N m}\n"

@@ -22,7 +22,7 @@ from rsea_ros.diagnosis.criteria import (
     worst_ratio,
 )
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.signals import Fault
+from rsea_ros.records.record import Fault
 
 
 def settings(**acceptance):

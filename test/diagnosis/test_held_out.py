@@ -16,7 +16,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = load_rig("paper_high_impedance")
 

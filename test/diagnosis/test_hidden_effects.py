@@ -20,7 +20,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 SECONDS = {34: 8.0, 35: 8.0, 36: 8.0, 37: 8.0, 38: 8.0, 39: 14.0}
 """Duration of the records of each seed; the gain of a compliant gear varies more in shorter ones."""

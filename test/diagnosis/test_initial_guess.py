@@ -11,7 +11,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import MEASURED, Channel
+from rsea_ros.records.record import MEASURED, Channel
 
 
 @pytest.fixture(scope="module")

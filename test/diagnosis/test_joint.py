@@ -14,8 +14,8 @@ from rsea_ros.identification.excitation import JOINT, excitation
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.signals import Channel, Record
 
 TRIED = ("coulomb_friction", "command_delay", "backlash", "stribeck_friction", "current_loop_lag")
 SETTINGS = DiagnosisSettings(max_causes=2, without=tuple(n for n in catalogue() if n not in TRIED))

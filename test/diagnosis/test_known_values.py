@@ -14,7 +14,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.identification.unknowns import with_effect
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 FRICTION, GAP, STOP = "coulomb_friction", "backlash", "hard_stop"
 GAIN = 40 * 100 * (1.0 - 0.25)

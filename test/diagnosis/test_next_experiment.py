@@ -12,7 +12,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.nodes._device_parameters import LIMITS
 from rsea_ros.nodes.excite import TABLE
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0
 DRIVER = DriverLimits()

@@ -15,7 +15,7 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.rig_file import load_rig, rig_names
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 from test.diagnosis.test_next_experiment import DRIVER, RATE, move_rig, play_run
 
 OPTIONS = {(o.kind, o.low, o.high): (o.kind, _settings(o, RATE)) for o in EXCITATIONS}

@@ -6,7 +6,7 @@ import pytest
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 
 def test_the_rate_is_that_of_the_samples_without_their_copies():

@@ -17,7 +17,7 @@ from rsea_ros.identification.problem import case_from
 from rsea_ros.model.inverse import predict_torque
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 
 def test_the_missing_torque_of_a_rigid_joint_is_that_of_rotor_and_link():

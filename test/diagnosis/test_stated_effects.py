@@ -16,8 +16,8 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.records.record import Channel
 from rsea_ros.report.diagnosis.terminal import terminal_lines
-from rsea_ros.signals import Channel
 
 RATE, DURATION = 280.0, 8.0
 RIG = load_rig("paper_high_impedance")

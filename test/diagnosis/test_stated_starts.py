@@ -20,7 +20,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.identification.unknowns import with_effect
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RATE = 280.0
 LAG, DELAY = "current_loop_lag", "command_delay"

@@ -27,8 +27,8 @@ from rsea_ros.identification.solver import serial
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.records.record import MEASURED, Channel
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.signals import MEASURED, Channel
 
 RATE = 280.0
 SHORT = DiagnosisSettings(stretches=StretchSettings(enough=35.0, blocks=8, run_up=1.0))

@@ -11,7 +11,7 @@ from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate_drive
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RIG = load_rig("paper_high_impedance")
 ON_THE_BENCH = [e for e in catalogue().values() if e.name != "gravity_error"]

@@ -13,7 +13,7 @@ import numpy as np
 from rsea_ros.effects.effect import Effect
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 _TORQUES = {"N m": 1, "N m/rad": 1, "N m s/rad": 1, "N m s^2/rad^2": 1, "kg m^2": 1, "1/(N m)": -1}
 """Power of a torque in each unit; 0 in others."""

@@ -11,7 +11,7 @@ import pytest
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RATE, NEAR = 280.0, 1e-4
 RIG = load_rig("paper_moving_output")

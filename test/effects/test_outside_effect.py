@@ -34,8 +34,8 @@ from rsea_ros.model.observer.assemble import without_delay
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.records.record import MEASURED
 from rsea_ros.report.diagnosis.sketch import part_of
-from rsea_ros.signals import MEASURED
 
 PADDLE = '''
 """Torque of a paddle in oil: between dry and viscous friction.

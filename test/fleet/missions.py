@@ -10,7 +10,7 @@ from zarr_groups import as_tar, write_group
 
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 STIFFNESS = 700.0
 """N m/rad of joint 0; that of joint i is smaller by i percent, its torque too."""

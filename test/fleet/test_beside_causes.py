@@ -16,7 +16,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 
 def test_a_row_has_the_parameters_of_the_fit_with_causes(monkeypatch: pytest.MonkeyPatch) -> None:

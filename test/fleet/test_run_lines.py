@@ -12,7 +12,7 @@ from rsea_ros.cli import _fleet_run
 from rsea_ros.cli.main import main
 from rsea_ros.fleet import task
 from rsea_ros.fleet.sources import bags_of
-from rsea_ros.interrupts import Stopped
+from rsea_ros.processes import Stopped
 
 MAP = """joints:
   knee: {rig: paper_high_impedance, bags: '*'}

@@ -23,7 +23,7 @@ from rsea_ros.fleet.task import Changed, Task, read_fingerprint, work
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig, rig_text
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 ROOT = Path(__file__).parents[2]
 RIG = "paper_high_impedance"

@@ -8,7 +8,7 @@ from fleet_stubs import stub_work
 from rsea_ros.cli import _fleet_watch
 from rsea_ros.cli.main import main
 from rsea_ros.fleet import task
-from rsea_ros.interrupts import Stopped
+from rsea_ros.processes import Stopped
 
 MAP = "joints:\n  knee: {rig: paper_high_impedance}\n"
 

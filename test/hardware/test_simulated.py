@@ -7,7 +7,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0
 START = 1_700_000_000 * SECOND

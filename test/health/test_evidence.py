@@ -11,7 +11,7 @@ from rsea_ros.model.observer import Observer, noise_of
 from rsea_ros.model.observer.batch import BatchObserver
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RATE = 280.0
 RIG = load_rig("paper_high_impedance")

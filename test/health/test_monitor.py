@@ -14,7 +14,7 @@ from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE, CLEAN, AFTER = 280.0, 14.0, 8.0
 BENCH = Bench().with_values(coulomb=3.0, b_m=8.0)

@@ -14,8 +14,8 @@ from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.signals import Channel, Record
 
 
 def with_clock(record: Record, channel: str, offset: float, ppm: float) -> Record:

@@ -16,7 +16,7 @@ from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, synthesize
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, FloatArray, Record
 
 RATE = 280.0
 SENSORS = ("ft", "position", "velocity")

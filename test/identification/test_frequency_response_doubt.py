@@ -10,7 +10,7 @@ from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0
 CIRCLE = np.sqrt(-np.log(0.05))

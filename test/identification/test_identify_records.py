@@ -14,8 +14,8 @@ from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate
+from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.signals import Channel, Record
 
 PERIOD = 1.0 / RATE
 

@@ -15,8 +15,8 @@ from rsea_ros.identification.identify import identify
 from rsea_ros.identification.lost_cycles import explained_by_lost_cycles
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.records.record import Channel, Fault, Record
 from rsea_ros.report.identification.words import next_command, verdict_sentence
-from rsea_ros.signals import Channel, Fault, Record
 
 LOST = 108
 LOSSES = (Fault("lost_cycles", "/rsea/driver", float("nan"), "lost_cycles on /diagnostics", LOST, "cycles"),)

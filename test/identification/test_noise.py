@@ -18,7 +18,7 @@ from rsea_ros.identification.quantum import step_of
 from rsea_ros.identification.unknowns import Clocks
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RMS = {"ft": 0.1, "position": 4e-5}
 

@@ -13,7 +13,7 @@ from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
 from rsea_ros.identification.noise_settings import DEFAULT
 from rsea_ros.identification.quantum import step_of
 from rsea_ros.model.rig import Sensor
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 256.0
 """Hz; its period is exact."""

@@ -15,8 +15,8 @@ from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.signals import Channel, Record
 
 TRUE = {
     "rotor.reflected_inertia": 0.03,

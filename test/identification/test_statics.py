@@ -10,7 +10,7 @@ from rsea_ros.identification.statics import statics_of
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 PEAK, RATE = 20.0, 280.0
 

@@ -16,7 +16,7 @@ from rsea_ros.identification.remark import Remark
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 
 @pytest.fixture(scope="module")

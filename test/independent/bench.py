@@ -15,7 +15,7 @@ from independent.plant import Bench, Outside, Plant
 from independent.solvers import run_fixed
 from numba import njit
 
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 
 def drawn_bench(rng, setup="high_impedance"):

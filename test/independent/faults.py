@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 
 def frozen_samples(record, rng, share=0.05):

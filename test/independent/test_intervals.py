@@ -15,7 +15,7 @@ from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import MEASURED
+from rsea_ros.records.record import MEASURED
 
 RIG = load_rig("paper_high_impedance")
 BARE = RIG.with_values({"chassis.inertia": 0.0})

@@ -14,7 +14,7 @@ from rsea_ros.laws.columns import case_model, rows_of
 from rsea_ros.laws.gram import SELECTION, gram_of
 from rsea_ros.laws.sparse_regression import fold_sums
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 
 def problem_with(extra: np.ndarray):

@@ -10,8 +10,8 @@ from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.laws.base import fitted_base
 from rsea_ros.laws.learn import learn
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.records.record import Channel
 from rsea_ros.report.law.words import headline
-from rsea_ros.signals import Channel
 
 RIG = load_rig("paper_high_impedance")
 

@@ -14,7 +14,7 @@ import pytest
 import rsea_ros as rsea
 from rsea_ros import DOOR
 from rsea_ros.errors import ChannelError, ParameterError
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RATE = 280.0
 SECONDS = 12.0

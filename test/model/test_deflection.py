@@ -13,7 +13,7 @@ from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.model.simulation import simulate, synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 T = np.arange(2000) / 500.0
 WAVE = Channel(T, 3.0 * np.sin(2 * np.pi * 3.0 * T))

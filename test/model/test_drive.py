@@ -12,7 +12,7 @@ from rsea_ros.model.drive import LONGEST_STEP, coarser, drive_from, steps_per_sa
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, simulate_drive, synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0
 SIGNALS = ("position", "velocity", "ft")

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from rsea_ros.model.rig import PositionLoop
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 1000.0
 T = np.arange(1500) / RATE

@@ -15,7 +15,7 @@ from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.model.simulation import simulate
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RIG = load_rig("paper_high_impedance")
 RATE = 280.0

@@ -10,7 +10,7 @@ import pytest
 import rsea_ros as rsea
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model import inverse
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 
 @functools.cache

@@ -15,7 +15,7 @@ from rsea_ros.model.observer import Observer, noise_of, observe
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0
 SETTLE = 100

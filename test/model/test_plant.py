@@ -10,7 +10,7 @@ from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 FRICTION = EffectSetting("coulomb_friction", {"torque": 0.5})
 

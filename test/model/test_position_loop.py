@@ -17,7 +17,7 @@ from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.model.simulation import simulate, synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 200.0
 T = np.arange(400) / RATE

@@ -13,7 +13,7 @@ from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import EffectSetting, Quantity
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 HZ = np.geomspace(0.1, 100.0, 40)
 RIG = load_rig("separate_stiffnesses")

@@ -12,7 +12,7 @@ from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 
 def hum(phase: float) -> Rig:

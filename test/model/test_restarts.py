@@ -9,7 +9,7 @@ import rsea_ros as rsea
 from rsea_ros.checks.faults import check
 from rsea_ros.model.restarts import gaps
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RIG = load_rig("paper_high_impedance")
 SOUND = rsea.simulate(RIG, 15.0 * np.random.default_rng(1).standard_normal(4200), rate=280.0, seed=1)

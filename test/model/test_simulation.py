@@ -15,7 +15,7 @@ from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import build, run, simulate, synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 RATE = 1120.0
 SIGNALS = ("position", "velocity", "ft")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from msg_adapters import iterate, write_record
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 
 def test_batches_make_no_difference(tmp_path, monkeypatch):

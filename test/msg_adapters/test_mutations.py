@@ -13,7 +13,7 @@ from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from msg_adapters import read_record
 from rsea_ros.errors import RseaError
-from rsea_ros.stamps import repair_stamps
+from rsea_ros.records.stamps import repair_stamps
 
 MUTATIONS = 40
 NUMBERS = (0, 1, 255, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1)

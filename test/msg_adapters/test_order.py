@@ -9,8 +9,8 @@ from mcap_bytes import McapFile, write
 
 from msg_adapters import read_record, write_record
 from rsea_ros.errors import BagError
-from rsea_ros.signals import Channel
-from rsea_ros.stamps import repair_stamps
+from rsea_ros.records.record import Channel
+from rsea_ros.records.stamps import repair_stamps
 
 COUNT = 400
 PERIOD = 3_571_428

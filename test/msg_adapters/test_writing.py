@@ -19,7 +19,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin
 from msg_adapters import BagWriter, TopicMap, iterate, read_record, write_record, write_records
 from msg_adapters.overlay_bag import write_overlay
 from rsea_ros.errors import BagError, ParameterError
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 STORAGES = ["mcap", "sqlite3"]
 BOOL = bytes([0, 1, 0, 0, 1])

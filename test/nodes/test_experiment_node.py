@@ -14,7 +14,7 @@ from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes.excite import plan
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = "paper_high_impedance"
 RATE = 280.0

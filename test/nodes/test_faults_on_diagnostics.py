@@ -12,7 +12,7 @@ import rsea_ros as rsea
 from rsea_ros.nodes import _diagnosing
 from rsea_ros.nodes import identify as node
 from rsea_ros.nodes._health import OK, WARN
-from rsea_ros.signals import Fault
+from rsea_ros.records.record import Fault
 
 FROZEN = Fault("frozen_samples", "ft", 0.3)
 

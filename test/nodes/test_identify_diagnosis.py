@@ -13,7 +13,7 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.nodes._qos import COMMAND
-from rsea_ros.signals import Channel
+from rsea_ros.records.record import Channel
 
 RIG = "paper_high_impedance"
 RATE, DURATION = 280.0, 12.0

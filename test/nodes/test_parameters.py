@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.interrupts import STOPPING
 from rsea_ros.nodes._parameters import NodeParameter, _refuse_unknown
+from rsea_ros.processes import STOPPING
 from test.nodes.conftest import as_argument
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"

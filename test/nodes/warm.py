@@ -115,7 +115,7 @@ def prepare() -> None:
 
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.model.simulation import synthesize
-    from rsea_ros.signals import Channel
+    from rsea_ros.records.record import Channel
 
     synthesize(load_rig("paper_high_impedance"), Channel(np.arange(30) / 280.0, np.ones(30)))
     threads = len(list(Path("/proc/self/task").iterdir()))

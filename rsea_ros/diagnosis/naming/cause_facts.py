@@ -20,7 +20,7 @@ from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import solve
 from rsea_ros.model.rig import CLOCK_DOUBT
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
 
 
 def cause_of(

@@ -13,7 +13,7 @@ from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import BlockSettings, DiagnosisSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian_columns, power, serial
-from rsea_ros.signals import BoolArray, FloatArray, IntArray
+from rsea_ros.records.record import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)

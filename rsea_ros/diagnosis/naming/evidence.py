@@ -18,7 +18,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.model.drive import Drive
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _RIDGE = 1e-6
 """Of each column's power: keeps parts of the spline apart that the data do not. Numerical: a thousandth of a

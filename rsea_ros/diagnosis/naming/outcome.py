@@ -16,7 +16,7 @@ from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.errors import IdentificationError
-from rsea_ros.signals import MEASURED
+from rsea_ros.records.record import MEASURED
 
 
 @dataclass(frozen=True)

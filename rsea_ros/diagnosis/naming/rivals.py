@@ -35,7 +35,7 @@ from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.identification.off_rig import is_off_rig
 from rsea_ros.identification.workers import Pools
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)

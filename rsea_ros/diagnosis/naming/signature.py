@@ -17,7 +17,7 @@ import numpy as np
 
 from rsea_ros.diagnosis.naming.contribution import ContributionRows, project_out
 from rsea_ros.diagnosis.settings import DEFAULT, EvidenceSettings
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 _SHIFTS = 6
 """Shifts in time by which a contribution is held against a residual that it has nothing to do with.

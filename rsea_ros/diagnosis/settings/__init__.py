@@ -19,10 +19,10 @@ from rsea_ros.diagnosis.settings.cause_names import EvidenceSettings, NamingSett
 from rsea_ros.diagnosis.settings.data import BlockSettings, FloorSettings, PieceSettings, StretchSettings
 from rsea_ros.diagnosis.settings.next_run import NextRunSettings
 from rsea_ros.diagnosis.settings.search import AcceptanceSettings, FitSettings, ForwardSettings
+from rsea_ros.documents.setting import Setting
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.interval_settings import IntervalSettings
 from rsea_ros.identification.noise_settings import NoiseSettings
-from rsea_ros.setting import Setting
 
 MOST_CAUSES = 4
 __all__ = [

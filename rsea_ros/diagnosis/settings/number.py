@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from rsea_ros import setting
+from rsea_ros.documents import setting
 
 T = TypeVar("T")
 CHOSEN = "chosen on the benchmark; bench/settings_curve.py shows the outcomes over it"

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from rsea_ros import strict_yaml
+from rsea_ros.documents import strict_yaml
 
 FOLDER = Path(__file__).with_name("models")
 HARDWARE_ERRORS = ("voltage", "hall sensor", "overheating", "encoder", "electrical shock", "overload")

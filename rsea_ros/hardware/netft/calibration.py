@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.parsers import expat
 
-from rsea_ros.decimal_number import is_decimal
+from rsea_ros.documents.strict_yaml import is_decimal
+from rsea_ros.documents.wording import quote
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import Wrench
 from rsea_ros.hardware.netft.web_page import get
-from rsea_ros.wording import quote
 
 NEWTON = {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "klbf": 4448.2216152605, "kgf": 9.80665}
 """N per unit of force, as the sensor names it (`scfgfu`)."""

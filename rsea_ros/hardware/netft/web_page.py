@@ -8,8 +8,8 @@ import time
 from http.client import HTTPException, HTTPResponse
 from typing import Any, cast
 
+from rsea_ros.documents.wording import quote
 from rsea_ros.errors import DeviceError
-from rsea_ros.wording import quote
 
 LARGEST = 1 << 20
 """Bytes. The calibration of an F/T sensor has 4 kB."""

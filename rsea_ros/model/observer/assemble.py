@@ -16,7 +16,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls
 from rsea_ros.model.structure import with_structure
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _GEAR = int(st.Port.GEAR)
 

@@ -26,7 +26,7 @@ from rsea_ros.model.observer.filter import (
 from rsea_ros.model.observer.log import COMMAND, STATE
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 MEASURED, TORQUE = range(2)
 """Columns of innovations: position or ft, whichever the event brings; motor torque."""

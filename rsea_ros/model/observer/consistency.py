@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 CHANNELS = ("position", "ft", "motor_torque")
 FALSE_ALARM = 1e-6

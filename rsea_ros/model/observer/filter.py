@@ -20,7 +20,7 @@ from rsea_ros.effects.effect import compiled
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.observer.transition import exponential, transition
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 POSITION, WRENCH, TORQUE = range(3)
 NOW, FORCED, SINCE, ERROR, STARTED, CLOCK = range(6)

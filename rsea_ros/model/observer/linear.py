@@ -17,7 +17,7 @@ from rsea_ros.model.equations import PORTS
 from rsea_ros.model.outputs import Output
 from rsea_ros.model.propagator import StateSpace, state_space
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 _GEAR = PORTS.index("gear")
 ANGLE, SPEED = 1.0, 100.0

@@ -25,7 +25,7 @@ from rsea_ros.model.observer.filter import (
     update,
     weigh_torque,
 )
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 STATE, FT, COMMAND = range(3)
 """Kinds: position and motor torque; ft; command."""

@@ -16,7 +16,7 @@ from rsea_ros.model.observer.log import COMMAND, FT, LATE, REFUSED, STATE, empty
 from rsea_ros.model.observer.signal_noise import Noise, noise_of
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.records.record import FloatArray, Record
 
 GAP = 1.0
 """s. A larger jump of the stamps, in either direction, restarts the observer."""

@@ -20,12 +20,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from rsea_ros.documents.units import plain
 from rsea_ros.errors import RigError
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
-from rsea_ros.signals import UNITS
-from rsea_ros.units import plain
+from rsea_ros.records.record import UNITS
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.experiment.campaign import CampaignOutcome
 from rsea_ros.experiment.containment import NOTHING
 from rsea_ros.experiment.joint_weighing import RunWeighing
 from rsea_ros.model.rig import CLOCK_DOUBT
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.experiment.words import plain_name
-from rsea_ros.wording import list_names
 
 _SHOWN = 0.01
 

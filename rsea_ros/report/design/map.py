@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report.design.surface import Point, log_marks
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line
 from rsea_ros.report.figures.palette import TRUTH, faint
-from rsea_ros.signals import FloatArray
 
 _TOP = 2e4
 

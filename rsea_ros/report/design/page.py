@@ -14,6 +14,7 @@ from rsea_ros.design.spring_design import SpringDesign, least_for_band, rig_of, 
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, undamped_stiffness
 from rsea_ros.model.response import frequency_response
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.design.map import LeastStiffness, feasible_map
 from rsea_ros.report.design.surface import Point, bandwidth_contours
@@ -29,7 +30,6 @@ from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, respons
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import equation, key_numbers, section
 from rsea_ros.report.provenance import Provenance
-from rsea_ros.signals import FloatArray
 
 _COLOURS = (BEFORE, AFTER, TRUTH)
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.model.bandwidth import undamped_band
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, numbers
 from rsea_ros.report.figures.palette import INK, faint
-from rsea_ros.signals import FloatArray
 
 _SHADES = [[0.0, "#eef3f8"], [0.5, "#7fa8cf"], [1.0, "#123f6d"]]
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from html import escape
 
 from rsea_ros.diagnosis.result import Cause, CauseParameter, Diagnosis, Rejected
+from rsea_ros.documents.wording import list_names
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
@@ -15,7 +16,6 @@ from rsea_ros.report.diagnosis.status_line import STATUS, status_line
 from rsea_ros.report.figures.palette import AFTER, GRID, MEASURED, QUIET, faint
 from rsea_ros.report.page.html import bullets, equation, paragraph, section
 from rsea_ros.report.page.html_table import table_of_rows
-from rsea_ros.wording import list_names
 
 _WIDTH, _HEIGHT = 180.0, 18.0
 _GAIN = "Gain: share of the residual that the cause removes, on held-out data."

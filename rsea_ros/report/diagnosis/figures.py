@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.diagnosis.result import Diagnosis, Spectrum
+from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.result import Overlay
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, band
 from rsea_ros.report.figures.overlay import Simulated, overlay_figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
 from rsea_ros.report.figures.spectrum import ABOVE_FLOOR, SpectrumLine, finding, in_bands, residual_figure
-from rsea_ros.signals import FloatArray
-from rsea_ros.wording import list_names
 
 _FIRST_VIEW = 3.0
 """s of the record that the figure over time opens with."""

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.new_files import Destination, NewFiles
+from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.json import diagnosis_json
 from rsea_ros.report.diagnosis.overlay_records import overlay_records
 from rsea_ros.report.diagnosis.page import diagnosis_report
 from rsea_ros.report.file_names import DIAGNOSIS_JSON, MODEL, OVERLAY, REPORT
 from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.provenance import Provenance
-from rsea_ros.signals import Record
 
 OverlayWriter = Callable[[Mapping[str, Record], Path], None]
 """Writes records by namespace into one bag file: msg_adapters.overlay_bag.write_overlay."""

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from rsea_ros.diagnosis.result import Cause, CauseParameter, Diagnosis
+from rsea_ros.documents.units import in_motion
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import UNITS
 from rsea_ros.report import words
-from rsea_ros.signals import UNITS
-from rsea_ros.units import in_motion
 
 _END = 0.99
 """Share of the upper bound from which a value stands for infinity."""

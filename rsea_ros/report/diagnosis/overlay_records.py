@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.identification.result import Overlay
-from rsea_ros.signals import Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 MEASURED, BEFORE, AFTER = "/rsea", "/rsea/simulated_before", "/rsea/simulated_after"
 """Namespaces of the three sets of topics in overlay.mcap."""

@@ -11,7 +11,7 @@ from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.identification.residual_bins import edges_of, rms_in
 from rsea_ros.identification.result import Overlay
 from rsea_ros.model.pace import SKIPPED_START
-from rsea_ros.signals import UNITS, FloatArray
+from rsea_ros.records.record import UNITS, FloatArray
 
 BINS = 16
 _FEWEST = 4 * BINS

@@ -6,14 +6,14 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Verdict
+from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.fault_kinds import MASKED
 from rsea_ros.identification.silent import is_unexcited, silent_channels
+from rsea_ros.records.fault_kinds import MASKED
+from rsea_ros.records.record import Fault
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.rig.words import values_off
-from rsea_ros.signals import Fault
-from rsea_ros.wording import list_names
 
 _AMPLITUDES = {0.5: "half", 2.0: "twice"}
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rsea_ros.diagnosis.result import Alternative, Cause
+from rsea_ros.documents.wording import list_names
 from rsea_ros.report import words
-from rsea_ros.wording import list_names
 
 STATUS = {"confirmed": "confirmed", "leading": "leading", "one_of": "one of"}
 _REASON = {

@@ -5,13 +5,13 @@ from __future__ import annotations
 from html import escape
 
 from rsea_ros.diagnosis.result import Diagnosis, Experiment
+from rsea_ros.records.record import UNITS
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.sentences import next_run
 from rsea_ros.report.page.html import code, paragraph, section
 from rsea_ros.report.page.html_table import table_of_rows
-from rsea_ros.signals import UNITS
 
 _EXCITE = ("kind", "amplitude", "noise", "low", "high", "period", "duration", "rate", "seed")
 """Settings that are parameters of the node excite."""

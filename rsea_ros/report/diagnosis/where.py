@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rsea_ros.documents.wording import list_names
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.profile import Profile
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, NOISE, QUIET
-from rsea_ros.signals import FloatArray
-from rsea_ros.wording import list_names
 
 _DEPENDS = 1.5
 _GAP = 0.035

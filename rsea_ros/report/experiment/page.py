@@ -8,6 +8,7 @@ import numpy as np
 
 from rsea_ros.experiment.advice import Advice
 from rsea_ros.experiment.proposal import Proposal
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report.experiment.words import (
     LEVEL_WORDS,
     decided_words,
@@ -23,7 +24,6 @@ from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
 from rsea_ros.report.page.html_table import table
 from rsea_ros.report.provenance import Provenance
-from rsea_ros.signals import FloatArray
 
 
 def advice_page(advice: Advice, provenance: Provenance | None = None) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from rsea_ros.documents.units import plain
+from rsea_ros.documents.wording import list_names
 from rsea_ros.experiment.advice import Advice, Proof
 from rsea_ros.experiment.chance_constraint import LEVEL
 from rsea_ros.experiment.containment import NOTHING
@@ -11,8 +13,6 @@ from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.experiment.run_limits import UNITS
 from rsea_ros.report import words
-from rsea_ros.units import plain
-from rsea_ros.wording import list_names
 
 _NARROWER = 1.01
 """Factor below which a run does not narrow an interval."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import UNITS, ComplexArray, FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.bode_words import caption, finding
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, MEASURED, QUIET, faint
 from rsea_ros.report.figures.thinned import thin
-from rsea_ros.signals import UNITS, ComplexArray, FloatArray
 
 _SIDE = Z95 / np.sqrt(2.0)
 """Half-width of the 95 % interval of a circular complex variable along one direction, in its sd."""

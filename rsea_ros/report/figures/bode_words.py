@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.identification.result import FrequencyResponse
+from rsea_ros.records.record import ComplexArray, FloatArray
 from rsea_ros.report import words
-from rsea_ros.signals import ComplexArray, FloatArray
 
 _CIRCLE = float(np.sqrt(-np.log(0.05)))
 """Radius of the circle that holds 95 % of a circular complex normal variable, in its sd."""

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report.figures.palette import GRID, INK, QUIET
-from rsea_ros.signals import FloatArray
 
 Json = dict[str, Any]
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout
 from rsea_ros.report.figures.packing import pack
 from rsea_ros.report.figures.palette import MEASURED, faint
-from rsea_ros.signals import UNITS, FloatArray
 
 MOST_SAMPLES = 45_000
 """Of a trace in the page: the paper's 160 s at 280 Hz. A longer one keeps its and the residual's extremes."""

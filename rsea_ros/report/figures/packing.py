@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.signals import FloatArray
+from rsea_ros.records.record import FloatArray
 
 STEPS = 60_000
 """Of the whole range, at the least: 16 bits hold them."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.records.record import ComplexArray, FloatArray
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import QUIET, faint
-from rsea_ros.signals import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)

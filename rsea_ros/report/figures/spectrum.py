@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import NOISE, QUIET
-from rsea_ros.signals import UNITS, FloatArray
 
 _PER_DECADE = 40
 _LONGEST = 4096

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 _PER_DECADE = 50
 _SMALLEST = 1e-100

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rsea_ros.new_files import Destination, NewFiles
+from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.report.fleet.joint_page import joint_page
 from rsea_ros.report.fleet.links import Links, page_names
 from rsea_ros.report.fleet.page import fleet_page

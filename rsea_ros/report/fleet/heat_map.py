@@ -7,11 +7,11 @@ from html import escape
 
 import numpy as np
 
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report.fleet.dates_below import months
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import name, percent, short_day, undetermined_state
 from rsea_ros.report.page.html import section
-from rsea_ros.signals import FloatArray
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.series import BoolArray

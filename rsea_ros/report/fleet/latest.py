@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from rsea_ros.documents.wording import list_names
 from rsea_ros.report import words
 from rsea_ros.trends.series import Table
-from rsea_ros.wording import list_names
 
 _SURE = ("confirmed", "leading")
 

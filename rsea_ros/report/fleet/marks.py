@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report.figures.figure import Json, axis
 from rsea_ros.report.figures.palette import BEFORE, faint
 from rsea_ros.report.fleet.words import dates
-from rsea_ros.signals import FloatArray
 from rsea_ros.trends.settings import DAY
 from rsea_ros.trends.weeks import Steps
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rsea_ros.documents.wording import list_names
 from rsea_ros.report.fleet.heat_map import heat_map, naming_map, shades
 from rsea_ros.report.fleet.latest import latest_causes
 from rsea_ros.report.fleet.links import Links
@@ -25,7 +26,6 @@ from rsea_ros.trends.ranking import by_joint, worst_first
 from rsea_ros.trends.result import FleetTrends
 from rsea_ros.trends.series import Table
 from rsea_ros.trends.weeks import Steps
-from rsea_ros.wording import list_names
 
 _ROWS = 60
 """Joints of a heat map: the first of a larger fleet."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, numbers
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, NOISE, faint
 from rsea_ros.report.fleet.marks import change_marks, date_axis, points
 from rsea_ros.report.fleet.words import amount, dates, finding, name, percent, short_day, value
-from rsea_ros.signals import FloatArray
 from rsea_ros.trends.result import Change, Interval, Trend
 from rsea_ros.trends.settings import DAY, YEAR
 from rsea_ros.trends.weeks import Binned, Steps, bin_days

@@ -8,7 +8,8 @@ from html import escape
 
 import numpy as np
 
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import (
@@ -22,7 +23,6 @@ from rsea_ros.report.fleet.words import (
     value,
 )
 from rsea_ros.report.page.html_table import table_of_cells
-from rsea_ros.signals import FloatArray
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Interval, Trend
 from rsea_ros.trends.series import CLOCKS, Table

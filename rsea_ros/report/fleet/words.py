@@ -7,12 +7,12 @@ from datetime import datetime, timezone
 
 import numpy as np
 
+from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
-from rsea_ros.signals import FloatArray
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import Appearance, Change, Interval, Trend
-from rsea_ros.wording import list_names
 
 _MONTHS = ("January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
            "November", "December")  # fmt: skip

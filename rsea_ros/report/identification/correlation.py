@@ -7,10 +7,10 @@ from html import escape
 
 import numpy as np
 
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
 from rsea_ros.report.page.html import fold, paragraph
-from rsea_ros.signals import FloatArray
 
 STRONG = 0.9
 """Correlation from which two values are hardly distinguishable."""

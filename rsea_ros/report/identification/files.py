@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.new_files import Destination, NewFiles
+from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.report.file_names import IDENTIFICATION_JSON, MODEL, REPORT
 from rsea_ros.report.identification.json import identification_json
 from rsea_ros.report.identification.page import identification_report

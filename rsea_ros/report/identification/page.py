@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.identification.result import CLOCKS, Identification, Overlay
+from rsea_ros.records.record import SENSED, UNITS
 from rsea_ros.report import words
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.figures.bode import bode_figure
@@ -22,7 +23,6 @@ from rsea_ros.report.provenance import Provenance
 from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.report.rig.page import right_rig_block
 from rsea_ros.report.rig.words import rig_named, split_off_rig
-from rsea_ros.signals import SENSED, UNITS
 
 
 def identification_report(identification: Identification, provenance: Provenance | None = None) -> str:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.lost_cycles import explained_by_lost_cycles
 from rsea_ros.identification.result import Identification
 from rsea_ros.report import words
 from rsea_ros.report.remark_words import coloured_noise
 from rsea_ros.report.rig.words import command, rig_in_brackets, values_off
-from rsea_ros.wording import list_names
 
 _LOST = (
     "Behind the lost cycles the motor torque is further from its commands than elsewhere: the computer was "

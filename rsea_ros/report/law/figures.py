@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.laws.result import WrittenLaw
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import FloatArray, IntArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, label, layout, line, numbers
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, QUIET, faint
 from rsea_ros.report.law.words import NAMES, UNITS
-from rsea_ros.signals import FloatArray, IntArray
 
 _WINDOWS = 12
 _CURVE = 160

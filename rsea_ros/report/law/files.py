@@ -7,7 +7,7 @@ from pathlib import Path
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.laws.result import LawResult
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.new_files import Destination, NewFiles
+from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.report.file_names import BASE, LAW_JSON, MODEL, REPORT
 from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.law.json import law_json

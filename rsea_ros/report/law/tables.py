@@ -5,13 +5,13 @@ from __future__ import annotations
 from html import escape
 
 from rsea_ros.laws.result import LawResult
-from rsea_ros.normal import Z95
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import UNITS as CHANNEL_UNITS
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, QUIET, faint
 from rsea_ros.report.law.words import gain_sentence
 from rsea_ros.report.page.html import fold, paragraph, section
 from rsea_ros.report.page.html_table import table_of_rows
-from rsea_ros.signals import UNITS as CHANNEL_UNITS
 
 _MOST_TRIED = 12
 _DEPENDENCE_HEADS = ("A function of", "#", "#explains, held out", "#of the rest")

@@ -15,12 +15,12 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.figure_18 import readings
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, BEFORE, TRUTH
 from rsea_ros.report.figures.response_curves import Mark, ResponseCurve
 from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit
 from rsea_ros.report.paper.svg import gain_svg
-from rsea_ros.signals import FloatArray
 
 _HZ: FloatArray = np.geomspace(0.1, 140.0, 240)
 

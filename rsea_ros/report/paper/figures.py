@@ -17,13 +17,13 @@ from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
 from rsea_ros.paper.moving_output import MovingOutput
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.design.surface import Point, bandwidth_contours, slices
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
 from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
 from rsea_ros.report.figures.thinned import thin
-from rsea_ros.signals import FloatArray
 
 _HZ: FloatArray = np.geomspace(0.1, 140.0, 500)
 

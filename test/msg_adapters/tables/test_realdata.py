@@ -13,7 +13,7 @@ from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import Record
+from rsea_ros.records.record import Record
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 REAL = REPOSITORY.parent / "shared" / "realdata"

@@ -7,8 +7,8 @@ import numpy as np
 from rsea_ros import simulate
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.records.record import Channel
 from rsea_ros.report.diagnosis.page import diagnosis_report
-from rsea_ros.signals import Channel
 
 
 def test_the_page_of_a_rigid_drive_whose_log_lost_samples_is_written():

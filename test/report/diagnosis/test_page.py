@@ -10,9 +10,9 @@ import pytest
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment
 from rsea_ros.errors import BagError
+from rsea_ros.records.record import Fault
 from rsea_ros.report.diagnosis.files import write_diagnosis
 from rsea_ros.report.diagnosis.page import diagnosis_report
-from rsea_ros.signals import Fault
 
 HEADINGS = (
     "explains the misfit",

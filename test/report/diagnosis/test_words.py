@@ -14,6 +14,7 @@ from rich.console import Console
 from rsea_ros.diagnosis.result import CauseParameter, Misfit, Reason, Rejected
 from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings, NoiseSettings
 from rsea_ros.identification.result import Overlay
+from rsea_ros.records.record import Fault
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
@@ -23,7 +24,6 @@ from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.diagnosis.settings import settings_section
 from rsea_ros.report.diagnosis.terminal import terminal_lines
 from rsea_ros.report.diagnosis.where import finding, where_figure
-from rsea_ros.signals import Fault
 
 
 def terminal(diagnosis):

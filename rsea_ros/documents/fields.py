@@ -1,14 +1,15 @@
-"""Values out of a YAML document, checked: each error names the field, the value and what was expected."""
+"""Fields of a document: the keys that it may have, and each value checked with its unit and range."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from rsea_ros.documents.units import plain, same_unit
+from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import FieldError
-from rsea_ros.units import plain, same_unit
-from rsea_ros.wording import did_you_mean, quote
 
 
 def number(value: Any, name: str, unit: str) -> float:
@@ -67,3 +68,32 @@ def unit(value: Any, name: str, expected: str) -> None:
     """Raise FieldError for another unit than the one expected, however that is written."""
     if not same_unit(value, expected):
         raise FieldError(f"{name} = {quote(value)}, expected {expected!r}", name)
+
+
+NEEDED = "required"
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a mapping: the expected value, the default, and the meaning."""
+
+    name: str
+    expects: str
+    default: str
+    meaning: str = ""
+
+
+def names(keys: Collection[Key]) -> set[str]:
+    """Return the names of keys."""
+    return {key.name for key in keys}
+
+
+def table(section: str, keys: Sequence[Key]) -> str:
+    """Return a table of keys in Markdown."""
+    head = [f"`{section}`:", "", "| key | expected | default | meaning |", "|---|---|---|---|"]
+    return "\n".join([*head, *map(_row, keys)]) + "\n"
+
+
+def _row(key: Key) -> str:
+    cells = (f"`{key.name}`", key.expects.replace("|", "\\|"), key.default, key.meaning)
+    return f"| {' | '.join(cells)} |"

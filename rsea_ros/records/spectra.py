@@ -1,14 +1,16 @@
-"""Spectra by Welch's method: half-overlapping Hann segments without their means.
+"""Spectra by Welch's method (half-overlapping Hann segments without their means), and fast lengths for them.
 
 Source: Welch, IEEE Trans. Audio Electroacoust. 15, 1967. The same as scipy.signal.welch and csd, whose import
 takes longer than a diagnosis that finds nothing wrong.
+
+scipy.fft has the same function, but imports for 0.15 s at every start; numpy.fft transforms alike.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 
 def segment_spectra(values: FloatArray, length: int) -> ComplexArray:
@@ -41,3 +43,21 @@ def cross_density(
 
 def _hann(length: int) -> FloatArray:
     return np.hanning(length + 1)[:-1]
+
+
+_COMPLEX, _REAL = (2, 3, 5, 7, 11), (2, 3, 5)
+
+
+def next_fast_length(least: int, *, real: bool = False) -> int:
+    """Return the least fast length that is not below `least`, 1 or more. real: of a real signal."""
+    length = max(1, least)
+    while not _is_product_of(length, _REAL if real else _COMPLEX):
+        length += 1
+    return length
+
+
+def _is_product_of(number: int, primes: tuple[int, ...]) -> bool:
+    for prime in primes:
+        while number % prime == 0:
+            number //= prime
+    return number == 1

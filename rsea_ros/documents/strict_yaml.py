@@ -1,4 +1,4 @@
-"""YAML that people write, read strictly: one meaning a value, no key twice, bounded in size and depth.
+"""Strict YAML: one value for a key, numbers as people write them, errors with file, line and field.
 
 Numbers are plain decimals (`1e-3` too). Text that YAML 1.1 but not a person reads as a number (`0x10`, `010`,
 `1:30`, `1_000`, a date) is refused with its line, as are anchors, aliases and tags.
@@ -6,6 +6,7 @@ Numbers are plain decimals (`1e-3` too). Text that YAML 1.1 but not a person rea
 
 from __future__ import annotations
 
+import math
 import re
 import stat
 from collections.abc import Iterator, Mapping
@@ -15,9 +16,26 @@ from typing import Any
 
 import yaml
 
-from rsea_ros.decimal_number import decimal, is_decimal
+from rsea_ros.documents.wording import no_utf_8, quote
 from rsea_ros.errors import FieldError
-from rsea_ros.wording import no_utf_8, quote
+
+_DECIMAL = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
+
+def is_decimal(text: str) -> bool:
+    """Return whether a text is a number like `12`, `-0.5` or `1e-3` that a double can hold.
+
+    `0x10`, `1_000`, `1:30`, `1,5`, `nan`, `inf` and `1e999` are not.
+    """
+    return bool(_DECIMAL.fullmatch(text)) and math.isfinite(float(text))
+
+
+def decimal(text: str) -> float:
+    """Return the number. Raises ValueError where `is_decimal` is false; blanks around it do not count."""
+    if not is_decimal(text.strip()):
+        raise ValueError(f"{text!r} is not a finite decimal number")
+    return float(text)
+
 
 LARGEST = 1 << 20
 """Bytes. The largest rig has 4 kB."""

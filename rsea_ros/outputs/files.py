@@ -15,8 +15,8 @@ from itertools import chain
 from pathlib import Path
 
 from rsea_ros.errors import OutputError
-from rsea_ros.interrupts import hold_signals
-from rsea_ros.replaced import Replaced, putting_aside
+from rsea_ros.outputs.replaced import Replaced, putting_aside
+from rsea_ros.processes import hold_signals
 
 NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS}
 """What a file system without hard links says (FAT, some network mounts)."""

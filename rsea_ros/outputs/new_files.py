@@ -1,4 +1,4 @@
-"""Results: files of one folder that appear together and complete, and replace nothing unasked.
+"""Results as files, all or nothing: written into a stage beside their place, then named together.
 
 They are written into a folder of a random name beside their destination (see staging), and get their names
 when all are complete and on the disk. An earlier error or signal changes nothing.
@@ -15,17 +15,44 @@ from pathlib import Path
 from types import TracebackType
 
 from rsea_ros.errors import OutputError, RseaError
-from rsea_ros.files import (
+from rsea_ros.outputs.files import (
     check_replaceable,
     give_names,
     make_folder,
     name_errors,
+    remove,
     taken_error,
     write_new,
 )
-from rsea_ros.interrupts import hold_signals
-from rsea_ros.replaced import put_back
-from rsea_ros.staging import Stage, make_stage
+from rsea_ros.outputs.replaced import LockedFolder, abandoned_folders, make_locked, put_back
+from rsea_ros.processes import hold_signals
+
+KIND = "stage"
+
+
+@dataclass(frozen=True)
+class Stage(LockedFolder):
+    """A folder in which files are written before they get their names."""
+
+    def remove(self) -> None:
+        """Remove the folder, if it can be removed."""
+        remove(self.path)
+        self.release()
+
+
+def make_stage(parent: Path, mode: int = 0o700) -> Stage:
+    """Make a stage in a folder, and remove stages of killed writers in it. Raises OSError."""
+    put_back(parent)
+    remove_left(parent)
+    folder = make_locked(parent, KIND, mode)
+    return Stage(folder.path, folder.lock)
+
+
+def remove_left(parent: Path) -> None:
+    """Remove stages of this user in a folder whose process is gone, and that are older than LEFT_AFTER."""
+    for folder in abandoned_folders(parent, KIND):
+        if folder.is_old:
+            remove(folder.path)
 
 
 @dataclass(frozen=True)

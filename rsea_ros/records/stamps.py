@@ -1,4 +1,4 @@
-"""Corrected stamps of a run: samples in order, clock jumps removed, gaps and repeats reported.
+"""Stamps as they can be used: in order, without repeats, on the clock that took the measurements.
 
 A clock that jumped shifts all the samples after the jump: sorted, they would mix with those before it, so
 the jump is removed first. A motor torque that belongs behind the edge of its command goes there.
@@ -8,23 +8,47 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.coarse_clock import even_behind_ticks
-from rsea_ros.coverage import absent_spans
 from rsea_ros.errors import ChannelError
-from rsea_ros.held_commands import COMMANDS, paused_steps, with_held_commands
-from rsea_ros.held_samples import without_held_samples
-from rsea_ros.mixed_rows import without_mixed_rows
-from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
-from rsea_ros.stamp_gaps import dropped_samples
-from rsea_ros.stamp_order import (
+from rsea_ros.records.coverage import absent_spans, without_mixed_rows
+from rsea_ros.records.holds import (
+    COMMANDS,
+    behind_the_edge,
+    paused_steps,
+    with_held_commands,
+    without_held_samples,
+)
+from rsea_ros.records.record import BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.records.stamp_order import (
     LONGEST_PAUSE,
+    dropped_samples,
     far_apart,
     jumps_back,
     median_period,
     sort_by_stamp,
     stray_fault,
 )
-from rsea_ros.torque_edge import behind_the_edge
+
+_FEWEST_TICKS = 10
+"""Fewer show no rate."""
+_SLACK = 0.05
+"""Of a tick: so far off may the line be that is drawn through stamps rounded to ticks."""
+
+
+def even_behind_ticks(t: FloatArray) -> FloatArray | None:
+    """Return the even stamps that a clock rounded to its ticks, s, shape of t; None where no such fit.
+
+    The line through all samples, where each stamp lies within half a tick of it. A rate that wanders, a lost
+    sample and a pause each leave that band, which rounding alone fills. t: s, not decreasing.
+    """
+    ticks = t[np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)]
+    if len(ticks) == len(t) or len(ticks) < _FEWEST_TICKS:
+        return None
+    tick = float(np.median(np.diff(ticks)))
+    place = np.arange(len(t)) - 0.5 * (len(t) - 1)
+    slope = float(place @ (t - t[0])) / float(place @ place)
+    even: FloatArray = np.asarray(float(np.mean(t)) + slope * place)
+    return even if np.max(np.abs(t - even)) <= (0.5 + _SLACK) * tick else None
+
 
 _SHORTEST_JUMP = 5.0
 """In sample periods: less than that a channel may well end later than the others, by chance."""

@@ -1,0 +1,1 @@
+"""Results as files, all or nothing: written beside, synced, then named."""

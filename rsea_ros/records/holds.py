@@ -1,0 +1,269 @@
+"""Values that hold: commands sent on change alone, slow sensors, lost commands, a torque read at an edge.
+
+A log of such a publisher has one message for each step, which may last for seconds, or pauses between spans
+at the rate of a loop. What reads a record expects the commands of a control loop, one for each of its cycles.
+
+A command takes effect at its stamp and holds. A torque that is read at that instant is, by convention, of the
+command that just ended; a log that commands first and then reads holds the one that just began. Under white
+commands the other one is wrong by all of its size, so the data decide; a torque of the commands that begin
+moves into the time in which they hold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.records.record import MEASURED, SENSED, BoolArray, Channel, Fault, FloatArray, IntArray, Record
+
+SHORTEST, PERIODS = 0.1, 10.0
+"""s, and sample periods of the fastest channel: a shorter gap leaves the last command a good guess."""
+
+AT_EDGE = 0.01
+"""Of a command's period: stamps so near are one, rounded to nanoseconds in one of two channels."""
+_LOST = 3.0
+"""Times what the motor torque is off the commands elsewhere: in a pause that is further off others acted."""
+
+
+def lost_commands(record: Record) -> list[tuple[float, float]]:
+    """Return begin and end (s) of the pauses of the commands in which the motor did not hold the last one."""
+    command, torque = record.channels.get("command"), record.channels.get("motor_torque")
+    if command is None or torque is None or len(command) < 3 or not np.all(np.diff(command.t) > 0.0):
+        return []
+    pauses = np.flatnonzero(np.diff(command.t) > max(SHORTEST, PERIODS / command.rate))
+    if not len(pauses) or not np.isfinite(torque.y).any():
+        return []
+    hold = _shown_commands(command, torque)
+    off = np.square(torque.y - command.y[hold])
+    known, paused = np.isfinite(off), np.isin(hold, pauses)
+    if not (known & ~paused).any():
+        return []
+    usual = float(np.mean(off[known & ~paused]))
+    within = [off[known & (hold == k)] for k in pauses]
+    lost = [k for k, o in zip(pauses, within, strict=True) if len(o) and np.mean(o) > _LOST**2 * usual]
+    return [(float(command.t[k]), float(command.t[k + 1])) for k in lost]
+
+
+def _shown_commands(command: Channel, torque: Channel) -> IntArray:
+    """Return the number of the command that each motor torque shows: the one at its stamp, or before it."""
+    edge = AT_EDGE / command.rate
+    ended, begun = (np.searchsorted(command.t, torque.t + side * edge) - 1 for side in (-1.0, 1.0))
+    either = [np.maximum(k, 0) for k in (ended, begun)]
+    return np.asarray(min(either, key=lambda k: np.nanmedian(np.abs(torque.y - command.y[k]))), np.int64)
+
+
+COMMANDS = ("command", "reference")
+
+_LONG = 32.0
+"""Sample periods of the sensors that a value lasts, at the median: a step, no sample of a signal (a loop at
+20 Hz beside sensors at 500 Hz is none)."""
+_FEWEST = 2
+_THROUGHOUT = 0.25
+"""Of a pause: without a sample for no longer than that, a sensor shows that the recorder went on."""
+
+
+def with_held_commands(record: Record) -> tuple[Record, list[Fault]]:
+    """Return the record with a command in each sample period of its sensors, where each command is a step.
+
+    In a pause of the commands alone, the last one is repeated at their usual rate. A note says so; no fault
+    comes with it. The stamps of the steps are kept exactly, and the last one is held to the end of the
+    sensors.
+    """
+    held = _held_steps(record)
+    if not held:
+        return record, []
+    commands = {name: _hold_commands(record, name, steps) for name, steps in held.items()}
+    notes = (f"{name}: {_words(record[name], steps)}" for name, steps in held.items())
+    return replace(record.with_channels(**commands), notes=(*record.notes, *notes)), []
+
+
+def words_on_steps(record: Record) -> dict[str, str]:
+    """Return, for each channel of commands that are steps, how it is read."""
+    return {name: _words(record[name], steps) for name, steps in _held_steps(record).items()}
+
+
+def _words(channel: Channel, held: BoolArray) -> str:
+    if held.all():
+        return f"{len(channel)} messages, one for each change; each value is held until the next"
+    lasts = np.where(held, np.diff(channel.t), 0.0)
+    longest, count = int(np.argmax(lasts)), np.count_nonzero(held)
+    return (
+        f"{count} {'pauses' if count > 1 else 'pause'} of the commands alone, the longest "
+        f"{lasts[longest]:.3g} s at {channel.t[longest]:.4g} s; the last value is held"
+    )
+
+
+def _held_steps(record: Record) -> dict[str, BoolArray]:
+    """Return which steps to the next command a value is held over, shape (n - 1,), of channels with any."""
+    held = {}
+    for name in COMMANDS:
+        if name in record:
+            is_steps = _is_steps(record[name], _sensor_period(record))
+            held[name] = np.ones(len(record[name]) - 1, np.bool_) if is_steps else paused_steps(record, name)
+    return {name: steps for name, steps in held.items() if steps.any()}
+
+
+def paused_steps(record: Record, name: str) -> BoolArray:
+    """Return which steps between commands are pauses of their publisher, shape (n - 1,).
+
+    A pause lasts for many of the commands' usual steps and of the sensors' sample periods, while a sensor
+    goes on: the recorder lost nothing. Commands of a log that stops as a whole are lost, and those in whose
+    place the motor torque shows others.
+    """
+    channel = record[name]
+    step = np.diff(channel.t)
+    if len(step) < _FEWEST or not np.isfinite(channel.y).all() or np.any(step <= 0.0):
+        return np.zeros(len(step), np.bool_)
+    usual = max(_sensor_period(record), float(np.median(step)))
+    pauses: BoolArray = step >= _LONG * usual
+    sensors = [record[n].t for n in MEASURED if n in record]
+    for k in np.flatnonzero(pauses):
+        pauses[k] = any(_goes_on(t, float(channel.t[k]), float(channel.t[k + 1])) for t in sensors)
+    if name == "command" and pauses.any():
+        pauses &= ~np.isin(channel.t[:-1], [begin for begin, _ in lost_commands(record)])
+    return pauses
+
+
+def _goes_on(t: FloatArray, start: float, stop: float) -> bool:
+    """Return whether stamps lie all over a span, s."""
+    inside = t[(t > start) & (t < stop)]
+    return float(np.max(np.diff(inside, prepend=start, append=stop))) <= _THROUGHOUT * (stop - start)
+
+
+def _hold_commands(record: Record, name: str, held: BoolArray) -> Channel:
+    """Return a channel of commands with the values of its held steps repeated; steps alone to the end."""
+    channel, last = record[name], float(record[name].t[-1])
+    is_steps = bool(held.all())
+    period = _sensor_period(record) if is_steps else float(np.median(np.diff(channel.t)))
+    end = max(float(c.t[-1]) for c in record.channels.values() if len(c)) if is_steps else last
+    return _repeat_values(channel, np.append(channel.t[1:], end), period, np.append(held, is_steps))
+
+
+def _sensor_period(record: Record) -> float:
+    """Return the shortest usual time between two samples of a sensor, s; infinite without one."""
+    channels = (record[name] for name in MEASURED if name in record and len(record[name]) > _FEWEST)
+    periods = [float(np.median(np.diff(channel.t))) for channel in channels]
+    return min((p for p in periods if p > 0.0), default=np.inf)
+
+
+def _is_steps(channel: Channel, period: float) -> bool:
+    """Return whether every message is a change and most values last long. period: of the sensors, s."""
+    if len(channel) < _FEWEST or not np.isfinite(channel.y).all() or np.any(np.diff(channel.t) <= 0.0):
+        return False
+    changes = bool(np.all(channel.y[1:] != channel.y[:-1]))
+    return changes and float(np.median(np.diff(channel.t))) >= _LONG * period
+
+
+def _repeat_values(channel: Channel, ends: FloatArray, period: float, which: BoolArray) -> Channel:
+    """Return the channel with some samples repeated evenly until their ends, s. period: of the repeats, s."""
+    lasts: FloatArray = ends - channel.t
+    counts = np.where(which, np.maximum(1, np.rint(lasts / period)), 1).astype(np.int64)
+    place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    t = np.repeat(channel.t, counts) + place * np.repeat(lasts / counts, counts)
+    return Channel(t, np.repeat(channel.y, counts))
+
+
+_FEWEST_VALUES = 32
+"""Fewer say nothing of how often they come."""
+_REPEATED, _REGULAR = 3.0, 1.6
+"""Samples that a value lasts, at least, and times as long that nine of ten last at most."""
+_MANY_STEPS = 4.0
+"""Times the smallest step: a sensor that goes on by one step or two is coarse, not slow."""
+
+
+def without_held_samples(record: Record) -> tuple[Record, list[Fault]]:
+    """Return the record with the first sample of each value alone, where a sensor's log repeats it; faults.
+
+    A repeat is no measurement at its stamp: a fit takes it for a sensor that comes late.
+    """
+    arrived, faults = {}, []
+    for name in SENSED:
+        repeats = repeats_of(record[name].y) if name in record else 1
+        if repeats > 1:
+            arrived[name] = _arrivals(record[name])
+            share = 1.0 - len(arrived[name]) / len(record[name])
+            detail = f"the log repeats every value {repeats} times; the first of each is used"
+            faults.append(Fault("held_samples", name, share, detail, record[name].rate / repeats, "Hz"))
+    return record.with_channels(**arrived), faults
+
+
+def repeats_of(values: FloatArray) -> int:
+    """Return in how many samples in a row a value arrives, 1 where each is a reading of its own.
+
+    A coarse sensor repeats values too, but as long as the motion has it, and then goes on by a step or two.
+    """
+    new = np.flatnonzero(_is_new(values))
+    if len(new) < _FEWEST_VALUES or not np.isfinite(values).all():
+        return 1
+    usual, long = np.quantile(np.diff(new), (0.5, 0.9))
+    steps = np.abs(np.diff(values[new] / np.max(np.abs(values))))
+    regular = usual >= _REPEATED and long < _REGULAR * usual
+    return int(usual) if regular and np.median(steps) > _MANY_STEPS * steps.min() else 1
+
+
+def _arrivals(channel: Channel) -> Channel:
+    """Return the samples that differ from the one before; all that lack a value, which a check reports."""
+    new = _is_new(channel.y)
+    return Channel(channel.t[new], channel.y[new])
+
+
+def _is_new(values: FloatArray) -> BoolArray:
+    """Return which samples differ from the one before."""
+    return np.concatenate([[True], values[1:] != values[:-1]])
+
+
+NEAR = 0.25
+"""Of the shorter period: a torque so close to the stamp of a command is read at its edge."""
+INSIDE = 0.6
+"""Of a command period: how far such a torque moves, past any step of a simulation that ends at the edge."""
+_FEWEST_EDGES = 64
+"""Samples at edges, to decide."""
+_BETTER = 0.8
+"""Of the residual under the command that ended, which that under the command that began must not exceed."""
+
+
+def behind_the_edge(record: Record) -> tuple[Record, list[Fault]]:
+    """Return the record with a motor torque of the commands that begin at its stamps read after their edges.
+
+    A joint in its position loop has no commanded torque, and is returned as it is.
+    """
+    if not {"command", "motor_torque"} <= set(record.channels) or "reference" in record:
+        return record, []
+    command, torque = record["command"], record["motor_torque"]
+    if len(command) < _FEWEST_EDGES or len(torque) < _FEWEST_EDGES or not _began(command, torque):
+        return record, []
+    late = min(INSIDE * _period(command), _period(torque))
+    fault = Fault("early_torque", "motor_torque", 1.0, "each value is of the command with its stamp")
+    return record.with_channels(motor_torque=Channel(torque.t + late, torque.y)), [fault]
+
+
+def _began(command: Channel, torque: Channel) -> bool:
+    """Return whether the torque at the edges of commands is that of the commands that begin there."""
+    middle = 0.5 * (command.t[1:] + command.t[:-1])
+    begun = np.searchsorted(middle, torque.t)
+    near = NEAR * min(_period(command), _period(torque))
+    at_edge = (np.abs(torque.t - command.t[begun]) < near) & (begun > 0)
+    ended = np.maximum(begun - 1, 0)
+    at_edge &= np.isfinite(torque.y) & np.isfinite(command.y[begun]) & np.isfinite(command.y[ended])
+    if np.count_nonzero(at_edge) < _FEWEST_EDGES:
+        return False
+    y, began, was = torque.y[at_edge], command.y[begun[at_edge]], command.y[ended[at_edge]]
+    return _rms_left(_scale(y), _scale(began)) < _BETTER * _rms_left(_scale(y), _scale(was))
+
+
+def _period(channel: Channel) -> float:
+    """Return the usual time between two samples, s."""
+    return float(np.median(np.diff(channel.t)))
+
+
+def _scale(values: FloatArray) -> FloatArray:
+    """Return values over the largest of them, so that no square overflows."""
+    return np.asarray(values / (np.max(np.abs(values)) or 1.0))
+
+
+def _rms_left(y: FloatArray, u: FloatArray) -> float:
+    """Return the RMS that a constant and a gain on the command leave of a torque, in the torque's unit."""
+    y, u = y - y.mean(), u - u.mean()
+    power = float(u @ u)
+    return float(np.sqrt(np.mean((y - (float(u @ y) / power if power else 0.0) * u) ** 2)))
