@@ -32,7 +32,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.workers import worker_pools
 
 CACHE = Path("out/calibration/evidence.jsonl")
-TABLE = Path(__file__).resolve().parents[1] / "rsea_ros/diagnosis/naming/coefficients.py"
+TABLE = Path(__file__).resolve().parents[1] / "rsea_ros/diagnosis/naming/status.py"
 
 
 def _read_only(values: dict[str, Any]) -> MappingProxyType[str, Any]:

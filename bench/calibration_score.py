@@ -9,12 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
 from rsea_ros.diagnosis.naming.evidence import Evidence
 from rsea_ros.diagnosis.naming.flexible import Flexible
-from rsea_ros.diagnosis.naming.probability import features
 from rsea_ros.diagnosis.naming.signature import Signature
-from rsea_ros.diagnosis.naming.status import probabilities_and_status
+from rsea_ros.diagnosis.naming.status import COEFFICIENTS, features, probabilities_and_status
 
 OUTSIDE = ("off", "taken_out")
 """Beginnings of the names of groups whose record holds a law that the diagnosis cannot know."""

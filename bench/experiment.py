@@ -42,11 +42,13 @@ from rsea_ros.cli._processes import Processes  # noqa: E402
 from rsea_ros.cli.demo import EXCITED, patience  # noqa: E402
 from rsea_ros.experiment.campaign import Budget, Campaign  # noqa: E402
 from rsea_ros.experiment.hypothesis import motion  # noqa: E402
-from rsea_ros.experiment.joint_weighing import weigh  # noqa: E402
+from rsea_ros.experiment.joint_weighing import (
+    USUAL,  # noqa: E402
+    weigh,  # noqa: E402
+)
 from rsea_ros.experiment.proposal import DesignRequest  # noqa: E402
 from rsea_ros.experiment.run_design import propose  # noqa: E402
 from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response  # noqa: E402
-from rsea_ros.experiment.weighed_causes import USUAL  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
 from rsea_ros.identification.workers import worker_pools  # noqa: E402
 from rsea_ros.model.rig_file import load_rig, save_rig  # noqa: E402

@@ -23,8 +23,8 @@ from fleet_simulated import DAY, DAY_SD, START, Fleet, Wear, fleet
 from json_log import append_to_log, read_log
 
 from rsea_ros.trends import Alarm, TrendSettings, alarms
-from rsea_ros.trends.ranking import by_joint
-from rsea_ros.trends.significance import scan_threshold
+from rsea_ros.trends.alarms import by_joint
+from rsea_ros.trends.appearing import scan_threshold
 
 WEEK, FIRST = 7, 28
 """Days between looks; the first look."""

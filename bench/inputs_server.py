@@ -29,7 +29,7 @@ MODULES = (
     "rsea_ros.report.diagnosis.terminal", "rsea_ros.report.identification.terminal",
     "rsea_ros.report.control.page", "rsea_ros.report.design.page", "rsea_ros.control.study",
     "rsea_ros.design.spring_design", "rsea_ros.design.mujoco_model", "msg_adapters.records",
-    "msg_adapters.overlay_bag",
+    "msg_adapters.records",
     "scipy.interpolate", "scipy.signal", "scipy.io", "rich.console", "rich.table",
 )  # fmt: skip
 FIRST = (

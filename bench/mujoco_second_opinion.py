@@ -26,11 +26,11 @@ from rsea_ros.design.mujoco_model import STEP, mjcf
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import train_ratio
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.model.train import TRAINS
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel, FloatArray, Record
 
 LOW, HIGH, TOP = 0.5, 130.0, 100.0

@@ -10,10 +10,10 @@ import numpy as np
 
 from bench.observer_truth import Truth, true_run
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.observer import Noise, Observer, noise_of, observe
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.rival_models import lumped_rig
 from rsea_ros.records.record import FloatArray
 
 RATE, SECONDS, SETTLE = 280.0, 8.0, 0.5

@@ -1,18 +1,22 @@
-"""Bags: directories and single files, MCAP or sqlite3, compressed or not."""
+"""Bags of all storages, opened and checked."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+import numpy as np
 
 from msg_adapters import mcap_file, metadata, sqlite_file
 from msg_adapters.compression import ERRORS, ZSTD_MAGIC, Allowance, unpack_file, unpack_message
 from msg_adapters.contents import AND, Contents, Messages
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import BagError
+from rsea_ros.records.record import Fault, FloatArray, IntArray
 
 SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
     ".mcap": mcap_file.scan,
@@ -159,3 +163,58 @@ def _unpack(topic: str, messages: Messages, allowance: Allowance, contents: Cont
         share = len(damaged) / len(messages.raw)
         contents.tell("damaged_messages", topic, damaged[0], len(damaged), "messages", share)
     messages.log_times, messages.raw = [t for t, _ in kept], [raw for _, raw in kept]
+
+
+@dataclass(frozen=True)
+class FieldSamples:
+    """One field of one topic: stamps in ns and values, both (n,); `where` is file, topic and field."""
+
+    where: str
+    stamps: IntArray
+    values: FloatArray
+
+
+def check_finite(series: FieldSamples) -> None:
+    """Raises BagError for a value that is not finite."""
+    bad = np.flatnonzero(~np.isfinite(series.values))
+    if bad.size:
+        at = bad[0]
+        raise BagError(
+            f"{series.where}[{at}] is {series.values[at]} at {_seconds(series.stamps[at])},"
+            f" expected a finite number ({bad.size} of {series.values.size} are not)"
+        )
+
+
+def note_repeats(series: FieldSamples, notes: list[str]) -> None:
+    """Leave a note of stamps that repeat."""
+    repeats = np.count_nonzero(np.diff(np.sort(series.stamps)) == 0)
+    if repeats:
+        total = series.stamps.size
+        notes.append(f"{series.where}: {repeats} of {total} stamps repeat, the first of each kept")
+
+
+def on_the_clock_of_the_command(
+    series: Mapping[str, FieldSamples], report: Contents
+) -> dict[str, FieldSamples]:
+    """Leave out channels without a moment in common with the command: their stamps come from another clock.
+
+    A simulation from the command's first stamp to their last would go through all the years between.
+    """
+    command = series.get("command")
+    kept = {}
+    for name, one in series.items():
+        ahead = 0 if command is None else int(one.stamps.min()) - int(command.stamps.min())
+        if command is None or _in_common(one.stamps, command.stamps):
+            kept[name] = one
+        else:
+            detail = "left out: no moment in common with the command, its stamps are from another clock"
+            report.faults.append(Fault("clock_offset", name, 1.0, detail, ahead * 1e-9, "s"))
+    return kept
+
+
+def _in_common(a: IntArray, b: IntArray) -> bool:
+    return bool(max(a.min(), b.min()) <= min(a.max(), b.max()))
+
+
+def _seconds(stamp: np.int64) -> str:
+    return f"{stamp // 1_000_000_000}.{stamp % 1_000_000_000:09d} s"

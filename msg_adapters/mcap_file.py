@@ -1,4 +1,4 @@
-"""MCAP files read from front to back, without their index, so that a cut-off file reads as well.
+"""An MCAP file read, damaged or not.
 
 Damaged parts are left out and reported; the rest is read.
 """
@@ -13,8 +13,8 @@ from collections import Counter
 from pathlib import Path
 
 from msg_adapters.compression import ERRORS, Allowance, unpack_chunk
-from msg_adapters.contents import Contents, Messages
-from msg_adapters.mcap_damage import Damage
+from msg_adapters.contents import NAME as REMARKS
+from msg_adapters.contents import Contents, Messages, remarks_of
 from msg_adapters.mcap_records import (
     ATTACHMENT,
     CHANNEL,
@@ -32,12 +32,41 @@ from msg_adapters.mcap_records import (
     STATISTICS,
     Buffer,
     Declarations,
+    McapSummary,
     number,
+    read_summary,
+    take_statistics,
     text,
 )
-from msg_adapters.mcap_summary import McapSummary, read_summary, take_statistics
-from msg_adapters.remarks import NAME as REMARKS
-from msg_adapters.remarks import remarks_of
+
+UNITS = {
+    "damaged_chunks": "chunks",
+    "damaged_messages": "messages",
+    "damaged_records": "bytes",
+    "data_after_end": "records",
+    "unknown_records": "records",
+}
+"""Unit of the size of each kind of fault."""
+
+
+class Damage:
+    """Counts by kind of fault, with the first detail."""
+
+    def __init__(self) -> None:
+        self._count: dict[str, int] = {}
+        self._detail: dict[str, str] = {}
+
+    def add(self, kind: str, detail: str, count: int = 1) -> None:
+        """Count one more; the first detail of a kind is kept."""
+        self._count[kind] = self._count.get(kind, 0) + count
+        self._detail.setdefault(kind, detail)
+
+    def tell(self, contents: Contents, where: str) -> None:
+        """Report the damage as faults."""
+        for kind, count in self._count.items():
+            detail = f"damaged MCAP: {'first: ' if count > 1 else ''}{self._detail[kind]}"
+            contents.tell(kind, where, detail, count if kind in UNITS else None, UNITS.get(kind, ""))
+
 
 CUT_OFF = "cut off (recorder killed?), read up to its last complete message"
 

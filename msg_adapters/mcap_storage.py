@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from msg_adapters.definitions import definition
+from msg_adapters.contents import NAME as REMARKS
 from msg_adapters.mcap_records import (
     CHANNEL,
     CHUNK,
@@ -34,7 +34,7 @@ from msg_adapters.mcap_records import (
     STATISTICS,
     STATISTICS_HEAD,
 )
-from msg_adapters.remarks import NAME as REMARKS
+from msg_adapters.topic_map import definition
 from rsea_ros.outputs.files import create, write_at
 from rsea_ros.records.record import IntArray
 

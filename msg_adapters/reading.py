@@ -7,13 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from msg_adapters.bags import BagPath, read_contents
+from msg_adapters.bags import (
+    BagPath,
+    FieldSamples,
+    check_finite,
+    note_repeats,
+    on_the_clock_of_the_command,
+    read_contents,
+)
 from msg_adapters.cdr import Block
-from msg_adapters.checks import FieldSamples, check_finite, note_repeats, on_the_clock_of_the_command
 from msg_adapters.contents import Contents, Messages
-from msg_adapters.decoding import Decoded
-from msg_adapters.inferred import is_inferred
-from msg_adapters.reported_faults import DIAGNOSTICS, tell_health
+from msg_adapters.decoding import DIAGNOSTICS, Decoded, is_inferred, tell_health
 from msg_adapters.topic_map import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.documents.wording import brief, did_you_mean
 from rsea_ros.errors import BagError

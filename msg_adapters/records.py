@@ -1,16 +1,16 @@
-"""Records to bags: the reverse of reading.py."""
+"""Records written as bags: measured runs, and overlays of simulations."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from msg_adapters import encoding
-from msg_adapters.remarks import Remarks
+from msg_adapters.contents import Remarks
 from msg_adapters.topic_map import AXES, FIELDS, TYPES, TopicMap, sign_and_index
 from msg_adapters.writing import BagWriter
 from rsea_ros.errors import BagError
@@ -135,3 +135,13 @@ def _encode(stamps: IntArray, values: Mapping[str, FloatArray], topics: TopicMap
     sign, index = sign_and_index(topics.axis)
     wrench[:, index] = sign * values["wrench"]
     return encoding.wrenches(stamps, wrench)
+
+
+def write_overlay(records: Mapping[str, Record], path: str | Path) -> None:
+    """Write records by namespace as one bag file. Raises BagError where it cannot be written.
+
+    Stamps before 1970, which no bag can hold as log times, are shifted to begin at 1970.
+    """
+    first = min(record.epoch_ns + round(1e9 * record.start) for record in records.values())
+    moved = [(replace(r, epoch_ns=r.epoch_ns - min(first, 0)), name) for name, r in records.items()]
+    write_records([(record, TopicMap(namespace=name)) for record, name in moved], path)

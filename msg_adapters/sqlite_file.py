@@ -13,7 +13,7 @@ from pathlib import Path
 
 from msg_adapters import metadata
 from msg_adapters.contents import Contents, Messages
-from msg_adapters.yaml_text import LARGEST
+from msg_adapters.metadata import LARGEST
 
 MAGIC = b"SQLite format 3\x00"
 TOPICS = "SELECT id, name, type FROM topics"

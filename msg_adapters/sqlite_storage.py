@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from msg_adapters.definitions import definition
 from msg_adapters.metadata import VERSION
+from msg_adapters.topic_map import definition
 from rsea_ros.outputs.files import create
 from rsea_ros.records.record import IntArray
 

@@ -1,13 +1,21 @@
-"""Which topics, joint and wrench axis a record is made of."""
+"""Which topic is which channel, and the definitions of their types."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+from rosbags.typesys import Stores, get_typestore
 
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import BagError, ParameterError
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
@@ -103,3 +111,24 @@ class TopicMap:
         renamed = replace(self, **names)  # type: ignore[arg-type]  # names of str fields
         object.__setattr__(renamed, "required", self.required | names.keys())
         return renamed
+
+
+class Definition(NamedTuple):
+    """Message definition (empty for a type that nobody knows here) and its RIHS01 hash."""
+
+    text: str
+    digest: str
+
+
+@cache
+def definition(msgtype: str) -> Definition:
+    """Return the definition of a message type of ROS 2 Kilted."""
+    store = _store()
+    if msgtype not in store.types:
+        return Definition("", "")
+    return Definition(store.generate_msgdef(msgtype, ros_version=2)[0], store.hash_rihs01(msgtype))
+
+
+@cache
+def _store() -> Typestore:
+    return get_typestore(Stores.ROS2_KILTED)

@@ -1,4 +1,4 @@
-"""Bags written aside and renamed when complete."""
+"""Bags written."""
 
 from __future__ import annotations
 
@@ -9,22 +9,52 @@ from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from types import TracebackType
+from typing import Protocol
 
 import numpy as np
 
 from msg_adapters import metadata
-from msg_adapters.definitions import definition
+from msg_adapters.contents import Remarks
 from msg_adapters.mcap_storage import McapStorage
 from msg_adapters.metadata import Topic
-from msg_adapters.remarks import Remarks
 from msg_adapters.sqlite_storage import SqliteStorage
-from msg_adapters.storage import Storage
-from msg_adapters.topic_map import check_topic
+from msg_adapters.topic_map import check_topic, definition
 from rsea_ros.errors import BagError, OutputError
 from rsea_ros.outputs import files
 from rsea_ros.outputs.new_files import Stage, make_stage
 from rsea_ros.processes import hold_signals
 from rsea_ros.records.record import IntArray
+
+
+class Storage(Protocol):
+    """One file of a bag being written; times are log times in ns. Raises OSError when the disk is full."""
+
+    path: Path
+
+    def add(self, topic: str, msgtype: str) -> int:
+        """Declare a topic; return its key."""
+
+    def write(self, key: int, log_time: int, raw: bytes) -> None:
+        """Append a serialised message."""
+
+    def write_all(self, keys: IntArray, log_times: IntArray, raws: Sequence[bytes]) -> None:
+        """Append serialised messages; keys, log_times: shape (n,)."""
+
+    def flush(self) -> None:
+        """Pass written data to the system, where they survive the end of this process."""
+
+    def sync(self) -> None:
+        """Wait until flushed data are on the disk, where they survive a power cut too."""
+
+    def remark(self, texts: Mapping[str, str], metadata: str) -> None:
+        """Keep texts by name in the file; metadata: the same in metadata.yaml of rosbag2."""
+
+    def close(self) -> None:
+        """Write the rest and the index."""
+
+    def abort(self) -> None:
+        """Close the file; flushed data stay."""
+
 
 STORAGES: Mapping[str, tuple[str, Callable[[Path], Storage]]] = {
     "mcap": (".mcap", McapStorage),

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-from msg_adapters.reported_faults import COUNTERS
+from msg_adapters.decoding import COUNTERS
 from rsea_ros.checks.faults import FINDERS
 from rsea_ros.records.fault_kinds import FAULT_KINDS
 

@@ -23,8 +23,7 @@ from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import FittedTerm, Law
 from rsea_ros.laws.terms import GEAR_TERMS
-from rsea_ros.model.rig_choice import RigChoice
-from rsea_ros.model.rig_file import load_rig, rig_text
+from rsea_ros.model.rig_file import RigChoice, load_rig, rig_text
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.page.frame import page
 from rsea_ros.report.page.html import code

@@ -7,21 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.checks.angle_jumps import jump_findings
 from rsea_ros.checks.channel_spectra import Quotient, quotient
-from rsea_ros.checks.expected import Side, is_full_of_gaps, quotients, sides
+from rsea_ros.checks.encoder_findings import jump_findings, smoothing_findings
+from rsea_ros.checks.expected import Side, is_commanded, is_full_of_gaps, quotients, sides
 from rsea_ros.checks.faults import Checked, check
-from rsea_ros.checks.finding import Finding, Findings
+from rsea_ros.checks.finding import Finding, Findings, unused_sentence
 from rsea_ros.checks.gain_findings import gain_findings, strangers
 from rsea_ros.checks.gains import Readings, readings_of
-from rsea_ros.checks.lag import far_off, in_step, lag_findings
-from rsea_ros.checks.linear_findings import clock_findings
+from rsea_ros.checks.lag import far_off, in_step, lag_behind, lag_findings, open_findings
 from rsea_ros.checks.linearised_rig import LinearisedFit, linear_of
-from rsea_ros.checks.machine_impedance import impedance_findings
-from rsea_ros.checks.moved_spans import is_commanded
-from rsea_ros.checks.offset_findings import angle_offset_findings, offset_findings
-from rsea_ros.checks.restoring import restoring_findings
-from rsea_ros.checks.rig_values import value_findings
+from rsea_ros.checks.machine_impedance import impedance_findings, restoring_findings
+from rsea_ros.checks.rig_findings import clock_findings, value_findings
 from rsea_ros.checks.running_clock import (
     at_rates,
     clock_rates,
@@ -29,17 +25,18 @@ from rsea_ros.checks.running_clock import (
     lag_lines,
     with_rates,
 )
-from rsea_ros.checks.signal_findings import excitation, noises
-from rsea_ros.checks.slow_lag import lag_behind, open_findings
-from rsea_ros.checks.smoothing import smoothing_findings
+from rsea_ros.checks.signal_findings import (
+    angle_offset_findings,
+    excitation,
+    noises,
+    offset_findings,
+    standstill_findings,
+)
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
-from rsea_ros.checks.standstill import standstill_findings
-from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.threads import one_blas_thread
-from rsea_ros.model.extent import bound_values
+from rsea_ros.identification.workers import one_blas_thread
+from rsea_ros.model.extent import bound_values, is_too_fast
 from rsea_ros.model.inverse import is_inverse
-from rsea_ros.model.pace import is_too_fast
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import Channel, Fault, Record

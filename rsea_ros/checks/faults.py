@@ -10,18 +10,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.checks.dead import dead_channels
-from rsea_ros.checks.expected import Side, sides
+from rsea_ros.checks.expected import Side, is_commanded, sides
 from rsea_ros.checks.frozen import (
     SMALLEST_SHARE,
+    dead_channels,
     frozen_samples,
     longest,
     simultaneous_holds,
     while_others_moved,
 )
-from rsea_ros.checks.moved_spans import is_commanded
-from rsea_ros.checks.rounded_stamps import rounded_stamps
-from rsea_ros.identification.quantum import FEW, step_of
+from rsea_ros.checks.stamp_findings import rounded_stamps
+from rsea_ros.identification.noise import FEW, step_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.holds import repeats_of
 from rsea_ros.records.record import BoolArray, Channel, Fault, FloatArray, Record

@@ -1,4 +1,4 @@
-"""Findings of a check: one line of a traffic light each."""
+"""A finding: a line with its light, channel and share; channels that nothing used."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from rsea_ros.model.rig_choice import RigChoice
-from rsea_ros.records.record import BoolArray, Fault
+from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import RigChoice
+from rsea_ros.records.record import BoolArray, Fault, Record
 
 Light = Literal["green", "amber", "red"]
 LIGHTS: tuple[Light, ...] = ("green", "amber", "red")
@@ -65,3 +67,14 @@ class Findings:
 def worst(lights: Sequence[Light]) -> Light:
     """Return the worst of some lights, green for none."""
     return max(lights, key=LIGHTS.index, default="green")
+
+
+def unused_sentence(record: Record, rig: Rig) -> str:
+    """Return which channels are not used and why, empty where all are."""
+    unused = ", ".join(n for n in record.channels if not _takes(rig, n))
+    return f"a rig without a spring makes no use of {unused}" if unused else ""
+
+
+def _takes(rig: Rig, channel: str) -> bool:
+    """Return whether a fit of the rig uses a channel; a drive without a spring is judged by its torque."""
+    return rig.measures(channel) and not (is_inverse(rig) and channel == "velocity")

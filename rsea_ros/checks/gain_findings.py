@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.checks.channel_spectra import Quotient
-from rsea_ros.checks.factors import Factor
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.checks.gains import SHAPED, ChannelCorrection, Readings
+from rsea_ros.checks.gains import SHAPED, ChannelCorrection, Factor, Readings
 from rsea_ros.checks.response_shape import FittedShape
 from rsea_ros.model.rig import Rig
 

@@ -1,7 +1,9 @@
-"""Residuals of a record and their derivatives by the rig's values and the sensors' clocks, biases and gains.
+"""The rig's linear model as rows of a least-squares problem, each with its step of a parameter.
 
 Unknowns beside the rig's values, for each of F/T sensor, position and velocity: how late its stamps are at
 the start of the record (offset, s), how that grows (drift, s/s), bias, gain.
+
+The covariance is the sandwich over blocks of one second (identification/confidence.py says why).
 """
 
 from __future__ import annotations
@@ -12,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.identification.interval_settings import DEFAULT
 from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.settings import INTERVALS
 from rsea_ros.identification.solver import jacobian
-from rsea_ros.identification.unknowns import Unknown, clocks
+from rsea_ros.identification.unknowns import Unknown, clocks, start_vector
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import drive_of
 from rsea_ros.records.record import Channel, FloatArray, IntArray, Record
@@ -152,6 +154,43 @@ def rows_of(setting: LinearSetting, residual: FitResidual, known: Slope | None =
     columns = [moved[:, n:] * (t - setting.start)[:, None]]
     columns += [of_channel * column[:, None] for column in residual.plain.T]
     weight = 1.0 / np.maximum(residual.misfit, _LEAST_MISFIT)[residual.of]
-    block = np.floor((t - t.min()) / min(DEFAULT.block, case.duration / _BLOCKS)).astype(np.int64)
+    block = np.floor((t - t.min()) / min(INTERVALS.block, case.duration / _BLOCKS)).astype(np.int64)
     matrix = np.column_stack([moved, *columns]) * weight[:, None]
     return LinearisedRows(residual, known, residual.residual * weight, matrix, block)
+
+
+_OFFSET_DOUBT, _DRIFT_DOUBT, _GAIN_DOUBT = 0.05, 1e-3, 0.25
+"""One sigma before: s, s/s, 1."""
+_WIDER = 3.0
+
+
+def gauss_newton_step(
+    rows: LinearisedRows, setting: LinearSetting, state: LinearState
+) -> tuple[FloatArray, FloatArray]:
+    """Return the step of every unknown and its one sigma."""
+    m, matrix = len(setting.timed), rows.matrix
+    doubt = [_WIDER * _doubt(u) for u in setting.values]
+    doubt += [_OFFSET_DOUBT] * m + [_DRIFT_DOUBT] * m + [np.inf] * m + [_GAIN_DOUBT] * m
+    prior = np.array(doubt) ** -2.0
+    off = state.theta - start_vector(setting.values)
+    at = np.concatenate([off, -state.offset, -state.drift, np.zeros(2 * m)])
+    normal = matrix.T @ matrix + np.diag(prior)
+    scale = np.sqrt(np.diag(normal) + 1e-300)
+    inverse = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+    step = -inverse @ (matrix.T @ rows.residual + prior * at)
+    scores = _scores(rows, rows.residual + matrix @ step)
+    covariance = inverse @ (scores.T @ scores + np.diag(prior)) @ inverse
+    return step, np.sqrt(np.maximum(np.diag(covariance), np.diag(inverse)))
+
+
+def _scores(rows: LinearisedRows, left: FloatArray) -> FloatArray:
+    """Return the sum of the scores of each block, shape (blocks, unknowns)."""
+    first = np.flatnonzero(np.diff(rows.block, prepend=-1))
+    parts = np.add.reduceat(rows.matrix * left[:, None], first, axis=0)
+    scores = np.zeros((int(rows.block.max()) + 1, rows.matrix.shape[1]))
+    np.add.at(scores, rows.block[first], parts)
+    return scores
+
+
+def _doubt(u: Unknown) -> float:
+    return u.doubt if np.isfinite(u.doubt) else u.scale

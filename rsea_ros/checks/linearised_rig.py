@@ -14,11 +14,11 @@ from rsea_ros.checks.linear_rows import (
     LinearisedRows,
     LinearSetting,
     LinearState,
+    gauss_newton_step,
     on_time,
     residual_at,
     rows_of,
 )
-from rsea_ros.checks.linear_step import gauss_newton_step
 from rsea_ros.checks.response_shape import FittedShape
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.problem import Problem, case_from, channels_that_tell

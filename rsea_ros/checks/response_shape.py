@@ -15,7 +15,7 @@ import numpy as np
 
 from rsea_ros.checks.channel_spectra import Quotient, usable
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.responses import model_responses
+from rsea_ros.identification.frequency_response import model_responses
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector, unknowns_of_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray

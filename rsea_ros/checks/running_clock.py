@@ -15,8 +15,8 @@ import numpy as np
 
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.checks.linear_findings import JOINT, SURE, drift_finding
 from rsea_ros.checks.linearised_rig import LinearisedFit, Number
+from rsea_ros.checks.rig_findings import JOINT, SURE, drift_finding
 from rsea_ros.identification.lag_line import BLOCK, LEAST_RISE, SCATTER, LagLine, lag_line
 from rsea_ros.records.record import SENSED, Channel, Record
 

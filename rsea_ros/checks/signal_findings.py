@@ -1,19 +1,19 @@
-"""Findings about the signals: excitation, rest, noise."""
+"""Findings on single signals: noise, rate, offset, standstill."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.fft import rfft, rfftfreq
 
+from rsea_ros.checks.expected import Side, at_rest, moves
 from rsea_ros.checks.finding import Finding
-from rsea_ros.checks.moved_spans import at_rest
 from rsea_ros.checks.stamp_findings import natural_frequency
 from rsea_ros.identification.noise import noise_floor
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import UNITS, Channel, Record
+from rsea_ros.records.record import SENSED, UNITS, BoolArray, Channel, FloatArray, Record
 
 _MOSTLY = 0.5
 _WORTH_TELLING = 0.02
@@ -122,3 +122,113 @@ def _rough(channel: Channel) -> float:
 
 def _times(noise: float, stated: float) -> str:
     return f"{noise / stated:.2g} times the rig's" if stated > 0.0 else "the rig states none"
+
+
+_LARGE, _FAR = 1.0, 3.0
+"""Times the largest torque of the run: a zero that was never set; an offset that no zero explains."""
+
+
+def offset_findings(record: Record, compared: Mapping[str, Side]) -> list[Finding]:
+    """Return the finding of an F/T torque that lies far from what the rig would give.
+
+    compared: the record beside the rig's simulation, which has the gravity of its loads.
+    """
+    side = compared.get("ft")
+    if side is None or "command" not in record:
+        return []
+    offset = float(np.median(side.y) - np.median(side.p))
+    largest = max(float(np.max(np.abs(record["command"].y))), float(np.max(np.abs(side.p))))
+    if abs(offset) <= _LARGE * largest:
+        return []
+    return [
+        Finding(
+            "red" if abs(offset) > _FAR * largest else "amber",
+            "offset",
+            "ft",
+            offset,
+            "N m",
+            expected=f"less than {largest:.3g}, the largest torque of the run",
+            detail=f"{abs(offset) / largest:.2g} times that torque at all times",
+            remedy="set the sensor's zero, look at its mount, or give the constant in the import map",
+        )
+    ]
+
+
+def angle_offset_findings(rig: Rig, compared: Mapping[str, Side]) -> list[Finding]:
+    """Return the finding of a position whose whole range lies away from where the rig would be."""
+    side = compared.get("position")
+    if side is None or rig.zero_unknown("position"):
+        return []
+    middle, rest = float(np.median(side.y)), float(np.median(side.p))
+    if min(abs(middle), abs(middle - rest)) <= float(np.ptp(side.y)):
+        return []
+    return [
+        Finding(
+            "red",
+            "offset",
+            "position",
+            middle - rest,
+            "rad",
+            expected=f"motion about {rest:.3g}, where the rig rests",
+            detail=f"all of the motion is about {middle:.4g} rad; fits compare its changes alone",
+            remedy="`zero_unknown: true` for position in the rig, or give the constant in the import map",
+        )
+    ]
+
+
+_LONGEST, _SHARE = 1.0, 0.1
+"""s, and share of the record: a shorter standstill is one of friction at a turn of the command."""
+_AROUND, _FEWEST, _MOSTLY_STILL = 0.25, 9, 0.8
+"""s, samples, and share of them: noise passes for motion now and then, a turn of the command for rest."""
+_HARDLY = 0.1
+"""Of its range: a sensor at rest has noise, and the end of a motion that fades."""
+_GOES_ON = 0.3
+"""Share of that time in which the command changes clearly."""
+
+
+def standstill_findings(record: Record) -> list[Finding]:
+    """Return the finding of the longest standstill under a command. record: finite values, rising stamps."""
+    sensors = [record[n] for n in SENSED if n in record and np.ptp(record[n].y) > 0.0]
+    if "command" not in record or not sensors or np.ptp(record["command"].t) < _LONGEST:
+        return []
+    command, t = moves(record["command"]), record["command"].t
+    still = np.ones(len(t), bool)
+    for channel in sensors:
+        moved = moves(channel)
+        covered = (t >= channel.t[0]) & (t <= channel.t[-1])
+        still &= covered & ~moved[np.clip(np.searchsorted(channel.t, t), 0, len(moved) - 1)]
+    around = min(max(_FEWEST, round(_AROUND * record["command"].rate)), len(t))
+    mostly = np.convolve(still, np.full(around, 1.0 / around), "same") > _MOSTLY_STILL
+    first, last = _longest(mostly, t)
+    length = float(t[last] - t[first])
+    if not all(_rests(channel, float(t[first]), float(t[last])) for channel in sensors):
+        return []
+    if length < max(_LONGEST, _SHARE * float(t[-1] - t[0])) or command[first : last + 1].mean() < _GOES_ON:
+        return []
+    return [
+        Finding(
+            "amber",
+            "standstill",
+            "",
+            length,
+            "s",
+            expected="motion while the command changes",
+            detail=f"from {t[first]:.4g} s to {t[last]:.4g} s nothing moves while the command goes on",
+            remedy="was the motor on, the command above the friction? If not, cut the record there",
+        )
+    ]
+
+
+def _rests(channel: Channel, start: float, stop: float) -> bool:
+    """Return whether a channel changes between two times, s, by a small part of its range in the run."""
+    y = channel.between(start + _AROUND, stop - _AROUND).y
+    return bool(len(y) and np.ptp(y) < _HARDLY * np.ptp(channel.y))
+
+
+def _longest(still: BoolArray, t: FloatArray) -> tuple[int, int]:
+    """Return the first and the last sample of the longest run."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
+    if not len(edges):
+        return 0, 0
+    k = int(np.argmax(t[edges[1::2] - 1] - t[edges[::2]]))
+    return int(edges[::2][k]), int(edges[1::2][k] - 1)

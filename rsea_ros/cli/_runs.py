@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rsea_ros.cli._topics import topic_options, window_options
-from rsea_ros.identification.remark import Remark
-from rsea_ros.model.rig_choice import RigChoice
+from rsea_ros.identification.result import Remark
+from rsea_ros.model.rig_file import RigChoice
 
 RIG = "paper_high_impedance"
 """The rig of a verb that is not given one."""

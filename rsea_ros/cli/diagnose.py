@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import get_args
 
 from msg_adapters import TopicMap, read_record
-from msg_adapters.overlay_bag import write_overlay
+from msg_adapters.records import write_overlay
 from rsea_ros.cli import _lines
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
@@ -91,7 +91,7 @@ def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None)
 
     Raises BagError or IdentificationError for a run that cannot be diagnosed.
     """
-    from rsea_ros.checks.usable import check_diagnosable
+    from rsea_ros.checks.carried import check_diagnosable
     from rsea_ros.model.extent import bound_values
 
     record = bound_values(read_record([bag], topics=topics, strict=False))

@@ -81,8 +81,7 @@ def run(args: argparse.Namespace) -> int:
 def models_in(path: str) -> list[ModelFile]:
     """Return the causes of a model.yaml, a rig, or a diagnosis.json beside its model.yaml."""
     from rsea_ros.documents import strict_yaml
-    from rsea_ros.experiment.diagnosis_document import models_of
-    from rsea_ros.experiment.stored_models import model_of
+    from rsea_ros.experiment.stored_models import model_of, models_of
     from rsea_ros.model.rig_file import load_rig
 
     if Path(path).suffix != ".json":
@@ -111,7 +110,7 @@ def _possible(
         return hypotheses_from(models), {}, {}
     from rsea_ros.cli.diagnose import readable
     from rsea_ros.experiment.campaign import Rules
-    from rsea_ros.experiment.containment import NOTHING
+    from rsea_ros.experiment.hypothesis import NOTHING
     from rsea_ros.experiment.joint_weighing import weigh
 
     first = models[0].rig
@@ -127,7 +126,7 @@ def _possible(
 def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
     from rsea_ros.cli._provenance import provenance
-    from rsea_ros.experiment.run_file import run_text
+    from rsea_ros.experiment.run_limits import run_text
     from rsea_ros.report.experiment.json import advice_json
     from rsea_ros.report.experiment.page import advice_page
     from rsea_ros.report.json_values import json_text, with_provenance

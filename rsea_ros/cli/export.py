@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Export, verify, write, and report."""
     from rsea_ros.cli.simulate import parse_effect
-    from rsea_ros.model.effect_settings import check_effects
+    from rsea_ros.model.rig_document import check_effects
     from rsea_ros.model.rig_file import load_rig
 
     target = next(name for name in TARGETS if getattr(args, name))

@@ -18,8 +18,8 @@ from rsea_ros.documents.wording import quote
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.excitation import JOINT, KINDS, ExcitationSettings, check_limits, excitation
-from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_document import check_effects
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.outputs.new_files import check_free

@@ -21,8 +21,8 @@ from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, lags_of, mod
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import ComplexArray, FloatArray
 
 

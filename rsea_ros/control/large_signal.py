@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.model import outputs
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import FloatArray
 
 HIGHEST = 400.0

@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 from rsea_ros.design import mechanism
+from rsea_ros.design.mechanism import spring_rate
 from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end, flat_band, pure_torque_bandwidth, undamped_stiffness
 from rsea_ros.model.rig import Quantity, Rig
 from rsea_ros.model.rig_fields import END_NAMES
-from rsea_ros.model.spring import spring_rate
 
 DAMPING_RATIO = 0.025
 """Of spring and chassis, assumed: that of the prototype's rig. The paper states none."""

@@ -19,7 +19,7 @@ import numpy as np
 from rsea_ros.diagnosis.result import Reason, Status, Verdict
 from rsea_ros.diagnosis.score import Score, bootstrap_means, likelier_by
 from rsea_ros.diagnosis.settings import DEFAULT, AcceptanceSettings, DiagnosisSettings, FloorSettings
-from rsea_ros.identification.silent import silent_channels
+from rsea_ros.identification.result import silent_channels
 from rsea_ros.records.record import Fault
 
 

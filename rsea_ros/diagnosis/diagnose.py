@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
+from rsea_ros.checks.carried import check_diagnosable
 from rsea_ros.checks.faults import Checked, check
-from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
-from rsea_ros.diagnosis.evaluation import Evaluated, Examined, evaluate, held_out_data
+from rsea_ros.diagnosis.evaluation import Evaluated, Examined, Selection, evaluate, held_out_data
 from rsea_ros.diagnosis.naming.conclusion import conclude
 from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
@@ -24,13 +23,12 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import torque_scale
+from rsea_ros.identification.even_stamps import with_even_clocks
 from rsea_ros.identification.fit import unknowns_of
-from rsea_ros.identification.joint_start import joint_start
-from rsea_ros.identification.lost_cycles import lost_behind
-from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.problem import Problem, case_from
-from rsea_ros.identification.remark import Remark
-from rsea_ros.identification.steady import with_even_clocks
+from rsea_ros.identification.record_checks import lost_behind
+from rsea_ros.identification.result import Remark
+from rsea_ros.identification.start import joint_start, scale_of
 from rsea_ros.identification.workers import Pools, worker_pools
 from rsea_ros.model.extent import bound_values
 from rsea_ros.model.position_loop import with_command

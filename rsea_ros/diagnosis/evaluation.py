@@ -1,16 +1,16 @@
-"""Evaluation: the accepted models, each re-fitted on all blocks but the test blocks and scored on those."""
+"""A selection of causes, and its evaluation on blocks that took no part."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.candidate import Candidate, FitSetup, fit_candidate
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
+from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.score import Score, score, score_on
-from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, IntervalSettings
 from rsea_ros.diagnosis.stretches import spread_over
 from rsea_ros.identification.confidence import Confidence, confidence_of
@@ -18,9 +18,56 @@ from rsea_ros.identification.problem import Case, Problem, case_from, simulate_c
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.identification.workers import Pools
-from rsea_ros.model.record_phase import in_phase
+from rsea_ros.model.prediction_errors import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import Fault, FloatArray, Record
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An effect tried beside a model. problem, theta: with it, at the end of its fit.
+
+    is_full: fitted to all training blocks, not only to short pieces. rival: the effect that was preferred.
+    """
+
+    name: str
+    beside: Candidate
+    problem: Problem
+    theta: FloatArray
+    is_full: bool
+    reason: Reason
+    rival: str = ""
+
+
+def trial_of(model: Candidate, name: str, beside: Candidate, reason: Reason, rival: str = "") -> Trial:
+    """Return the trial of an effect that was fitted to all training blocks."""
+    return Trial(name, beside, model.problem, model.solution.theta, True, reason, rival)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The accepted models, from the nominal one on, and other trials.
+
+    rivals: by accepted cause, the models that do as well with another effect in its place.
+    """
+
+    models: tuple[Candidate, ...]
+    trials: tuple[Trial, ...] = ()
+    rivals: Mapping[str, tuple[Candidate, ...]] = field(default_factory=dict)
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """Every sample of the records, with the noise by the last model."""
+        return self.last.cases
+
+    @property
+    def last(self) -> Candidate:
+        """The model with all accepted causes."""
+        return self.models[-1]
+
+    def rivals_of(self, cause: str) -> tuple[Candidate, ...]:
+        """Return the models that do as well with another in a cause's place, which is no cause beside it."""
+        return tuple(m for m in self.rivals.get(cause, ()) if m.newest not in self.last.causes)
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,14 @@ from typing import NamedTuple
 
 from rsea_ros.diagnosis.candidate import Candidate, effect_size, prior_cost
 from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
+from rsea_ros.diagnosis.evaluation import Trial, trial_of
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.screening import ScreenedEffect
-from rsea_ros.diagnosis.selection import Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.step_fits import StepFits
 from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
-from rsea_ros.identification.off_rig import is_off_rig
+from rsea_ros.identification.estimates import is_off_rig
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.workers import Pools
 from rsea_ros.progress import Progress

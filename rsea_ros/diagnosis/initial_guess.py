@@ -1,7 +1,11 @@
-"""Initial guesses of an effect: by its file's functions of the residual, otherwise its typical parameters.
+"""Initial guesses of an effect's parameters, from the residual and from the stated values.
 
 The typical sizes of the catalogue are those of an actuator of some 20 N m; a servo of 1 N m would stick fast.
 For a joint in a position loop, the largest torque bounds the size of an effect in N m.
+
+A fit without the missing effect may carry a value far from the rig's, to imitate it: a lag of the motor's
+current becomes sixteen times the rotor's damping. A fit of the right effect that begins there can end in a
+poor minimum, where one that begins at the stated values does not.
 """
 
 from __future__ import annotations
@@ -23,9 +27,9 @@ from rsea_ros.diagnosis.residual_peaks import (
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE, Port
-from rsea_ros.identification.machine_scale import LARGEST, torque_size
-from rsea_ros.identification.problem import Case
-from rsea_ros.identification.unknowns import WELL_KNOWN
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.start import LARGEST, torque_size
+from rsea_ros.identification.unknowns import WELL_KNOWN, theta_with
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
@@ -170,3 +174,11 @@ class RecordView:
     def repeating_angle(self) -> list[Guess]:
         """Return the same of the measured angle's error, amplitude in rad."""
         return angle_errors(self.case, self.rig, self.outputs)
+
+
+def stated_starts(problem: Problem, theta: FloatArray, effect: Effect) -> list[FloatArray]:
+    """Return theta with the values that the rig states, once for each default guess of an effect in it."""
+    stated = problem.rig.free()
+    rig = {u.name: u.start for u in problem.unknowns if u.name in stated}
+    guesses = [{f"{effect.name}.{name}": v for name, v in g.items()} for g in effect.default_guesses]
+    return [theta_with(problem.unknowns, theta, {**rig, **guess}) for guess in guesses]

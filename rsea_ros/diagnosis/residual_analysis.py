@@ -1,4 +1,4 @@
-"""Where a model misfits the data: by frequency, amplitude, speed, time, angle, against the noise."""
+"""Where the residual is: by frequency, amplitude, velocity, time, angle, each with its uncertainty."""
 
 from __future__ import annotations
 
@@ -9,11 +9,32 @@ import numpy as np
 
 from rsea_ros.diagnosis.result import Misfit, Spectrum
 from rsea_ros.identification.problem import Case
-from rsea_ros.identification.residual_bins import edges_of, rms_in
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.spectra import power_density
+
+
+def edges_of(values: FloatArray, count: int, *, equal: bool) -> FloatArray:
+    """Return the edges of bins, rising: of equal width, or with equal numbers of values.
+
+    Where many values are the same the bins are fewer than `count`.
+    """
+    shares = np.linspace(0.0, 1.0, count + 1)
+    edges = np.linspace(values.min(), values.max(), count + 1) if equal else np.quantile(values, shares)
+    distinct: FloatArray = np.unique(edges)
+    return distinct if len(distinct) > 1 else np.array([distinct[0], distinct[0] + 1e-12])
+
+
+def rms_in(edges: FloatArray, values: FloatArray, residual: FloatArray) -> FloatArray:
+    """Return the RMS of the residual in each bin; NaN where a bin is empty."""
+    count = len(edges) - 1
+    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
+    number = np.bincount(which, minlength=count).astype(float)
+    power = np.bincount(which, residual**2, count) / np.where(number > 0.0, number, np.nan)
+    rms: FloatArray = np.sqrt(power)
+    return rms
+
 
 _SHOWN_ABOVE = 1.25
 """Times the noise. It steers what is shown, no verdict."""

@@ -10,10 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.identification.remark import Remark
-from rsea_ros.identification.result import Overlay, ParameterEstimate
+from rsea_ros.identification.result import Overlay, ParameterEstimate, Remark
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_choice import RigChoice
+from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.records.record import Fault, FloatArray
 
 Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]

@@ -25,9 +25,9 @@ from rsea_ros.diagnosis.candidate import (
     with_noise_reestimated,
 )
 from rsea_ros.diagnosis.criteria import is_acceptable, is_far_from_floor
+from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.forward_step import NO_STEP, ForwardStep, StepResult
 from rsea_ros.diagnosis.problem_variants import without_effect
-from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect

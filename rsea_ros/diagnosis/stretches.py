@@ -22,7 +22,7 @@ from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.data_split import as_often_as_commands, block_length, misfit_between, state_at
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.remark import Remark
+from rsea_ros.identification.result import Remark
 from rsea_ros.identification.solver import Map
 from rsea_ros.model.drive import LONGEST_STEP, Drive
 from rsea_ros.model.rig import Rig

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.experiment.apart import Apart, measurements_apart
-from rsea_ros.experiment.bound import Bound, bound
+from rsea_ros.experiment.bound import Apart, Bound, bound, measurements_apart
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_design import propose

@@ -12,8 +12,7 @@ from typing import Literal
 
 from rsea_ros.errors import DeviceError, IdentificationError, ParameterError
 from rsea_ros.experiment.advice import Proof, proofs_of
-from rsea_ros.experiment.containment import NOTHING
-from rsea_ros.experiment.hypothesis import Hypothesis
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.joint_weighing import RunWeighing, weigh
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_design import propose

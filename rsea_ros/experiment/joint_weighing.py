@@ -1,5 +1,4 @@
-"""Causes weighed against each other by all records together: each fitted to all of them, their evidence
-compared (fits.py).
+"""Causes weighed jointly over all runs.
 
 A cause that the data cannot show weighs as much as no cause: it stays possible until a run could have shown
 it. All causes have the same prior probability.
@@ -13,13 +12,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.checks.faults import check
-from rsea_ros.experiment.containment import NOTHING
-from rsea_ros.experiment.fits import fit_cause, information_of, log_evidence, repeat_fits, scale_of
-from rsea_ros.experiment.hypothesis import Hypothesis
-from rsea_ros.experiment.prior import problem_of
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import catalogue, effect_named
+from rsea_ros.errors import ParameterError
+from rsea_ros.experiment.fits import (
+    fit_cause,
+    information_of,
+    log_evidence,
+    problem_of,
+    repeat_fits,
+    scale_of,
+)
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.identification.problem import Case, case_from
 from rsea_ros.identification.solver import Map, Solution, power, serial
 from rsea_ros.model.rig import Rig
+from rsea_ros.progress import Progress
 from rsea_ros.records.record import BoolArray, FloatArray, Record
 
 HOPELESS = 1e-6
@@ -152,3 +162,40 @@ def _weigh(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> RunWei
 
 def _rms_left(solution: Solution) -> float:
     return float(np.sqrt(np.mean(solution.residual**2)))
+
+
+SHORTEST = 4.2
+"""s of a record, rest included, that the diagnosis takes."""
+
+
+def diagnose_together(
+    records: Sequence[Record], rig: Rig, causes: Sequence[str], tell: Progress | None = None
+) -> Diagnosis:
+    """Return the diagnosis of all records together, which weighs causes by held-out data."""
+    others = tuple(name for name in catalogue() if name not in causes)
+    return diagnose(list(records), rig, None, tell, DiagnosisSettings(without=others))
+
+
+USUAL = (
+    "coulomb_friction",
+    "stribeck_friction",
+    "backlash",
+    "nonlinear_spring",
+    "spring_hysteresis",
+    "hard_stop",
+    "torque_constant_error",
+    "ft_gain_error",
+    "command_delay",
+    "ft_sensor_lag",
+    "current_loop_lag",
+    "torque_saturation",
+)
+"""Of a gear, a spring and their sensors. Each one more costs a fit a round."""
+
+
+def causes_from(text: str) -> tuple[str, ...]:
+    """Return the effects of `backlash,hard_stop`. Raises ParameterError for unknown, repeated, or none."""
+    names = tuple(effect_named(name.strip()).name for name in text.split(",") if name.strip())
+    if not names or len(set(names)) < len(names):
+        raise ParameterError(f"causes = {text!r}, expected effects of the catalogue, each once")
+    return names

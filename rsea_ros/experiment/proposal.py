@@ -1,16 +1,135 @@
-"""The request for a design, and the resulting run."""
+"""A proposed run, and the chance that it breaks a limit.
+
+For each cause that may be true, the largest of every limited quantity is simulated at the most likely values
+and at both ends of every principal axis of their posterior, z standard deviations away, and half-way
+to them. The increases add up as squares: for a peak linear in the values that is the quantile of
+z, for another one the simulated ends count. A cause with several parameters is also simulated with these
+moved together, and at draws from its posterior. z is such that all causes together, each by its probability,
+break a limit with less than 1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
+from scipy.stats import norm
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.chance_constraint import Peaks
-from rsea_ros.experiment.run_limits import RunLimits
+from rsea_ros.experiment.hypothesis import Hypothesis, motion
+from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
 from rsea_ros.experiment.run_shape import FEWEST, Kind, Shape
+from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
+
+LEVEL = 1.0 - 1e-5
+"""Probability with which all limits hold, over the causes and what is known of their numbers."""
+_POINTS = 4
+"""On each axis: both ends and half-way to them, for a stop is struck hardest somewhere in between."""
+_LEVELS = 33
+"""Of a cause's size within its bounds, where its other parameters are moved with it."""
+_DRAWS = 64
+"""Rigs drawn from the posterior of a cause with several parameters."""
+_LIKELIEST = 0.01
+"""Share of its benches in which even the least likely cause may break a limit."""
+BETWEEN = 1.02
+"""What a peak between two samples may have above them."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rigs of one hypothesis: the first `axes` on the axes; in the others its parameters move together."""
+
+    rigs: tuple[Rig, ...]
+    axes: int
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """The largest of every quantity in a run: expected at the most likely values, and at LEVEL."""
+
+    expected: dict[str, float]
+    at_level: dict[str, float]
+
+
+def ends_of(hypotheses: Sequence[Hypothesis]) -> list[Group]:
+    """Return for each hypothesis its most likely rig, the points of every axis, and those moved together."""
+    quantiles = [quantile_of(h.probability, len(hypotheses)) for h in hypotheses]
+    axes = [_ends(h, z) for h, z in zip(hypotheses, quantiles, strict=True)]
+    corners = [_corners(h, z) for h, z in zip(hypotheses, quantiles, strict=True)]
+    return [Group((*a, *c), len(a)) for a, c in zip(axes, corners, strict=True)]
+
+
+def quantile_of(probability: float, count: int) -> float:
+    """Return z of one of `count` causes: a less likely one may break a limit more often."""
+    allowed = (1.0 - LEVEL) / (count * max(probability, 1e-9))
+    return float(norm.isf(min(max(allowed, 1.0 - LEVEL), _LIKELIEST)))
+
+
+def _ends(hypothesis: Hypothesis, z: float) -> list[Rig]:
+    unknowns, theta = hypothesis.problem.unknowns, hypothesis.theta
+    moving = [i for i, u in enumerate(unknowns) if not u.is_clock]
+    covariance = np.linalg.inv(hypothesis.information)[np.ix_(moving, moving)]
+    sd = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
+    rigs = [hypothesis.rig]
+    for value, vector in zip(values, vectors.T, strict=True):
+        for side in (-z, -0.5 * z, 0.5 * z, z):
+            moved = theta.copy()
+            moved[moving] += side * np.sqrt(max(value, 0.0)) * vector * sd
+            rigs.append(hypothesis.rig_at(moved))
+    return rigs
+
+
+def _corners(hypothesis: Hypothesis, z: float) -> list[Rig]:
+    """Return rigs with the cause's own parameters moved together, and some drawn from the posterior.
+
+    A near stop is worst where it is stiff, at some distances more than at those beside them, and where the
+    rest damps little.
+    """
+    positions, sd = hypothesis.cause_indices[:3], hypothesis.sd()
+    if len(positions) < 2:
+        return []
+    main = positions[0]
+    low, high = ((bounds - hypothesis.theta)[main] / (z * sd[main]) for bounds in hypothesis.bounds())
+    sizes = np.linspace(max(-1.0, low), min(1.0, high), _LEVELS)
+    rigs = []
+    for corner in product(sizes, *[(-1.0, 0.0, 1.0)] * (len(positions) - 1)):
+        moved = hypothesis.theta.copy()
+        moved[positions] += z * np.array(corner) * sd[positions]
+        rigs.append(hypothesis.rig_at(moved))
+    return rigs + hypothesis.draws(_DRAWS, np.random.default_rng(0))
+
+
+def peaks(command: FloatArray, rate: float, groups: Sequence[Group]) -> Peaks:
+    """Return the peaks of a command over the groups of ends_of."""
+    by_command = of_command(command, rate)
+    expected, at_level = dict(by_command), dict(by_command)
+    for group in groups:
+        runs = [of_response(command, motion(rig, command, rate)) for rig in group.rigs]
+        for name in runs[0]:
+            values = BETWEEN * np.array([run[name] for run in runs])
+            expected[name] = max(expected.get(name, 0.0), float(values[0]))
+            level = at_ends(values[: group.axes])
+            together = float(values.max()) if np.isfinite(values).all() else np.inf
+            at_level[name] = max(at_level.get(name, 0.0), level, together)
+    return Peaks(expected, at_level)
+
+
+def at_ends(values: FloatArray) -> float:
+    """Return the peak at the quantile: in the middle, then at the points of each axis, shape (1 + 4 k,)."""
+    if not np.isfinite(values).all():
+        return np.inf
+    increases = np.maximum(values[1:].reshape(-1, _POINTS).max(axis=1) - values[0], 0.0)
+    return float(values[0] + np.sqrt(np.sum(increases**2)))
+
+
+def share_used(peaks: Peaks, limits: RunLimits) -> float:
+    """Return the largest share of a limit that is used at LEVEL."""
+    return largest_share(peaks.at_level, limits)
+
 
 RATES = (50.0, 1000.0)
 """Hz, least and most commands a second: the rates of the nodes that play a run."""

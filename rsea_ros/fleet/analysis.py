@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.checks.carried import with_faults
+from rsea_ros.checks.carried import check_diagnosable, require_motion, with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.faults import check
 from rsea_ros.checks.signal_findings import band
-from rsea_ros.checks.usable import check_diagnosable, require_motion
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError
@@ -24,8 +23,7 @@ from rsea_ros.fleet.read_recording import JointRecording, read_run
 from rsea_ros.fleet.row import Row
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification, ParameterEstimate
-from rsea_ros.model.extent import bound_values
-from rsea_ros.model.pace import check_pace
+from rsea_ros.model.extent import bound_values, check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text

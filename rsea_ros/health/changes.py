@@ -14,14 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.health.bank import CHANNELS, Bank, LookEvidence
-from rsea_ros.health.cusum import Cusum, threshold
-from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, unexplained_finding
-from rsea_ros.health.hypotheses import ChangeHypothesis
+from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, WatchSettings, unexplained_finding
+from rsea_ros.health.hypotheses import CHANNELS, Bank, ChangeHypothesis, LookEvidence
 from rsea_ros.health.look import FILTER_SETTLING, Look
-from rsea_ros.health.recursive_estimates import Estimates
-from rsea_ros.health.scatter import Scatter
-from rsea_ros.health.settings import WatchSettings
+from rsea_ros.health.recursive_estimates import Cusum, Estimates, Scatter, threshold
 from rsea_ros.health.single_cause import ChangeCause, Fitter
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig

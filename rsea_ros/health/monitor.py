@@ -8,16 +8,13 @@ from collections.abc import Callable
 import numpy as np
 
 from rsea_ros.errors import RigError
-from rsea_ros.health.bank import Bank
 from rsea_ros.health.changes import CandidateCauses, Changes
-from rsea_ros.health.health_finding import HealthFinding, sensor_findings
-from rsea_ros.health.hypotheses import hypotheses_of
+from rsea_ros.health.health_finding import HealthFinding, WatchSettings, sensor_findings
+from rsea_ros.health.hypotheses import Bank, hypotheses_of
 from rsea_ros.health.learning import USUAL, Learned, Learning
 from rsea_ros.health.look import Cutter, Look
-from rsea_ros.health.recursive_estimates import ChangeEstimate
-from rsea_ros.health.scatter import scatter_of
+from rsea_ros.health.recursive_estimates import ChangeEstimate, scatter_of
 from rsea_ros.health.sensors import Sensors
-from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray, IntArray

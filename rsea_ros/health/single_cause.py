@@ -16,10 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.health.bank import whiten
-from rsea_ros.health.hypotheses import ChangeHypothesis
+from rsea_ros.health.hypotheses import ChangeHypothesis, whiten
 from rsea_ros.health.look import Look
-from rsea_ros.model.observer.batch import BatchObserver
+from rsea_ros.model.observer.log import BatchObserver
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.normal import Z95

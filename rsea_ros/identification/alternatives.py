@@ -18,10 +18,10 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval
-from rsea_ros.identification.machine_scale import scale_of
-from rsea_ros.identification.misfit import misfit_ratios, reweight
+from rsea_ros.identification.fit import misfit_ratios, reweight
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, solve
+from rsea_ros.identification.start import scale_of
 from rsea_ros.identification.unknowns import idle, start_vector, unknowns_of_effect, with_effect
 from rsea_ros.identification.workers import Pools
 from rsea_ros.model.inverse import is_inverse

@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.identification.determined import shares_from_data
-from rsea_ros.identification.interval_settings import DEFAULT, IntervalSettings
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.remark import Remark
+from rsea_ros.identification.result import Remark, shares_from_data
+from rsea_ros.identification.settings import INTERVALS, IntervalSettings
 from rsea_ros.identification.solver import Map, Solution, central_jacobian, serial
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive
@@ -56,7 +55,7 @@ class Confidence:
 
 
 def confidence_of(
-    solution: Solution, run: Map = serial, rule: IntervalSettings = DEFAULT
+    solution: Solution, run: Map = serial, rule: IntervalSettings = INTERVALS
 ) -> Confidence:
     """Return the doubt that is left after a fit."""
     doubt = np.array([u.reach for u in solution.problem.unknowns])

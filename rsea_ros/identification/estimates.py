@@ -1,8 +1,8 @@
-"""The results of a fit: errors by channel, estimates with intervals, the rig with them."""
+"""Parameters as estimates with intervals, and those that are off what the rig states."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.documents.units import in_motion
 from rsea_ros.identification.confidence import Confidence, interval
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.result import Overlay, ParameterEstimate
+from rsea_ros.identification.result import CLOCKS, IDENTIFIABLE_SHARE, Overlay, ParameterEstimate, Remark
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.rig import Rig
@@ -72,3 +72,28 @@ def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) 
 def overlays_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Overlay, ...]:
     """Return measured beside simulated for every channel of a case."""
     return tuple(Overlay(n, case.t[n], case.measured[n], outputs[n]) for n in outputs)
+
+
+FAR = 3.0
+"""Stated spreads of a value: one right rig in 400 lies further off by chance."""
+
+
+def is_off(spreads: float, told_by_data: float) -> bool:
+    """Return whether a value is surely not the rig's: far from it, and determined by the data."""
+    return abs(spreads) > FAR and told_by_data >= IDENTIFIABLE_SHARE
+
+
+def is_off_rig(solution: Solution) -> bool:
+    """Return whether a fit has taken some value of the rig that far, determined by the data or not."""
+    stated = solution.problem.rig.free()
+    unknowns = zip(solution.problem.unknowns, solution.theta, strict=True)
+    return any(u.name in stated and u.sigmas(float(t)) > FAR for u, t in unknowns)
+
+
+def off_rig(parameters: Iterable[ParameterEstimate]) -> tuple[Remark, ...]:
+    """Return a remark for each value that the data put far from the value of the rig."""
+    return tuple(
+        Remark("off_rig", (p.name,), (p.start, p.value, *p.ci95, p.spreads_off), p.unit)
+        for p in parameters
+        if not p.name.startswith(CLOCKS) and is_off(p.spreads_off, p.told_by_data)
+    )

@@ -1,4 +1,4 @@
-"""Commands and sensors on an even clock whose stamps scatter, as those of a driver's process.
+"""Even stamps from rounded or jittering ones, and records that are steady enough for them.
 
 Scattered stamps read the simulation at wrong instants, and those of commands drive it at wrong instants. That
 is more than noise: quick motion seems to need more torque, and a fit finds too much damping (errors in
@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
-from rsea_ros.identification.remark import Remark
+from rsea_ros.identification.result import Remark
 from rsea_ros.identification.solver import Solution
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import Channel, FloatArray, Record
+from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
 
 SCATTER = 0.005
 """Of a period, RMS: what scatters less is taken as stamped right."""
@@ -160,3 +161,21 @@ def _residual_rms(record: Record, rig: Rig, solution: Solution) -> dict[str, flo
     (outputs,) = replace(solution.problem, cases=(case,)).outputs(solution.theta)
     present = solution.problem.present(case)
     return {n: float(np.std((outputs[n] - case.measured[n])[case.mask[n]])) for n in present}
+
+
+def with_even_clocks(
+    records: Sequence[Record], masked: Sequence[Mapping[str, BoolArray]], rig: Rig
+) -> Evened:
+    """Return records on the even clocks that a fit of the rig prefers; as they are where no stamps scatter.
+
+    masked: samples that do not count, by channel, of each record.
+    """
+    steady = Evened(tuple(records), {})
+    if is_inverse(rig) or not any(may_be_even(record) for record in records):
+        return steady
+    while True:
+        cases = [case_from(r, rig, bad) for r, bad in zip(steady.records, masked, strict=True)]
+        more = even_out(steady.records, rig, fit(cases, rig)[0])
+        if not more.scatter:
+            return steady
+        steady = Evened(more.records, {**steady.scatter, **more.scatter})

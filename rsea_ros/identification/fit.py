@@ -1,9 +1,11 @@
-"""The fit of a rig: output error, with noise and clocks determined by the residual."""
+"""The fit: parameters and noise in turn, until neither changes, and its misfit."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
@@ -16,11 +18,10 @@ from rsea_ros.identification.clocks import (
     with_drifts,
     without_needless,
 )
-from rsea_ros.identification.machine_scale import scale_of
-from rsea_ros.identification.misfit import ratios_of, reweight
 from rsea_ros.identification.noise_level import reestimate_noise
-from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.problem import Case, Problem, weighted_residual
 from rsea_ros.identification.solver import Map, Solution, serial, solve
+from rsea_ros.identification.start import scale_of
 from rsea_ros.identification.unknowns import (
     Unknown,
     clocks,
@@ -33,6 +34,29 @@ from rsea_ros.identification.unknowns import (
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import MEASURED, FloatArray
+
+
+def misfit_ratios(solution: Solution) -> dict[str, float]:
+    """Return by channel the RMS of a solution's residual over its noise: 1 where it is at the noise."""
+    problem = solution.problem
+    return ratios_of(problem, problem.cases, problem.outputs(solution.theta))
+
+
+def ratios_of(
+    problem: Problem, cases: Sequence[Case], outputs: Sequence[Mapping[str, FloatArray]]
+) -> dict[str, float]:
+    """Return by channel the RMS of the residual over its noise: 1 where it is at the noise."""
+    parts: dict[str, list[FloatArray]] = {}
+    for case, out in zip(cases, outputs, strict=True):
+        for n in problem.present(case):
+            parts.setdefault(n, []).append(weighted_residual(case, out, [n]))
+    return {n: float(np.sqrt(np.mean(np.concatenate(p) ** 2))) for n, p in parts.items()}
+
+
+def reweight(case: Case, ratios: Mapping[str, float]) -> Case:
+    """Return a case in which the residual of a channel counts as its noise, where it is larger."""
+    return replace(case, noise={n: s * max(1.0, ratios.get(n, 1.0)) for n, s in case.noise.items()})
+
 
 _REWEIGHTINGS = 3
 _OTHER_NOISE = 1.1

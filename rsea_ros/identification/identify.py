@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.identification.alternatives import ExtendedFit, alternatives, span_all
-from rsea_ros.identification.clock_doubt import with_even_clocks
+from rsea_ros.identification.clocks import with_even_clocks
 from rsea_ros.identification.confidence import (
     Confidence,
     confidence_of,
@@ -18,24 +18,22 @@ from rsea_ros.identification.confidence import (
 from rsea_ros.identification.estimates import (
     errors_by_channel,
     identified_rig,
+    off_rig,
     overlays_of,
     parameters_of,
 )
 from rsea_ros.identification.even_stamps import Evened, even_out
-from rsea_ros.identification.fit import fit
-from rsea_ros.identification.joint_start import joint_start
-from rsea_ros.identification.misfit import ratios_of
-from rsea_ros.identification.off_rig import off_rig
+from rsea_ros.identification.fit import fit, ratios_of
+from rsea_ros.identification.frequency_response import model_response, responses_of
 from rsea_ros.identification.problem import Case, case_from
 from rsea_ros.identification.record_checks import check_excited, check_usable
-from rsea_ros.identification.responses import model_response, responses_of
 from rsea_ros.identification.result import (
     AT_NOISE,
     FrequencyResponse,
     Identification,
 )
 from rsea_ros.identification.solver import Solution
-from rsea_ros.identification.start import start_from
+from rsea_ros.identification.start import joint_start, start_from
 from rsea_ros.identification.statics import statics_of
 from rsea_ros.identification.workers import worker_pools
 from rsea_ros.model.extent import bound_values

@@ -1,23 +1,179 @@
-"""The noise of every channel after a fit, from its residual.
+"""Noise level of the residuals: white or coloured, from channels that witness each other.
 
 A floor is never above the residual's white part, which no law of the bench can make; and where all of a
 residual passes for noise of the sensor (coloured.py) it equals that residual. That noise is called coloured
 only where it exceeds its white part by more than the doubt of that part, which is large in short records.
+
+Sensor noise is stationary; its spectrum falls with frequency and is flat below what a block of a second
+resolves; whitened, it is nearly Gaussian; and it is independent of the command, of the motion, and of
+other sensors. A residual that passes all of these tests is noise, however large; one that fails in any point
+is a misfit. The limits (noise_settings.py) were set between noise of first order with a memory of up to
+0.25 s and mild effects, inside and outside the catalogue, of the second bench in test/independent.
+
+The command; laws of friction, play, springs, ripple and drift over the simulated motion; and the
+residual of another sensor: two sensors that see the same misfit agree about it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.identification.coloured import is_noise, residual_of
-from rsea_ros.identification.noise import top_of_band
-from rsea_ros.identification.noise_settings import DEFAULT, NoiseSettings
+from rsea_ros.identification.noise import (
+    HANN,
+    OVERLAP,
+    TOP,
+    SpectralShape,
+    segment_spectra,
+    shape_of,
+    top_of_band,
+)
 from rsea_ros.identification.problem import Case
+from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.model.drive import Drive
-from rsea_ros.records.record import FloatArray, IntArray
+from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
+
+_SHARP = 0.05
+"""Of a signal's RMS: the width of its sign's step."""
+_ONE_SENSOR = frozenset({"position", "velocity"})
+"""Channels that one encoder makes: their noise agrees."""
+
+
+def witnesses(
+    case: Case, outputs: Mapping[str, FloatArray], channel: str, ratio: float
+) -> Iterator[FloatArray]:
+    """Yield signals at the stamps of a channel. outputs: simulated. ratio: of the gear, rotor over output."""
+    t = case.t[channel]
+    for n in case.measured.keys() & outputs.keys():
+        if n != channel and {n, channel} != _ONE_SENSOR:
+            residual = np.where(case.mask[n], case.measured[n] - outputs[n], 0.0)
+            yield np.interp(t, case.t[n], residual)
+    command, q, v, load = _motion(case, outputs, t)
+    late = (t - t.mean()) / max(float(np.ptp(t)), 1e-9)
+    yield command
+    yield command**3
+    for x in (q, v, load):
+        yield from (_sign(x), x * np.abs(x), x * late)
+    yield from (q**2, q**3, np.abs(v), np.abs(load) * _sign(v))
+    yield from (np.sin(ratio * q), np.cos(ratio * q))
+
+
+def _sign(x: FloatArray) -> FloatArray:
+    return np.tanh(x / max(_SHARP * float(np.std(x)), 1e-300))
+
+
+def _motion(case: Case, outputs: Mapping[str, FloatArray], t: FloatArray) -> tuple[FloatArray, ...]:
+    """Return command, position, velocity and load at instants; those without a sensor are derived."""
+    drive = case.drive
+    if not isinstance(drive, Drive):
+        return tuple(np.interp(t, drive.t, y) for y in (drive.torque, drive.q, drive.v, drive.torque))
+    steps = ((t - drive.start) / drive.step).astype(np.int64)
+    command = drive.command[np.clip(steps, 0, len(drive.command) - 1)]
+    at = {n: np.interp(t, case.t[n], outputs[n]) for n in case.t.keys() & outputs.keys()}
+    load = at.get("ft", command)
+    q = at.get("position", load)
+    v = at["velocity"] if "velocity" in at else np.gradient(q, t)
+    return command, q, v, load
+
+
+_LONG, _SHORT = 1024, 512
+_STEADY_BANDS = (0.4, 3.0, 10.0, 40.0)
+_SHARED_BANDS = (0.4, 4.0, 14.0, 50.0)
+"""Hz, lower ends; the last band ends below the Nyquist frequency."""
+
+
+def is_noise(
+    case: Case,
+    outputs: Mapping[str, FloatArray],
+    channel: str,
+    ratio: float = 1.0,
+    rule: NoiseSettings = NOISE,
+) -> bool:
+    """Return whether the residual of a channel is noise of its sensor, coloured or not.
+
+    outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
+    False where the record is too short to decide.
+    """
+    residual = residual_of(case, outputs, channel)
+    if len(residual) < rule.fewest or not np.any(residual):
+        return False
+    rate = 1.0 / float(np.median(np.diff(case.t[channel])))
+    if _lasting_share(residual) > rule.lasting or _slow(residual, rate) > rule.slow:
+        return False
+    spectra = segment_spectra(residual, _LONG, 8)
+    shape = shape_of(spectra)
+    if shape.off > rule.shape or _unsteady(spectra, shape, rate) > rule.unsteady:
+        return False
+    if _kurtosis(shape, residual) > rule.spiky:
+        return False
+    short_spectra = segment_spectra(residual, _SHORT, 16)
+    others = (segment_spectra(w, _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
+    return all(_coherent_share(short_spectra, other, rate) < rule.shared for other in others)
+
+
+def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
+    """Return measured - simulated, 0 where a sample does not count, shape of the channel."""
+    return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+
+
+def _lasting_share(values: FloatArray) -> float:
+    """Return the share of the power in a constant and a trend."""
+    late = np.linspace(-1.0, 1.0, len(values))
+    line = np.polyval(np.polyfit(late, values, 1), late)
+    return float(np.mean(line**2) / np.mean(values**2))
+
+
+def _slow(values: FloatArray, rate: float) -> float:
+    """Return the power density below 0.25 Hz over that from 0.3 to 1 Hz; 0 where the record is too short."""
+    spectra = segment_spectra(values, 2**30, 2)
+    frequency, power = _lines(spectra, rate), np.mean(np.abs(spectra) ** 2, axis=0)
+    low = (frequency > 0.0) & (frequency < 0.25)
+    above = (frequency >= 0.3) & (frequency < 1.0)
+    if np.count_nonzero(low) < 2 or not above.any():
+        return 0.0
+    return float(power[low].mean() / max(power[above].mean(), 1e-300))
+
+
+def _unsteady(spectra: ComplexArray, shape: SpectralShape, rate: float) -> float:
+    """Return the variance of the whitened power over time, over stationary noise's, in the worst band."""
+    power = np.abs(spectra) ** 2 / shape.at(np.linspace(0.0, 1.0, spectra.shape[1]))
+    ratios = [0.0]
+    for inside in _bands(_lines(spectra, rate), _STEADY_BANDS):
+        level = power[:, inside].mean(axis=1)
+        expected = HANN / np.count_nonzero(inside)
+        ratios.append(float(np.var(level / level.mean())) / expected)
+    return max(ratios)
+
+
+def _kurtosis(shape: SpectralShape, values: FloatArray) -> float:
+    """Return the excess kurtosis of whitened values."""
+    white = shape.whiten(values)
+    white = white - white.mean()
+    return float(np.mean(white**4) / np.mean(white**2) ** 2) - 3.0
+
+
+def _coherent_share(a: ComplexArray, b: ComplexArray, rate: float) -> float:
+    """Return the share of the power of a that is coherent with b, without its bias, in the worst band."""
+    chance = OVERLAP / len(a)
+    powers = np.sum(np.abs(a) ** 2, axis=0) * np.sum(np.abs(b) ** 2, axis=0)
+    coherence = np.abs(np.sum(a * b.conj(), axis=0)) ** 2 / np.maximum(powers, 1e-300)
+    share = (coherence - chance) / (1.0 - chance)
+    return max(float(share[inside].mean()) for inside in _bands(_lines(a, rate), _SHARED_BANDS))
+
+
+def _lines(spectra: ComplexArray, rate: float) -> FloatArray:
+    return np.linspace(0.0, 0.5 * rate, spectra.shape[1])
+
+
+def _bands(frequency: FloatArray, lows: tuple[float, ...]) -> list[FloatArray]:
+    """Return which lines lie in each band that has some."""
+    top = TOP * frequency[-1]
+    ends = zip(lows, (*lows[1:], np.inf), strict=True)
+    inside = [(frequency >= low) & (frequency < min(high, top)) for low, high in ends]
+    return [which for which in inside if np.count_nonzero(which) > 1]
+
 
 _WHITE_DOUBT = 1.5
 """Relative standard deviation of the RMS of white noise read off the top of the band, times sqrt(samples).
@@ -29,7 +185,7 @@ _BLOCK = 1.0
 
 
 def reestimate_noise(
-    case: Case, outputs: Mapping[str, FloatArray], ratio: float = 1.0, rule: NoiseSettings = DEFAULT
+    case: Case, outputs: Mapping[str, FloatArray], ratio: float = 1.0, rule: NoiseSettings = NOISE
 ) -> Case:
     """Return a case with its noise from a fitted model's residual.
 

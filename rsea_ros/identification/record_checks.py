@@ -1,4 +1,9 @@
-"""Requirements on records for identification: finite values, rising stamps, a command that changes."""
+"""What a record must have before a fit: channels that move, commands without lost cycles.
+
+A record has the commands as they were published. Where the computer was too busy for a cycle, the motor got
+none; the measured motor torque then differs from the simulated one behind the gap, and less elsewhere.
+Any fault of the machine is as large elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.result import Identification, Overlay
 from rsea_ros.model.extent import LARGEST
-from rsea_ros.records.record import Record
+from rsea_ros.records.record import Fault, Record
+from rsea_ros.records.stamp_order import GAP
 
 
 def check_usable(record: Record) -> None:
@@ -38,3 +45,40 @@ def check_excited(records: Sequence[Record]) -> None:
         raise IdentificationError(
             f"{records[0].source}: torque_command is {held}, expected an excitation (chirp, multisine, noise)"
         )
+
+
+KIND = "lost_cycles"
+_FEWEST = 10
+"""Gaps: the RMS behind fewer is known to worse than a quarter."""
+_TIMES = 1.5
+"""RMS behind gaps over that elsewhere, from which the gaps made it: twice what chance makes of ten gaps."""
+
+
+def explained_by_lost_cycles(identification: Identification) -> int:
+    """Return how many lost cycles are the likely cause of a misfit; 0 for another, and without misfit."""
+    return 0 if identification.at_noise else lost_behind(identification.faults, identification.overlays)
+
+
+def lost_behind(faults: Sequence[Fault], overlays: Sequence[Overlay]) -> int:
+    """Return how many cycles were lost, if the motor torque of a misfit shows them; otherwise 0."""
+    lost = count_of(faults)
+    torque = next((o for o in overlays if o.channel == "motor_torque"), None)
+    return lost if lost and torque is not None and rises_behind_gaps(torque) else 0
+
+
+def count_of(faults: Sequence[Fault]) -> int:
+    """Return how many cycles the nodes of the run reported as lost."""
+    return round(sum(f.size or 0.0 for f in faults if f.kind == KIND))
+
+
+def rises_behind_gaps(overlay: Overlay) -> bool:
+    """Return whether the residual is larger in the first sample behind a gap than in the others."""
+    if len(overlay.t) < 2:
+        return False
+    step = np.diff(overlay.t)
+    behind = np.concatenate([[False], step > GAP * float(np.median(step))])
+    off = np.square(overlay.measured - overlay.simulated)
+    known = np.isfinite(off)
+    if np.count_nonzero(behind & known) < _FEWEST or not np.any(known & ~behind):
+        return False
+    return bool(np.mean(off[behind & known]) > _TIMES**2 * np.mean(off[known & ~behind]))

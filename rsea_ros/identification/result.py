@@ -1,18 +1,121 @@
-"""The result of an identification as values, for reports and files."""
+"""The result of an identification: parameters and what the data determine of them, remarks, silent channels."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from rsea_ros.identification.determined import IDENTIFIABLE_SHARE, Determined, how_determined
-from rsea_ros.identification.remark import Remark
-from rsea_ros.identification.silent import silent_channels
+import numpy as np
+
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_choice import RigChoice
+from rsea_ros.model.rig_file import RigChoice
+from rsea_ros.records.fault_kinds import MASKED
 from rsea_ros.records.record import SENSED, ComplexArray, Fault, FloatArray
+
+Code = Literal[
+    "even_clocks",
+    "clocks_taken_as_right",
+    "torque_by_motor_constant",
+    "torque_by_loop_gains",
+    "at_bound",
+    "not_shown",
+    "only_prior",
+    "only_ratios",
+    "only_together",
+    "play_undetermined",
+    "also_in_model",
+    "coherence_lost",
+    "on_measured_angle",
+    "coloured_noise",
+    "off_rig",
+    "stretches",
+    "lost_cycles",
+]
+"""What a remark says.
+
+even_clocks: stamps of channels scatter (s RMS) about an even clock, which is used.
+clocks_taken_as_right: where the data ask for no correction; were they unknown, the interval of a value would
+be so many times as wide.
+torque_by_…: nothing but that says how large the torques are.
+at_bound: a value ran to its bound (value, unit).
+not_shown, only_prior: a value is not identifiable; the data do not show it, or only the rig's prior holds it.
+only_ratios, only_together: values that are not identifiable each.
+play_undetermined: of a gear, by its best gap (rad) and the gain of that.
+also_in_model: effects that the extended model has and that are no causes.
+coherence_lost: of a channel with the command, above a frequency (Hz).
+on_measured_angle: an effect was simulated on the measured rotor angle.
+coloured_noise: of channels, taken from the residual.
+off_rig: the rig states a value, the data another (that, 95 % interval), so many of its stated spreads away.
+stretches: of long records so many s were used, of so many.
+lost_cycles: so many cycles of the driver were lost, and the motor torque shows them.
+"""
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A fact: its code, the parameters, channels or effects concerned, and its numbers."""
+
+    code: Code
+    names: tuple[str, ...] = ()
+    values: tuple[float, ...] = ()
+    unit: str = ""
+
+
+def silent_channels(faults: Iterable[Fault]) -> tuple[str, ...]:
+    """Return the sensors of which no sample could be used: dead, or masked throughout."""
+    whole = (f.channel for f in faults if f.kind == "dead_channel" or (f.kind in MASKED and f.share >= 1.0))
+    return tuple(dict.fromkeys(whole))
+
+
+def is_unexcited(faults: Iterable[Fault]) -> bool:
+    """Return whether the command of a record never changes, so that no cause could have shown itself."""
+    return any(f.kind == "no_excitation" for f in faults)
+
+
+Determined = Literal["yes", "in part", "no"]
+IDENTIFIABLE_SHARE = 0.5
+"""Share of what is known of a value that the data must have brought for it to be identified."""
+_WELL = 0.9
+"""The same for a value that the data determine whole."""
+_NULL = 1e-9
+"""Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
+
+
+def shares_from_data(information: FloatArray, doubt: FloatArray) -> FloatArray:
+    """Return for each unknown the share of its information that comes from the data, 0 … 1, shape (n,).
+
+    d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other unknowns
+    free: 0 where only a ratio with others is determined. information: J'J, shape (n, n).
+    """
+    scaled = information * np.outer(doubt, doubt) + _NULL * np.eye(len(doubt))
+    return np.asarray(1.0 / (1.0 + _variances(scaled)))
+
+
+def _variances(information: FloatArray) -> FloatArray:
+    """Return the variance that an information leaves of each unknown; where rounding leaves it singular,
+    directions below the rounding count as unknown."""
+    try:
+        return np.diag(np.linalg.inv(information))
+    except np.linalg.LinAlgError:
+        size, vectors = np.linalg.eigh(information)
+        return np.asarray(vectors**2 @ (1.0 / np.maximum(size, _NULL)))
+
+
+def how_determined(name: str, value: float, ci95: tuple[float, float], share: float) -> Determined:
+    """Return how well data determine a value, relative to its prior and to its size.
+
+    "no" where the interval reaches as far as the value is large, or where the fit ended at a bound.
+    """
+    low, high = ci95
+    at_bound = value in ci95 and low < high
+    size = math.pi if name.endswith(".phase") else abs(value)
+    if share < IDENTIFIABLE_SHARE or at_bound or not max(high - value, value - low) < size:
+        return "no"
+    return "yes" if share >= _WELL else "in part"
+
 
 Verdict = Literal["adequate", "misfit", "not_identifiable"]
 """Whether the model fits down to the noise, and if so, whether the data determine any of its values."""

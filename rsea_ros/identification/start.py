@@ -1,23 +1,35 @@
-"""The start of a fit: the rig's values fitted to the measured frequency responses.
+"""Where a fit begins: responses, joint starts of several records, and the machine's scale.
 
 An output error of hundreds of times the noise has many minima; the logarithm of a response has hardly any,
 
     r = ln(G_model / G_measured) / w,   w^2 = (sd / |G|)^2 + 0.05^2
 
 so a rig that is far off still converges. The result only starts the fit and decides nothing.
+
+u = J a + b v + F sign(v) + c_s sin q + c_c cos q + T_0,   m g l = |(c_s, c_c)|, its angle atan2(c_c, c_s)
+
+u is the loop's law on the measured motion (its integral aside), q filtered both ways and differentiated (the
+inverse model; Gautier, Janot et al.). Gravity's angle has two minima in an output error: this finds the side.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rsea_ros.identification.responses import model_response
+from rsea_ros.effects.scale import STIFFNESS, TORQUE, Scale, scale_to
+from rsea_ros.errors import RseaError
+from rsea_ros.identification.frequency_response import model_response
+from rsea_ros.identification.problem import Case
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.identification.unknowns import apply, start_vector, unknowns_of_rig
+from rsea_ros.model.drive import Drive
+from rsea_ros.model.inverse import FEWEST, smooth
+from rsea_ros.model.position_loop import loop_parameters
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import FloatArray
+from rsea_ros.records.record import FloatArray, Record
 
 _LINES = 60
 """Of each response, evenly spread on a logarithmic scale."""
@@ -83,3 +95,131 @@ def _least_squares(residual: Callable[[FloatArray], FloatArray], theta: FloatArr
         if done:
             break
     return theta
+
+
+_SLOW = 0.05
+"""Of the RMS speed: below it the sign of the speed is not determined."""
+_TURNS = 2.0
+"""rad of travel from which gravity is distinguished from a constant torque."""
+_LEAST = 1e-3
+"""Of its stated value: an inertia or damping that comes out smaller begins there."""
+GRAVITY, ANGLE = "spring_end.gravity", "spring_end.gravity_angle"
+INERTIA, DAMPING = "rotor.reflected_inertia", "rotor.reflected_damping"
+
+
+def joint_start(record: Record, rig: Rig) -> Rig:
+    """Return the rig with its free values from the regression; unchanged where that is impossible.
+
+    record: with the targets as its command.
+    """
+    try:
+        inertia, damping, _, sine, cosine, _ = _regression(record, rig)
+    except (RseaError, ValueError, np.linalg.LinAlgError):
+        return rig
+    load = rig["spring_end.inertia"] + rig["chassis.inertia"]
+    coefficients = {
+        INERTIA: max(inertia - load, _LEAST * rig[INERTIA]),
+        DAMPING: max(damping, _LEAST * rig[DAMPING]),
+        GRAVITY: math.hypot(sine, cosine),
+        ANGLE: math.atan2(cosine, sine),
+    }
+    free = rig.free()
+    if GRAVITY in free and ANGLE not in free:
+        coefficients[GRAVITY] = max(sine, 0.0)
+    return rig.with_values({n: v for n, v in coefficients.items() if n in free and math.isfinite(v)})
+
+
+def _regression(record: Record, rig: Rig) -> FloatArray:
+    """Return J, b, F, c_s, c_c, T_0. Raises ValueError for a record too short."""
+    position = record["position"]
+    if len(position) < FEWEST:
+        raise ValueError("too few samples")
+    step = 1.0 / position.rate
+    t = np.arange(position.t[0], position.t[-1], step)
+    q = smooth(np.interp(t, position.t, position.y), step)
+    v = smooth(np.gradient(q, step), step)
+    a = smooth(np.gradient(v, step), step)
+    sign = np.tanh(v / max(_SLOW * float(np.sqrt(np.mean(v**2))), 1e-300))
+    terms = np.column_stack([a, v, sign, np.sin(q), np.cos(q), np.ones(len(q))])
+    keep = terms if np.ptp(q) > _TURNS else terms[:, :5]
+    solved = np.linalg.lstsq(keep, _loop_torque(record, rig, t, q, v), rcond=None)[0]
+    return np.concatenate([solved, np.zeros(6 - len(solved))])
+
+
+def _loop_torque(record: Record, rig: Rig, t: FloatArray, q: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the torque that the loop makes along a motion, without its integral."""
+    command = record["command"]
+    held = command.y[np.clip(np.searchsorted(command.t, t, side="right") - 1, 0, len(command) - 1)]
+    target = smooth(held, float(t[1] - t[0]))
+    _, position, _, velocity, *_ = loop_parameters(rig)
+    if rig.loop == "pd":
+        return position * (target - q) - velocity * v
+    return velocity * (position * (target - q) - v)
+
+
+LARGEST = 0.999
+"""Quantile that is taken for the largest value: a few samples may be outliers."""
+_LAG = 0.02
+"""s over which the measured angle is differenced for a speed: over one sample it were the encoder's step."""
+
+
+def scale_of(cases: Sequence[Case], rig: Rig) -> Scale:
+    """Return how a machine and its records compare with the machine of the catalogue."""
+    torque = max((torque_size(case, rig) for case in cases), default=0.0)
+    stiffness = STIFFNESS * torque / TORQUE if rig.rigid_spring else rig["spring.stiffness"]
+    speed = max((_speed(case) for case in cases), default=0.0)
+    inertia = rig["rotor.reflected_inertia"]
+    return scale_to(torque, stiffness, inertia, speed, max((_period(case) for case in cases), default=0.0))
+
+
+def torque_size(case: Case, rig: Rig) -> float:
+    """Return the largest torque of a run, N m: commanded, or measured in the motor or by the F/T sensor.
+
+    Of a position loop: measured in the motor, otherwise computed from its errors. 0 where unknown.
+    """
+    if rig.loop is None:
+        shown = [_largest(case, n) for n in ("motor_torque", "ft") if n in case.measured]
+        commanded = [_quantile(case.drive.command)] if isinstance(case.drive, Drive) else []
+        return max([*commanded, *shown], default=0.0)
+    if "motor_torque" in case.measured:
+        return _largest(case, "motor_torque")
+    return _torque_of_errors(case, rig)
+
+
+def _torque_of_errors(case: Case, rig: Rig) -> float:
+    """Return the largest torque of a position loop by its errors, N m; 0 without a position."""
+    if "position" not in case.measured or not isinstance(case.drive, Drive):
+        return 0.0
+    keep, drive = case.mask["position"], case.drive
+    steps = ((case.t["position"][keep] - drive.start) / drive.step).astype(np.int64)
+    error = drive.command[np.clip(steps, 0, len(drive.command) - 1)] - case.measured["position"][keep]
+    _, position, _, velocity, *_ = loop_parameters(rig)
+    gain = position if rig.loop == "pd" else position * velocity
+    return gain * _quantile(error)
+
+
+def _speed(case: Case) -> float:
+    """Return the largest speed of a run, rad/s; 0 where neither speed nor angle was measured."""
+    if not isinstance(case.drive, Drive):
+        return _quantile(case.drive.v)
+    if "velocity" in case.measured:
+        return _largest(case, "velocity")
+    if "position" not in case.measured:
+        return 0.0
+    t, q = (values["position"][case.mask["position"]] for values in (case.t, case.measured))
+    lag = max(1, round(_LAG / _period(case)))
+    return _quantile((q[lag:] - q[:-lag]) / (t[lag:] - t[:-lag])) if len(q) > lag else 0.0
+
+
+def _period(case: Case) -> float:
+    """Return the time between samples of the channel that has most of them, s."""
+    periods = [float(np.median(np.diff(t))) for t in case.t.values() if len(t) > 1]
+    return min(periods, default=math.nan)
+
+
+def _largest(case: Case, channel: str) -> float:
+    return _quantile(case.measured[channel][case.mask[channel]])
+
+
+def _quantile(values: FloatArray) -> float:
+    return float(np.quantile(np.abs(values), LARGEST)) if len(values) else 0.0

@@ -1,4 +1,4 @@
-"""Pools: fits side by side, and the derivatives within each, on two cores unless fewer are requested.
+"""Worker threads, each with one thread for linear algebra.
 
 Two pools, because a fit waits for its derivatives: a single pool full of fits would wait for itself.
 """
@@ -11,8 +11,17 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
+from threadpoolctl import threadpool_limits
+
 from rsea_ros.identification.solver import Map, in_pool
-from rsea_ros.identification.threads import one_blas_thread
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Keep BLAS from starting threads inside a with statement; else a fit takes four times as long."""
+    with threadpool_limits(1, user_api="blas"):
+        yield
+
 
 _CORES: ContextVar[int] = ContextVar("cores", default=2)
 

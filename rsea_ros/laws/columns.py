@@ -13,8 +13,7 @@ from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import apply
-from rsea_ros.laws.injection import Injector
-from rsea_ros.laws.missing import MissingTorque, missing_torque
+from rsea_ros.laws.injection import Injector, MissingTorque, missing_torque
 from rsea_ros.laws.terms import PORTS, Place
 from rsea_ros.laws.variables import Variables, variables_along, variables_of
 from rsea_ros.model.inverse import Motion, smooth

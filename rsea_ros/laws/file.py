@@ -1,24 +1,151 @@
-"""The files of fitted laws: fitted values, measured claims, provenance, and points for figures."""
+"""The effect file of a law, with the claims that the data support."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
+from rsea_ros.diagnosis.problem_variants import on_blocks
+from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lend
-from rsea_ros.effects.effect import Claims, Effect
+from rsea_ros.effects.effect import Claims, Effect, Parity
+from rsea_ros.identification.confidence import confidence_of, interval
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.unknowns import apply
+from rsea_ros.identification.solver import Solution, solve
+from rsea_ros.identification.unknowns import apply, start_vector, unknowns_of_effect
 from rsea_ros.laws.columns import case_model
 from rsea_ros.laws.effect_source import LawProvenance, source_of
-from rsea_ros.laws.law import Law
-from rsea_ros.laws.measured_claims import claims_of
-from rsea_ros.laws.refinement import Refined, effect_from
+from rsea_ros.laws.law import Law, letters_of
 from rsea_ros.laws.result import FigurePoints, WrittenLaw
-from rsea_ros.laws.variable_places import letters_of
-from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.drive import Drive
+from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.model.simulation import simulate_drive
+from rsea_ros.outputs.files import write_new
+from rsea_ros.plugins import plugin_constant
+from rsea_ros.records.record import FloatArray
+
+_LONGEST = 10.0
+"""s of the record that are simulated."""
+_WHOLE = 0.12
+"""How near to a whole number an exponent must be, at every amplitude, to be one."""
+_SHARES = (0.3, 0.6, 1.2)
+"""Of the record's amplitude."""
+_ODD, _EVEN = 1e-7, 0.95
+
+
+def claims_of(law: Law, effect: Effect, rig: Rig, case: Case) -> Claims:
+    """Return channel, parity, exponent and passivity of a law; along a measured motion only the last."""
+    passive = bool(law.parts) and law.place == "gear" and all(p.term.is_drag for p in law.parts)
+    drive = case.drive
+    if not isinstance(drive, Drive) or rig.loop is not None:
+        return Claims("motor_torque", "neither", None, passive)
+    drive = _beginning(drive)
+    forward, backward = (_change(law, effect, rig, drive, a) for a in (1.0, -1.0))
+    shown = {n: _rms(v) / case.noise[n] for n, v in forward.items() if n in case.noise}
+    channel = max(shown, key=lambda n: shown[n])
+    odd, even = (_rms(forward[channel] + s * backward[channel]) for s in (-1.0, 1.0))
+    share = even / max(odd + even, 1e-300)
+    parity: Parity = "odd" if share < _ODD else "even" if share > _EVEN else "neither"
+    sizes = [_rms(_change(law, effect, rig, drive, a)[channel]) for a in _SHARES]
+    exponents = np.diff(np.log2(np.maximum(sizes, 1e-300)))
+    whole = float(np.rint(exponents.mean()))
+    power = whole if np.abs(exponents - whole).max() < _WHOLE else None
+    return Claims(channel, parity, power, passive)
+
+
+def _beginning(drive: Drive) -> Drive:
+    steps = min(len(drive.command), int(_LONGEST / drive.step))
+    kept = {n: at[at <= steps] for n, at in drive.at.items()}
+    impulse = {n: drive.impulse[n][: len(at)] for n, at in kept.items()}
+    still = replace(drive, initial=(0.0, 0.0), restarts=())
+    return replace(still, command=drive.command[:steps], at=kept, impulse=impulse)
+
+
+def _change(law: Law, effect: Effect, rig: Rig, drive: Drive, factor: float) -> Mapping[str, FloatArray]:
+    """Return the change of every channel by the law, under the command times a factor."""
+    scaled = replace(
+        drive, command=factor * drive.command, impulse={n: factor * v for n, v in drive.impulse.items()}
+    )
+    setting = EffectSetting(effect.name, law.parameters)
+    linear = rig.with_effects()
+    without, with_it = (simulate_drive(r, scaled) for r in (linear, linear.with_effects(setting)))
+    return {n: with_it[n] - without[n] for n in without}
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+_ITERATIONS = 12
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A problem with laws acting, fitted. ci95: of every unknown by name."""
+
+    solution: Solution
+    ci95: Mapping[str, tuple[float, float]]
+
+    def parameters(self, name: str) -> dict[str, float]:
+        """Return the parameters of one law, held ones included."""
+        values = self.solution.values
+        acting = next(e for e in self.solution.problem.rig.effects if e.name == name)
+        return {n: values.get(f"{name}.{n}", v) for n, v in acting.parameters.items()}
+
+
+def effect_from(source: str, name: str) -> Effect:
+    """Return the effect of a text as a file's would be loaded."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{name}.py"
+        write_new(path, source)
+        return plugin_constant("law", str(path), "EFFECT", Effect)
+
+
+@contextmanager
+def register(effects: Sequence[Effect]) -> Iterator[None]:
+    """Have laws known to the simulation within the block."""
+    with lend(*effects):
+        yield
+
+
+def with_laws(
+    problem: Problem, laws: Sequence[tuple[Effect, Mapping[str, float]]], held: frozenset[str] = frozenset()
+) -> Problem:
+    """Return a problem with laws acting and their parameters unknown; not those of `held`."""
+    settings = [EffectSetting(e.name, dict(p)) for e, p in laws]
+    rig = problem.rig.with_effects(*problem.rig.effects, *settings)
+    more = [u for e, p in laws for u in unknowns_of_effect(e, p, held)]
+    return replace(problem, rig=rig, unknowns=(*problem.unknowns, *more))
+
+
+def refine(
+    base: Solution, cases: Sequence[Case], weights: Score, laws: Sequence[tuple[Effect, Mapping[str, float]]],
+    held: frozenset[str] = frozenset(),
+) -> Refined:  # fmt: skip
+    """Fit a base model's values and its laws' parameters to all blocks but the test blocks.
+
+    weights: a score whose misfit counts as noise. Creep velocities stay as they are.
+    """
+    creeps = {f"{e.name}.creep_velocity" for e, _ in laws}
+    problem = with_laws(base.problem, laws, frozenset(creeps) | held)
+    start = np.concatenate([base.theta, start_vector(problem.unknowns[len(base.theta) :])])
+    blocks = on_blocks(problem, cases, (*TRAIN, *VALIDATION), weights, DEFAULT.blocks)
+    solution = solve(blocks, start, iterations=_ITERATIONS, gain=1e-4)
+    confidence = confidence_of(solution)
+    sd = np.sqrt(np.diag(confidence.covariance))
+    ci95 = {
+        u.name: interval(u, float(at), float(s))
+        for u, at, s in zip(solution.problem.unknowns, solution.theta, sd, strict=True)
+    }
+    return Refined(solution, ci95)
+
 
 _POINTS = 4000
 """Of the missing torque that are drawn."""

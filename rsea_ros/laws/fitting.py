@@ -10,9 +10,8 @@ from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.score import gain_of as gain_of_blocks
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.effect import Effect
-from rsea_ros.laws.base import FITTED, Base
-from rsea_ros.laws.file import Draft
-from rsea_ros.laws.refinement import Refined, refine
+from rsea_ros.laws.choice import FITTED, Base
+from rsea_ros.laws.file import Draft, Refined, refine
 
 _NEEDED = 0.03
 """Of what is left: a term without which the fit leaves no more than that is left out."""

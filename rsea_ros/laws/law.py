@@ -1,7 +1,8 @@
-"""A law as a value: terms with coefficients and shapes at one place, or a learnt curve."""
+"""A law: its terms with coefficients, how it reads, and where its variables lie in the step."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -119,3 +120,72 @@ class Law:
 def join_names(names: Sequence[str]) -> str:
     """Return names as people list them."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+_SYMBOLS = {"w": "ω", "q": "q", "theta": "θ", "d": "d", "T": "T_s", "u": "u", "t": "t", "h": "φ"}
+
+
+def equation_of(law: Law) -> str:
+    """Return the equation with the names of the parameters, in plain text."""
+    left = {
+        "encoder": "position error",
+        "ft": "T_ft error",
+        "motor": "T_m added",
+        "command": "T_m added",
+    }.get(law.place, "T")
+    if law.curve is not None:
+        factor = {"": "", "T": "·|T_s|", "u": "·u", "w": "·ω", "d": "·d"}[law.curve.factor]
+        return f"{left} = size · f({_SYMBOLS[law.curve.over]}){factor}, f learnt from data"
+    terms = []
+    for part, (c, s) in zip(law.parts, law.names, strict=True):
+        text = part.term.equation.format(a=s) if s else part.term.equation
+        if s and s not in text:
+            text += f" with {s}"
+        terms.append(_signed_text(c, text, minus=part.term.friction))
+    tail = ", smooth below creep_velocity" if law.is_friction else ""
+    return f"{left} = {' + '.join(terms).replace('+ -', '- ')}{tail}"
+
+
+def _signed_text(coefficient: str, text: str, *, minus: bool) -> str:
+    bare = text.removeprefix("-")
+    sign = "-" if minus or bare != text else ""
+    return f"{sign}{coefficient}" if bare == "1" else f"{sign}{coefficient} · {bare}"
+
+
+def about_of(law: Law) -> str:
+    """Return the meaning of the law in a few words."""
+    kind = "learnt law" if law.is_learnt else "law found in data"
+    return f"{kind}: {'angle error' if law.place == 'encoder' else 'torque'} by {law.regressor}"
+
+
+READS = {"w": "GEAR_VELOCITY", "q": "OUTPUT_ANGLE", "theta": "ROTOR_ANGLE", "d": "DEFLECTION", "T": "LOAD",
+          "u": "COMMAND", "h": "HOUSING_ANGLE"}  # fmt: skip
+
+
+def words_of(expression: str) -> set[str]:
+    return set(re.findall(r"[a-z_A-Z]+", expression))
+
+
+def time_letters(law: Law) -> set[str]:
+    words = {w for part in law.parts for w in words_of(part.term.expression)}
+    if law.curve is not None:
+        words |= {law.curve.over, law.curve.factor}
+    return words & {"t", "share"}
+
+
+def letters_of(law: Law) -> set[str]:
+    """Return the letters of the variables that a law reads."""
+    used: set[str] = set()
+    for part in law.parts:
+        used |= words_of(part.term.expression) & set(READS)
+        used |= {"w"} if part.term.friction else set()
+        used |= {part.term.remembers} if part.term.memory else set()
+    if law.curve is not None:
+        used |= {law.curve.over, law.curve.factor} & set(READS)
+        used |= {"w"} if law.curve.factor == "w" else set()
+    return used
+
+
+def ranges_of(law: Law, letters: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """Return the largest size of each variable that a law reads."""
+    return {n: float(np.max(np.abs(letters[n]))) for n in READS if n in letters_of(law)}

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rsea_ros.effects.effect import Claims, Effect
-from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.law import Law
+from rsea_ros.laws.sparse_regression import Dependence
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_choice import RigChoice
+from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.records.record import FloatArray
 
 

@@ -1,25 +1,137 @@
-"""The variables of laws on the steps of a record: speed, angles, deflection, load, command and time.
+"""Variables of a law: signals of the machine, and memory of their past.
 
 The motion is the measured one, smoothed: the simulation plus the response to the missing torque.
+
+Each is one small function of the state and the newest value; the generated files call the same.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rsea_ros.laws.injection import Injector
-from rsea_ros.laws.memory import remember
-from rsea_ros.laws.missing import MissingTorque
+from rsea_ros.compiler import njit
+from rsea_ros.laws.injection import Injector, MissingTorque
 from rsea_ros.laws.terms import Term
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.inverse import Motion
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.records.record import FloatArray
+
+RING = 512
+"""Values that a delay keeps: a quarter of a second at the usual step."""
+
+
+@njit(inline="always")
+def lagged(before, value, step, time_constant):  # type: ignore[no-untyped-def]
+    """Return the lag of a signal after a step (s) in which it had a value."""
+    return before + (value - before) * -math.expm1(-step / time_constant)
+
+
+@njit(inline="always")
+def played(before, value, half):  # type: ignore[no-untyped-def]
+    """Return the position dragged behind a signal with play on either side (Krasnoselskii's play)."""
+    return min(max(before, value - half), value + half)
+
+
+@njit(inline="always")
+def bent(before, way, angle):  # type: ignore[no-untyped-def]
+    """Return Dahl's bristle after a way (rad), within -1 and 1: z' = (1 - sign(way) z) / angle."""
+    side = math.copysign(1.0, way)
+    return side + (before - side) * math.exp(-abs(way) / angle)
+
+
+@njit(inline="always")
+def rung(x, first, value, step, frequency, damping_ratio):  # type: ignore[no-untyped-def]
+    """Return y of y'' / w^2 + 2 damping_ratio y' / w + y = value after a step.
+
+    y and y' are x[first] and x[first + 1]. frequency: Hz, w = 2 pi frequency. Exact for
+    a value that is held over the step.
+    """
+    w = 2.0 * math.pi * frequency
+    decay, turn = damping_ratio * w, w * math.sqrt(1.0 - damping_ratio * damping_ratio)
+    u, v = x[first] - value, x[first + 1]
+    e, c, n = math.exp(-decay * step), math.cos(turn * step), math.sin(turn * step) / turn
+    x[first] = value + e * (u * (c + decay * n) + v * n)
+    x[first + 1] = e * (v * (c - decay * n) - u * w * w * n)
+    return x[first]
+
+
+@njit(cache=True)
+def rings(values, step, frequency, damping_ratio):  # type: ignore[no-untyped-def]
+    """Return the answer of a mode along a signal."""
+    out, x = np.empty(len(values)), np.zeros(2)
+    x[0] = values[0]
+    for k in range(len(values)):
+        out[k] = rung(x, 0, values[k], step, frequency, damping_ratio)
+    return out
+
+
+@njit(cache=True)
+def lags(values, step, time_constant):  # type: ignore[no-untyped-def]
+    """Return the lag of a signal at the middle of each step, where the step calls it."""
+    out, now = np.empty(len(values)), 0.0
+    for k in range(len(values)):
+        now = lagged(now, values[k], step, time_constant)
+        out[k] = now
+    return out
+
+
+@njit(cache=True)
+def plays(values, half):  # type: ignore[no-untyped-def]
+    """Return the play operator along a signal."""
+    out, now = np.empty(len(values)), values[0]
+    for k in range(len(values)):
+        now = played(now, values[k], half)
+        out[k] = now
+    return out
+
+
+@njit(cache=True)
+def bends(values, angle):  # type: ignore[no-untyped-def]
+    """Return Dahl's bristle along an angle."""
+    out, now, last = np.empty(len(values)), 0.0, values[0]
+    for k in range(len(values)):
+        now = bent(now, values[k] - last, angle)
+        out[k], last = now, values[k]
+    return out
+
+
+def shift(values: FloatArray, steps: float) -> FloatArray:
+    """Return a signal delayed by a number of steps, zero before."""
+    at = np.arange(len(values)) - steps
+    return np.asarray(np.interp(at, np.arange(-1, len(values)), np.concatenate([[0.0], values]), left=0.0))
+
+
+def remember(
+    memory: str, values: FloatArray, step: float, shape: float, constant: float = 0.0
+) -> FloatArray:
+    """Return the memory of a signal along the steps; for `heat` of its square. constant: damping ratio."""
+    if memory == "ring":
+        return np.asarray(rings(values, step, shape, constant))
+    if memory == "delay":
+        return shift(values, shape / step)
+    if memory == "play":
+        return np.asarray(plays(values, shape))
+    if memory == "dahl":
+        return np.asarray(bends(values, shape))
+    return np.asarray(lags(values * values if memory == "heat" else values, step, shape))
+
+
+@njit(inline="always")
+def from_ring(x, first, value, steps):  # type: ignore[no-untyped-def]
+    """Put a value into a ring of states from x[first] on, and return the delayed one."""
+    back = min(max(steps, 0.0), RING - 2.0)
+    whole, now = int(back), int(x[first])
+    x[first + 1 + now] = value
+    newer, older = x[first + 1 + (now - whole) % RING], x[first + 1 + (now - whole - 1) % RING]
+    x[first] = (now + 1) % RING
+    return newer + (back - whole) * (older - newer)
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,7 @@ class Diagnosed:
 
         force: replace existing results; without it they raise OutputError.
         """
-        from msg_adapters.overlay_bag import write_overlay
+        from msg_adapters.records import write_overlay
         from rsea_ros.outputs.new_files import Destination
         from rsea_ros.report.diagnosis.files import write_diagnosis
 
@@ -115,8 +115,7 @@ def diagnose(
     IdentificationError for records that cannot be diagnosed, RigError for the rig. Method: docs/diagnosis.md.
     Not to be confused with identify, which trusts the structure of the rig and fits only its values.
     """
-    from rsea_ros.checks.carried import with_check_faults
-    from rsea_ros.checks.usable import check_diagnosable
+    from rsea_ros.checks.carried import check_diagnosable, with_check_faults
     from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
     from rsea_ros.library.inputs import records_of
     from rsea_ros.library.notebook_progress import shown_in_notebook

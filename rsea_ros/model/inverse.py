@@ -22,8 +22,7 @@ from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.equations import mechanics
-from rsea_ros.model.extent import check_extent
-from rsea_ros.model.pace import SKIPPED_START, check_slow
+from rsea_ros.model.extent import SKIPPED_START, check_extent, check_slow
 from rsea_ros.model.restarts import gaps
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build

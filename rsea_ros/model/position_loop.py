@@ -1,11 +1,30 @@
-"""A position loop as a rig states it: parameters of the compiled step, and the closed-loop response."""
+"""Position loops: of a driver, and of a motor's firmware.
+
+pd        u = k_p e + k_i int e dt - k_d q' + k_f r',   e = r - q; r follows its target within a speed
+    cascade   v_r = k_pos e within a limit,   u = k_v (v_r - q') + k_vi int (v_r - q') dt
+
+The firmware uses the mean of the target since its last sample: the instant of a new target in it is unknown,
+and a target that counted only at a sample would make every residual a staircase in the delay.
+u is limited, held until the next sample, and added to the external command. An integral stands still
+while u is at its limit and the error would drive it further (conditional integration; Astrom, Hagglund,
+Advanced PID Control, 2006, section 3.5).
+"""
 
 from __future__ import annotations
 
 import math
 
+from rsea_ros.effects.effect import compiled
+from rsea_ros.effects.signal_table import (
+    COMMAND,
+    CURRENT,
+    OUTPUT_ANGLE,
+    OUTPUT_VELOCITY,
+    REFERENCE,
+    STEP,
+    TIME,
+)
 from rsea_ros.errors import ChannelError
-from rsea_ros.model import firmware_loop
 from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.records.record import ComplexArray, Record
 
@@ -14,13 +33,13 @@ def loop_parameters(rig: Rig) -> tuple[float, ...]:
     """Return the parameters of firmware_loop.control, in its order, of a rig that has a loop."""
     if rig.loop is None:
         c = rig.controller or PositionLoop(0.0, 0.0)
-        return firmware_loop.CASCADE, c.k_p, 0.0, c.k_v, 0.0, c.limit, math.inf, 0.0
+        return CASCADE, c.k_p, 0.0, c.k_v, 0.0, c.limit, math.inf, 0.0
     limits = tuple(rig[f"controller.{name}"] for name in ("torque_limit", "velocity_limit", "sample_time"))
     if rig.loop == "pd":
         gains = tuple(rig[f"controller.{name}"] for name in ("k_p", "k_i", "k_d", "k_f"))
-        return firmware_loop.PD, *gains, *limits
+        return PD, *gains, *limits
     gains = tuple(rig[f"controller.{name}"] for name in ("k_pos", "k_vi", "k_v"))
-    return firmware_loop.CASCADE, *gains, 0.0, *limits
+    return CASCADE, *gains, 0.0, *limits
 
 
 def with_command(record: Record, rig: Rig) -> Record:
@@ -59,3 +78,42 @@ def close_loop(rig: Rig, plant: ComplexArray, output: ComplexArray, s: ComplexAr
         ahead, back = inner * position, inner * (position + s)
     result: ComplexArray = output * ahead / (1.0 + plant * back)
     return result
+
+
+PD, CASCADE = 0.0, 1.0
+STATES = 8
+_KIND, _POSITION, _INTEGRAL, _VELOCITY, _FORWARD, _TORQUE_LIMIT, _VELOCITY_LIMIT, _SAMPLE = range(8)
+_SUM, _HELD, _DUE, _TARGET, _ASKED, _STARTED, _TOTAL, _COUNT = range(STATES)
+
+
+@compiled
+def control(s, p, x):  # type: ignore[no-untyped-def]
+    """Add the loop's torque. p: kind, three gains, feed-forward, limits of torque and speed, sample time."""
+    h, r = s[STEP], s[REFERENCE]
+    x[_TOTAL] += r
+    x[_COUNT] += 1.0
+    if x[_STARTED] == 0.0:
+        x[_TARGET] = x[_ASKED] = r
+        x[_DUE], x[_STARTED] = s[TIME], 1.0
+    if s[TIME] + 0.5 * h > x[_DUE]:
+        dt = max(p[_SAMPLE], h)
+        x[_DUE] += dt
+        r = x[_TOTAL] / x[_COUNT]
+        x[_TOTAL] = x[_COUNT] = 0.0
+        forward = p[_FORWARD] * (r - x[_ASKED]) / dt
+        x[_ASKED] = r
+        if p[_KIND] == PD:
+            most = p[_VELOCITY_LIMIT] * dt
+            x[_TARGET] += min(max(r - x[_TARGET], -most), most)
+            error = x[_TARGET] - s[OUTPUT_ANGLE]
+            u = p[_POSITION] * error - p[_VELOCITY] * s[OUTPUT_VELOCITY] + forward
+        else:
+            speed = p[_POSITION] * (r - s[OUTPUT_ANGLE])
+            error = min(max(speed, -p[_VELOCITY_LIMIT]), p[_VELOCITY_LIMIT]) - s[OUTPUT_VELOCITY]
+            u = p[_VELOCITY] * error
+        u += p[_INTEGRAL] * x[_SUM]
+        x[_HELD] = min(max(u, -p[_TORQUE_LIMIT]), p[_TORQUE_LIMIT])
+        if u == x[_HELD] or math.copysign(1.0, error) != math.copysign(1.0, u):
+            x[_SUM] += error * dt
+    s[COMMAND] += x[_HELD]
+    s[CURRENT] += x[_HELD]

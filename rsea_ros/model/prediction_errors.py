@@ -1,4 +1,4 @@
-"""The errors of a model on a new record."""
+"""Errors of a prediction of a record."""
 
 from __future__ import annotations
 
@@ -9,18 +9,52 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.extent import bound_values, check_command
+from rsea_ros.model.extent import SKIPPED_START, bound_values, check_command, check_pace
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
-from rsea_ros.model.pace import SKIPPED_START, check_pace
 from rsea_ros.model.position_loop import with_command
-from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.records.record import FloatArray, Record
+
+
+def in_phase(rig: Rig, record: Record) -> Rig:
+    """Return the rig with the phases that belong to this record."""
+    for place, setting in enumerate(rig.effects):
+        effect = effect_named(setting.name)
+        for phase in (p.name for p in effect.parameters if p.per_record):
+            if effect.claims.channel in record:
+                rig = _with_parameters(rig, place, {phase: _phase(rig, place, phase, record)})
+    return rig
+
+
+def _phase(rig: Rig, place: int, phase: str, record: Record) -> float:
+    """Return the phase (rad) of A sin(w t + phase) in a record's channel.
+
+    It is that of the residual without the wave, projected on the wave and on itself a quarter period ahead.
+    """
+    effect = effect_named(rig.effects[place].name)
+    channel, size = effect.claims.channel, effect.main
+    without = simulate(_with_parameters(rig, place, {size.name: size.null}), record)[channel]
+    residual = record[channel].y - without
+    keep = np.isfinite(residual)
+
+    def share(angle: float) -> float:
+        wave: FloatArray = simulate(_with_parameters(rig, place, {phase: angle}), record)[channel] - without
+        return float(residual[keep] @ wave[keep])
+
+    return math.atan2(share(0.5 * math.pi), share(0.0))
+
+
+def _with_parameters(rig: Rig, place: int, parameters: Mapping[str, float]) -> Rig:
+    """Return the rig with some parameters of one of its effects changed."""
+    effects = list(rig.effects)
+    effects[place] = replace(effects[place], parameters={**effects[place].parameters, **parameters})
+    return rig.with_effects(*effects)
 
 
 @dataclass(frozen=True)

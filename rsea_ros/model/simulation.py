@@ -20,10 +20,9 @@ from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
-from rsea_ros.model.firmware_loop import STATES, control
-from rsea_ros.model.measured_motion import zero_unknown
-from rsea_ros.model.position_loop import loop_parameters, with_command
+from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
 from rsea_ros.model.propagator import propagator, start_map
+from rsea_ros.model.restarts import zero_unknown
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.sampling import sample

@@ -1,4 +1,4 @@
-"""The compiled step: exact for the linear rig, second order in the torques that effects add.
+"""One step of the simulation, compiled.
 
 The linear part x' = A x + B tau is integrated by its matrix exponential, with the torques of the step held
 (the exponential midpoint rule: Hochbruck and Ostermann, Acta Numerica 19, 2010, section 2):
@@ -12,15 +12,32 @@ Friction takes its mean over the step instead (effects/_friction.py).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from llvmlite import ir
+from numba import types
 from numba.cpython.unsafe.tuple import tuple_setitem
+from numba.extending import intrinsic
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
-from rsea_ros.model.compiled_call import call
 from rsea_ros.records.record import FloatArray, IntArray
+
+
+@intrinsic
+def call(typingctx: Any, address: Any, s: Any, p: Any, x: Any) -> Any:
+    """Call `void f(double*, double*, double*)` at an address with three addresses, all given as integers."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        double_pointer = ir.DoubleType().as_pointer()
+        function = ir.FunctionType(ir.VoidType(), [double_pointer] * 3).as_pointer()
+        target = builder.inttoptr(arguments[0], function)
+        builder.call(target, [builder.inttoptr(a, double_pointer) for a in arguments[1:]])
+        return context.get_dummy_value()
+
+    return types.void(types.intp, types.intp, types.intp, types.intp), generate
+
 
 OUTPUTS = ("position", "velocity", "motor_torque", "ft", "deflection")
 

@@ -1,4 +1,4 @@
-"""Transfer functions of any rig, by expanding its equations of motion: exact polynomials, no roots, no grid.
+"""Transfer functions of the rig, and frequency responses from them.
 
 Cramer's rule on (M s^2 + D s + K) q = B tau gives every output over every torque on the same denominator
 det(M s^2 + D s + K). For two clamped ends these are Eqs. (4) to (6) with the rotor's spin kept (outputs.py).
@@ -18,10 +18,11 @@ from rsea_ros.model import outputs, propagator
 from rsea_ros.model.equations import PORTS, mechanics
 from rsea_ros.model.outputs import Output, Sees
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
-if TYPE_CHECKING:  # python-control takes a second to import, which a node that starts need not wait for
+if TYPE_CHECKING:
     from control import StateSpace, TransferFunction
+
 
 _ROUNDING = 1e-12
 """A sum that is smaller than this part of its terms is zero."""
@@ -135,3 +136,21 @@ def _transfer_function(fraction: Fraction) -> TransferFunction:
     from control import TransferFunction
 
     return TransferFunction(fraction.numerator, fraction.denominator)
+
+
+def frequency_response(rig: Rig, output: Output, hz: FloatArray, port: str = "gear") -> ComplexArray:
+    """Return output over torque at a port, (M s^2 + D s + K) q = B tau with s = 2 pi i f.
+
+    hz: shape (n,), without 0 where the rig is free to turn as a whole. Returns shape (n,), in the output's
+    unit per N m. A pendulum counts as its small-angle stiffness; the rig's effects are left out.
+    """
+    m = mechanics(rig)
+    p = PORTS.index(port)
+    s = 2j * np.pi * np.asarray(hz, dtype=np.float64)[:, None, None]
+    q = (
+        np.linalg.solve(m.mass * s**2 + m.damping * s + m.stiffness, m.ports[p][:, None])[..., 0]
+        @ m.placement.T
+    )
+    s = s[:, 0, 0]
+    response: ComplexArray = (np.stack([s**0, s, s**2], axis=1) @ output.c * q).sum(axis=1) + output.d[p]
+    return response

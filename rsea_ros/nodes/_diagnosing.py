@@ -6,8 +6,8 @@ from collections.abc import Generator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 
-from msg_adapters.overlay_bag import write_overlay
-from rsea_ros.checks.usable import check_diagnosable
+from msg_adapters.records import write_overlay
+from rsea_ros.checks.carried import check_diagnosable
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError

@@ -11,8 +11,7 @@ from rclpy.node import Node
 
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, statuses_message
 from rsea_ros.documents.units import with_unit
-from rsea_ros.health.codes import TABLE
-from rsea_ros.health.health_finding import HealthFinding
+from rsea_ros.health.health_finding import TABLE, HealthFinding
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import STEADY
 from rsea_ros.nodes._qos import COMMAND

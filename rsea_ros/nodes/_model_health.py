@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
-from rsea_ros.model.observer.consistency import Consistency
+from rsea_ros.model.observer.signal_noise import Consistency
 from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig

@@ -14,7 +14,7 @@ from msg_adapters.reading import record_from
 from msg_adapters.ros import ERROR, DiagnosticArray, message_type
 from msg_adapters.topic_map import ROLES, TYPES
 from rsea_ros.errors import DeviceError, RseaError
-from rsea_ros.experiment.opinion import SHORTEST
+from rsea_ros.experiment.joint_weighing import SHORTEST
 from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND, RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._tap import Tap

@@ -14,9 +14,8 @@ from typing import Any
 from rclpy.node import Node
 
 from rsea_ros.documents.units import with_unit
-from rsea_ros.health.health_finding import HealthFinding
+from rsea_ros.health.health_finding import HealthFinding, WatchSettings
 from rsea_ros.health.monitor import Monitor
-from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND

@@ -18,9 +18,9 @@ from rsea_ros.model.bandwidth import (
     pure_torque_bandwidth,
     undamped_band,
 )
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper.formulas import eq_6_distal_per_proximal
 
 TOLERANCES = ((3.0, 90.0), (1.0, 90.0), (3.0, 10.0), (1.0, 5.0))

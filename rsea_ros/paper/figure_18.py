@@ -10,9 +10,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from rsea_ros.model import outputs
-from rsea_ros.model.lumped import lumped_rig
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.transfer import frequency_response
+from rsea_ros.paper.rival_models import lumped_rig
 from rsea_ros.records.record import FloatArray
 
 _HZ: FloatArray = np.geomspace(0.1, 140.0, 400)

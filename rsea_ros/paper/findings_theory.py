@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from rsea_ros.design.mechanism import spring_radius
 from rsea_ros.model.bandwidth import (
     flat_band,
     inner_inertia,
@@ -13,7 +14,6 @@ from rsea_ros.model.bandwidth import (
     undamped_band,
 )
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.spring import spring_radius
 from rsea_ros.paper import claims, formulas
 from rsea_ros.paper.paper_finding import PaperFinding
 

@@ -15,10 +15,9 @@ import numpy as np
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.paper.rival_models import Rival, compare
+from rsea_ros.paper.rival_models import Rival, compare, lumped_rig
 from rsea_ros.records.record import Channel, Record
 
 NOISE = 30.0

@@ -1,4 +1,12 @@
-"""Rival models of the same bench: each fitted to one record, all tested on records that took no part."""
+"""Rival models of the paper: lumped ones.
+
+The reflected rotor inertia is taken for an inertia of the chassis against the ground, J_eff = J_sc + J_m,
+and the motor for a torque between ground and chassis: the housing's motion is left out. With both ends
+clamped this changes T_p, Eqs. (2) and (3), and nothing in T_d, Eq. (1).
+
+A rig with `train: lumped` and a free housing grounds the rotor only; its loads move. Fig. 18 can be read
+either way (paper/figure_18.py).
+"""
 
 from __future__ import annotations
 
@@ -65,3 +73,8 @@ def test_on(rig: Rig, end: str, record: Record) -> HeldOutFit:
         rms_error=comparison.rms_error,
         rms=float(np.std(measured)),
     )
+
+
+def lumped_rig(rig: Rig) -> Rig:
+    """Return the rig of the lumped model; every function of the model accepts it."""
+    return replace(rig, name=f"{rig.name}, lumped", train="lumped", clamped=rig.clamped | {"housing_end"})

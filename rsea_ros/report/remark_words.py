@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 from rsea_ros.documents.wording import list_names
-from rsea_ros.identification.remark import Code, Remark
+from rsea_ros.identification.result import Code, Remark
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.report import words
 

@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.trends.course import Course, StepOrRamp, cost, course_of, improve
-from rsea_ros.trends.day_effect import DayEffect, day_effect
-from rsea_ros.trends.days import Days
-from rsea_ros.trends.regression import Kind, scan
+from rsea_ros.trends.appearing import scan_p, scan_threshold
+from rsea_ros.trends.course import Course, Kind, StepOrRamp, cost, course_of, improve, scan
+from rsea_ros.trends.days import DayEffect, Days, day_effect
 from rsea_ros.trends.segments import breaks
 from rsea_ros.trends.settings import TrendSettings
-from rsea_ros.trends.significance import scan_p, scan_threshold
 
 _KINDS: tuple[Kind, ...] = ("step", "ramp")
 _MOST_TERMS = 12

@@ -1,4 +1,4 @@
-"""The course of every parameter of every joint, with its significant changes."""
+"""Trends of a whole fleet, and joints that stand out."""
 
 from __future__ import annotations
 
@@ -7,18 +7,45 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.trends.appearing import appearances, with_course
+from rsea_ros.records.normal import MAD_TO_SD, Z95
+from rsea_ros.trends.appearing import adjust, appearances, two_sided_p, with_course
 from rsea_ros.trends.cause_series import namings, size_series, temperatures
 from rsea_ros.trends.course_search import Tested, change_test, describe
-from rsea_ros.trends.day_effect import DayEffect, day_effect
-from rsea_ros.trends.days import Days, day_means
-from rsea_ros.trends.outliers import outliers
-from rsea_ros.trends.result import FleetTrends, Trend
+from rsea_ros.trends.days import DayEffect, Days, day_effect, day_means, fleet_prior
+from rsea_ros.trends.result import FleetTrends, Outlier, Trend
 from rsea_ros.trends.series import RECORDINGS, Series, Table, all_series, check_columns
 from rsea_ros.trends.settings import DEFAULT, TrendSettings
-from rsea_ros.trends.significance import adjust
-from rsea_ros.trends.temperature_slope import fleet_prior
 from rsea_ros.trends.trend import trend_of
+
+
+def outliers(trends: Iterable[Trend], settings: TrendSettings) -> tuple[Outlier, ...]:
+    """Return the joints whose present level is far from the fleet's median, in spreads of the fleet.
+
+    Spread: median absolute deviation of the others' levels, together with the joint's own doubt.
+    """
+    groups: dict[tuple[str, str], list[Trend]] = {}
+    for trend in trends:
+        if trend.now is not None:
+            groups.setdefault((trend.series.parameter, trend.series.unit), []).append(trend)
+    scored = [s for group in groups.values() if len(group) >= settings.fewest_joints for s in _score(group)]
+    if not scored:
+        return ()
+    q = adjust(np.array([two_sided_p(score, len_ - 1.0) for _, _, score, len_ in scored]))
+    return tuple(
+        Outlier(t.series.joint, t.series.parameter, t.series.unit, t.now, median, score, float(rate))
+        for (t, median, score, _), rate in zip(scored, q, strict=True)
+        if t.now is not None and abs(score) >= settings.outlier_joint and rate <= settings.false_discovery
+    )
+
+
+def _score(group: list[Trend]) -> list[tuple[Trend, float, float, int]]:
+    levels = np.array([t.now.value for t in group if t.now is not None])
+    half = np.array([t.now.high - t.now.low for t in group if t.now is not None]) / (2.0 * Z95)
+    median = float(np.median(levels))
+    spread = MAD_TO_SD * float(np.median(np.abs(levels - median)))
+    scores = (levels - median) / np.sqrt(spread**2 + half**2 + 1e-300)
+    return [(t, median, float(s), len(group)) for t, s in zip(group, scores, strict=True)]
+
 
 Key = tuple[str, str]
 

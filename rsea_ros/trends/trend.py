@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.records.normal import Z95
-from rsea_ros.trends.course import Course
+from rsea_ros.trends.appearing import scan_threshold
+from rsea_ros.trends.course import Course, term
 from rsea_ros.trends.course_search import Tested
 from rsea_ros.trends.quantities import (
     Dated,
@@ -21,13 +22,11 @@ from rsea_ros.trends.quantities import (
     ramp_size,
     slope_after,
     step_size,
+    time_to_limit,
 )
-from rsea_ros.trends.regression import term
 from rsea_ros.trends.result import Change, Interval, ParameterCourse, Trend
 from rsea_ros.trends.series import Series
 from rsea_ros.trends.settings import DAY, YEAR, TrendSettings
-from rsea_ros.trends.significance import scan_threshold
-from rsea_ros.trends.time_to_limit import time_to_limit
 
 _POINTS = 24
 """Places at which a course is drawn, beside its steps."""

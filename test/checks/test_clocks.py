@@ -11,8 +11,8 @@ from independent.bench import drawn_bench, record_run
 import rsea_ros as rsea
 from rsea_ros.checks.carried import with_faults
 from rsea_ros.checks.check import check_record
-from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.linearised_rig import Number
+from rsea_ros.checks.rig_findings import clock_findings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel
 

@@ -10,7 +10,7 @@ import pytest
 import rsea_ros as rsea
 from msg_adapters import write_record
 from rsea_ros.checks.check import check_record
-from rsea_ros.checks.rounded_stamps import rounded_stamps
+from rsea_ros.checks.stamp_findings import rounded_stamps
 from rsea_ros.cli.main import main
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel

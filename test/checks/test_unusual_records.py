@@ -11,8 +11,8 @@ import pytest
 import rsea_ros as rsea
 from rsea_ros import simulate
 from rsea_ros.checks.check import check_record
+from rsea_ros.checks.expected import is_still
 from rsea_ros.checks.linearised_rig import linear_of
-from rsea_ros.checks.moved_spans import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.statics import statics_of
 from rsea_ros.model.rig_file import load_rig

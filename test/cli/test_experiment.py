@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main
-from rsea_ros.experiment.diagnosis_document import models_of
-from rsea_ros.experiment.run_file import read_run
+from rsea_ros.experiment.run_limits import read_run
+from rsea_ros.experiment.stored_models import models_of
 from rsea_ros.model.rig_file import load_rig, save_rig
 
 RIG = load_rig("paper_high_impedance")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from msg_adapters import TopicMap, read_record
-from msg_adapters.remarks import FAULTS, remarks_of
+from msg_adapters.contents import FAULTS, remarks_of
 from rsea_ros.cli.main import main
 
 MAP = """

@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 
 from msg_adapters import write_record
-from rsea_ros.checks import usable
+from rsea_ros.checks import carried as usable
 from rsea_ros.checks.finding import Findings
 from rsea_ros.cli import _checks, experiment, paper
 from rsea_ros.control import study
 from rsea_ros.design import spring_design, tolerance
 from rsea_ros.diagnosis import diagnose
-from rsea_ros.experiment import advice, run_file
+from rsea_ros.experiment import advice
+from rsea_ros.experiment import run_limits as run_file
 from rsea_ros.fleet import store_columns
 from rsea_ros.identification import identify
 from rsea_ros.laws import learn
-from rsea_ros.model.rig_choice import RigChoice
+from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.records.record import Record
 from rsea_ros.report import file_names
 from rsea_ros.report.control import json as control_json

@@ -18,9 +18,9 @@ from rsea_ros.design.mujoco_model import mjcf
 from rsea_ros.documents.units import STANDARD_GRAVITY
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import mechanics
-from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS
+from rsea_ros.paper.rival_models import lumped_rig
 
 sys.path.append(str(Path(__file__).parents[1] / "model"))
 from random_rigs import rigs

@@ -10,7 +10,7 @@ from scripted import POOLS, Script
 
 from rsea_ros.diagnosis import backward_elimination as elimination
 from rsea_ros.diagnosis.backward_elimination import ReducedModels, eliminate_backwards
-from rsea_ros.diagnosis.selection import Selection
+from rsea_ros.diagnosis.evaluation import Selection
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
 

@@ -8,7 +8,7 @@ from scripted import script
 
 from rsea_ros.diagnosis import backward_elimination as elimination
 from rsea_ros.diagnosis.backward_elimination import nested_sequence
-from rsea_ros.diagnosis.selection import Selection
+from rsea_ros.diagnosis.evaluation import Selection
 
 FRICTION, STRIBECK, LUGRE = "coulomb_friction", "stribeck_friction", "lugre_friction"
 GAP, STOP, CUBIC = "backlash", "hard_stop", "nonlinear_spring"

@@ -8,7 +8,7 @@ import pytest
 from scripted import script, unknown
 
 from rsea_ros.diagnosis.backward_elimination import fitted_parameters
-from rsea_ros.diagnosis.selection import trial_of
+from rsea_ros.diagnosis.evaluation import trial_of
 from rsea_ros.effects.catalogue import effect_named
 
 FRICTION, STRIBECK, GAP = "coulomb_friction", "stribeck_friction", "backlash"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.naming import outcome
+from rsea_ros.diagnosis.naming import conclusion as outcome
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import IdentificationError

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsea_ros.diagnosis.criteria import verdict_of
-from rsea_ros.diagnosis.naming.outcome import main_channel
+from rsea_ros.diagnosis.naming.conclusion import main_channel
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.report.diagnosis.sentences import verdict_sentence

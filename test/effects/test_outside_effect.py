@@ -29,7 +29,7 @@ from rsea_ros.identification.identify import identify
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect
-from rsea_ros.laws.base import fitted_base
+from rsea_ros.laws.choice import fitted_base
 from rsea_ros.model.observer.assemble import without_delay
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig

@@ -6,8 +6,7 @@ from slow_work import CAUSES, RIG
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.joint_weighing import middles_of_runs, weigh
-from rsea_ros.experiment.weighed_causes import causes_from
+from rsea_ros.experiment.joint_weighing import causes_from, middles_of_runs, weigh
 
 
 def test_a_cause_that_the_log_could_not_show_stays_as_likely_as_none(known):

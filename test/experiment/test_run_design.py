@@ -10,11 +10,10 @@ from independent.hidden import hide
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.advice import advise, proofs_of
 from rsea_ros.experiment.bound import bound
-from rsea_ros.experiment.chance_constraint import at_ends, ends_of, peaks
+from rsea_ros.experiment.fits import problem_of, weights_of
 from rsea_ros.experiment.hypothesis import Hypothesis, motion, run_case
 from rsea_ros.experiment.joint_weighing import cases_of
-from rsea_ros.experiment.prior import problem_of, weights_of
-from rsea_ros.experiment.proposal import DesignRequest
+from rsea_ros.experiment.proposal import DesignRequest, at_ends, ends_of, peaks
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
 from rsea_ros.experiment.run_shape import Shape, at_rest_around, command_of

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.run_file import read_run, run_text
-from rsea_ros.experiment.run_limits import RunLimits, largest_share, limits_from, of_command
+from rsea_ros.experiment.run_limits import (
+    RunLimits,
+    largest_share,
+    limits_from,
+    of_command,
+    read_run,
+    run_text,
+)
 from rsea_ros.experiment.run_shape import KINDS, LEAD, Shape, command_of
 
 RATE = 280.0

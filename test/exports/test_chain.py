@@ -14,8 +14,8 @@ from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.sdf import export_sdf
 from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.model.equations import mechanics
-from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.rival_models import lumped_rig
 
 S = 2j * np.pi * np.array([0.3, 2.0, 11.0, 70.0])
 LEFT_OUT = {"housing_end.stiffness": 0.0, "housing_end.damping": 0.0}

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from rsea_ros.health.codes import NAMES, TABLE
+from rsea_ros.health.health_finding import NAMES, TABLE
 from rsea_ros.health.hypotheses import hypotheses_of
 from rsea_ros.model.rig_file import load_rig
 

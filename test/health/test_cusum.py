@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rsea_ros.health.cusum import Cusum, threshold
+from rsea_ros.health.recursive_estimates import Cusum, threshold
 
 INNER, OUTER = np.array([1.0, 0.5]), np.array([2.0, 1.5])
 NONE = np.ones(2)

@@ -11,8 +11,7 @@ from benches import bench, record_bench
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_document import rig_from_document
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.rig_to_document import rig_to_document
+from rsea_ros.model.rig_file import load_rig, rig_to_document
 from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences

@@ -9,8 +9,8 @@ import pytest
 from coloured_cases import RATE, white
 from scipy.signal import lfilter
 
-from rsea_ros.identification import coloured
-from rsea_ros.identification.spectra import SpectralShape, segment_spectra, shape_of
+from rsea_ros.identification import noise_level as coloured
+from rsea_ros.identification.noise import SpectralShape, segment_spectra, shape_of
 
 ALTERNATING = np.resize([1.0, -1.0], 10_000)
 

@@ -10,8 +10,8 @@ import pytest
 from coloured_cases import RATE, case, white
 from scipy.signal import lfilter
 
-from rsea_ros.identification import coloured
-from rsea_ros.identification.coloured import is_noise, residual_of
+from rsea_ros.identification import noise_level as coloured
+from rsea_ros.identification.noise_level import is_noise, residual_of
 
 
 def passes(y, **more):

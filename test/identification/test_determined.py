@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.identification.determined import shares_from_data
+from rsea_ros.identification.result import shares_from_data
 
 
 def test_values_of_which_only_a_combination_is_determined_are_not_and_nothing_is_singular():

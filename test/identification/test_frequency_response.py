@@ -7,15 +7,14 @@ import pytest
 
 from rsea_ros.errors import ChannelError, IdentificationError
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
-from rsea_ros.identification.frequency_response import estimate_response
+from rsea_ros.identification.frequency_response import estimate_response, responses_of
 from rsea_ros.identification.resample import AtRestError
-from rsea_ros.identification.responses import responses_of
 from rsea_ros.identification.result import ComplexArray, FrequencyResponse
 from rsea_ros.model import outputs
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel, FloatArray, Record
 
 RATE = 280.0

@@ -9,12 +9,10 @@ import pytest
 from benches import bench, record_bench
 from scipy.signal import lfilter
 
-from rsea_ros.identification.coloured import is_noise
 from rsea_ros.identification.identify import identify
-from rsea_ros.identification.noise import noise_floor, top_of_band
-from rsea_ros.identification.noise_level import reestimate_noise
+from rsea_ros.identification.noise import noise_floor, step_of, top_of_band
+from rsea_ros.identification.noise_level import is_noise, reestimate_noise
 from rsea_ros.identification.problem import case_from, simulate_cases
-from rsea_ros.identification.quantum import step_of
 from rsea_ros.identification.unknowns import Clocks
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig

@@ -9,9 +9,8 @@ import pytest
 from scipy.signal import lfilter
 
 from rsea_ros.identification import noise
-from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
-from rsea_ros.identification.noise_settings import DEFAULT
-from rsea_ros.identification.quantum import step_of
+from rsea_ros.identification.noise import least_noise, noise_floor, step_of, top_of_band
+from rsea_ros.identification.settings import NOISE
 from rsea_ros.model.rig import Sensor
 from rsea_ros.records.record import Channel, Record
 
@@ -139,7 +138,7 @@ def test_the_noise_is_read_off_the_top_of_the_band(levels, level, flat):
 def lines(count, **powers):
     """Powers of some lines, 1 where nothing is said: halves of the top of the band, and the rest."""
     power = np.full(count, powers.get("rest", 1.0))
-    top = noise._top(power, DEFAULT)
+    top = noise._top(power, NOISE)
     half = (top.stop - top.start + 1) // 2
     power[top.start : top.start + half] = powers.get("lower", 1.0)
     power[top.start + half : top.stop] = powers.get("upper", 1.0)
@@ -150,7 +149,7 @@ def lines(count, **powers):
     ("count", "first", "last"), [(100, 62, 97), (257, 160, 250), (8, 5, 6), (5, 4, 4), (7, 5, 5)]
 )
 def test_the_top_of_the_band_is_62_to_98_percent_and_a_line_at_least(count, first, last):
-    assert list(range(count))[noise._top(np.ones(count), DEFAULT)] == list(range(first, last + 1))
+    assert list(range(count))[noise._top(np.ones(count), NOISE)] == list(range(first, last + 1))
 
 
 @pytest.mark.parametrize(
@@ -170,7 +169,7 @@ def test_the_top_of_the_band_is_62_to_98_percent_and_a_line_at_least(count, firs
     ],
 )
 def test_flat_is_up_to_twice_the_power_in_one_half(power, flat):
-    assert noise._is_flat(power, DEFAULT) is flat
+    assert noise._is_flat(power, NOISE) is flat
 
 
 LOG = lfilter([0.25, 0.5, 0.25], [1.0], white(2**14))

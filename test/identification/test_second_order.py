@@ -8,9 +8,9 @@ import pytest
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
-from rsea_ros.identification.second_order import SecondOrder, effective_values, fit_second_order
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.paper.second_order import SecondOrder, effective_values, fit_second_order
 from rsea_ros.records.record import Channel, Record
 
 K_S, C, A1, A0 = 1530.456, 1560.436, 27.267, 1638.783

@@ -12,7 +12,7 @@ from rsea_ros.identification import confidence
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
-from rsea_ros.identification.remark import Remark
+from rsea_ros.identification.result import Remark
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize

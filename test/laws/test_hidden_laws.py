@@ -15,8 +15,8 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import Port
+from rsea_ros.laws.candidates import periods
 from rsea_ros.laws.learn import learn
-from rsea_ros.laws.repeats import periods
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel

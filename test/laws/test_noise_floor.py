@@ -7,7 +7,7 @@ from independent.bench import drawn_bench, record_run
 from scipy.signal import lfilter
 
 from rsea_ros.identification.noise_level import reestimate_noise
-from rsea_ros.laws.base import fitted_base
+from rsea_ros.laws.choice import fitted_base
 from rsea_ros.laws.learn import learn
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel

@@ -16,11 +16,10 @@ from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.effects.catalogue import catalogue, effect_named, lend
 from rsea_ros.effects.effect import Claims
 from rsea_ros.laws.effect_source import LawProvenance, source_of
+from rsea_ros.laws.file import claims_of, effect_from
 from rsea_ros.laws.law import FittedTerm, Law, LearntCurve
-from rsea_ros.laws.measured_claims import claims_of
-from rsea_ros.laws.memory import remember
-from rsea_ros.laws.refinement import effect_from
 from rsea_ros.laws.terms import COMMAND_TERMS, GEAR_TERMS, SENSOR_TERMS, SPRING_TERMS, Term, wave_terms
+from rsea_ros.laws.variables import remember
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.simulation import simulate_drive, synthesize
 

@@ -11,12 +11,11 @@ from random_rigs import RIG_NAMES, rigs
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs
-from rsea_ros.model.circuit import circuit, circuit_response
 from rsea_ros.model.equations import PORTS
-from rsea_ros.model.lumped import lumped_rig
-from rsea_ros.model.netlist import Element, impedance, nodal_analysis
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import frequency_response
+from rsea_ros.paper.circuit import Element, circuit, circuit_response, impedance, nodal_analysis
+from rsea_ros.paper.rival_models import lumped_rig
 
 HZ = np.geomspace(0.05, 300.0, 12)
 

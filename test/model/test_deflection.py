@@ -10,8 +10,7 @@ import pytest
 from msg_adapters import read_record, write_record
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_document import rig_from_document
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.rig_to_document import rig_to_document
+from rsea_ros.model.rig_file import load_rig, rig_to_document
 from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.records.record import Channel, Record
 

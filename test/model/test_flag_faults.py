@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.model.observer import ErrorModel, Observer, TorqueEstimate
-from rsea_ros.model.observer.consistency import consistency
+from rsea_ros.model.observer.signal_noise import consistency
 from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.rig_file import load_rig
 

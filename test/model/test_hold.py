@@ -12,8 +12,7 @@ from rsea_ros.errors import RigError
 from rsea_ros.model.drive import coarser, drive_from
 from rsea_ros.model.propagator import propagator, state_space
 from rsea_ros.model.rig_document import rig_from_document
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.rig_to_document import rig_to_document
+from rsea_ros.model.rig_file import load_rig, rig_to_document
 from rsea_ros.model.simulation import simulate
 from rsea_ros.records.record import Channel, Record
 

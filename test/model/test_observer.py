@@ -10,11 +10,11 @@ from scipy.linalg import expm
 
 from bench.observer_truth import true_run
 from rsea_ros.errors import RigError
-from rsea_ros.model.lumped import lumped_rig
 from rsea_ros.model.observer import Observer, noise_of, observe
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.rival_models import lumped_rig
 from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0

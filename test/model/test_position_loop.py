@@ -10,12 +10,11 @@ import slow
 from scipy.linalg import expm
 
 from rsea_ros.errors import ChannelError, RigError
-from rsea_ros.identification.responses import model_response
+from rsea_ros.identification.frequency_response import model_response
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import PositionLoop, Quantity, Rig
 from rsea_ros.model.rig_document import rig_from_document
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.rig_to_document import rig_to_document
+from rsea_ros.model.rig_file import load_rig, rig_to_document
 from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.records.record import Channel, Record
 

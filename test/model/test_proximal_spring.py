@@ -9,10 +9,10 @@ import pytest
 
 from rsea_ros.errors import RigError
 from rsea_ros.model import outputs
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import EffectSetting, Quantity
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel
 
 HZ = np.geomspace(0.1, 100.0, 40)

@@ -12,12 +12,11 @@ import pytest
 from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.observer import Observer, TorqueEstimate
 from rsea_ros.model.plant import Plant
-from rsea_ros.model.pure_torque import FlagSettings, PureTorque
+from rsea_ros.model.pure_torque import FlagSettings, PureTorque, split
 from rsea_ros.model.pure_torque_filter import empty_pair, powers
-from rsea_ros.model.pure_torque_noise import split
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import frequency_response
 
 SIGMA = 0.008
 

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.model.prediction_errors import predict
-from rsea_ros.model.record_phase import in_phase
+from rsea_ros.model.prediction_errors import in_phase, predict
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize

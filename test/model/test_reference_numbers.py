@@ -8,11 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rsea_ros.model import bandwidth, outputs, spring
-from rsea_ros.model.lumped import lumped_rig
-from rsea_ros.model.response import frequency_response
+from rsea_ros.design import mechanism as spring
+from rsea_ros.model import bandwidth, outputs
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import formulas
+from rsea_ros.paper.rival_models import lumped_rig
 
 K_S, J_SC, B_S, J_M, B_M = 1530.456, 0.0040, 3.0, 0.953, 23.088
 K_S_PROTOTYPE, J_SC_PROTOTYPE = 260.0, 6.169e-4

@@ -12,9 +12,9 @@ from scipy.linalg import expm
 from scipy.signal import lsim
 
 from rsea_ros.model import outputs
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import build, run, simulate, synthesize
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel, Record
 
 RATE = 1120.0

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rsea_ros.design.mechanism import spring_radius, spring_rate
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.spring import spring_radius, spring_rate
 from rsea_ros.paper.formulas import eq_8_spring_torque, eq_9_spring_stiffness
 
 RATE, LENGTH, ANGLE = st.floats(1e3, 1e6), st.floats(1e-3, 0.2), st.floats(-0.7, 0.7)

@@ -14,10 +14,10 @@ from rsea_ros.errors import RigError
 from rsea_ros.model import outputs, transfer
 from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import PORTS
-from rsea_ros.model.lumped import lumped_rig
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import formulas
+from rsea_ros.paper.rival_models import lumped_rig
 
 HZ = np.geomspace(0.05, 300.0, 60)
 S = 2j * np.pi * HZ

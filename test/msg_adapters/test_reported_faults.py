@@ -84,7 +84,7 @@ def test_the_keys_are_those_that_the_nodes_publish():
     """Each key stands in the source of a node."""
     from pathlib import Path
 
-    from msg_adapters.reported_faults import COUNTERS
+    from msg_adapters.decoding import COUNTERS
 
     root = Path(__file__).resolve().parents[2] / "rsea_ros"
     sources = [path.read_text() for folder in ("nodes", "hardware") for path in (root / folder).glob("*.py")]

@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader, StoragePlugin
 
 from msg_adapters import BagWriter, TopicMap, iterate, read_record, write_record, write_records
-from msg_adapters.overlay_bag import write_overlay
+from msg_adapters.records import write_overlay
 from rsea_ros.errors import BagError, ParameterError
 from rsea_ros.records.record import Channel, Record
 

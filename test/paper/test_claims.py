@@ -7,8 +7,8 @@ import pytest
 
 from rsea_ros.design.motor_gear_units import unit_named
 from rsea_ros.model import outputs
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims, last_digit
 from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
 from rsea_ros.paper.findings import findings

@@ -10,18 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from msg_adapters.overlay_bag import write_overlay
+from msg_adapters.records import write_overlay
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
-from rsea_ros.identification.remark import Remark
-from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate
+from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate, Remark
 from rsea_ros.model import outputs
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.diagnosis.files import write_diagnosis
 from test.watch.browser import chromium

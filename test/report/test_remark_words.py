@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from rsea_ros.identification.remark import Code, Remark
+from rsea_ros.identification.result import Code, Remark
 from rsea_ros.report.remark_words import remark_sentences
 
 SAID = {

@@ -7,8 +7,8 @@ import pytest
 from fleet_histories import DAY, START, cause, history, recordings
 
 from rsea_ros.trends import alarms, fleet_trends
-from rsea_ros.trends.ranking import by_joint
-from rsea_ros.trends.significance import adjust, scan_p, scan_threshold
+from rsea_ros.trends.alarms import by_joint
+from rsea_ros.trends.appearing import adjust, scan_p, scan_threshold
 
 JOINTS = tuple("abcdefgh")
 QUIET = history(np.random.default_rng(0), joints=JOINTS, days=60, each=1)

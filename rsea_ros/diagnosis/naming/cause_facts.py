@@ -6,18 +6,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut
+from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, Selection, Trial
 from rsea_ros.diagnosis.naming.status import Named
 from rsea_ros.diagnosis.naming.weighing import Weighed
 from rsea_ros.diagnosis.result import Alternative, Cause, CauseParameter, Reason, Rejected
 from rsea_ros.diagnosis.score import Score, gain
-from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DiagnosisSettings, SizeSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.estimates import parameters_of
-from rsea_ros.identification.remark import Remark
-from rsea_ros.identification.result import ParameterEstimate
+from rsea_ros.identification.result import ParameterEstimate, Remark
 from rsea_ros.identification.solver import solve
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.records.normal import Z95

@@ -28,12 +28,11 @@ from rsea_ros.diagnosis.candidate import (
     refit,
 )
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
-from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut
+from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, Selection, Trial
 from rsea_ros.diagnosis.naming.evidence import Claim
 from rsea_ros.diagnosis.score import Score, tempered_loss
-from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.identification.off_rig import is_off_rig
+from rsea_ros.identification.estimates import is_off_rig
 from rsea_ros.identification.workers import Pools
 from rsea_ros.records.record import FloatArray
 

@@ -13,11 +13,10 @@ from functools import partial
 
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.criteria import is_at_floor, preference
-from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, evaluate, held_out_data
+from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, Selection, Trial, evaluate, held_out_data
 from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for
 from rsea_ros.diagnosis.naming.rivals import beside, contests
 from rsea_ros.diagnosis.score import Score
-from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.workers import Pools
 

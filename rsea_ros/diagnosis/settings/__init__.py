@@ -15,14 +15,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 
-from rsea_ros.diagnosis.settings.cause_names import EvidenceSettings, NamingSettings, SizeSettings
-from rsea_ros.diagnosis.settings.data import BlockSettings, FloorSettings, PieceSettings, StretchSettings
-from rsea_ros.diagnosis.settings.next_run import NextRunSettings
-from rsea_ros.diagnosis.settings.search import AcceptanceSettings, FitSettings, ForwardSettings
+from rsea_ros.diagnosis.settings.groups import (
+    AcceptanceSettings,
+    BlockSettings,
+    EvidenceSettings,
+    FitSettings,
+    FloorSettings,
+    ForwardSettings,
+    NamingSettings,
+    NextRunSettings,
+    PieceSettings,
+    SizeSettings,
+    StretchSettings,
+)
 from rsea_ros.documents.setting import Setting
 from rsea_ros.errors import ParameterError
-from rsea_ros.identification.interval_settings import IntervalSettings
-from rsea_ros.identification.noise_settings import NoiseSettings
+from rsea_ros.identification.settings import IntervalSettings, NoiseSettings
 
 MOST_CAUSES = 4
 __all__ = [

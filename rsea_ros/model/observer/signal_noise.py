@@ -1,4 +1,4 @@
-"""The noise of each signal for the observer, from the sensors and from the residual of an identification.
+"""Noise of the observed signals, and the consistency of innovations with it.
 
 The disturbance is a random walk. Its intensity comes from a torque of RMS sigma that keeps for a time tau:
 over times short against tau such an Ornstein-Uhlenbeck process is a random walk of intensity
@@ -9,6 +9,10 @@ tau = 1 / |slowest pole| of the actuator between clamped ends: the filter follow
 sigma is the residual of the F/T signal beyond its noise, and never less than the doubt in the measured
 motor torque: a torque too small for that sensor cannot be excluded.
 Source: Gardiner, Handbook of Stochastic Methods, 2004, section 3.8.4.
+
+Where the model is right nu^2 / S, the squared innovation over its variance, is chi-square distributed with
+one degree of freedom and white: the sum over a window of n samples has n degrees of freedom.
+Source: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, sec. 5.4.
 """
 
 from __future__ import annotations
@@ -16,16 +20,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 
 from rsea_ros.documents.units import plain
 from rsea_ros.errors import RigError
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
-from rsea_ros.records.record import UNITS
+from rsea_ros.records.record import UNITS, FloatArray
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
 
@@ -84,3 +91,41 @@ def _sigma(rig: Rig, channel: str, noise_rms: Mapping[str, float]) -> float:
             "expected > 0, as measured"
         )
     return sigma
+
+
+CHANNELS = ("position", "ft", "motor_torque")
+FALSE_ALARM = 1e-6
+"""Probability that a right model is called inconsistent in a window: once in ten days of windows of 1 s."""
+
+
+class Consistency(NamedTuple):
+    """ratio: RMS of the innovations over its expected value.
+
+    limit: the largest allowed. mean: in the channel's unit.
+    """
+
+    ratio: float
+    limit: float
+    mean: float
+
+    @property
+    def broken(self) -> bool:
+        """Whether the model is inconsistent with this channel."""
+        return self.ratio > self.limit
+
+
+def consistency(score: FloatArray) -> dict[str, Consistency]:
+    """Return the test of each channel that had samples. score: sums of nu^2 / S, 1, nu, shape (3, 3).
+
+    A late sample changes innovations that were already counted, so a sum may decrease: to zero at least.
+    """
+    return {
+        name: Consistency(math.sqrt(max(total, 0.0) / count), _limit(round(count)), sum_ / count)
+        for name, (total, count, sum_) in zip(CHANNELS, score.tolist(), strict=True)
+        if count >= 1.0 and math.isfinite(total + sum_)
+    }
+
+
+@lru_cache(maxsize=64)
+def _limit(count: int) -> float:
+    return math.sqrt(float(chdtri(count, FALSE_ALARM)) / count)

@@ -8,7 +8,7 @@ from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.experiment.campaign import CampaignOutcome
-from rsea_ros.experiment.containment import NOTHING
+from rsea_ros.experiment.hypothesis import NOTHING
 from rsea_ros.experiment.joint_weighing import RunWeighing
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.records.normal import Z95

@@ -11,8 +11,8 @@ from rsea_ros.control.following import Following
 from rsea_ros.control.spread import Spread
 from rsea_ros.control.study import AtRate, Study
 from rsea_ros.model import outputs
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.report import words
 from rsea_ros.report.control.tables import control_tables, gains_words, typeset
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line

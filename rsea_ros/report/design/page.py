@@ -13,7 +13,7 @@ from rsea_ros.design.by_train import by_train
 from rsea_ros.design.spring_design import SpringDesign, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, undamped_stiffness
-from rsea_ros.model.response import frequency_response
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.design.map import LeastStiffness, feasible_map

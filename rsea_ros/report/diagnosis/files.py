@@ -17,7 +17,7 @@ from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.provenance import Provenance
 
 OverlayWriter = Callable[[Mapping[str, Record], Path], None]
-"""Writes records by namespace into one bag file: msg_adapters.overlay_bag.write_overlay."""
+"""Writes records by namespace into one bag file: msg_adapters.records.write_overlay."""
 
 
 def write_diagnosis(

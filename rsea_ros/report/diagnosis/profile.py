@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.diagnosis.residual_analysis import edges_of, rms_in
 from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.identification.residual_bins import edges_of, rms_in
 from rsea_ros.identification.result import Overlay
-from rsea_ros.model.pace import SKIPPED_START
+from rsea_ros.model.extent import SKIPPED_START
 from rsea_ros.records.record import UNITS, FloatArray
 
 BINS = 16

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Verdict
 from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.silent import is_unexcited, silent_channels
+from rsea_ros.identification.result import is_unexcited, silent_channels
 from rsea_ros.records.fault_kinds import MASKED
 from rsea_ros.records.record import Fault
 from rsea_ros.report import words

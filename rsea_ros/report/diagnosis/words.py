@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit, Reason, Rejected
 from rsea_ros.documents.wording import list_names
-from rsea_ros.identification.silent import is_unexcited, silent_channels
+from rsea_ros.identification.result import is_unexcited, silent_channels
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.rig.words import values_off

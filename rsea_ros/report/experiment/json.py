@@ -7,8 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from rsea_ros.experiment.advice import Advice, Proof
-from rsea_ros.experiment.chance_constraint import LEVEL
-from rsea_ros.experiment.proposal import Proposal
+from rsea_ros.experiment.proposal import LEVEL, Proposal
 from rsea_ros.report.experiment.words import proof_words, verdict
 from rsea_ros.report.json_values import strict
 

@@ -7,10 +7,8 @@ import math
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import list_names
 from rsea_ros.experiment.advice import Advice, Proof
-from rsea_ros.experiment.chance_constraint import LEVEL
-from rsea_ros.experiment.containment import NOTHING
-from rsea_ros.experiment.hypothesis import Hypothesis
-from rsea_ros.experiment.proposal import Proposal
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.proposal import LEVEL, Proposal
 from rsea_ros.experiment.run_limits import UNITS
 from rsea_ros.report import words
 

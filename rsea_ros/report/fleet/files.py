@@ -10,9 +10,8 @@ from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.report.fleet.joint_page import joint_page
 from rsea_ros.report.fleet.links import Links, page_names
 from rsea_ros.report.fleet.page import fleet_page
-from rsea_ros.trends.alarms import alarms_of
+from rsea_ros.trends.alarms import alarms_of, by_joint
 from rsea_ros.trends.fleet_trends import fleet_trends
-from rsea_ros.trends.ranking import by_joint
 from rsea_ros.trends.series import Table
 from rsea_ros.trends.settings import DEFAULT, TrendSettings
 from rsea_ros.trends.weeks import Steps, steps_over

@@ -21,8 +21,7 @@ from rsea_ros.report.fleet.timeline import timeline
 from rsea_ros.report.fleet.words import about, day, name, percent
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, fold, key_numbers, paragraph, section
-from rsea_ros.trends.alarms import Alarm
-from rsea_ros.trends.ranking import by_joint, worst_first
+from rsea_ros.trends.alarms import Alarm, by_joint, worst_first
 from rsea_ros.trends.result import FleetTrends
 from rsea_ros.trends.series import Table
 from rsea_ros.trends.weeks import Steps

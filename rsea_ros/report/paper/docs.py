@@ -9,12 +9,12 @@ import numpy as np
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, inner_inertia, pure_torque_bandwidth, undamped_band
 from rsea_ros.model.equations import train_ratio
-from rsea_ros.model.lumped import lumped_rig
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.figure_18 import readings
+from rsea_ros.paper.rival_models import lumped_rig
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, BEFORE, TRUTH

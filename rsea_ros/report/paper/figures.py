@@ -10,9 +10,9 @@ from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, inner_inertia, pure_torque_bandwidth, undamped_band
 from rsea_ros.model.equations import train_ratio
-from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.bandwidth import inner_inertia, pure_torque_bandwidth
-from rsea_ros.model.lumped import lumped_rig as lumped_model
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.arrangements import arrangements, limits
@@ -15,6 +14,7 @@ from rsea_ros.paper.bands import Bands, bands
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims
 from rsea_ros.paper.findings import findings
 from rsea_ros.paper.moving_output import MovingOutput
+from rsea_ros.paper.rival_models import lumped_rig as lumped_model
 from rsea_ros.report import words
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import key_numbers

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from rsea_ros.identification.remark import Remark
-from rsea_ros.model.rig_choice import RigChoice
+from rsea_ros.identification.result import Remark
+from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.report.json_values import finite
 from rsea_ros.report.rig.words import split_off_rig
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from rsea_ros.identification.remark import Remark
+from rsea_ros.identification.result import Remark
 from rsea_ros.report.file_names import MODEL
 from rsea_ros.report.page.html import bullets, code, section
 from rsea_ros.report.remark_words import remark_sentences

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
-from rsea_ros.identification.remark import Remark
-from rsea_ros.model.rig_choice import RigChoice
+from rsea_ros.identification.result import Remark
+from rsea_ros.model.rig_file import RigChoice
 
 
 def rig_named(name: str, choice: RigChoice) -> str:

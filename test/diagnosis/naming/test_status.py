@@ -9,12 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsea_ros.diagnosis.criteria import takes_most, verdict_of
-from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
 from rsea_ros.diagnosis.naming.evidence import Evidence
 from rsea_ros.diagnosis.naming.flexible import Flexible
-from rsea_ros.diagnosis.naming.probability import features, probability
 from rsea_ros.diagnosis.naming.signature import Signature
-from rsea_ros.diagnosis.naming.status import probabilities_and_status, status_of
+from rsea_ros.diagnosis.naming.status import (
+    COEFFICIENTS,
+    features,
+    probabilities_and_status,
+    probability,
+    status_of,
+)
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from msg_adapters.tables import import_record, load_map
-from rsea_ros.identification.joint_start import joint_start
+from rsea_ros.identification.start import joint_start
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig

@@ -1,4 +1,4 @@
-"""The numbers by which a residual is taken for noise of its sensor: before a fit, and after it."""
+"""Settings of noise and intervals: each number with unit, meaning and reason."""
 
 from __future__ import annotations
 
@@ -69,4 +69,21 @@ class NoiseSettings:
     )
 
 
-DEFAULT = NoiseSettings()
+NOISE = NoiseSettings()
+
+
+@dataclass(frozen=True)
+class IntervalSettings:
+    """The blocks of the sandwich covariance, and its correction for a small number of them."""
+
+    block: float = number(
+        1.0, "s", "residuals further apart than this are taken as independent",
+        "longer than a bench's memory, as blocks.longest",
+    )  # fmt: skip
+    most_corrected: float = number(
+        4.0, "1", "largest factor n / (n - p) on the variance, for n blocks and p unknowns",
+        "an interval twice as wide: with fewer than 4/3 p blocks the factor runs away",
+    )  # fmt: skip
+
+
+INTERVALS = IntervalSettings()
