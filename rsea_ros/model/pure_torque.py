@@ -36,8 +36,7 @@ from rsea_ros.model.pure_torque_filter import (
     empty_pair,
     update_flag,
 )
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_structure import check_two_torques
+from rsea_ros.model.rig import Rig, check_two_torques
 from rsea_ros.model.structure import with_structure
 from rsea_ros.records.record import FloatArray
 

@@ -26,8 +26,7 @@ from rsea_ros.compiler import njit
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end, inner_inertia
 from rsea_ros.model.observer import TorqueEstimate
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_structure import check_two_torques
+from rsea_ros.model.rig import Rig, check_two_torques
 from rsea_ros.model.structure import with_structure
 from rsea_ros.model.transfer import Fraction
 from rsea_ros.records.normal import Z90
