@@ -27,9 +27,8 @@ def tree(top: str) -> list[tuple[str, list[str]]]:
 
 
 def requirements(part: str) -> list[str]:
-    """Return what a part of requirements.in asks for: a comment, a package a line, an empty line."""
-    parts = Path("requirements.in").read_text(encoding="utf-8").split("\n\n")
-    (lines,) = (text.splitlines() for text in parts if text.startswith(f"# {part}"))
+    """Return what requirements/PART.in asks for."""
+    lines = Path("requirements", f"{part}.in").read_text(encoding="utf-8").splitlines()
     return [line for line in lines if not line.startswith("#")]
 
 
@@ -42,13 +41,14 @@ setup(
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=["rsea_ros*", "msg_adapters*"]),
     python_requires=">=3.10",
-    install_requires=requirements("What runs"),
-    extras_require={"fleet": requirements("fleet")},
+    install_requires=requirements("run"),
+    extras_require={part: requirements(part) for part in ("fleet", "export")},
     zip_safe=False,
     package_data={
         "": ["py.typed"],
         "rsea_ros.report.page": ["*.css", "*.js", "vendor/*"],
         "rsea_ros.report.fleet": ["*.css"],
+        "rsea_ros.report.paper": ["*.svg"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
         "rsea_ros.nodes": ["*.xml"],
         "rsea_ros.watch": ["page/*"],

@@ -18,7 +18,7 @@ import pyarrow as pa
 from fleet_real import make_fleet, run_real
 
 from rsea_ros.fleet import history, recordings
-from rsea_ros.fleet.cluster import on_this_machine
+from rsea_ros.fleet.pool import on_this_machine
 from rsea_ros.fleet.row import ARROW, VARYING, write_table
 from rsea_ros.fleet.store import Store, open_store
 from rsea_ros.fleet.store_keys import read
@@ -57,7 +57,7 @@ def real() -> bool:
         busy = time.process_time() - busy
         for count in (1, 2):
             stores[count] = open_store(root / f"dask{count}", create=True)
-            with on_this_machine(count, MEMORY, "127.0.0.1:0") as (workers, _):
+            with on_this_machine(count, MEMORY) as workers:
                 # some recordings for each worker first, so that none compiles while the clock runs
                 warm = open_store(root / f"warm{count}", create=True)
                 run_real(warm, make_fleet(root / f"warmers{count}", 4), workers)
@@ -100,7 +100,7 @@ def scheduler(count: int = 10_000) -> bool:
             held.append(resident())
 
         store.put = watch_run  # type: ignore[method-assign]
-        with on_this_machine(1, MEMORY, "127.0.0.1:0") as (workers, _):
+        with on_this_machine(1, MEMORY) as workers:
             begin = time.process_time()
             took = seconds_of(lambda: stub.run_engine(store, bags, workers, stub.stub_row))
             busy = time.process_time() - begin

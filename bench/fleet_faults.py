@@ -17,8 +17,9 @@ from pathlib import Path
 import fleet_stub as stub
 
 from rsea_ros.errors import RseaError
-from rsea_ros.fleet.cluster import on_scheduler, on_this_machine
+from rsea_ros.fleet.cluster import on_scheduler
 from rsea_ros.fleet.executor import serial
+from rsea_ros.fleet.pool import on_this_machine
 from rsea_ros.fleet.store import Store, hold_lock, open_store
 
 KILLS = 20
@@ -44,7 +45,7 @@ def verdict(name: str, store: Path, count: int, more: str) -> bool:
 def workers_killed(count: int = 60) -> bool:
     """Kill a worker at random times while a run goes on."""
     random.seed(1)
-    with place(count) as (bags, path), on_this_machine(2, MEMORY, "127.0.0.1:0") as (workers, _):
+    with place(count) as (bags, path), on_this_machine(2, MEMORY) as workers:
         store, killed, over = open_store(path, create=True), [], threading.Event()
 
         def kill() -> None:
@@ -66,7 +67,7 @@ def workers_killed(count: int = 60) -> bool:
 def client(folder: str, path: str) -> None:
     """Run a whole run with its cluster, as a client that can be killed."""
     store = open_store(path, create=True)
-    with hold_lock(store, lambda holder: None), on_this_machine(1, MEMORY, "127.0.0.1:0") as (workers, _):
+    with hold_lock(store, lambda holder: None), on_this_machine(1, MEMORY) as workers:
         store.finish()
         stub.run_engine(store, Path(folder), workers)
 
@@ -164,7 +165,7 @@ def disk_full(count: int = 200) -> bool:
 
 def four_gigabytes(count: int = 8) -> bool:
     """Have one recording take 4 GB on workers that may have 1 GB."""
-    with place(count) as (bags, path), on_this_machine(2, MEMORY, "127.0.0.1:0") as (workers, _):
+    with place(count) as (bags, path), on_this_machine(2, MEMORY) as workers:
         summary = stub.run_engine(open_store(path, create=True), bags, workers, stub.greedy)
         good = summary.outcomes == {"done": count - 1, "quarantined": 1}
         why = summary.quarantined[0][2] if summary.quarantined else "no quarantine"

@@ -3,12 +3,13 @@
     python bench/pythons.py                    all versions from 3.10 to 3.14 on this machine
     python bench/pythons.py --only 3.13
 
-Nodes are left out, because the wheels of ROS 2 exist for one Python. A missing version counts as untried.
+Nodes are left out: .ci/run tries them, on GitHub with each version. A missing version counts as untried.
 """
 
 from __future__ import annotations
 
 import argparse
+import platform
 import re
 import subprocess
 import sys
@@ -60,12 +61,14 @@ def steps(interpreter: str, folder: Path) -> list[tuple[str, list[str]]]:
     """Return name and command of each step, in a folder of their own."""
     source = folder / "source"
     python = str(folder / "environment" / "bin" / "python")
-    pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    names = ("run", "dev") if platform.machine() != "x86_64" else ("run", "ros", "dev")
+    locks = [option for name in names for option in ("-r", str(ROOT / "requirements" / f"{name}.lock"))]
     return [
         ("environment", [interpreter, "-m", "venv", str(folder / "environment")]),
-        ("lock", [*pip, "--require-hashes", "-r", str(ROOT / "requirements.lock")]),
+        ("locks", [*pip, "--require-hashes", "--only-binary", ":all:", *locks]),
         ("source", ["sh", "-c", f"mkdir {source} && git -C {ROOT} archive HEAD | tar -x -C {source}"]),
-        ("wheel", [*pip, "--no-deps", str(source)]),
+        ("wheel", [*pip, str(source)]),
         ("use of the wheel", ["sh", "-c", f'cd {folder} && {python} -c "{USE}"']),
         ("tests", ["sh", "-c", f"cd {source} && {python} -m pytest -q -x -n 2 {' '.join(fast_tests())}"]),
     ]

@@ -1,7 +1,9 @@
-"""Make .venv from the pinned lock; ./rsea calls `environment.py ROOT wheels|sourced KEY [ARGUMENT…]`.
+"""Make .venv from the locks; ./rsea calls `environment.py ROOT wheels|sourced KEY "PART …" [ARGUMENT…]`.
 
-Standard library only. The stamp `.venv/complete` (the key, and where ROS 2 comes from) is written last and by
-rename: an environment without it is never used, whatever interrupted its making.
+Standard library only. No resolver runs: pip installs what the locks name, as wheels with these hashes, and
+nothing else. The stamp `.venv/complete` (the key, and where ROS 2 comes from: wheels, sourced or none) is
+written last and by rename, and is away while a part is added: an environment without it is never used,
+whatever interrupted its making.
 """
 
 from __future__ import annotations
@@ -16,7 +18,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 NETWORK_SIGNS = ("connection broken", "Max retries exceeded", "name resolution", "timed out")
-PIP_INSTALL = ("-m", "pip", "install", "--no-input", "--progress-bar=off", "--retries=2")
+PIP_INSTALL = (
+    "-m", "pip", "install", "--no-input", "--progress-bar=off", "--retries=2", "--disable-pip-version-check",
+    "--no-deps", "--require-hashes", "--only-binary=:all:",
+)  # fmt: skip
+BEGUN = "Installing collected packages"
+"""What pip says once it changes the environment."""
+PARTS = {
+    "dev": "pytest, ruff and mypy, about 130 MB",
+    "fleet": "Dask, Parquet and DuckDB, about 280 MB",
+    "export": "MuJoCo and FMPy, about 230 MB",
+}
+"""By name in requirements/: what it brings."""
 
 
 class InstallError(Exception):
@@ -25,11 +38,11 @@ class InstallError(Exception):
 
 def main(arguments: Sequence[str]) -> int:
     """Make the environment, then start ./rsea again with the user's arguments."""
-    root, ros, key = Path(arguments[0]), arguments[1], arguments[2]
+    root, ros, key, parts = Path(arguments[0]), arguments[1], arguments[2], arguments[3].split()
     try:
-        ensure(root, ros, key)
+        ensure(root, ros if ros == "sourced" else wheels(platform.machine(), libc()), key, parts)
     except KeyboardInterrupt:
-        say("interrupted: .venv is not complete, the next call makes it anew")
+        say("interrupted: the next call goes on with .venv, or makes it anew")
         return 130
     except InstallError as error:
         say(str(error))
@@ -38,45 +51,112 @@ def main(arguments: Sequence[str]) -> int:
         say(f"{error.filename}: {error.strerror}")
         return 2
     launcher = str(root / "rsea")
-    os.execv(launcher, [launcher, *arguments[3:]])
+    os.execv(launcher, [launcher, *arguments[4:]])
 
 
-def ensure(root: Path, ros: str, key: str) -> None:
-    """Make root/.venv unless a process that was waited for has made it meanwhile."""
+def libc() -> str:
+    """Return the C library, such as "glibc 2.36", or "" where it is not glibc."""
+    try:
+        return os.confstr("CS_GNU_LIBC_VERSION") or ""
+    except (ValueError, OSError):
+        return ""
+
+
+def wheels(machine: str, libc: str) -> str:
+    """Return where nodes come from without a sourced ROS 2: wheels or none.
+
+    Raises InstallError for a machine for which the packages that compile have no wheels either.
+    """
+    if not libc.startswith("glibc "):
+        raise InstallError("no glibc here (musl?), expected 2.28 or later: numba has no wheels without it")
+    if tuple(map(int, libc.split()[1].split(".")[:2])) < (2, 28):
+        raise InstallError(f"{libc}, expected 2.28 or later: the wheels are built for it")
+    if machine not in ("x86_64", "aarch64"):
+        raise InstallError(f"{machine}: no wheels for it, expected x86_64, or aarch64 without nodes")
+    return "wheels" if machine == "x86_64" else "none"
+
+
+def ensure(root: Path, ros: str, key: str, parts: Sequence[str]) -> None:
+    """Make root/.venv with some parts, unless a process that was waited for has made them meanwhile."""
     with exclusive(root / ".venv.lock") as lock:
-        if stamp(root) != (key, ros):
+        if stamp(root / ".venv") != (key, ros):
             make(root, ros, key, lock)
+        for part in parts:
+            if not same(root / "requirements" / f"{part}.lock", root / ".venv" / f"complete-{part}"):
+                add(root, part, lock)
 
 
-def stamp(root: Path) -> tuple[str, ...]:
+def stamp(venv: Path) -> tuple[str, ...]:
     """Return key and source of ROS 2 of the complete environment, or nothing."""
     try:
-        return tuple((root / ".venv" / "complete").read_text(encoding="utf-8").splitlines())
+        return tuple((venv / "complete").read_text(encoding="utf-8").splitlines())
     except OSError:
         return ()
 
 
+def same(lock: Path, stamp: Path) -> bool:
+    """Return whether a part was installed from this lock."""
+    return stamp.is_file() and stamp.read_bytes() == lock.read_bytes()
+
+
 def make(root: Path, ros: str, key: str, lock: int) -> None:
     """Make the environment from nothing and stamp it."""
+    venv = owned(root)
+    (venv / "complete").unlink(missing_ok=True)
+    say(f"making .venv with Python {platform.python_version()}, this once: about two minutes, about 0.8 GB")
+    site = ["--system-site-packages"] if ros == "sourced" else []
+    run([sys.executable, "-m", "venv", "--clear", *site, str(venv)], root / ".venv.log", lock)
+    names = ["run"]
+    if ros == "sourced":
+        say(f"rclpy is that of the sourced ROS 2 {os.environ.get('ROS_DISTRO', '')}; installing the rest")
+    elif ros == "none":
+        say(f"ROS 2 wheels exist for x86_64, this is {platform.machine()}: nodes need a sourced ROS 2")
+    else:
+        say("no usable ROS 2 is sourced: ROS 2 Kilted is installed with the rest")
+        names.append("ros")
+    install(root, names, lock)
+    write(venv / "complete", f"{key}\n{ros}\n".encode())
+    say(".venv is complete")
+
+
+def add(root: Path, part: str, lock: int) -> None:
+    """Add a part and stamp it.
+
+    If it is interrupted while pip changes the environment, the next call makes all of it anew.
+    """
+    venv = owned(root)
+    say(f"adding {part} to .venv, this once: {PARTS[part]}")
+    complete, away = venv / "complete", venv / "complete.away"
+    complete.replace(away)
+    try:
+        install(root, [part], lock)
+    except BaseException:
+        if BEGUN not in (root / ".venv.log").read_text(encoding="utf-8"):
+            away.replace(complete)
+        raise
+    write(venv / f"complete-{part}", (root / "requirements" / f"{part}.lock").read_bytes())
+    away.replace(complete)
+
+
+def owned(root: Path) -> Path:
+    """Return root/.venv. Raises InstallError where it is a link: it belongs to another clone."""
     venv = root / ".venv"
     if venv.is_symlink():
         raise InstallError(f"{venv}: a link, made for another lock; expected a folder of its own, or none")
-    (venv / "complete").unlink(missing_ok=True)
-    say(f"making .venv with Python {platform.python_version()}, this once: about two minutes, about 1.6 GB")
-    site = ["--system-site-packages"] if ros == "sourced" else []
-    run([sys.executable, "-m", "venv", "--clear", *site, str(venv)], root / ".venv.log", lock)
-    locks = [root / "requirements.lock"]
-    if ros == "sourced":
-        say(f"rclpy is that of the sourced ROS 2 {os.environ.get('ROS_DISTRO', '')}; installing the rest")
-    else:
-        say("no usable ROS 2 is sourced: ROS 2 Kilted is installed with the rest")
-        locks.append(root / "requirements-ros.lock")
-    options = [option for path in locks for option in ("-r", str(path))]
-    run([str(venv / "bin" / "python"), *PIP_INSTALL, *options], root / ".venv.log", lock)
-    part = venv / "complete.part"
-    part.write_text(f"{key}\n{ros}\n", encoding="utf-8")
-    part.replace(venv / "complete")
-    say(".venv is complete")
+    return venv
+
+
+def install(root: Path, names: Sequence[str], lock: int) -> None:
+    """Install what some locks name. Raises InstallError."""
+    files = [option for name in names for option in ("-r", str(root / "requirements" / f"{name}.lock"))]
+    run([str(root / ".venv" / "bin" / "python"), *PIP_INSTALL, *files], root / ".venv.log", lock)
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a stamp at once."""
+    part = path.with_name(f"{path.name}.part")
+    part.write_bytes(content)
+    part.replace(path)
 
 
 def run(command: Sequence[str], log: Path, lock: int) -> None:
@@ -104,7 +184,10 @@ def run(command: Sequence[str], log: Path, lock: int) -> None:
 
 def clean(environment: Mapping[str, str]) -> dict[str, str]:
     """Return the environment without what would install elsewhere or look elsewhere for what is installed."""
-    drop = ("PYTHONPATH", "PYTHONHOME", "PIP_TARGET", "PIP_PREFIX", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
+    drop = (
+        "PYTHONPATH", "PYTHONHOME", "PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_NO_BINARY", "PIP_CONSTRAINT",
+        "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
+    )  # fmt: skip
     return {name: value for name, value in environment.items() if name not in drop} | {"PIP_USER": "0"}
 
 

@@ -53,7 +53,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 WAITING = (
-    "cli/test_demo", "nodes/", "hardware/test_faults", "cli/test_run_launch_topics", "test_package",
+    "cli/test_demo", "nodes/", "hardware/test_faults", "cli/test_run_launch_topics",
     "hardware/test_lost_torque", "hardware/test_protection", "hardware/test_port", "hardware/test_netft",
     "hardware/test_line", "cli/test_bench", "watch/test_server", "watch/test_page", "msg_adapters/test_ros",
     "cli/test_ctrl_c",

@@ -1,16 +1,17 @@
 """Expressions of columns: `0.12 * i_q - 0.4 * sign(omega)`, `derivative(phi)`, `column("tau [Nm]") * gain`.
 
-asteval evaluates them with a table of symbols that holds the columns and the functions below, nothing else.
-Before it sees a text, the syntax tree is held against a list: numbers, names, + - * / **, and calls of
-those functions. So attributes, subscripts, texts, comprehensions, lambdas and imports are never evaluated,
-numbers are doubles, and an expression takes SIZE passes over the samples at most (decision 0130).
+The syntax tree is held against a list (numbers, names, + - * / **, and calls of the functions below), and
+what is on the list is computed node by node. So attributes, subscripts, texts, comprehensions, lambdas and
+imports are never evaluated, numbers are doubles, and an expression takes at most SIZE passes over samples.
+Its values are real and finite, or holes of its columns, or it is refused (decision 0130).
 """
 
 from __future__ import annotations
 
 import ast
 import difflib
-from collections.abc import Callable, Mapping
+import operator
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +24,10 @@ LONGEST, SIZE = 1000, 200
 """Characters, and parts of the syntax tree."""
 COLUMN = "column"
 """`column("…")`: a column whose name is no plain word."""
-_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.UAdd, ast.USub)
+_OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: operator.pow, ast.UAdd: operator.pos, ast.USub: operator.neg,
+}  # fmt: skip
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, *_OPERATORS)
 
 PLAIN: Mapping[str, tuple[Callable[..., Any], int, str]] = {
@@ -63,29 +67,20 @@ class Expression:
 
         Raises ValueError for an expression that cannot be computed.
         """
-        from asteval import Interpreter
-
-        evaluator = Interpreter(minimal=True, use_numpy=False, symtable=self._symbols(columns, t))
-        tree = _Doubles().visit(ast.parse(self.text.strip(), mode="eval")).body
-        try:
-            with np.errstate(all="ignore"):
-                result = evaluator.run(tree, expr=self.text)
-                values = np.broadcast_to(np.asarray(result, np.float64), t.shape).copy()
-        except Exception as error:  # asteval may raise anything for an error in a function
-            raise ValueError(f"{quote(self.text)} cannot be computed: {_reason(error)}") from None
-        if np.isinf(values).any():
-            at = int(np.argmax(np.isinf(values)))
+        named = {name: np.asarray(columns[name], np.float64) for name in self.columns}
+        with np.errstate(all="ignore"):
+            try:
+                result = _value(ast.parse(self.text.strip(), mode="eval").body, named, t)
+                values: FloatArray = np.broadcast_to(result, t.shape).copy()
+            except (ValueError, IndexError) as error:  # of a function: too few samples, say
+                reason = brief(" ".join(str(error).split()))
+                raise ValueError(f"{quote(self.text)} cannot be computed: {reason}") from None
+        if (wrong := np.isinf(values)).any():
+            at = int(np.argmax(wrong))
             raise ValueError(
                 f"{quote(self.text)} is {values[at]} at sample {at + 1}, expected a finite number"
             )
-        return np.asarray(values, np.float64)
-
-    def _symbols(self, columns: Mapping[str, FloatArray], t: FloatArray) -> dict[str, Any]:
-        """Return all that the evaluator knows."""
-        timed = {name: _over(function, t) for name, (function, *_) in TIMED.items()}
-        plain = {name: function for name, (function, *_) in PLAIN.items()}
-        named = {name: columns[name] for name in self.columns}
-        return {**named, **plain, **timed, COLUMN: columns.__getitem__}
+        return values
 
 
 def parse(text: str) -> Expression:
@@ -123,7 +118,7 @@ def _column_name(node: ast.AST) -> ast.Constant | None:
 
 def _check(node: ast.AST, text: str, *, is_quoted: bool) -> None:
     """Raise ValueError for a part that is not on the list."""
-    if isinstance(node, ast.operator | ast.unaryop) and not isinstance(node, _OPERATORS):
+    if isinstance(node, ast.operator | ast.unaryop) and type(node) not in _OPERATORS:
         raise ValueError(f"has {type(node).__name__}, expected + - * / **")
     if not isinstance(node, _NODES):
         part = brief(ast.get_source_segment(text.strip(), node) or text)
@@ -149,23 +144,39 @@ def _check_call(node: ast.Call) -> None:
         raise ValueError(f"calls {name} with {len(node.args) + len(node.keywords)} values, expected {count}")
 
 
-class _Doubles(ast.NodeTransformer):
-    """Numbers as doubles: powers of integers may grow without end."""
+def _value(node: ast.AST, columns: Mapping[str, FloatArray], t: FloatArray) -> Any:
+    """Return what a node of a checked tree is: a double, or one a sample; NaN where a column has a hole.
 
-    def visit_Constant(self, node: ast.Constant) -> ast.Constant:
-        value = node.value
-        return ast.copy_location(ast.Constant(float(value) if isinstance(value, int) else value), node)
+    Raises ValueError where it is no real number.
+    """
+    if isinstance(node, ast.Constant):
+        return np.float64(node.value)  # type: ignore[arg-type]
+    if isinstance(node, ast.Name):
+        return columns[node.id]
+    if isinstance(node, ast.BinOp):
+        pair = _value(node.left, columns, t), _value(node.right, columns, t)
+        return _real(_OPERATORS[type(node.op)](*pair), pair)
+    if isinstance(node, ast.UnaryOp):
+        return _OPERATORS[type(node.op)](_value(node.operand, columns, t))
+    assert isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    if (text := _column_name(node)) is not None:
+        return columns[str(text.value)]
+    arguments = [_value(one, columns, t) for one in node.args]
+    if node.func.id in PLAIN:
+        result = PLAIN[node.func.id][0](*arguments)
+        return result if node.func.id == "unwrap" else _real(result, arguments)
+    return TIMED[node.func.id][0](np.broadcast_to(arguments[0], t.shape), t)
 
 
-def _over(function: Callable[[Any, FloatArray], Any], t: FloatArray) -> Callable[[Any], Any]:
-    return lambda x: function(np.broadcast_to(np.asarray(x, float), t.shape), t)
+def _real(result: Any, arguments: Sequence[Any]) -> Any:
+    """Return a result. Raises ValueError where it is NaN and its arguments are not."""
+    made = np.isnan(result)
+    for one in arguments:
+        made = made & ~np.isnan(one)
+    if np.any(made):
+        raise ValueError(f"no real number at sample {int(np.argmax(made)) + 1}")
+    return result
 
 
 def _integral(x: Any, t: FloatArray) -> Any:
     return np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(t))])
-
-
-def _reason(error: Exception) -> str:
-    """Return the last line of an error, without the values that asteval shows with it."""
-    lines = str(error).strip().splitlines() or [type(error).__name__]
-    return brief(lines[-1].strip() or type(error).__name__)

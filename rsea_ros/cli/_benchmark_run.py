@@ -7,6 +7,7 @@ import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from rsea_ros.cli._lines import say
@@ -47,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     refused = [line["error"] for line in lines if "error" in line]
     if refused:
         say(f"refused     {len(refused)} records, no effect named; the first: {refused[0]}", indent=12)
-    print(f"next        rsea benchmark score {args.dataset} {out}")
+    print(f"next        rsea benchmark score {quote(str(args.dataset))} {quote(str(out))}")
     return 0
 
 

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from shlex import quote
 from typing import TYPE_CHECKING, get_args
 
 from rsea_ros.cli._output import FOUND, add_fail_on
@@ -48,10 +49,8 @@ def add_work(parser: argparse.ArgumentParser) -> None:
     where = parser.add_argument_group("workers")
     where.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: cores)")
     where.add_argument("--memory", type=float, metavar="GB", help="of each worker (default: all, shared)")
-    where.add_argument("--serial", action="store_true", help="use this process only, without Dask")
+    where.add_argument("--serial", action="store_true", help="use this process only")
     where.add_argument("--scheduler", metavar="ADDRESS", help="use a running Dask cluster: tcp://HOST:PORT")
-    dashboard = "address of the Dask dashboard (default %(default)s; port 0: any)"
-    where.add_argument("--dashboard", default="127.0.0.1:0", metavar="HOST:PORT", help=dashboard)
     where.add_argument("--no-wait", action="store_true", help="refuse if another run writes to the store")
 
 
@@ -77,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"unreadable, left for the next run: {line}")
     for bag in summary.changed[:MOST_SHOWN]:
         print(f"changed while it was read, left for the next run: {bag}")
-    print(f"store: {args.out}; next: rsea fleet report {args.out} --out report")
+    print(f"store: {args.out}; next: rsea fleet report {quote(args.out)} --out report")
     return FOUND if set(summary.outcomes).intersection(args.fail_on) else 0
 
 
@@ -143,15 +142,16 @@ def executor(args: argparse.Namespace, memory: int | None) -> Iterator[Executor]
         with serial() as process:
             yield process
         return
-    from rsea_ros.fleet.cluster import on_scheduler, on_this_machine
-
     if args.scheduler:
+        from rsea_ros.fleet.cluster import on_scheduler
+
         with on_scheduler(args.scheduler) as scheduler:
             yield scheduler
         return
+    from rsea_ros.fleet.pool import on_this_machine
+
     assert memory is not None
-    with on_this_machine(_workers(args), memory, args.dashboard) as (workers, link):
-        print(f"dashboard: {link}", file=sys.stderr, flush=True)
+    with on_this_machine(_workers(args), memory) as workers:
         yield workers
 
 
@@ -168,13 +168,13 @@ def check_options(args: argparse.Namespace) -> None:
 
 
 def _workers(args: argparse.Namespace) -> int:
-    from rsea_ros.fleet.cluster import cores
+    from rsea_ros.fleet.pool import cores
 
     return args.workers or cores()
 
 
 def _memory(args: argparse.Namespace) -> int:
-    from rsea_ros.fleet.cluster import memory_for
+    from rsea_ros.fleet.pool import memory_for
 
     return int(args.memory * GIGA) if args.memory else memory_for(_workers(args))
 

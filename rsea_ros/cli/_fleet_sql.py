@@ -13,6 +13,7 @@ from typing import Any
 from rsea_ros.cli._columns import columns
 from rsea_ros.report.json_values import strict
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _WIDEST = 60
 """Largest width of a cell on a terminal, characters."""
 
@@ -39,11 +40,17 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(objects, indent=1, allow_nan=False, ensure_ascii=False))
     elif args.csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows([_text(value) for value in row] for row in rows)
+        writer.writerow(map(no_formula, names))
+        writer.writerows([no_formula(value) for value in row] for row in rows)
     else:
         print(columns([names, *([_cell(value) for value in row] for row in rows)]))
     return 0
+
+
+def no_formula(value: Any) -> str:
+    """Return a value in full; a text that a spreadsheet would run begins with an apostrophe."""
+    text = _text(value)
+    return f"'{text}" if isinstance(value, str) and text.startswith(_FORMULA) else text
 
 
 def _plain(value: Any) -> Any:

@@ -65,15 +65,18 @@ class Processes:
     def wait(self, node: str, timeout: float, progress: Callable[[float], None] = lambda share: None) -> None:
         """Wait until a node has ended, and report the last percentage that it logged.
 
-        Raises RseaError if it fails, if another one ends before it, and after `timeout` seconds.
+        Raises RseaError if it fails, if another one ends before it, and after `timeout` seconds without a
+        line of its log: beside other work it takes longer, and gets on.
         """
-        deadline = time.monotonic() + timeout
+        deadline, logged = time.monotonic() + timeout, 0
         while self._running[node].poll() is None:
             for other in [name for name, process in self._running.items() if process.poll() is not None]:
                 if other != node:
                     raise self._failure(other, "ended too early")
+            if (size := self.log(node).stat().st_size) != logged:
+                deadline, logged = time.monotonic() + timeout, size
             if time.monotonic() > deadline:
-                raise self._failure(node, f"did not end within {timeout:g} s")
+                raise self._failure(node, f"got no further for {timeout:g} s")
             progress(self._share(node))
             time.sleep(POLL)
         if self._running[node].returncode != 0:

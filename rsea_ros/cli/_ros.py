@@ -10,4 +10,4 @@ from rsea_ros.errors import RseaError
 def need_ros() -> None:
     """Raise RseaError if rclpy is missing."""
     if find_spec("rclpy") is None:
-        raise RseaError("rclpy is missing, expected ./rsea in a clone, or a sourced ROS 2")
+        raise RseaError("rclpy is missing, expected a sourced ROS 2, or ./rsea in a clone on x86_64")

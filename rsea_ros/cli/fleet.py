@@ -12,7 +12,7 @@ from rsea_ros.fleet.extra import need_extra
 HELP = "process bags of many joints: store (run), reports (report), alarms (watch), queries (sql)"
 EXAMPLE = "rsea fleet run recordings --map joints.yaml --out store && rsea fleet report store --out report"
 ACTIONS: Mapping[str, Action] = {
-    "run": Action("process new recordings, with Dask", _fleet_run.add_run, _fleet_run.run),
+    "run": Action("process new recordings, on all cores or a cluster", _fleet_run.add_run, _fleet_run.run),
     "report": Action(
         "write pages of the fleet and of each joint", _fleet_report.add_report, _fleet_report.run
     ),

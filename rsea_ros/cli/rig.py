@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._lines import say
@@ -44,7 +45,7 @@ def _new(args: argparse.Namespace) -> int:
     check_free([out], force=args.force)
     write_text(out, template.read_text(encoding="utf-8").replace("NAME", args.name), force=args.force)
     load_rig(out)
-    print(f"{out}: fill in the values, then: rsea rig check {out}")
+    print(f"{out}: fill in the values, then: rsea rig check {quote(str(out))}")
     return 0
 
 

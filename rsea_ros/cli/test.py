@@ -32,7 +32,9 @@ def run(args: argparse.Namespace) -> int:
     if not (root / "test" / "conftest.py").is_file():
         raise RseaError(f"{root}: no tests here, expected the repository: run ./rsea test in a clone")
     workers = ["-n", "2", "--dist", "loadfile"] if (os.cpu_count() or 1) > 1 else []
-    pytest = subprocess.Popen([sys.executable, "-m", "pytest", "-q", *workers, *args.pass_on], cwd=root)
+    environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    command = [sys.executable, "-m", "pytest", "-q", *workers, *args.pass_on]
+    pytest = subprocess.Popen(command, cwd=root, env=environment)
     stopped: KeyboardInterrupt | None = None
     while True:
         try:

@@ -24,6 +24,7 @@ from xml.etree import ElementTree as xml
 
 from rsea_ros.design.mesh import Mesh, mesh_of
 from rsea_ros.documents.units import STANDARD_GRAVITY
+from rsea_ros.documents.wording import printable
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia
 from rsea_ros.model.rig import Rig
@@ -52,7 +53,7 @@ def mjcf(rig: Rig) -> str:
 def text(root: xml.Element) -> str:
     """Return a model as the text of its file."""
     xml.indent(root)
-    return xml.tostring(root, encoding="unicode") + "\n"
+    return printable(xml.tostring(root, encoding="unicode")) + "\n"
 
 
 def model_element(rig: Rig, play: float = 0.0) -> xml.Element:

@@ -6,7 +6,9 @@ import difflib
 import re
 from collections.abc import Iterable, Sequence
 
-_CONTROLS = r"[\x00-\x08\x0b-\x1a\x1c-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+_CONTROLS = (
+    r"[\x00-\x08\x0b-\x1a\x1c-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+)
 _COLOUR = r"\x1b(?!\[[\d;]*m)"
 _PLAIN, _COLOURED = re.compile(f"{_CONTROLS}|\x1b"), re.compile(f"{_CONTROLS}|{_COLOUR}")
 _LONGEST = 60
@@ -38,6 +40,11 @@ def printable(text: str, *, colours: bool = False) -> str:
     """
     pattern = _COLOURED if colours else _PLAIN
     return pattern.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+
+
+def in_docstring(text: str) -> str:
+    """Return text of unknown origin as a part of a Python docstring, which it cannot end."""
+    return " ".join(printable(text).split("\n")).replace("\\", "\\\\").replace('"', '\\"')
 
 
 def quote(value: object, longest: int = 60) -> str:

@@ -155,7 +155,11 @@ def _unit_of_output(name: str) -> str:
     return {"position": "rad", "velocity": "rad/s", "deflection": "rad"}.get(name, "N m")
 
 
+_LONGEST = 60
+"""Characters of a rig's name in that of its model, which is that of a file too."""
+
+
 def identifier(name: str) -> str:
     """Return a name as FMI wants that of a model: letters, digits and underscores, a letter first."""
-    plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
+    plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name[:_LONGEST])
     return plain if plain[:1].isalpha() else f"rig_{plain}"

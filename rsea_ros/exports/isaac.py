@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from rsea_ros.documents.wording import in_docstring
 from rsea_ros.exports.others import finite_sizes, omitted_effects, omitted_parts, without_null_effects
 from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.equations import gear_inertia
@@ -103,8 +104,8 @@ def _file(
     omitted: list[Omitted],
 ) -> str:
     """Return the Python file."""
-    lines = [f'"""Actuator of {_plain(rig.name)}, written by rsea export --isaac.', ""]
-    lines += [_plain(line) for line in coverage_lines(represented, omitted)]
+    lines = [f'"""Actuator of {in_docstring(rig.name)}, written by rsea export --isaac.', ""]
+    lines += [in_docstring(line) for line in coverage_lines(represented, omitted)]
     lines += ['"""', "", f"from isaaclab.actuators import {kind}", ""]
     if kind == "DelayedPDActuatorCfg":
         step = f"PHYSICS_STEP = {PHYSICS_STEP!r}  # s, of your SimulationCfg"
@@ -114,8 +115,3 @@ def _file(
     if kind == "DelayedPDActuatorCfg":
         lines += [f"    {end}_delay=round(DELAY / PHYSICS_STEP)," for end in ("min", "max")]
     return "\n".join([*lines, ")", ""])
-
-
-def _plain(text: str) -> str:
-    """Return text that cannot end the docstring around it."""
-    return text.replace("\\", "/").replace('"', "'")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree as xml
 
+from rsea_ros.documents.wording import printable
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import Chain, Joint, Link, chain_of
 from rsea_ros.exports.others import finite_sizes, without_null_effects
@@ -134,4 +135,4 @@ def _comment(represented: tuple[Represented, ...], omitted: tuple[Omitted, ...])
 
 def _text(root: xml.Element) -> str:
     xml.indent(root)
-    return '<?xml version="1.0"?>\n' + xml.tostring(root, encoding="unicode") + "\n"
+    return '<?xml version="1.0"?>\n' + printable(xml.tostring(root, encoding="unicode")) + "\n"

@@ -1,4 +1,4 @@
-"""The interface of executors: tasks run in this process, one after another, or on Dask's workers."""
+"""The interface of executors: tasks run in this process, on workers, or on a Dask cluster."""
 
 from __future__ import annotations
 

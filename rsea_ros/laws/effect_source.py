@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from rsea_ros.documents.wording import in_docstring
 from rsea_ros.effects.effect import Claims
 from rsea_ros.laws.law import (
     READS,
@@ -191,7 +192,7 @@ def source_of(law: Law, claims: Claims, provenance: LawProvenance) -> str:
 def _docstring(law: Law, provenance: LawProvenance) -> str:
     kind = "A learnt law, no cause: a curve through data" if law.is_learnt else "A law that was found in data"
     seen = "; ".join(f"{_LETTERS[n]}: up to {v:.3g}" for n, v in law.ranges.items() if n in letters_of(law))
-    bags = "\n".join(f"    {name}  sha256 {digest}" for name, digest in provenance.bags.items())
+    bags = "\n".join(f"    {in_docstring(name)}  sha256 {digest}" for name, digest in provenance.bags.items())
     kept = "its last value" if law.is_learnt else f"the value at {FARTHER:g} times that range"
     limited = law.is_learnt or any(is_limited(law, n) for n in letters_of(law))
     beyond = f" Beyond it the law keeps {kept}." if limited else ""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.result import Identification, Overlay
@@ -20,14 +21,13 @@ if TYPE_CHECKING:
 def fit_figure(result: Identification, response: int) -> Figure:
     """Return the Bode figure of a response, or measured and simulated channels if there is no response.
 
-    Raises ParameterError for a response that the identification does not have.
+    Raises ParameterError for a response that the identification does not have, and without plotly.
     """
     if not result.responses:
         return overlay_figure(result.overlays)
     if not 0 <= response < len(result.responses):
         raise ParameterError(f"response = {response}, expected 0 to {len(result.responses) - 1}")
-    from plotly.graph_objects import Figure
-
+    Figure = _plotly("graph_objects").Figure
     drawn = bode_figure(result.responses[response], result.models[response])
     return Figure(
         data=list(drawn.data), layout={**drawn.layout, "height": drawn.height, "title": drawn.title}
@@ -36,9 +36,7 @@ def fit_figure(result: Identification, response: int) -> Figure:
 
 def overlay_figure(before: Sequence[Overlay], after: Sequence[Overlay] = ()) -> Figure:
     """Return each channel as measured and as simulated, one above the other; after: the extended model."""
-    from plotly.subplots import make_subplots
-
-    figure = make_subplots(rows=len(before), cols=1, shared_xaxes=True)
+    figure = _plotly("subplots").make_subplots(rows=len(before), cols=1, shared_xaxes=True)
     for row, overlay in enumerate(before, start=1):
         later = next((o for o in after if o.channel == overlay.channel), None)
         curves = [
@@ -61,3 +59,11 @@ def overlay_figure(before: Sequence[Overlay], after: Sequence[Overlay] = ()) -> 
         figure.update_yaxes(title_text=f"{words.channel(overlay.channel)}, {unit}", row=row, col=1)
     figure.update_xaxes(title_text="s", row=len(before), col=1)
     return figure
+
+
+def _plotly(part: str) -> Any:
+    """Return a module of plotly. Raises ParameterError where it is not installed: reports do not need it."""
+    try:
+        return import_module(f"plotly.{part}")
+    except ImportError:
+        raise ParameterError("plot() needs the package plotly: pip install plotly") from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -114,9 +115,10 @@ class HealthNode:
 
     def _command(self, path: Path) -> str:
         name = self._node.get_namespace()
-        elsewhere = f" --namespace {name}" if name != f"/{NAMESPACE}" else ""
-        axis = f" --axis={self._axis}" if self._axis != AXIS.default else ""
-        return f"rsea diagnose {path / 'after'} --rig {self._rig_name}{elsewhere}{axis}"
+        elsewhere = ["--namespace", name] if name != f"/{NAMESPACE}" else []
+        axis = [f"--axis={self._axis}"] if self._axis != AXIS.default else []
+        rig = ["--rig", self._rig_name]
+        return shlex.join(["rsea", "diagnose", str(path / "after"), *rig, *elsewhere, *axis])
 
     def _report(self) -> NodeHealth:
         monitor, inputs = self._monitor, self._inputs

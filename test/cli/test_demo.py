@@ -104,6 +104,28 @@ def test_a_node_that_fails_while_another_is_awaited_is_named_too(tmp_path):
     assert not _left_running(tmp_path)
 
 
+def test_the_limit_of_a_node_counts_from_its_last_line(tmp_path, monkeypatch):
+    """It counted from the start: beside other work a demo that got on was ended at 85 %."""
+    now, is_stuck = [0.0], False
+    nodes = Processes(tmp_path, DOMAIN)
+    poll = lambda: 0 if now[0] > 40.0 else None  # noqa: E731
+    nodes._running["replay"] = SimpleNamespace(poll=poll, returncode=0)
+
+    def sleep(_):
+        now[0] += 8.0
+        with nodes.log("replay").open("a") as log:
+            log.write("" if is_stuck else f"{now[0]:.0f}%\n")
+
+    stand_in = SimpleNamespace(monotonic=lambda: now[0], sleep=sleep)
+    monkeypatch.setattr("rsea_ros.cli._processes.time", stand_in)
+    nodes.log("replay").touch()
+    nodes.wait("replay", 10.0)
+    is_stuck = True
+    nodes._running["replay"] = SimpleNamespace(poll=lambda: None)
+    with pytest.raises(RseaError, match=r"replay got no further for 10 s: 4.%"):
+        nodes.wait("replay", 10.0)
+
+
 def test_a_used_directory_is_refused(tmp_path):
     (tmp_path / "demo" / "bag").mkdir(parents=True)
     process = _demo(tmp_path / "demo")

@@ -17,7 +17,7 @@ from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.design.map import LeastStiffness, feasible_map
-from rsea_ros.report.design.surface import Point, bandwidth_surface
+from rsea_ros.report.design.surface import Point, bandwidth_contours
 from rsea_ros.report.design.tables import (
     checks_table,
     margins_table,
@@ -48,7 +48,7 @@ def design_report(
         checks_table(designs),
         trains_table(by_train(asked.requirement, asked.unit, asked.stiffness), asked),
         _map(designs),
-        bandwidth_surface(*_surface(designs)),
+        bandwidth_contours(*_surface(designs)),
         _open_loop(designs),
         springs_table(designs),
         margins_table(asked if robust is None else robust),
@@ -157,13 +157,13 @@ def _map_title(d: SpringDesign) -> str:
 
 
 def _surface(designs: Sequence[SpringDesign]) -> tuple[str, list[Point], str]:
-    d, side = designs[0], "middle right"  # away from the marks of the axis, one name above the other
+    d = designs[0]
     points = [
-        Point(f"{d.stiffness:.0f} N·m/rad, chassis", d.stiffness, d.requirement.inertia, AFTER, 240.0, side),
-        Point("the same with the rotor's spin", d.stiffness, d.inner, BEFORE, 160.0, side),
+        Point(f"{d.stiffness:.0f} N·m/rad, chassis", d.stiffness, d.requirement.inertia, AFTER),
+        Point("the same with the rotor's spin", d.stiffness, d.inner, BEFORE, "bottom center"),
     ]
-    title = "Bandwidth by Eq. (7) over stiffness and inertia (Fig. 9): drag to turn"
-    return title, points, "Both horizontal axes are logarithmic; lines of equal bandwidth every 20 Hz."
+    title = "Bandwidth by Eq. (7) over stiffness and inertia (Fig. 9)"
+    return title, points, "Both axes are logarithmic; lines of equal bandwidth every 20 Hz."
 
 
 def _open_loop(designs: Sequence[SpringDesign]) -> Figure:

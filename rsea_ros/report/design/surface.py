@@ -1,4 +1,4 @@
-"""Fig. 9: bandwidth over stiffness and inertia, Eq. (7), as a surface to turn and as its two views."""
+"""Fig. 9: bandwidth over stiffness and inertia, Eq. (7), as contours and as the surface's two views."""
 
 from __future__ import annotations
 
@@ -10,77 +10,58 @@ import numpy as np
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, numbers
-from rsea_ros.report.figures.palette import INK, QUIET, faint
+from rsea_ros.report.figures.palette import INK, faint
 
 _SHADES = [[0.0, "#eef3f8"], [0.5, "#7fa8cf"], [1.0, "#123f6d"]]
 
 
 @dataclass(frozen=True)
 class Point:
-    """An actuator. stiffness: K_s, N m/rad. inertia: between its ends, kg m^2, of either sign. pole: of its
-    name, Hz. side: of the name at its pole. A negative inertia stands at its magnitude, above the surface."""
+    """An actuator. stiffness: K_s, N m/rad. inertia: between its ends, kg m^2, of either sign; a negative one
+    stands at its magnitude. side: where its name stands."""
 
     name: str
     stiffness: float
     inertia: float
     colour: str
-    pole: float = 60.0
     side: str = "top center"
 
 
-def bandwidth_surface(title: str, points: Sequence[Point], caption: str = "") -> Figure:
-    """Return the surface of Eq. (7) with actuators on it; drag turns it."""
+def bandwidth_contours(title: str, points: Sequence[Point], caption: str = "") -> Figure:
+    """Return lines of equal bandwidth by Eq. (7) with actuators among them."""
     k, j = _grid(points)
-    surface: Json = {
-        "type": "surface",
+    contours: Json = {
+        "type": "contour",
         "x": numbers(k),
         "y": numbers(1e3 * j),
         "z": [numbers(row) for row in undamped_band(k[None, :], j[:, None])],
         "colorscale": _SHADES,
         "showscale": False,
-        "opacity": 0.92,
-        "contours": {"z": {"show": True, "start": 10, "end": 400, "size": 20, "color": faint(INK, 0.35)}},
+        "contours": {"start": 20, "end": 400, "size": 20, "showlabels": True},
+        "line": {"color": faint(INK, 0.35)},
         "hovertemplate": "K_s %{x:.0f} N·m/rad<br>inertia %{y:.2f} g·m²<br>%{z:.1f} Hz<extra></extra>",
     }
-    return Figure(title, caption, [surface, *(_flag(p) for p in points)], _scene(), 560)
+    plane = layout(
+        xaxis=axis("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
+        yaxis=axis("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
+        hovermode="closest",
+    )
+    return Figure(title, caption, [contours, *(_named(p) for p in points)], plane, 480)
 
 
-def _flag(p: Point) -> Json:
-    """Return a point of the surface with its name on a pole: text in the surface would be cut by it."""
+def _named(p: Point) -> Json:
     z = float(undamped_band(p.stiffness, p.inertia))
     return {
-        "type": "scatter3d",
-        "mode": "lines+markers+text",
-        "x": [p.stiffness] * 2,
-        "y": [1e3 * abs(p.inertia)] * 2,
-        "z": [z, z + p.pole],
-        "text": ["", f"<b>{p.name.replace(', n', ',<br>n')}</b>"],
+        "type": "scatter",
+        "mode": "markers+text",
+        "x": [p.stiffness],
+        "y": [1e3 * abs(p.inertia)],
+        "text": [f"<b>{p.name.replace(', n', ',<br>n')}</b>"],
         "textposition": p.side,
-        "textfont": {"size": 12, "color": p.colour},
-        "line": {"color": p.colour, "width": 3},
-        "marker": {"size": [6, 0.1], "color": p.colour},
+        "textfont": {"size": 12, "color": INK},
+        "marker": {"size": 9, "color": p.colour, "line": {"color": "#ffffff", "width": 1}},
         "hovertemplate": f"{p.name}: {z:.1f} Hz<extra></extra>",
     }
-
-
-def _scene() -> Json:
-    small = {"size": 11, "color": QUIET}
-    plain = {"gridcolor": "#dfe4e8", "backgroundcolor": "rgba(0,0,0,0)", "tickfont": small}
-
-    def axis(text: str, **parts: object) -> Json:
-        return {**plain, "title": {"text": text, "font": {"size": 12, "color": QUIET}}, **parts}
-
-    return layout(
-        scene={
-            "xaxis": axis("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
-            "yaxis": axis("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
-            "zaxis": axis("bandwidth, Hz"),
-            "camera": {"eye": {"x": -1.36, "y": -1.42, "z": 0.68}, "center": {"x": 0, "y": 0, "z": -0.2}},
-            "aspectratio": {"x": 1.25, "y": 1.25, "z": 0.85},
-        },
-        hovermode="closest",
-        margin={"l": 0, "r": 0, "t": 0, "b": 0},
-    )
 
 
 def slices(title: str, points: Sequence[Point], caption: str = "") -> Figure:

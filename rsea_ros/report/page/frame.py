@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.json_values import strict
-from rsea_ros.report.page.bundle import plotly_for
+from rsea_ros.report.page.bundle import packed_plotly
 from rsea_ros.report.page.html import section
 
 _FOLDER = Path(__file__).parent
@@ -23,8 +23,7 @@ Block = Figure | str
 def page(title: str, kicker: str, blocks: Sequence[Block], footer: Sequence[str]) -> str:
     """Return the document. title: the verdict in a sentence. kicker: the subject, above the title."""
     body, contents = _number_sections("\n".join(_block(block, i) for i, block in enumerate(blocks)))
-    figures = [block for block in blocks if isinstance(block, Figure)]
-    plotly = plotly_for(figures) if figures else ""
+    plotly = packed_plotly() if any(isinstance(block, Figure) for block in blocks) else ""
     foot = "".join(f"<p>{escape(line)}</p>" for line in footer)
     return f"""<!doctype html>
 <html lang="en">
@@ -57,7 +56,7 @@ def _number_sections(body: str) -> tuple[str, str]:
         titles.append(unescape(re.sub("<[^>]*>", "", match[3])))
         return f'<section id="part-{len(titles)}"{match[1]}>{match[2] or ""}<h2>{match[3]}</h2>'
 
-    numbered = re.sub(r"<section([^>]*)>(<details><summary>)?<h2>(.*?)</h2>", name, body)
+    numbered = re.sub(r"<section([^>]*)>(<details><summary>)?<h2>(.*?)</h2>", name, body, flags=re.S)
     items = "".join(f'<li><a href="#part-{i}">{escape(t)}</a></li>' for i, t in enumerate(titles, 1))
     contents = f"<nav><details><summary>Contents</summary><ol>{items}</ol></details></nav>" if items else ""
     return numbered, contents
@@ -69,7 +68,7 @@ def _block(block: Block, index: int) -> str:
     name = f"figure-{index}"
     values = json.dumps(
         strict(asdict(block)), allow_nan=False, ensure_ascii=False, separators=(",", ":")
-    ).replace("</", "<\\/")
+    ).replace("<", "\\u003c")
     drawing = (
         f'<div class="figure" id="{name}" style="height:{block.height}px" role="img" '
         f'aria-label="{escape(block.title)}"></div>'

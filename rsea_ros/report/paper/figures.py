@@ -12,7 +12,6 @@ from rsea_ros.model.bandwidth import end_to_end, inner_inertia, pure_torque_band
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.train import Train
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
@@ -20,7 +19,7 @@ from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
 from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.design.surface import Point, bandwidth_surface, slices
+from rsea_ros.report.design.surface import Point, bandwidth_contours, slices
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
 from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
@@ -30,7 +29,7 @@ _HZ: FloatArray = np.geomspace(0.1, 140.0, 500)
 
 
 def figure_9() -> list[Figure]:
-    """Return the surface of Eq. (7) and its two views, with the paper's two actuators."""
+    """Return the contours of Eq. (7) and its surface's two views, with the paper's two actuators."""
     points = []
     for name, rig_name, colour in (
         ("platform", "paper_high_impedance", AFTER),
@@ -39,14 +38,14 @@ def figure_9() -> list[Figure]:
         rig = load_rig(rig_name)
         k_s = rig["spring.stiffness"]
         points.append(Point(name, k_s, rig["chassis.inertia"], colour, side="middle right"))
-        for train, pole in _senses(rig):
+        for train in (rig.train,) if rig.train == "planetary" else PROTOTYPE_TRAINS:
             turned = replace(rig, train=train)
             sign = "" if rig.train == "planetary" else f", n = {words.signed_text(train_ratio(turned), 0)}"
             inner = inner_inertia(turned)
-            points.append(Point(f"{name}, with spin{sign}", k_s, inner, BEFORE, pole, "middle left"))
-    whole = bandwidth_surface(
+            points.append(Point(f"{name}, with spin{sign}", k_s, inner, BEFORE, "middle left"))
+    whole = bandwidth_contours(
         "Fig. 9 (a): bandwidth over stiffness and inertia, Eq. (7)", points,
-        "Drag to turn. Points: what the paper has (blue, green), and with the rotor's spin (orange). A "
+        "Points: what the paper has (blue, green), and with the rotor's spin (orange). A "
         "negative n J_r + J_sc stands at its magnitude: T_d/T_p falls to −3 dB there.")  # fmt: skip
     views = slices(
         "Fig. 9 (b), (c): ten times the stiffness or a tenth of the inertia are worth √10 = 3.2 in "
@@ -54,12 +53,6 @@ def figure_9() -> list[Figure]:
         "The paper prints no number on this figure. On logarithmic axes the surface is a plane.")  # fmt: skip
     return [whole, views]
 
-
-def _senses(rig: Rig) -> list[tuple[Train, float]]:
-    """Return the trains that an actuator of the paper may have, and the pole of each one's name, Hz."""
-    if rig.train == "planetary":
-        return [(rig.train, 110.0)]
-    return list(zip(PROTOTYPE_TRAINS, (155.0, 95.0), strict=True))
 
 
 def figure_15(measured: FrequencyResponse) -> Figure:

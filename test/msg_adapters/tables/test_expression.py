@@ -67,11 +67,14 @@ def test_text_that_is_not_arithmetic_is_refused_before_it_is_evaluated(text):
 
 
 @pytest.mark.parametrize(
-    "text", ["a * 9**9**9", "9999**9999**9999 * a", "a / 0", "exp(exp(exp(10 * a + 9)))", "a ** 20000"]
-)
-def test_endless_powers_are_computed_as_doubles(text):
+    "text",
+    ["a * 9**9**9", "9999**9999**9999 * a", "1 / a", "exp(exp(exp(10 * a + 9)))", "(a + 2) ** 20000",
+     "(-8)**(1/3) * b", "sqrt(b - 2)", "log(-1 - a)", "0 * (1 / a)"],
+)  # fmt: skip
+def test_what_is_no_real_finite_number_is_refused(text):
+    """An imaginary part was dropped in silence, and an overflow gave a bare exception name."""
     began = time.process_time()
-    with pytest.raises(ValueError, match=r"cannot be computed|expected a finite number"):
+    with pytest.raises(ValueError, match=r"(no real number|is -?inf) at sample \d+"):
         value(text)
     assert time.process_time() - began < 1.0
 

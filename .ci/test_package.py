@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 import rclpy
@@ -87,6 +88,14 @@ def files(top: Path, pattern: str) -> set[str]:
     """Return the files under a directory, relative to it."""
     packaged = (path for path in top.rglob(pattern) if path.is_file() and path.suffix != ".pyc")
     return {str(path.relative_to(top)) for path in packaged}
+
+
+def test_what_package_xml_asks_for_has_a_rosdep_key():
+    """python3-threadpoolctl has none, so README's line for a colcon workspace ended in an error."""
+    keys = set((ROOT / ".ci" / "rosdep-keys.txt").read_text().split("\n"))
+    manifest = ElementTree.parse(ROOT / "package.xml").getroot()
+    asked = {one.text for one in manifest if one.tag.endswith("depend")}
+    assert "rclpy" in asked and not asked - keys
 
 
 def test_rsea_is_a_command_of_the_sourced_workspace(workspace):
