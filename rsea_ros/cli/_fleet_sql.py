@@ -11,7 +11,7 @@ from datetime import date, datetime
 from typing import Any
 
 from rsea_ros.cli._columns import columns
-from rsea_ros.report.json_values import strict
+from rsea_ros.report.result_files import strict
 
 _WIDEST = 60
 """Largest width of a cell on a terminal, characters."""

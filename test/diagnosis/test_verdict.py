@@ -12,7 +12,7 @@ from rsea_ros.diagnosis.criteria import verdict_of
 from rsea_ros.diagnosis.naming.conclusion import main_channel
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.report.diagnosis.sentences import verdict_sentence
+from rsea_ros.report.identification.words import verdict_sentence
 
 FLOOR = DEFAULT.floor.reached
 RATIOS = st.fixed_dictionaries({n: st.floats(0.3, 300.0) for n in ("ft", "position", "motor_torque")})

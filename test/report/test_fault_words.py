@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rsea_ros.records.record import Fault
-from rsea_ros.report.diagnosis.sentences import verdict_sentence
-from rsea_ros.report.fault_words import fault_lines, faults
+from rsea_ros.report.identification.words import verdict_sentence
+from rsea_ros.report.remark_words import fault_lines, faults
 
 DISORDER = [
     Fault("out_of_order", name, 0.05, "first at 0.4 s, sorted", 84, "samples")

@@ -83,10 +83,10 @@ def estimate(estimate: CauseParameter) -> tuple[str, str, str]:
     return value, doubt, prefix + words.unit(estimate.unit)
 
 
-def model_half_width(estimate: CauseParameter) -> tuple[str, str]:
-    """Return the half-width of the simulation's own error at 95 % and its unit: ("0.0147", "N·m")."""
+def model_half_width(estimate: CauseParameter) -> str:
+    """Return the half-width of the simulation's own error at 95 % with its unit: `0.0147 N·m`."""
     factor, prefix = _prefix(estimate)
-    return words.number(Z95 * estimate.model_sd * factor, 2), prefix + words.unit(estimate.unit)
+    return f"{words.number(Z95 * estimate.model_sd * factor, 2)} {prefix}{words.unit(estimate.unit)}".rstrip()
 
 
 def _prefix(estimate: CauseParameter) -> tuple[float, str]:

@@ -10,12 +10,9 @@ from rsea_ros.diagnosis.result import CauseParameter, Diagnosis, Experiment, Mis
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
-from rsea_ros.report.diagnosis.causes import fitted_rivals
-from rsea_ros.report.diagnosis.sentences import next_run
-from rsea_ros.report.diagnosis.status_line import status_line
-from rsea_ros.report.fault_words import fault_lines
-from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.report.rig.words import command, rig_named, right_rig, split_off_rig
+from rsea_ros.report.diagnosis.page import fitted_rivals
+from rsea_ros.report.remark_words import fault_lines, remark_sentences
+from rsea_ros.report.rig import command, rig_named, right_rig, split_off_rig
 from rsea_ros.report.wrapped_lines import LABEL, WIDTH, command_row, row, wrap
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
@@ -51,7 +48,7 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in num.sizes(cause).items())}"
         gain, interval = num.percent(cause.gain_holdout), num.percent_range(cause.gain_holdout_ci95)
         yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
-        yield "status", status_line(cause, d.alternatives, d.at_noise_floor)
+        yield "status", say.status_line(cause, d.alternatives, d.at_noise_floor)
     if d.misfit and d.verdict != "nothing_wrong":
         yield "wrong at", "; ".join(say.misfit(m) for m in _worst(d))
     for rival in fitted_rivals(d)[:_MOST]:
@@ -68,7 +65,7 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
 
 def _next(experiment: Experiment) -> str:
     settings = say.excitation(experiment.excitation)
-    return f"{say.prose(next_run(experiment))}{f': {settings}' if settings else ''}"
+    return f"{say.prose(say.next_run(experiment))}{f': {settings}' if settings else ''}"
 
 
 def _size(name: str, parameter: CauseParameter) -> str:

@@ -41,9 +41,7 @@ def residual_figure(
     caption: str = "",
 ) -> Figure:
     """Return the densities of residuals over frequency, Hz. noise: density of the noise floor."""
-    unit = words.unit(UNITS[channel])
-    floor = np.full(2, noise)
-    ends = np.array([frequency[0], frequency[-1]])
+    unit, floor, ends = words.unit(UNITS[channel]), np.full(2, noise), frequency[[0, -1]]
     drawn = [(c, *in_bands(frequency, c.density)) for c in curves]
     data: list[Json] = [line(ends, floor, "noise floor", NOISE, 6.0, hoverinfo="skip")]
     data += [line(f, d, c.name, c.colour, 1.8, hovertemplate=f"%{{y:.3g}} {unit}/√Hz") for c, f, d in drawn]
@@ -51,18 +49,10 @@ def residual_figure(
     top = max(range(len(drawn)), key=lambda i: float(drawn[i][2].max()))
     items = [(f"<b>{c.name}</b>", c.colour, float(d[-1])) for i, (c, _, d) in enumerate(drawn) if i != top]
     names = _apart([*items, ("noise floor", QUIET, noise)], gap=_LABEL * (reach[1] - reach[0]))
-    names.append(_at_peak(*drawn[top]))
-    return Figure(
-        title=title,
-        caption=caption,
-        data=data,
-        layout=layout(
-            xaxis=frequency_axis(frequency[0], frequency[-1]),
-            yaxis=axis(f"density, {unit}/√Hz", type="log", dtick=1, exponentformat="power", range=reach),
-            annotations=names,
-        ),
-        height=380,
-    )
+    density = axis(f"density, {unit}/√Hz", type="log", dtick=1, exponentformat="power", range=reach)
+    across = frequency_axis(frequency[0], frequency[-1])
+    drawing = layout(xaxis=across, yaxis=density, annotations=[*names, _at_peak(*drawn[top])])
+    return Figure(title, caption, data, drawing, 380)
 
 
 def density(residual: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
@@ -126,9 +116,8 @@ def _at_peak(curve: SpectrumLine, frequency: FloatArray, values: FloatArray) -> 
 def _apart(items: Sequence[tuple[str, str, float]], gap: float) -> list[Json]:
     """Return labels at the right end of curves, moved apart where they would overlap."""
     placed: list[Json] = []
-    order = sorted(items, key=lambda item: item[2])
     lowest = -np.inf
-    for text, colour, value in order:
+    for text, colour, value in sorted(items, key=lambda item: item[2]):
         height = max(_exponent(value), lowest)
         lowest = height + gap
         placed.append(label(text, 1.01, height, colour, xref="paper", yref="y"))

@@ -7,7 +7,7 @@ from typing import get_args
 import pytest
 
 from rsea_ros.diagnosis.result import Experiment, ExperimentReason
-from rsea_ros.report.diagnosis.sentences import next_run
+from rsea_ros.report.diagnosis.words import next_run
 
 RUN = {"kind": "multisine"}
 SAID = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rsea_ros.diagnosis.result import Alternative, Cause, CauseParameter
-from rsea_ros.report.diagnosis.json import diagnosis_json
+from rsea_ros.report.diagnosis.files import diagnosis_json
 from rsea_ros.report.diagnosis.page import diagnosis_report
-from rsea_ros.report.diagnosis.status_line import status_line
+from rsea_ros.report.diagnosis.words import status_line
 
 DELAY = Cause(
     "command_delay",

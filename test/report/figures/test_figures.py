@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification.result import Identification
-from rsea_ros.report.figures.bode import bode_figure
+from rsea_ros.report.figures.bode import bode_figure, thin
 from rsea_ros.report.figures.figure import Figure, line
 from rsea_ros.report.figures.overlay import (
     MOST_SAMPLES,
@@ -21,7 +21,6 @@ from rsea_ros.report.figures.overlay import (
 )
 from rsea_ros.report.figures.palette import AFTER, BEFORE
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
-from rsea_ros.report.figures.thinned import thin
 
 
 def as_json(figure: Figure) -> str:

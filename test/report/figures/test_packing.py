@@ -6,7 +6,7 @@ import gzip
 import numpy as np
 import pytest
 
-from rsea_ros.report.figures.packing import pack
+from rsea_ros.report.figures.overlay import pack
 
 
 def unpack(values):

@@ -16,8 +16,7 @@ from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report import words
 from rsea_ros.report.identification import files as results
-from rsea_ros.report.identification.json import identification_json
-from rsea_ros.report.identification.terminal import terminal_table
+from rsea_ros.report.identification.words import identification_json, terminal_table
 
 
 def test_all_files_are_written_and_none_is_partial(identification: Identification, tmp_path: Path) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification.result import ParameterEstimate
-from rsea_ros.report.identification.parameters import parameter_table, value_text
+from rsea_ros.report.identification.page import parameter_table
+from rsea_ros.report.identification.words import value_text
 
 
 def estimate(

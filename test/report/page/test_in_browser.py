@@ -7,13 +7,12 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from rsea_ros.report.page.html_table import table_of_cells
 
 from rsea_ros.report.diagnosis.sketch import sketch, upright_sketch
 from rsea_ros.report.figures.figure import Figure, axis, label, layout, line
 from rsea_ros.report.figures.palette import BEFORE, INK
-from rsea_ros.report.page.frame import page
-from rsea_ros.report.page.html import equation
-from rsea_ros.report.page.html_table import table, table_of_cells
+from rsea_ros.report.page import equation, page, table
 from test.watch.browser import Browser
 
 CAUSE = ["ft_gain_error"]

@@ -8,17 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rsea_ros.report.json_values import with_provenance
 
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.result import Identification
 from rsea_ros.report.diagnosis.page import diagnosis_report
 from rsea_ros.report.diagnosis.sketch import part_of, sketch
-from rsea_ros.report.identification.correlation import correlation_section, finding
-from rsea_ros.report.identification.page import identification_report
-from rsea_ros.report.json_values import with_provenance
-from rsea_ros.report.page.frame import page
-from rsea_ros.report.page.html import fold, section
-from rsea_ros.report.provenance import provenance_of
+from rsea_ros.report.figures.bode import finding
+from rsea_ros.report.identification.page import correlation_section, identification_report
+from rsea_ros.report.page import fold, page, section
+from rsea_ros.report.result_files import provenance_of
 
 from ..conftest import Diagnosed
 

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from rsea_ros.report.page.html_table import table
+from rsea_ros.report.page import table
 from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit, lumped_circuit
 from rsea_ros.report.paper.docs import documentation_figures
 from rsea_ros.report.paper.figures import figure_9, figure_18_as_printed, figure_20
