@@ -130,7 +130,7 @@ def excitation(record: Record) -> list[dict[str, Any]]:
     figures: list[tuple[str, float, str]] = []
     name = next((n for n in ("command", "reference") if n in record), "")
     if name:
-        y = record[name].y[np.isstrict(record[name].y)]
+        y = record[name].y[np.isfinite(record[name].y)]
         if len(y):
             unit = UNITS[name]
             figures += [("rms", float(np.std(y)), unit), ("peak", float(np.max(np.abs(y))), unit)]
@@ -138,7 +138,7 @@ def excitation(record: Record) -> list[dict[str, Any]]:
             low, high = band(record)
             figures += [("band_low", low, "Hz"), ("band_high", high, "Hz")]
     for channel, unit in (("position", "rad"), ("ft", "N m")):
-        if channel in record and np.isstrict(record[channel].y).any():
+        if channel in record and np.isfinite(record[channel].y).any():
             span = float(np.nanmax(record[channel].y) - np.nanmin(record[channel].y))
             figures.append((f"{channel}_span", span, unit))
     return [{"name": n, "value": strict(v), "unit": u} for n, v, u in figures]
@@ -153,6 +153,6 @@ def faults(listed: Iterable[Fault]) -> list[dict[str, Any]]:
 
 
 def _place(fault: Fault) -> str:
-    share = f"{100.0 * fault.share:.3g} %" if math.isstrict(fault.share) else ""
+    share = f"{100.0 * fault.share:.3g} %" if math.isfinite(fault.share) else ""
     size = with_unit(f"{fault.size:.4g}", fault.unit) if fault.size is not None else ""
     return ": ".join(filter(None, (fault.channel, ", ".join(filter(None, (share, size, fault.detail))))))

@@ -29,7 +29,16 @@ from rsea_ros.report.experiment.words import (
     size,
     verdict,
 )  # fmt: skip
-from rsea_ros.report.figures.figure import Figure, axis, frequency_axis, label, layout, line, numbers
+from rsea_ros.report.figures.figure import (
+    Figure,
+    Json,
+    axis,
+    frequency_axis,
+    layout,
+    line,
+    names_beside,
+    numbers,
+)
 from rsea_ros.report.figures.palette import AFTER, BEFORE, QUIET, TRUTH
 from rsea_ros.report.page import Block, Html, bullets, key_numbers, page, section, table
 from rsea_ros.report.result_files import EXPERIMENT_JSON, MODEL, REPORT, Provenance, json_text
@@ -132,35 +141,31 @@ def _proofs(proofs: Sequence[Proof]) -> list[Html]:
 
 def command_figure(p: Proposal) -> Figure:
     """Return the command over time."""
-    t = np.arange(len(p.command)) / p.rate
+    t, caption = (
+        np.arange(len(p.command)) / p.rate,
+        "Commanded motor torque at the gear output; it begins and ends",
+    )
+    drawn = line(t, p.command, "command", AFTER, 1.0, hovertemplate="%{y:.3g} N·m")
+    plane = layout(xaxis=axis("time, s"), yaxis=axis("torque, N·m"))
     return Figure(
-        f"The run: {shape_words(p)}",
-        "Commanded motor torque at the gear output; it begins and ends at zero under a raised cosine.",
-        [line(t, p.command, "command", AFTER, 1.0, hovertemplate="%{y:.3g} N·m")],
-        layout(xaxis=axis("time, s"), yaxis=axis("torque, N·m")),
-        height=300,
+        f"The run: {shape_words(p)}", f"{caption} at zero under a raised cosine.", [drawn], plane, 300
     )
 
 
 def spectrum_figure(runs: Sequence[tuple[str, Proposal]]) -> Figure:
     """Return the amplitude spectral densities of runs."""
-    traces, notes, tops = [], [], []
+    traces, names = [], []
     for k, (name, p) in enumerate(runs):
         f, density = density_of(p.command, p.rate)
-        colour, at = (AFTER, BEFORE, QUIET)[k % 3], int(np.argmax(density))
-        look = {"color": colour, "width": 1.4, "dash": _DASH[k % 4]}
-        traces.append(line(f, density, name, colour, line=look, hovertemplate="%{y:.3g} N·m/√Hz"))
-        notes.append(label(name, float(np.log10(f[at])), float(np.log10(density[at])) + 0.12, colour))
-        tops.append(density.max())
-    top = float(np.log10(max(tops)))
+        colour = (AFTER, BEFORE, QUIET)[k % 3]
+        look: Json = {"line": {"color": colour, "width": 1.4, "dash": _DASH[k % 4]}}
+        traces.append(line(f, density, name, colour, hovertemplate="%{y:.3g} N·m/√Hz", **look))
+        names.append((name, colour))
+    top = float(np.log10(max(y for trace in traces for y in trace["y"])))
     height = axis("N·m/√Hz", type="log", range=[top - 3.0, top + 0.3])
-    return Figure(
-        "Where the runs put their power" if len(runs) > 1 else "Where the run puts its power",
-        "Amplitude spectral density of the command.",
-        traces,
-        layout(xaxis=frequency_axis(0.2, 140.0), yaxis=height, annotations=notes),
-        height=320,
-    )
+    title = "Where the runs put their power" if len(runs) > 1 else "Where the run puts its power"
+    drawing = layout(xaxis=frequency_axis(0.2, 140.0), yaxis=height, annotations=names_beside(names, 0.075))
+    return Figure(title, "Amplitude spectral density of the command.", traces, drawing, height=320)
 
 
 def density_of(command: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
@@ -171,8 +176,7 @@ def density_of(command: FloatArray, rate: float) -> tuple[FloatArray, FloatArray
     edges = np.unique(np.concatenate([np.arange(1, 8), np.geomspace(8, len(power) - 1, 60).astype(int)]))
 
     def mean(values: FloatArray) -> FloatArray:
-        of: FloatArray = np.add.reduceat(values[: edges[-1]], edges[:-1]) / np.diff(edges)
-        return of
+        return np.asarray(np.add.reduceat(values[: edges[-1]], edges[:-1]) / np.diff(edges), float)
 
     return mean(frequency), np.sqrt(mean(power))
 
@@ -214,28 +218,25 @@ def probability_figure(outcome: CampaignOutcome) -> Figure:
     x = np.arange(len(rounds), dtype=float)
     names = sorted({n for r in rounds for n, p in r.items() if p >= _SHOWN})
     names.sort(key=lambda n: -rounds[-1].get(n, 0.0))
-    traces, notes = [], []
+    traces, shown = [], []
     for k, name in enumerate(names):
         colour = _COLOURS[k] if k < len(_COLOURS) else QUIET
         y, dot = np.array([r.get(name, 0.0) for r in rounds]), {"size": 7, "color": colour}
         hover = {"mode": "lines+markers", "marker": dot, "hovertemplate": "probability %{y:.3f}"}
         traces.append(line(x, y, plain_name(name), colour, 2.2, **hover))
-        if y[-1] >= 0.03 or k == 0:
-            notes.append(label(plain_name(name), 1.01, float(y[-1]), colour, xref="paper"))
+        shown.append((plain_name(name), colour))
     ticks = ["first records" if not k else f"after run {k}" for k in range(len(rounds))]
-    return Figure(
-        "Remaining causes after each run",
-        "Probability of each cause by all records up to there. Each cause weighed here is as likely as "
-        "any other before the first record.",
-        traces,
-        layout(
-            xaxis=axis(tickvals=numbers(x), ticktext=ticks, range=[-0.2, float(x[-1]) + 0.2]),
-            yaxis=axis("probability", range=[-0.03, 1.06]),
-            annotations=notes,
-            margin={"l": 64, "r": 180, "t": 12, "b": 48},
-        ),
-        height=360,
+    drawing = layout(
+        xaxis=axis(tickvals=numbers(x), ticktext=ticks, range=[-0.2, float(x[-1]) + 0.2]),
+        yaxis=axis("probability", range=[-0.03, 1.06]),
+        annotations=names_beside(shown, 0.075),
+        margin={"l": 64, "r": 180, "t": 12, "b": 48},
     )
+    caption = (
+        "Probability of each cause by all records up to there. Each cause weighed here is as likely as any other "
+        "before the first record."
+    )
+    return Figure("Remaining causes after each run", caption, traces, drawing, height=360)
 
 
 def _rounds(outcome: CampaignOutcome) -> Html:

@@ -11,7 +11,17 @@ from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import UNITS, ComplexArray, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
+from rsea_ros.report.figures.figure import (
+    Figure,
+    Json,
+    axis,
+    band,
+    frequency_axis,
+    label,
+    layout,
+    line,
+    names_beside,
+)
 from rsea_ros.report.figures.palette import AFTER, MEASURED, QUIET, faint
 
 _SIDE = Z95 / np.sqrt(2.0)
@@ -74,17 +84,11 @@ def _curves(
 
 
 def _decibel(ratio: FloatArray) -> FloatArray:
-    decibel: FloatArray = 20.0 * np.log10(np.maximum(ratio, 0.05))
-    return decibel
+    return np.asarray(20.0 * np.log10(np.maximum(ratio, 0.05)))
 
 
 def _layout(shown: FrequencyResponse, has_model: bool, limit: float) -> Json:
-    end = 20.0 * float(np.log10(np.abs(shown.response[-1])))
-    beside: Json = {"xref": "paper", "yref": "y"}
-    labels = [label("measured<br>95 % band", 1.01, end, MEASURED, yanchor="bottom", **beside)]
-    if has_model:
-        labels.append(label("<b>model</b>", 1.01, end, AFTER, yanchor="top", yshift=-4, **beside))
-    labels.append(label("measured<br>÷ model", 1.01, 0.0, MEASURED, xref="paper", yref="y3"))
+    names = [("measured<br>95 % band<br>", MEASURED), *([("<br><b>model</b>", AFTER)] if has_model else [])]
     above, below = (words.unit(UNITS[n]) for n in (shown.output, shown.input))
     reference = "" if above == below else f" re 1 {above} per {below}"
     return layout(
@@ -93,7 +97,10 @@ def _layout(shown: FrequencyResponse, has_model: bool, limit: float) -> Json:
         yaxis2=axis("phase, °", domain=[0.39, 0.6], dtick=90),
         yaxis3=axis("gain, dB", domain=[0.165, 0.35], range=[-limit, limit], nticks=5),
         yaxis4=axis("coherence", domain=[0.0, 0.125], range=[0, 1.08], tickvals=[0, 0.5, 1]),
-        annotations=labels,
+        annotations=[
+            *names_beside(names, 0.04),
+            label("measured<br>÷ model", 1.015, 0.0, MEASURED, xref="paper", yref="y3"),
+        ],
         hoversubplots="axis",
     )
 
@@ -137,8 +144,7 @@ def thin(
     total = np.add.reduceat(weight, starts)
 
     def mean(values: Values) -> Values:
-        averaged: Values = np.add.reduceat(values * weight, starts) / total
-        return averaged
+        return np.add.reduceat(values * weight, starts) / total  # type: ignore[no-any-return]
 
     shown = replace(
         measured, frequency=mean(measured.frequency), response=mean(measured.response),

@@ -10,7 +10,17 @@ from rsea_ros.laws.result import WrittenLaw
 from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray, IntArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import Figure, Json, axis, band, label, layout, line, numbers, points
+from rsea_ros.report.figures.figure import (
+    Figure,
+    Json,
+    axis,
+    band,
+    layout,
+    line,
+    names_beside,
+    numbers,
+    points,
+)
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, QUIET, faint
 from rsea_ros.report.law.words import NAMES, UNITS
 
@@ -75,17 +85,11 @@ def _slider(t: FloatArray, windows: Sequence[IntArray]) -> Json:
 
 def _curve(x: FloatArray, law: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return places along x, and the 10 to 90 % range of the law at each, by its other variables."""
-    first, last = (float(v) for v in np.quantile(x, [0.002, 0.998]))
-    edges = np.linspace(first, last, _CURVE + 1)
+    edges = np.linspace(*np.quantile(x, [0.002, 0.998]), _CURVE + 1)
     which = np.clip(np.searchsorted(edges, x) - 1, 0, _CURVE - 1)
-    centre = 0.5 * (edges[1:] + edges[:-1])
-    low, high = np.full(_CURVE, np.nan), np.full(_CURVE, np.nan)
-    for k in range(_CURVE):
-        inside = law[which == k]
-        if len(inside):
-            low[k], high[k] = np.quantile(inside, [0.1, 0.9])
-    keep = np.isfinite(low)
-    return centre[keep], low[keep], high[keep]
+    places = np.unique(which)
+    low, high = (np.array([np.quantile(law[which == k], q) for k in places]) for q in (0.1, 0.9))
+    return 0.5 * (edges[1:] + edges[:-1])[places], low, high
 
 
 def _bin_means(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -101,18 +105,13 @@ def _bin_means(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatA
 
 def time_figure(written: WrittenLaw) -> Figure:
     """Return the missing torque and the law over time."""
-    shown, unit = written.shown, "rad" if written.law.place == "encoder" else "N m"
-    hover = f"%{{y:.3g}} {words.unit(unit)}"
+    shown, unit = written.shown, words.unit("rad" if written.law.place == "encoder" else "N m")
+    curves = (("missing", shown.values, MEASURED, 1.0), ("law", shown.law, AFTER, 1.4))
     data = [
-        line(shown.t, shown.values, "missing", MEASURED, 1.0, hovertemplate=hover),
-        line(shown.t, shown.law, "law", AFTER, 1.4, hovertemplate=hover),
+        line(shown.t, y, name, colour, w, hovertemplate=f"%{{y:.3g}} {unit}") for name, y, colour, w in curves
     ]
-    ends = [label("missing", 1.0, 0.85, MEASURED, xref="paper", yref="paper", xshift=6),
-            label("law", 1.0, 0.72, AFTER, xref="paper", yref="paper", xshift=6)]  # fmt: skip
+    names = names_beside([(name, colour) for name, _, colour, _ in curves], 0.13)
     middle = float(shown.t[len(shown.t) // 2])
-    return Figure(
-        "The same over time", "Drag to look closer, double click to see all.", data,
-        layout(xaxis=axis("time, s", range=[middle, min(middle + 3.0, float(shown.t[-1]))]),
-               yaxis=axis(words.unit(unit)), annotations=ends),
-        300,
-    )  # fmt: skip
+    across = axis("time, s", range=[middle, min(middle + 3.0, float(shown.t[-1]))])
+    plane = layout(xaxis=across, yaxis=axis(unit), annotations=names)
+    return Figure("The same over time", "Drag to look closer, double click to see all.", data, plane, 300)
