@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.result import Code, Remark
@@ -24,7 +24,14 @@ def fault(*alike: Fault) -> str:
         return f"{names} {'are' if len(channels) > 1 else 'is'} missing"
     detail = f" ({f.detail})" if f.detail else ""
     place = f" in {names}" if f.channel else ""
-    return f"{_kind(f)}{place}{_size(f)}{detail}"
+    return f"{'NaN' if f.kind == 'nan' else f.kind.replace('_', ' ')}{place}{_size(f)}{detail}"
+
+
+def _size(f: Fault) -> str:
+    size = 0.0 if f.size is None else float(f.size)
+    number = f"{size:.0f}" if size.is_integer() else words.number(size, 3)
+    share = f", {words.number(100.0 * f.share, 2)} % of the samples" if math.isfinite(f.share) else ""
+    return ("" if f.size is None else f", {number} {words.unit(f.unit)}".rstrip()) + share
 
 
 def fault_lines(items: Sequence[Fault]) -> list[str]:
@@ -35,39 +42,22 @@ def fault_lines(items: Sequence[Fault]) -> list[str]:
     return [fault(*alike) for alike in groups.values()]
 
 
-def faults(items: Sequence[Fault]) -> str:
-    """Return all faults in a short sentence, those apart whose samples are masked."""
-    left, masked = (
-        _by_channel([f for f in items if (f.kind in MASKED) == is_masked]) for is_masked in (0, 1)
-    )
-    return " ".join(
-        f"{opening}: {text}."
-        for opening, text in (("Faults in the data", left), ("Faults in the data, masked", masked))
-        if text
-    )
+def found_faults(faults: Iterable[Fault], named: Callable[[str], str] = words.channel) -> str:
+    """Return which faults the data have, each kind once, and of which samples are masked; each after a space.
 
-
-def _by_channel(items: Sequence[Fault]) -> str:
+    named: the name of a channel, as it is written.
+    """
     kinds: dict[str, list[str]] = {}
-    for f in items:
-        kinds.setdefault(f.channel, []).append(_kind(f))
-    return "; ".join(
-        f"{list_names(k)} in {words.channel(n)}" if n else list_names(k) for n, k in kinds.items()
-    )
-
-
-def _size(f: Fault) -> str:
-    size = "" if f.size is None else f", {_number(f.size)} {words.unit(f.unit)}".rstrip()
-    share = f", {words.number(100.0 * f.share, 2)} % of the samples" if math.isfinite(f.share) else ""
-    return size + share
-
-
-def _number(value: float) -> str:
-    return f"{value:.0f}" if float(value).is_integer() else words.number(value, 3)
-
-
-def _kind(f: Fault) -> str:
-    return "NaN" if f.kind == "nan" else f.kind.replace("_", " ")
+    for f in faults:
+        channels = kinds.setdefault(f.kind, [])
+        channels += [] if named(f.channel) in channels else [named(f.channel)]
+    texts: dict[bool, list[str]] = {False: [], True: []}
+    for kind, channels in kinds.items():
+        names = list_names(channels)
+        text = f"{names} missing" if kind == "missing_topic" else f"{kind.replace('_', ' ')} in {names}"
+        texts[kind in MASKED].append(text)
+    openings = (" The data have faults", " Samples were masked")
+    return "".join(f"{o}: {'; '.join(t)}." for o, t in zip(openings, texts.values(), strict=True) if t)
 
 
 _FIXES = "A measured spring stiffness, the encoder (position), or a known inertia would fix it."
@@ -79,40 +69,41 @@ _REMEDY = {
 }
 _NOT_IDENTIFIABLE = "{name} is not identifiable from these data: "
 _WORDS: Mapping[Code, str] = {
-    "even_clocks": "Stamps scatter about an even clock: {scatter}. The values agree with the even clock, so the "
-    "fit uses it.",
-    "clocks_taken_as_right": "The sensors' clocks are taken as right unless the data demand a correction. If "
-    f"each were uncertain by {1e6 * CLOCK_DOUBT:.0f} µs, the interval of {{name}} would be {{v[0]:.1f}} times as "
-    "wide.",
-    "torque_by_motor_constant": "No F/T sensor takes part in this fit, so every torque is known only through the "
-    "motor constant: a constant g times as large scales inertia, damping and stiffness by g.",
-    "torque_by_loop_gains": "No F/T sensor takes part in this fit, so every torque is known only through the "
-    "loop's gains, and through the motor constant where a current was measured: gains g times as large scale "
-    "inertia, damping and friction by g.",
-    "at_bound": "{name} ran to its bound, {v[0]:.3g} {unit}: these data show nothing of it, or something that the "
-    "rig lacks stands in for it.",
+    "even_clocks": "Stamps scatter about an even clock: {scatter}. The values agree with the even clock, so "
+    "the fit uses it.",
+    "clocks_taken_as_right": "The sensors' clocks are taken as right unless the data demand a correction. "
+    f"If each were uncertain by {1e6 * CLOCK_DOUBT:.0f} µs, the interval of {{name}} would be {{v[0]:.1f}} "
+    "times as wide.",
+    "torque_by_motor_constant": "No F/T sensor takes part in this fit, so every torque is known only "
+    "through the motor constant: a constant g times as large scales inertia, damping and stiffness by g.",
+    "torque_by_loop_gains": "No F/T sensor takes part in this fit, so every torque is known only through "
+    "the loop's gains, and through the motor constant where a current was measured: gains g times as large "
+    "scale inertia, damping and friction by g.",
+    "at_bound": "{name} ran to its bound, {v[0]:.3g} {unit}: these data show nothing of it, or something "
+    "that the rig lacks stands in for it.",
     "not_shown": _NOT_IDENTIFIABLE + "they do not show it. {remedy}",
     "only_prior": _NOT_IDENTIFIABLE + "what is known of it is the rig's prior. {remedy}",
-    "only_ratios": "Only ratios of {names} are identifiable from these data: a common factor is taken from the "
-    "rig. {fixes}",
+    "only_ratios": "Only ratios of {names} are identifiable from these data: a common factor is taken from "
+    "the rig. {fixes}",
     "only_together": f"{{names}} are identifiable from these data only together, not each. {_MEASURE}",
-    "play_undetermined": "These data cannot determine the play in the gear: with {milli:.2g} mrad, which fits best, "
-    "the residual of data that took no part changes by {fall:+.1f} %.",
-    "also_in_model": "The extended model also has {effects}: it predicts better with it, but the data speak for "
-    "another law than that.",
-    "coherence_lost": "Above {v[0]:.3g} Hz the coherence of the {channels} with the command is lost: most of it is "
-    "noise there, and these data say little about those frequencies.",
-    "on_measured_angle": "The torque ripple was fitted and tested on the measured rotor angle: a simulation that "
-    "moves freely settles in other detents, so `rsea predict` will show a larger residual than the gain here.",
-    "coloured_noise": "The noise of the {channels} is coloured: its level was taken from the residual, which is "
-    "steady, falls with frequency, and agrees with neither command nor motion nor another sensor.",
-    "off_rig": "{name} differs from the rig: the rig states {stated} {unit}, the fit gives {fitted} {unit} (95 %), "
-    "{spreads} of the stated spreads away.",
-    "stretches": "Models were fitted and tested on {v[0]:.0f} s of the {v[1]:.0f} s recorded: on stretches spread "
-    "evenly, and on those that the nominal model simulates worst. The data were checked in full.",
-    "lost_cycles": "{v[0]:.0f} lost cycles of the driver are a likely cause of the misfit: behind them the motor "
-    "torque is further from its commands than elsewhere. What is named here may stand in for them: record again "
-    "on an idle computer.",
+    "play_undetermined": "These data cannot determine the play in the gear: with {milli:.2g} mrad, which "
+    "fits best, the residual of data that took no part changes by {fall:+.1f} %.",
+    "also_in_model": "The extended model also has {effects}: it predicts better with it, but the data speak "
+    "for another law than that.",
+    "coherence_lost": "Above {v[0]:.3g} Hz the coherence of the {channels} with the command is lost: most "
+    "of it is noise there, and these data say little about those frequencies.",
+    "on_measured_angle": "The torque ripple was fitted and tested on the measured rotor angle: a simulation "
+    "that moves freely settles in other detents, so `rsea predict` will show a larger residual than the "
+    "gain here.",
+    "coloured_noise": "The noise of the {channels} is coloured: its level was taken from the residual, "
+    "which is steady, falls with frequency, and agrees with neither command nor motion nor another sensor.",
+    "off_rig": "{name} differs from the rig: the rig states {stated} {unit}, the fit gives {fitted} {unit} "
+    "(95 %), {spreads} of the stated spreads away.",
+    "stretches": "Models were fitted and tested on {v[0]:.0f} s of the {v[1]:.0f} s recorded: on stretches "
+    "spread evenly, and on those that the nominal model simulates worst. The data were checked in full.",
+    "lost_cycles": "{v[0]:.0f} lost cycles of the driver are a likely cause of the misfit: behind them the "
+    "motor torque is further from its commands than elsewhere. What is named here may stand in for them: "
+    "record again on an idle computer.",
 }
 
 

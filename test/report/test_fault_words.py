@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from rsea_ros.records.record import Fault
-from rsea_ros.report.identification.words import verdict_sentence
-from rsea_ros.report.remark_words import fault_lines, faults
+from rsea_ros.report.remark_words import fault_lines, found_faults
 
 DISORDER = [
     Fault("out_of_order", name, 0.05, "first at 0.4 s, sorted", 84, "samples")
@@ -36,12 +35,9 @@ def test_a_channel_that_two_records_lack_is_named_once():
 
 
 def test_only_what_is_masked_is_called_masked():
-    assert faults([NAN]) == "Faults in the data, masked: NaN in F/T torque."
-    assert "masked" not in faults(DISORDER)
-    sentence = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, DISORDER)
-    assert sentence.endswith(" The data have faults: out of order in position, velocity and motor_torque.")
+    assert found_faults([NAN]) == " Samples were masked: nan in F/T torque."
+    names = "position, velocity and motor_torque"
+    assert found_faults(DISORDER, str) == f" The data have faults: out of order in {names}."
     missing = [Fault("missing_topic", name, 1.0) for name in ("velocity", "position", "velocity")]
-    lacking = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, missing)
-    assert lacking.endswith(" The data have faults: velocity and position missing.")
-    both = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, [*DISORDER, NAN])
-    assert both.endswith(" Samples were masked: nan in ft.")
+    assert found_faults(missing, str) == " The data have faults: velocity and position missing."
+    assert found_faults([*DISORDER, NAN], str).endswith(" Samples were masked: nan in ft.")

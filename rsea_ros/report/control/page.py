@@ -37,8 +37,8 @@ BAND = (
     "of 33 Hz at the sensor, whose own ringing is not in the torque)."
 )
 LEARNING = (
-    "Here the loads are half, once and twice the inertia. Slow or small motion teaches nothing of "
-    "the load; then only feedback is left."
+    "Here the loads are half, once and twice the inertia. Slow or small motion teaches nothing of the load; "
+    "then only feedback is left."
 )
 
 

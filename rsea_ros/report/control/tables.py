@@ -47,7 +47,7 @@ def _demand(trial: TrialResult) -> str:
 
 
 def trial_text(trial: TrialResult) -> str:
-    """Return the value with its unit and that of the worst case, after `missed` where it misses its demand."""
+    """Return the value with its unit and that of the worst case, marked where it misses its demand."""
     missed = "missed: " if trial.met is False else ""
     worst = "" if math.isnan(trial.worst) else f" ({_number(trial.worst)})"
     return f"{missed}{_number(trial.value)}{worst} {_unit(trial.unit)}".strip()
@@ -95,8 +95,8 @@ def gains_words(study: Study) -> Sequence[str]:
     """Return the gains of each rate, a line each."""
     return [
         words.minus(
-            f"{design.rate:g} Hz: k_p = {g.k_p:.3f}, k_d = {1e3 * g.k_d:.2f} ms, k_i = {g.k_i:.2f}, "
-            f"Q {g.q_frequency:.1f} Hz, k_w = {g.k_w:.1f} N·m·s/rad"
+            f"{design.rate:g} Hz: k_p = {g.k_p:.3f}, k_d = {1e3 * g.k_d:.2f} ms, k_i = {g.k_i:.2f}, Q "
+            f"{g.q_frequency:.1f} Hz, k_w = {g.k_w:.1f} N·m·s/rad"
         )
         for design, g in ((at.design, at.design.gains) for at in study.rates)
     ]

@@ -15,15 +15,17 @@ from rsea_ros.model.bandwidth import end_to_end, undamped_stiffness
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.design.figures import LeastStiffness, Point, bandwidth_surface, feasible_map
+from rsea_ros.report.design.surface import Point, bandwidth_surface, log_marks
 from rsea_ros.report.design.tables import checks_table, margins_table, springs_table, trains_table
-from rsea_ros.report.figures.figure import Figure
-from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, QUIET, TRUTH
+from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, points
+from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, QUIET, TRUTH, faint
 from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
 from rsea_ros.report.page import Block, Html, equation, key_numbers, page, section
 from rsea_ros.report.result_files import Provenance
 
 _COLOURS = (BEFORE, AFTER, TRUTH)
+_TOP = 2e4
+"""N·m/rad, upper end of the map of feasible designs."""
 
 
 def design_report(
@@ -82,6 +84,7 @@ def _hz(value: float) -> str:
 
 def _method(asked: SpringDesign, least: SpringDesign) -> Html:
     r, spin = asked.requirement, 1e3 * asked.unit.spin
+    signed = f"{'−' if spin < 0.0 else '+'} {abs(spin):.3f}"
     turns, train = words.signed_text(asked.unit.turns, 0), words.train(asked.unit.train)
     bounds = stiffness_bounds(least.requirement, least.unit).items()
     why = "; ".join(f"{words.sentence(name)} asks for {value:.0f}" for name, value in bounds)
@@ -93,11 +96,11 @@ def _method(asked: SpringDesign, least: SpringDesign) -> Html:
             f"Eq. (8)   T ≤ K_s / 2 = {asked.stiffness / 2:.0f} N·m at 45°, {r.torque:.0f} N·m asked for\n"
             f"linear    T / K_s = {asked.linear:.2f} rad = {math.degrees(asked.linear):.0f}°, "
             f"{math.degrees(r.deflection):.0f}° allowed\n"
-            f"spin      J_sc + n J_r = {1e3 * r.inertia:.3f} {'−' if spin < 0.0 else '+'} {abs(spin):.3f} g·m²  →  "
+            f"spin      J_sc + n J_r = {1e3 * r.inertia:.3f} {signed} g·m²  →  "
             f"{_hz(asked.band_exact)}   ({train}, n = {turns})"
         ),
-        f"The least stiffness that meets all demands on the spring is {least.stiffness:.0f} N·m/rad "
-        f"with this motor and gear: {why}.",
+        f"The least stiffness that meets all demands on the spring is {least.stiffness:.0f} N·m/rad with "
+        f"this motor and gear: {why}.",
     )
 
 
@@ -112,24 +115,43 @@ def _map(designs: Sequence[SpringDesign]) -> Figure:
         f"K_s/2 = {r.torque:g} N·m": bounds["Torque, K_s/2"] * np.ones(len(j)),
         f"{r.bandwidth:g} Hz, Eq. (7)": undamped_stiffness(r.bandwidth, j),
     }
-    shades = (BEFORE, INK, QUIET, AFTER)
-    demands = [LeastStiffness(n, c, j, k) for (n, k), c in zip(lines.items(), shades, strict=True)]
-    shown = [
-        Point(f"{d.stiffness:.0f}", d.stiffness, r.inertia, c)
-        for d, c in zip(designs, _COLOURS, strict=False)
+    least = np.max(list(lines.values()), axis=0)
+    hidden: Json = {"hoverinfo": "skip", "line": {"width": 0}}
+    hover: Json = {"hovertemplate": "%{y:.0f} N·m/rad"}
+    data: list[Json] = [
+        line(1e3 * j, np.full(len(j), _TOP), "", TRUTH, **hidden),
+        line(1e3 * j, least, "", TRUTH, fill="tonexty", fillcolor=faint(TRUTH, 0.12), **hidden),
     ]
+    middle = float(np.log10(1e3 * j[len(j) // 3]))
+    names = [label("<b>meets all demands</b>", middle, float(np.log10(0.6 * _TOP)), TRUTH)]
+    for (name, k), colour in zip(lines.items(), (BEFORE, INK, QUIET, AFTER), strict=True):
+        data.append(line(1e3 * j, k, name, colour, **hover))
+        names.append(label(name, 1.01, float(np.log10(k[-1])), colour, xref="paper"))
+    for d, colour in zip(designs, _COLOURS, strict=False):
+        x, k_s = 1e3 * r.inertia, d.stiffness
+        data.append(points([x], [k_s], f"{k_s:.0f}", marker={"size": 10, "color": colour}, **hover))
+        at = float(np.log10(x)), float(np.log10(k_s))
+        names.append(label(f"<b>{k_s:.0f}</b>", *at, colour, xshift=8, yshift=-11))
     alone = f"{float(undamped_stiffness(r.bandwidth, unit.spin)):.0f} N·m/rad"
     title = (
-        f"A chassis without mass needs {alone} for {r.bandwidth:g} Hz; a heavier one less, until it cancels the "
-        f"rotor's spin at {1e3 * abs(unit.spin):.1f} g·m²"
+        f"A chassis without mass needs {alone} for {r.bandwidth:g} Hz; a heavier one less, until it cancels "
+        f"the rotor's spin at {1e3 * abs(unit.spin):.1f} g·m²"
     )
     if unit.spin > 0.0:
         title = (
-            f"However light the chassis, {r.bandwidth:g} Hz need {alone} with this rotor: "
-            "Eq. (7) considers only the chassis"
+            f"However light the chassis, {r.bandwidth:g} Hz need {alone} with this rotor: Eq. (7) considers "
+            "only the chassis"
         )
+    plane = layout(
+        xaxis=axis("spring chassis inertia J_sc, g·m²", type="log", **log_marks(0.2, 0.5, 1, 2, 5, 10, 20)),
+        yaxis=axis(
+            "stiffness K_s, N·m/rad", type="log", range=[float(np.log10(v)) for v in (50.0, _TOP)],
+            **log_marks(100, 200, 500, 1000, 2000, 5000, 10000),
+        ),
+        annotations=names, hovermode="closest", margin={"l": 72, "r": 210, "t": 12, "b": 48},
+    )  # fmt: skip
     caption = "A design meets a demand above its line. Eq. (7) is the only one that the paper draws."
-    return feasible_map(title, shown, demands, caption)
+    return Figure(title, caption, data, plane, 460)
 
 
 def _surface(d: SpringDesign) -> Figure:

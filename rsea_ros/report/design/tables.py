@@ -77,7 +77,8 @@ def springs_table(designs: Sequence[SpringDesign]) -> Html:
         "Rate of one spring, N/mm: a wider separation makes the same joint from softer springs",
         table(head, rows),
         caption=f"Eq. (9) inverted, r_s = {1e3 * r.spring_radius:.1f} mm. Travel at "
-        f"{math.degrees(r.deflection):g}°, where the sin·cos law of Eq. (8) falls {short:.2f} % short of linear.",
+        f"{math.degrees(r.deflection):g}°, where the sin·cos law of Eq. (8) falls {short:.2f} % short of "
+        "linear.",
     )
 
 
@@ -105,8 +106,9 @@ def design_json(asked: SpringDesign, least: SpringDesign, robust: SpringDesign |
     """Return the result file. Angles in rad; null where a design cannot carry the torque."""
     r = asked.requirement
     train = (
-        "train turns inner_inertia=inner bandwidth_exact_hz=band bandwidth_hz_90_percent_of_rotor_inertia=band_range "
-        "least_stiffness_for_bandwidth=for_band least_stiffness=least"
+        "train turns inner_inertia=inner bandwidth_exact_hz=band "
+        "bandwidth_hz_90_percent_of_rotor_inertia=band_range least_stiffness_for_bandwidth=for_band "
+        "least_stiffness=least"
     )
     return {
         "schema": 1,

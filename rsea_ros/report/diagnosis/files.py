@@ -1,4 +1,4 @@
-"""The files of a diagnosis, all of them or none: diagnosis.json, overlay.mcap, the extended model, the page."""
+"""The files of a diagnosis, all or none: diagnosis.json, overlay.mcap, the extended model, the page."""
 
 from __future__ import annotations
 
@@ -81,7 +81,8 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "sentence": say.diagnosis_sentence(d),
         "data": {**pick(d, "bags=sources duration_s=duration rate_hz=rate"),
                  "faults": [fault_json(f) for f in d.faults]},
-        "baseline": {"parameters": parameters_json(d.baseline), **pick(d, "residual_rms noise_rms fit_percent")},
+        "baseline": {"parameters": parameters_json(d.baseline),
+                     **pick(d, "residual_rms noise_rms fit_percent")},
         "misfit": _misfits(d.misfit),
         "causes": [_cause(c) for c in d.causes],
         "alternatives": [_alternative(a) for a in d.alternatives],

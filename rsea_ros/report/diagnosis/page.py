@@ -34,7 +34,7 @@ from rsea_ros.report.page import (
     section,
     table,
 )  # fmt: skip
-from rsea_ros.report.remark_words import fault_lines, faults, remark_sentences
+from rsea_ros.report.remark_words import fault_lines, found_faults, remark_sentences
 from rsea_ros.report.result_files import Provenance
 from rsea_ros.report.rig import command, rig_named, right_rig_block, split_off_rig
 
@@ -56,7 +56,7 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
     main = d.channel
     yield key_numbers(_keys(d, words.channel(main)))
     yield right_rig_block(d.remarks, command("identify", d.sources, d.rig_name, d.rig_choice))
-    yield paragraph(faults(d.faults), "next")
+    yield paragraph(found_faults(d.faults).strip(), "next")
     yield sketch([c.name for c in d.causes])
     yield from (spectrum_figure(d, s) for s in d.spectra if s.channel == main)
     if any(o.channel == main for o in d.before):
@@ -117,8 +117,8 @@ def _tried(d: Diagnosis) -> Html:
     """Return all effects tried: causes and fitted rivals with their gains, then the others by reason."""
     if not (d.causes or d.rejected):
         return Html()
-    accepted = [(c, c.status.replace("_", " ")) for c in d.causes]
-    shown = [*accepted, *((r, say.rejection(r)) for r in fitted_rivals(d))]
+    shown: list[tuple[Cause | Rejected, str]] = [(c, c.status.replace("_", " ")) for c in d.causes]
+    shown += [(r, say.rejection(r)) for r in fitted_rivals(d)]
     others: dict[str, list[str]] = {}
     for r in d.rejected:
         if not r.is_fitted:
@@ -126,9 +126,10 @@ def _tried(d: Diagnosis) -> Html:
     reasons = [f"{words.sentence(say.prose(why))}: {list_names(sorted(n))}." for why, n in others.items()]
     ground = faint(GRID, 0.5)
     rows = [
-        [named(words.sentence(words.effect(item.name)), item.name, k < len(accepted)),
+        [named(words.sentence(words.effect(item.name)), item.name, k < len(d.causes)),
          num.percent(item.gain_holdout),
-         bar(item.gain_holdout, AFTER if k < len(accepted) else faint(MEASURED, 0.6), ground), say.prose(outcome)]
+         bar(item.gain_holdout, AFTER if k < len(d.causes) else faint(MEASURED, 0.6), ground),
+         say.prose(outcome)]
         for k, (item, outcome) in enumerate(shown)
     ]  # fmt: skip
     return section(

@@ -125,7 +125,7 @@ def finding(shown: Sequence[Profile]) -> str:
 def _extremes(profile: Profile) -> str:
     k = int(np.nanargmax(profile.before))
     most, least = (words.number(v(profile.before), 2) for v in (np.nanmax, np.nanmin))
-    where = words.span(*profile.edges[k : k + 2], profile.unit)
+    where = words.span(float(profile.edges[k]), float(profile.edges[k + 1]), profile.unit)
     return f"{most} times the noise from {where}, {least} where it is least"
 
 

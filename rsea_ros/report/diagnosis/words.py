@@ -10,10 +10,9 @@ from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Experiment,
 from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.result import is_unexcited, silent_channels
-from rsea_ros.records.fault_kinds import MASKED
-from rsea_ros.records.record import Fault
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
+from rsea_ros.report.remark_words import found_faults
 from rsea_ros.report.rig import values_off
 
 _REASONS: Mapping[Reason, str] = {
@@ -48,7 +47,7 @@ def headline(diagnosis: Diagnosis) -> str:
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:
     """Return the verdict with its numbers, values that are not the rig's, and faults of the data."""
     off = words.sentence(values_off(diagnosis.remarks))
-    return f"{_verdict(diagnosis)[1]}.{f' {off}.' if off else ''}{_faults(diagnosis.faults)}"
+    return f"{_verdict(diagnosis)[1]}.{f' {off}.' if off else ''}{found_faults(diagnosis.faults, str)}"
 
 
 def _verdict(d: Diagnosis) -> tuple[str, str]:
@@ -70,9 +69,11 @@ def _verdict(d: Diagnosis) -> tuple[str, str]:
         near = (
             f"{math.ceil(100.0 * before) / 100.0:.2f}" if before < 2.0 else ""
         )  # never rounded to the floor
-        title = f"The {name} residual is {near or _digits(before)} times the noise, and no effect of the catalogue"
-        return (f"{title} explains it",
-                f"The {name} residual is {near or f'{before:.1f}'} times the noise; no known effect explains it")  # fmt: skip
+        said = (
+            f"{near or _digits(before)} times the noise, and no effect of the catalogue explains it",
+            f"{near or f'{before:.1f}'} times the noise; no known effect explains it",
+        )
+        return f"The {name} residual is {said[0]}", f"The {name} residual is {said[1]}"
     explains, pronoun = ("explain", "them") if len(d.causes) > 1 else ("explains", "it")
     if d.verdict == "explained":
         how, rest, end = f"{explains} the misfit", "only noise is left", ", which is the floor"
@@ -107,24 +108,6 @@ def _digits(ratio: float) -> str:
     return words.number(ratio, 2 if ratio < 100.0 else 3)
 
 
-def _faults(faults: Sequence[Fault]) -> str:
-    """Return which faults the data have, each kind once, and which samples of them are masked."""
-    channels: dict[str, dict[str, None]] = {}
-    for f in faults:
-        channels.setdefault(f.kind, {})[f.channel] = None
-    texts = {
-        kind: f"{kind.replace('_', ' ')} in {list_names(list(names))}" for kind, names in channels.items()
-    }
-    if "missing_topic" in texts:
-        texts["missing_topic"] = f"{list_names(list(channels['missing_topic']))} missing"
-    left, masked = (
-        "; ".join(t for k, t in texts.items() if (k in MASKED) == is_masked) for is_masked in (0, 1)
-    )
-    return (f" The data have faults: {left}." if left else "") + (
-        f" Samples were masked: {masked}." if masked else ""
-    )
-
-
 def cause_list(causes: Sequence[Cause]) -> str:
     """Return causes with their main size: `Coulomb friction (3.00 N·m) and backlash (1.20 mrad)`."""
     shown = []
@@ -142,7 +125,8 @@ def status_line(cause: Cause, alternatives: Sequence[Alternative] = (), at_floor
     """
     rivals = [a for a in alternatives if a.instead_of == cause.name]
     rivals.sort(key=lambda a: -a.probability)
-    items = [f"{_size(item)}, probability {item.probability:.2f}" for item in (cause, *rivals)]
+    named: list[Cause | Alternative] = [cause, *rivals]
+    items = [f"{_size(item)}, probability {item.probability:.2f}" for item in named]
     reason = _CERTAINTY[cause.status]
     if at_floor and cause.status == "leading":
         reason = "it reduces the residual to the noise, but another law may do the same"
@@ -166,9 +150,9 @@ def evidence(cause: Cause) -> str:
     """Return the evidence for a cause as one sentence."""
     before, after = cause.times_noise
     return (
-        f"With {effect_named(cause.name).about}, the {words.channel(cause.channel)} residual of data "
-        f"that took no part falls from {before:.2f} to {after:.2f} times the noise "
-        f"(gain {words.minus(f'{100.0 * cause.gain_holdout:.1f}')} %)."
+        f"With {effect_named(cause.name).about}, the {words.channel(cause.channel)} residual of data that "
+        f"took no part falls from {before:.2f} to {after:.2f} times the noise (gain "
+        f"{words.minus(f'{100.0 * cause.gain_holdout:.1f}')} %)."
     )
 
 
@@ -215,16 +199,16 @@ def next_run(experiment: Experiment) -> str:
         return f"{alike}; this run makes them differ by {experiment.separation:.1f} times the noise"
     if experiment.reason == "inseparable":
         return (
-            f"{rivals} make the same motion under every excitation tried within the limits of rig and "
-            f"driver (at most {experiment.separation:.2f} times the noise apart): "
-            "only a separate measurement distinguishes them, such as the spring stiffness by a known weight"
+            f"{rivals} make the same motion under every excitation tried within the limits of rig and driver "
+            f"(at most {experiment.separation:.2f} times the noise apart): only a separate measurement "
+            "distinguishes them, such as the spring stiffness by a known weight"
         )
     multisine = " with an odd multisine, whose empty lines show distortion apart from noise"
     amplitude = {0.5: "half", 2.0: "twice"}[experiment.amplitude]
     return (
         f"nothing in the catalogue explains what is left: repeat at {amplitude} the "
-        f"amplitude{multisine if experiment.excitation else ''}; "
-        "what scales with the command is linear, what does not is friction-like"
+        f"amplitude{multisine if experiment.excitation else ''}; what scales with the command is linear, "
+        "what does not is friction-like"
     )
 
 

@@ -1,4 +1,4 @@
-"""The pages of a designed run and of a session of runs: causes, separations, demands on the bench, commands."""
+"""The pages of a designed run and of a session of runs: causes, separations, demands, commands."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def write_campaign(
     notes: tuple[str, ...] = (),
     provenance: Provenance | None = None,
 ) -> Path:
-    """Write experiment.json, model.yaml, report.html and the commands beside the bags; return the report's path.
+    """Write experiment.json, model.yaml, report.html and the commands; return the report's path.
 
     model.yaml: the rig with the likeliest cause and the values of all records together.
     """
@@ -178,7 +178,7 @@ def density_of(command: FloatArray, rate: float) -> tuple[FloatArray, FloatArray
     def mean(values: FloatArray) -> FloatArray:
         return np.asarray(np.add.reduceat(values[: edges[-1]], edges[:-1]) / np.diff(edges), float)
 
-    return mean(frequency), np.sqrt(mean(power))
+    return mean(np.asarray(frequency, float)), np.sqrt(mean(np.asarray(power, float)))
 
 
 def campaign_page(
@@ -188,7 +188,7 @@ def campaign_page(
     notes: tuple[str, ...] = (),
     provenance: Provenance | None = None,
 ) -> str:
-    """Return the page of a session: the remaining causes after each run. notes: on its making, for the reader."""
+    """Return the page of a session: the remaining causes after each run. notes: on its making."""
     title, kicker = words.sentence(end_sentence(outcome)), f"A session of experiments · {rig}"
     return page(title, kicker, _session(outcome, limits, notes), (), provenance)
 
@@ -233,8 +233,8 @@ def probability_figure(outcome: CampaignOutcome) -> Figure:
         margin={"l": 64, "r": 180, "t": 12, "b": 48},
     )
     caption = (
-        "Probability of each cause by all records up to there. Each cause weighed here is as likely as any other "
-        "before the first record."
+        "Probability of each cause by all records up to there. Each cause weighed here is as likely as any "
+        "other before the first record."
     )
     return Figure("Remaining causes after each run", caption, traces, drawing, height=360)
 

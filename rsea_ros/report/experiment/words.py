@@ -79,8 +79,8 @@ def proof_words(proof: Proof) -> str:
     low, high = b.frequency[0], b.frequency[-1]
     head = (
         f"{plain_name(b.true)} and {plain_name(b.rival)}: no run of {b.duration:.0f} s with a spectrum in "
-        f"{low:.2g} to {high:.3g} Hz within the limits separates them by more than S = {b.most:.2g} "
-        "(6 makes odds of twenty to one)"
+        f"{low:.2g} to {high:.3g} Hz within the limits separates them by more than S = {b.most:.2g} (6 makes "
+        "odds of twenty to one)"
     )
     return f"{head}. Measure separately: {'; or '.join(a.what for a in proof.apart)}."
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -129,8 +129,8 @@ def _caption(measured: FrequencyResponse) -> str:
     high = measured.frequency[measured.coherence > _COHERENT]
     reach = f"Coherence is above {_COHERENT:g} up to {words.number(high[-1])} Hz. " if len(high) else ""
     return (
-        f"{reach}{words.sentence(measured.method)}, {len(measured.frequency)} frequencies; hold of the command "
-        "and acquisition instants are taken out. Averaged in bands of 5 % for drawing."
+        f"{reach}{words.sentence(measured.method)}, {len(measured.frequency)} frequencies; hold of the "
+        "command and acquisition instants are taken out. Averaged in bands of 5 % for drawing."
     )
 
 
@@ -144,7 +144,8 @@ def thin(
     total = np.add.reduceat(weight, starts)
 
     def mean(values: Values) -> Values:
-        return np.add.reduceat(values * weight, starts) / total  # type: ignore[no-any-return]
+        averaged: Any = np.add.reduceat(values * weight, starts) / total
+        return averaged  # type: ignore[no-any-return]
 
     shown = replace(
         measured, frequency=mean(measured.frequency), response=mean(measured.response),

@@ -133,7 +133,7 @@ def _layout(channel: str, unit: str, simulations: Sequence[Simulated], view: tup
 
 
 def pack(values: FloatArray, step: float = 0.0) -> dict[str, Any]:
-    """Return values in few bytes, which page.js takes apart: value k = first + slope·k + step·(whole number k).
+    """Return values in few bytes for page.js: value k = first + slope·k + step·(whole number k).
 
     step: allowed rounding, in the unit of the values; 0: the resolution of 16 bits. Not-a-number becomes a
     gap. The line goes through the ends: stamps lie on it but for their jitter.

@@ -67,7 +67,7 @@ def _bars(colour: str, sides: FloatArray, below: FloatArray | None = None, **loo
 
 
 def naming_figure(naming: Naming, appearance: Appearance | None, steps: Steps) -> Figure:
-    """Return a cause by its size, a fault or a cause without a size by the share of recordings that name it."""
+    """Return a cause by its size; without one, and of a fault, the share of recordings that name it."""
     plain = name(naming.about) + (" in the data" if naming.kind == "fault" else "")
     often = f"{int(np.sum(naming.named))} of {len(naming.named)} recordings"
     title = f"{plain}{' is named' if naming.kind == 'cause' else ''} in {often}"
@@ -87,8 +87,8 @@ def naming_figure(naming: Naming, appearance: Appearance | None, steps: Steps) -
     height = axis(f"{naming.parameter.replace('_', ' ')}, {unit}".rstrip(", "), rangemode="tozero")
     return Figure(
         title,
-        f"Median size of each {steps.name}, with the middle half. Grey at zero: recordings that do "
-        "not name it; below the detection limit they could not.",
+        f"Median size of each {steps.name}, with the middle half. Grey at zero: recordings that do not name "
+        "it; below the detection limit they could not.",
         _sizes(naming, naming.size * factor, unit, steps),
         layout(xaxis=_date_axis(steps), yaxis=height, shapes=since, annotations=note, margin=_MARGIN),
         height=260,
@@ -96,7 +96,7 @@ def naming_figure(naming: Naming, appearance: Appearance | None, steps: Steps) -
 
 
 def _sizes(naming: Naming, size: FloatArray, unit: str, steps: Steps) -> list[Json]:
-    """Return the sizes where it is named, and marks at zero where it is not. size: in the unit of the axis."""
+    """Return sizes where it is named, and marks at zero where it is not. size: in the axis' unit."""
     usable = naming.named & np.isfinite(size)
     place = steps.place(naming.time_s[usable])
     weeks = np.unique(place)
@@ -135,7 +135,7 @@ def _shares(naming: Naming, title: str, since: list[Json], steps: Steps) -> Figu
 
 
 def parameter_figure(trend: Trend, steps: Steps) -> Figure:
-    """Return the figure of a parameter that the recordings determine: its course, changes, where it is going."""
+    """Return the figure of a parameter that the recordings determine: course, changes, forecast."""
     factor, unit = words.unit_factor(trend.now.value if trend.now else 1.0, trend.series.unit)
     assert trend.curve is not None
     fine = _FINE * float(np.median(trend.curve.high - trend.curve.low)) * abs(factor)
@@ -173,8 +173,8 @@ def _weeks(bins: Binned, trend: Trend, steps: Steps, factor: float, unit: str, f
     bottom = dates(*steps.middle[none])
     return [
         points(
-            places, numbers(bins.value[some] * factor, fine), steps.name, marker={"color": MEASURED, "size": 5},
-            error_y=_bars(faint(MEASURED, 0.7), half, thickness=1),
+            places, numbers(bins.value[some] * factor, fine), steps.name,
+            marker={"color": MEASURED, "size": 5}, error_y=_bars(faint(MEASURED, 0.7), half, thickness=1),
             customdata=np.column_stack([bins.identifiable[some], bins.recorded[some]]).astype(int).tolist(),
             hovertemplate=f"%{{y:.7g}} {unit}, %{{customdata[0]}} of %{{customdata[1]}} recordings",
         ),

@@ -162,8 +162,8 @@ def timeline(alarms: Sequence[Alarm], steps: Steps, links: Links) -> Html:
         f"What changed since when: {number}, the earliest of {first}",
         Html(f'<div class="spans">{"".join(rows)}{_months(steps)}</div>'),
         caption="A bar begins on the day of the change, pale if that day is uncertain, or with the first "
-        "recording if that shows it. Orange: it continues, "
-        f"or has a name. Blue: the change is over, its level stays. Grey: bad data.{more}",
+        "recording if that shows it. Orange: it continues, or has a name. Blue: the change is over, its "
+        f"level stays. Grey: bad data.{more}",
     )
 
 

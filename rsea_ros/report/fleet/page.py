@@ -164,7 +164,7 @@ def _sure(fleet: FleetTrends) -> list[str]:
     lines = [
         f"{fleet.tests} series were tested for any step or ramp, and every cause and fault for the day from "
         f"which on it is named. At most {rate} in 100 of the findings are expected to be false (Benjamini "
-        f"and Hochberg, over all joints and parameters of this look).",
+        "and Hochberg, over all joints and parameters of this look).",
         "Recordings of one day count as one draw: the effect of a day (mounting, grease, zeros) is "
         "estimated from the scatter of the days, by restricted likelihood, and is not a change.",
     ]

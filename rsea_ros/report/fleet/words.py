@@ -15,7 +15,8 @@ from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import Appearance, Change, Interval, Trend
 from rsea_ros.trends.series import Table
 
-_MONTHS = "January February March April May June July August September October November December".split()
+_MONTHS = ("January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
+           "November", "December")  # fmt: skip
 _MOST = 3
 """Changes that a title names."""
 

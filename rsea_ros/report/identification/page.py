@@ -124,9 +124,9 @@ def _parameters(parameters: Sequence[ParameterEstimate]) -> Html:
 def _clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     """Return the time offsets of the sensors; empty if all stamps may be correct."""
     parts = [
-        f"{words.channel(p.name.split('.')[1])} {words.quantity(p.value, p.unit, 2)} "
-        f"(95 %: {words.quantity(p.ci95[0], p.unit, 2)} to {words.quantity(p.ci95[1], p.unit, 2)})"
-        f"{' of the time passed' if p.unit == 'ppm' else ''}"
+        f"{words.channel(p.name.split('.')[1])} {words.quantity(p.value, p.unit, 2)} (95 %: "
+        f"{words.quantity(p.ci95[0], p.unit, 2)} to "
+        f"{words.quantity(p.ci95[1], p.unit, 2)}){' of the time passed' if p.unit == 'ppm' else ''}"
         for p in parameters
         if p.name.startswith(CLOCKS) and not p.ci95[0] <= 0.0 <= p.ci95[1]
     ]

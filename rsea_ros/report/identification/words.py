@@ -75,23 +75,25 @@ def doubt_sentences(identification: Identification) -> tuple[str, ...]:
     elif not identification.at_noise and identification.alternatives:
         names = " or ".join(words.effect(n) for n in identification.alternatives)
         sentences.append(
-            f"The intervals also span what {names} would make of the values: it explains a part of the misfit."
+            f"The intervals also span what {names} would make of the values: it explains a part of the "
+            "misfit."
         )
     elif not identification.at_noise:
         sentences.append(
-            "The intervals hold only if what the model lacks does not move its values: "
-            "nothing simple that was tried explains the misfit."
+            "The intervals hold only if what the model lacks does not move its values: nothing simple that "
+            "was tried explains the misfit."
         )
     return tuple(sentences)
 
 
 def statics_sentences(statics: Statics) -> tuple[str, ...]:
-    """Return travel, stiffness, lost motion and limit of slow ramps against a locked output, a sentence each."""
+    """Return travel, stiffness and limit of slow ramps against a locked output, a sentence each."""
     end, lost = words.number(statics.torque, 3), math.degrees(statics.lost_motion)
+    at_rest = f", {lost:.2f}° of it at no load" if math.isfinite(lost) else ""
     reached = None if statics.limit is None else words.number(statics.limit, 3)
     return (
-        f"Between −{end} and +{end} N·m of command the output angle travels {math.degrees(statics.travel):.2f}°"
-        f"{f', {lost:.2f}° of it at no load' if math.isfinite(lost) else ''}.",
+        f"Between −{end} and +{end} N·m of command the output angle travels "
+        f"{math.degrees(statics.travel):.2f}°{at_rest}.",
         f"Static stiffness while the load grows: {words.quantity(statics.stiffness, 'N m/rad')}.",
         "The motor torque follows the command to its ends: no saturation."
         if reached is None

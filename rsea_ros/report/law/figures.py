@@ -48,17 +48,18 @@ def over_figure(written: WrittenLaw) -> Figure:
         cloud(slice(None), faint(MEASURED, 0.28), 3.5, "measured"),
         *(cloud(k, faint(BEFORE, 0.85), 5, "", i == 0) for i, k in enumerate(windows)),
         band(centre, low, high, faint(AFTER, 0.16)),
-        points(numbers(centre[mean]), numbers(middle[mean]), "mean", marker={"size": 6, "color": INK}, error_y={
-            "type": "data", "array": numbers(error[mean]), "thickness": 1.2, "width": 0, "color": INK}),
+        points(numbers(centre[mean]), numbers(middle[mean]), "mean",
+               marker={"size": 6, "color": INK}, error_y={"type": "data", "array": numbers(error[mean]),
+                                                         "thickness": 1.2, "width": 0, "color": INK}),
         line(centre, 0.5 * (low + high), "law", AFTER, 2.6, hovertemplate=f"%{{y:.3g}} {unit}"),
     ]  # fmt: skip
     top = 1.15 * float(np.quantile(np.abs(y), 0.995))
     wave = "one period of the " if cycles and cycles[0] else ""
     return Figure(
         f"The missing {quantity} over the {NAMES[shown.over]}, and the law in it",
-        f"Grey: missing in the simulation, point by point (one sigma {shown.sd:.2g} {unit}). "
-        "Black: its mean with 95 %. Blue: the law; its band is the spread from its other variables. The "
-        "slider shows one stretch of time in orange.",
+        f"Grey: missing in the simulation, point by point (one sigma {shown.sd:.2g} {unit}). Black: its "
+        "mean with 95 %. Blue: the law; its band is the spread from its other variables. The slider shows "
+        "one stretch of time in orange.",
         data,
         layout(
             xaxis=axis(f"{wave}{NAMES[shown.over]}, {words.unit(UNITS[shown.over])}"),
@@ -85,7 +86,8 @@ def _slider(t: FloatArray, windows: Sequence[IntArray]) -> Json:
 
 def _curve(x: FloatArray, law: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return places along x, and the 10 to 90 % range of the law at each, by its other variables."""
-    edges = np.linspace(*np.quantile(x, [0.002, 0.998]), _CURVE + 1)
+    first, last = np.quantile(x, [0.002, 0.998])
+    edges = np.linspace(first, last, _CURVE + 1)
     which = np.clip(np.searchsorted(edges, x) - 1, 0, _CURVE - 1)
     places = np.unique(which)
     low, high = (np.array([np.quantile(law[which == k], q) for k in places]) for q in (0.1, 0.9))

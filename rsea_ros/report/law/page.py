@@ -1,4 +1,4 @@
-"""The page of a law, beside law.json, the effect files and both rigs: the torque, the law, other candidates."""
+"""The page of a law beside its files: the missing torque, the law, the other candidates."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _PARITY = {"odd": "turns with the command's sign", "even": "keeps its sign when 
 
 
 def write_law(result: LawResult, out: Destination | str | Path, provenance: Provenance | None = None) -> Path:
-    """Write law.json, the effect files, base.yaml, model.yaml and report.html: all or none; return its path."""
+    """Write law.json, the effect files, base.yaml, model.yaml and report.html; return the last's path."""
     with NewFiles(out) as new, lend(*(w.effect for w in result.laws)):
         new.write(LAW_JSON, json_text(law_json(result), provenance))
         for written in result.laws:
@@ -137,7 +137,7 @@ def _files(result: LawResult) -> Html:
     again = command("diagnose", ["RUN.mcap"], "", replace(result.rig_choice, part=()), BASE)
     use = code(f"RSEA_EFFECTS=. {again} --out again")
     return section("How to use it", Html(
-        f"<p>{names}: the law as an effect, to read and to change. "
-        f"{code('model.yaml')}: the rig with it, {code('base.yaml')}: the rig without.</p>"
+        f"<p>{names}: the law as an effect, to read and to change. {code('model.yaml')}: the rig with it, "
+        f"{code('base.yaml')}: the rig without.</p>"
         f'<p class="next">On a fresh record, in the folder of these files: {use}</p>'
     ))  # fmt: skip

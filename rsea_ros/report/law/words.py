@@ -120,6 +120,7 @@ def _law(law: Law) -> dict[str, Any]:
         for n, (v, ci95, unit) in _parameters(law).items()
     }
     return {
-        "name": law.name, "file": f"{law.name}.py", **pick(law, "at=place depends_on=regressor learnt=is_learnt"),
-        "equation": equation_of(law), "parameters": sizes,
+        "name": law.name, "file": f"{law.name}.py",
+        **pick(law, "at=place depends_on=regressor learnt=is_learnt"), "equation": equation_of(law),
+        "parameters": sizes,
     }  # fmt: skip

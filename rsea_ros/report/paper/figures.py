@@ -20,7 +20,7 @@ from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
 from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.records.record import ComplexArray, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.design.figures import Point, bandwidth_surface, slices
+from rsea_ros.report.design.surface import Point, bandwidth_surface, slices
 from rsea_ros.report.figures.bode import thin
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
@@ -87,14 +87,14 @@ def figure_18(test: MovingOutput) -> Figure:
         name = f"<b>{rival.name}</b>, fitted:<br>{share:.2f} % explained"
         curves.append(ResponseCurve(name, colour, _HZ, end_response(rival.rig, _HZ)))
     title = (
-        f"Fig. 18: the unlumped model explains {shares[0]:.2f} % of the held-out torque, "
-        f"the lumped {shares[1]:.0f} %"
+        f"Fig. 18: the unlumped model explains {shares[0]:.2f} % of the held-out torque, the lumped "
+        f"{shares[1]:.0f} %"
     )
     marks = [Mark(19.0, "19 Hz: “out of sync”", "right"), Mark(33.0, "33 Hz: “resonance”", "left")]
     caption = (
         "T_ft/T_m, housing with the pendulum free, spring end clamped. White noise of 30 N·m; the first half "
-        "fitted, the second held out. At 19 Hz the unlumped model has its own resonance; the paper's resonance "
-        "at 33 Hz is in neither."
+        "fitted, the second held out. At 19 Hz the unlumped model has its own resonance; the paper's "
+        "resonance at 33 Hz is in neither."
     )
     return response_figure(title, curves, marks, caption, decibel=(-62, 12))
 
@@ -114,23 +114,24 @@ def figure_18_as_printed() -> Figure:
         f"Fig. 18 with Table 2 as printed: resonance at {resonance:.1f} Hz unlumped, at {other:.1f} Hz lumped"
     )
     caption = (
-        "“Lumped” has two readings: its loads moving (Fig. 16), or the motor pushing against the ground (Fig. "
-        f"3), which puts it {gap:.1f} dB above the unlumped model at {hz:.2f} Hz, the pendulum's frequency. There "
-        "the pendulum swings by itself and holds no torque: none reaches the spring. In both readings the "
-        "resonance is elsewhere."
+        "“Lumped” has two readings: its loads moving (Fig. 16), or the motor pushing against the ground "
+        f"(Fig. 3), which puts it {gap:.1f} dB above the unlumped model at {hz:.2f} Hz, the pendulum's "
+        "frequency. There the pendulum swings by itself and holds no torque: none reaches the spring. In "
+        "both readings the resonance is elsewhere."
     )
     marks = [Mark(other, f"{other:.1f} Hz", "right"), Mark(resonance, f"{resonance:.1f} Hz", "left")]
     return response_figure(title, curves, marks, caption, decibel=(-72, 16))
 
 
-def end_to_end_curves(hz: FloatArray, name: str, spin: str, looks: Sequence[tuple[str, str]],
-                      anchors: tuple[str, str], first: Mark) -> tuple[list[ResponseCurve], list[Mark]]:  # fmt: skip
-    """Return the prototype end to end by Eq. (6), and with the rotor's spin in either sense; and where each ends."""
+def end_to_end_curves(
+    hz: FloatArray, name: str, spin: str, looks: Sequence[tuple[str, str]], sides: Sequence[str], first: Mark
+) -> tuple[list[ResponseCurve], list[Mark]]:
+    """Return the prototype by Eq. (6) and with the rotor's spin in either sense, and where each ends."""
     rig = load_rig("prototype_knee")
     k_s, s = rig["spring.stiffness"], 2j * np.pi * hz
     eq_6 = formulas.eq_6_distal_per_proximal(k_s, rig["chassis.inertia"], rig["spring.damping"])
     curves, marks = [ResponseCurve(name, AFTER, hz, eq_6(s))], [first]
-    for train, (colour, dash), anchor in zip(PROTOTYPE_TRAINS, looks, anchors, strict=True):
+    for train, (colour, dash), anchor in zip(PROTOTYPE_TRAINS, looks, sides, strict=True):
         turned = replace(rig, train=train)
         label = f"{spin}n = {words.signed_text(train_ratio(turned), 0)}"
         curves.append(ResponseCurve(label, colour, hz, end_to_end(turned)(s), dash=dash))
@@ -154,13 +155,13 @@ def figure_20() -> Figure:
     )  # fmt: skip
     ours, edges = prototype_band(), " or ".join(f"{mark.hz:.1f}" for mark in marks[1:])
     title = (
-        f"Fig. 20: {ours:.1f} Hz by Eq. (7), 55.5 Hz printed ({100 * (ours / 55.5 - 1):+.1f} %); {edges} "
-        "Hz with the rotor's spin, by its sense"
+        f"Fig. 20: {ours:.1f} Hz by Eq. (7), 55.5 Hz printed ({100 * (ours / 55.5 - 1):+.1f} %); {edges} Hz "
+        "with the rotor's spin, by its sense"
     )
     caption = (
-        "|T_d/T_p| of the prototype. A harmonic drive with its circular spline held turns backward (n = −160): no "
-        "resonance. With the flexspline held n = +161. J_m is our estimate; the paper states neither it, nor the "
-        "damping, nor what is held."
+        "|T_d/T_p| of the prototype. A harmonic drive with its circular spline held turns backward (n = "
+        "−160): no resonance. With the flexspline held n = +161. J_m is our estimate; the paper states "
+        "neither it, nor the damping, nor what is held."
     )
     return response_figure(title, curves, marks, caption, decibel=(-20, 20))
 

@@ -70,10 +70,10 @@ _KICKER = (
     "actuators”, recomputed"
 )
 _FOOTER = [
-    "Benches are simulated by the unlumped model: the test is whether data can decide, not nature. "
-    "Values drawn from the rigs' spread, sensors' noise, bags written and read back.",
-    "Models: rsea_ros/model; what they take for exact: docs/physics.md; derivation: docs/derivation.md. "
-    "All values in SI.",
+    "Benches are simulated by the unlumped model: the test is whether data can decide, not nature. Values "
+    "drawn from the rigs' spread, sensors' noise, bags written and read back.",
+    "Models: rsea_ros/model; what they take for exact: docs/physics.md; derivation: docs/derivation.md. All "
+    "values in SI.",
     "rsea paper",
 ]
 

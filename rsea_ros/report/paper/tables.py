@@ -55,8 +55,8 @@ def claims_table(claims: Sequence[PaperClaim]) -> Html:
     return section(
         f"{agree} of the {len(recomputed)} numbers that others of the paper make come out to the last digit",
         shown,
-        caption="found: the paper's numbers alone make it, and only these count. silent: one that is needed is not "
-        "printed. unclear: tuned by the paper, or only bounded by other sources.",
+        caption="found: the paper's numbers alone make it, and only these count. silent: one that is needed "
+        "is not printed. unclear: tuned by the paper, or only bounded by other sources.",
     )
 
 
@@ -124,8 +124,8 @@ def bands_table(actuators: Mapping[str, Bands]) -> Html:
         "Up to where each is a pure torque source depends on the tolerance, the sensor and the rotor's spin",
         *parts,
         caption="Exact: roots of polynomials in the frequency. Motor: continuous torque, both ends clamped. "
-        "J_m within the rig's spread: Table 2's for the platform, our estimate for the prototype. Which spline "
-        "of the prototype's drive is held is not printed: n = −160 or +161, never +160.",
+        "J_m within the rig's spread: Table 2's for the platform, our estimate for the prototype. Which "
+        "spline of the prototype's drive is held is not printed: n = −160 or +161, never +160.",
     )
 
 
@@ -164,8 +164,8 @@ def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> 
         shown,
         Html("<h3>Limits</h3>"),
         reached,
-        caption="Both ends clamped, the platform's values. An RT-RSEA is the same machine held by the other end: "
-        "T_d and T_p change places.",
+        caption="Both ends clamped, the platform's values. An RT-RSEA is the same machine held by the other "
+        "end: T_d and T_p change places.",
     )
 
 
@@ -195,6 +195,6 @@ def moving_table(tests: Mapping[str, MovingOutput]) -> Html:
         "other end can",
         table(head, rows),
         caption="Fitted to the first half of the spring end's record, tested on the second half, and on "
-        "the other sensor, which no fit has seen. The lumped model is fitted with loose priors. The "
-        "benches are unlumped by construction.",
+        "the other sensor, which no fit has seen. The lumped model is fitted with loose priors. The benches "
+        "are unlumped by construction.",
     )

@@ -116,12 +116,12 @@ def test_a_curve_without_a_unit_under_the_pointer_is_refused() -> None:
     assert line(ones, ones, "run", AFTER, hovertemplate="%{y:.3g} N·m")["hovertemplate"].endswith("N·m")
 
 
-@pytest.mark.parametrize(("peak", "anchor"), [(0.12, "left"), (6.0, "center"), (138.0, "right")])
-def test_the_name_of_the_highest_curve_stays_in_the_figure(peak: float, anchor: str) -> None:
-    """Centred above a peak at 0.4 Hz it lay on the marks of the axis, on a phone."""
-    frequency = np.linspace(0.1, 139.0, 5000)
-    curve = SpectrumLine("measured", AFTER, 1.0 + np.exp(-((frequency - peak) ** 2)))
+def test_every_curve_is_named_beside_the_figure_in_its_colour() -> None:
+    """Centred above a peak at 0.4 Hz a name lay on the marks of the axis, on a phone."""
+    frequency = np.linspace(0.1, 139.0, 500)
+    curve = SpectrumLine("measured", AFTER, 1.0 + np.exp(-((frequency - 0.4) ** 2)))
     drawn = residual_figure("t", "ft", frequency, [curve], 1e-2)
-    (name,) = [a for a in drawn.layout["annotations"] if "measured" in a["text"]]
-    assert name["xanchor"] == anchor
+    names = drawn.layout["annotations"]
+    assert [n["text"] for n in names] == ["<b>measured</b>", "noise floor"]
+    assert names[0]["font"]["color"] == AFTER and all(n["x"] > 1.0 and n["xref"] == "paper" for n in names)
     assert "N·m/√Hz" in drawn.data[1]["hovertemplate"]

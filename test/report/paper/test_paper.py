@@ -54,7 +54,7 @@ def test_figures_are_json():
 
 
 def test_a_table_is_escaped_and_aligned():
-    html = table(["a", "b"], [["<i>", "1"]], numbers=(1,))
+    html = table(["a", "#b"], [["<i>", "1"]])
     assert "&lt;i&gt;" in html
     assert "<td class='number'>1</td>" in html
 

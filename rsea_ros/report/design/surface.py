@@ -1,5 +1,4 @@
-"""Figures of designs: the map of feasible ones, and Fig. 9 of the paper, bandwidth by Eq. (7), as a surface
-to turn and as its two views."""
+"""Fig. 9: bandwidth over stiffness and inertia, Eq. (7), as a surface to turn and as its two views."""
 
 from __future__ import annotations
 
@@ -11,10 +10,9 @@ import numpy as np
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, numbers, points
-from rsea_ros.report.figures.palette import INK, QUIET, TRUTH, faint
+from rsea_ros.report.figures.palette import INK, QUIET, faint
 
 _SHADES = [[0.0, "#eef3f8"], [0.5, "#7fa8cf"], [1.0, "#123f6d"]]
-_TOP = 2e4
 
 
 @dataclass(frozen=True)
@@ -30,65 +28,9 @@ class Point:
     side: str = "top center"
 
 
-@dataclass(frozen=True)
-class LeastStiffness:
-    """The least K_s (N m/rad) for a demand, at each inertia of the chassis (kg m^2)."""
-
-    name: str
-    colour: str
-    inertia: FloatArray
-    stiffness: FloatArray
-
-
-def log_marks(*values: float) -> Json:
-    """Return plain numbers on a logarithmic axis."""
-    return {"type": "log", "tickvals": list(values), "ticktext": [f"{v:g}" for v in values]}
-
-
-def feasible_map(
-    title: str, shown: Sequence[Point], demands: Sequence[LeastStiffness], caption: str = ""
-) -> Figure:
-    """Return the plane of inertia and stiffness: above every line a design meets that demand."""
-
-    def named(text: str, inertia: float, stiffness: float, colour: str, **parts: float) -> Json:
-        return label(text, float(np.log10(1e3 * inertia)), float(np.log10(stiffness)), colour, **parts)
-
-    inertia = demands[0].inertia
-    least = np.max([d.stiffness for d in demands], axis=0)
-    hidden: Json = {"hoverinfo": "skip", "line": {"width": 0}}
-    data: list[Json] = [
-        line(1e3 * inertia, np.full(len(inertia), _TOP), "", TRUTH, **hidden),
-        line(1e3 * inertia, least, "", TRUTH, fill="tonexty", fillcolor=faint(TRUTH, 0.12), **hidden),
-    ]
-    names = [named("<b>meets all demands</b>", inertia[len(inertia) // 3], 0.6 * _TOP, TRUTH)]
-    hover: Json = {"hovertemplate": "%{y:.0f} N·m/rad"}
-    for d in demands:
-        data.append(line(1e3 * d.inertia, d.stiffness, d.name, d.colour, **hover))
-        names.append(label(d.name, 1.01, float(np.log10(d.stiffness[-1])), d.colour, xref="paper"))
-    for p in shown:
-        dot = {"size": 10, "color": p.colour}
-        data.append(points([1e3 * p.inertia], [p.stiffness], p.name, marker=dot, **hover))
-        names.append(named(f"<b>{p.name}</b>", p.inertia, p.stiffness, p.colour, xshift=8, yshift=-11))
-    height = {"range": [float(np.log10(50.0)), float(np.log10(_TOP))]}
-    drawing = layout(
-        xaxis=axis("spring chassis inertia J_sc, g·m²", **log_marks(0.2, 0.5, 1, 2, 5, 10, 20)),
-        yaxis=axis("stiffness K_s, N·m/rad", **height, **log_marks(100, 200, 500, 1000, 2000, 5000, 10000)),
-        annotations=names,
-        hovermode="closest",
-        margin={"l": 72, "r": 210, "t": 12, "b": 48},
-    )
-    return Figure(title, caption, data, drawing, 460)
-
-
 def bandwidth_surface(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
     """Return the surface of Eq. (7) with actuators on it; drag turns it."""
     k, j = _grid(shown)
-    small = {"size": 11, "color": QUIET}
-    plain = {"gridcolor": "#dfe4e8", "backgroundcolor": "rgba(0,0,0,0)", "tickfont": small}
-
-    def side(text: str, **parts: object) -> Json:
-        return {**plain, "title": {"text": text, "font": {"size": 12, "color": QUIET}}, **parts}
-
     surface: Json = {
         "type": "surface",
         "x": numbers(k),
@@ -100,15 +42,7 @@ def bandwidth_surface(title: str, shown: Sequence[Point], caption: str = "") -> 
         "contours": {"z": {"show": True, "start": 10, "end": 400, "size": 20, "color": faint(INK, 0.35)}},
         "hovertemplate": "K_s %{x:.0f} N·m/rad<br>inertia %{y:.2f} g·m²<br>%{z:.1f} Hz<extra></extra>",
     }
-    scene = {
-        "xaxis": side("stiffness, N·m/rad", **log_marks(200, 500, 1000, 2000)),
-        "yaxis": side("inertia, g·m²", **log_marks(0.5, 1, 2, 5, 10)),
-        "zaxis": side("bandwidth, Hz"),
-        "camera": {"eye": {"x": -1.36, "y": -1.42, "z": 0.68}, "center": {"x": 0, "y": 0, "z": -0.2}},
-        "aspectratio": {"x": 1.25, "y": 1.25, "z": 0.85},
-    }
-    drawing = layout(scene=scene, hovermode="closest", margin={"l": 0, "r": 0, "t": 0, "b": 0})
-    return Figure(title, caption, [surface, *map(_flag, shown)], drawing, 560)
+    return Figure(title, caption, [surface, *(_flag(p) for p in shown)], _scene(), 560)
 
 
 def _flag(p: Point) -> Json:
@@ -129,6 +63,26 @@ def _flag(p: Point) -> Json:
     }
 
 
+def _scene() -> Json:
+    small = {"size": 11, "color": QUIET}
+    plain = {"gridcolor": "#dfe4e8", "backgroundcolor": "rgba(0,0,0,0)", "tickfont": small}
+
+    def axis(text: str, **parts: object) -> Json:
+        return {**plain, "title": {"text": text, "font": {"size": 12, "color": QUIET}}, **parts}
+
+    return layout(
+        scene={
+            "xaxis": axis("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
+            "yaxis": axis("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
+            "zaxis": axis("bandwidth, Hz"),
+            "camera": {"eye": {"x": -1.36, "y": -1.42, "z": 0.68}, "center": {"x": 0, "y": 0, "z": -0.2}},
+            "aspectratio": {"x": 1.25, "y": 1.25, "z": 0.85},
+        },
+        hovermode="closest",
+        margin={"l": 0, "r": 0, "t": 0, "b": 0},
+    )
+
+
 def slices(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
     """Return Fig. 9 (b) and (c): bandwidth over inertia at some stiffnesses, and the other way round."""
     k, j = _grid(shown)
@@ -137,7 +91,7 @@ def slices(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
     views += [(f"{1e3 * v:g} g·m²", k, undamped_band(k, v), "2") for v in (1e-2, 3e-3, 1e-3)]
     data, names = [], []
     for (name, x, y, which), shade in zip(views, shades * 2, strict=True):
-        place = {"xaxis": f"x{which}", "yaxis": f"y{which}"} if which else {}
+        place: Json = {"xaxis": f"x{which}", "yaxis": f"y{which}"} if which else {}
         data.append(line(x, y, name, shade, hovertemplate="%{y:.1f} Hz", **place))
         at: Json = {"xref": f"x{which}", "yref": f"y{which}", "xshift": 6}
         names.append(label(name, float(np.log10(x[-1])), float(np.log10(y[-1])), shade, **at))
@@ -145,7 +99,7 @@ def slices(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
         z, dot = [float(undamped_band(p.stiffness, p.inertia))], {"size": 9, "color": p.colour}
         data.append(points([1e3 * abs(p.inertia)], z, p.name, marker=dot))
         data.append(points([p.stiffness], z, p.name, marker=dot, xaxis="x2", yaxis="y2"))
-    decades = log_marks(0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
+    decades = {"type": "log"} | log_marks(0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
     drawing = layout(
         xaxis=axis("inertia, g·m²", domain=[0.0, 0.4], anchor="y", **decades),
         yaxis=axis("bandwidth, Hz", anchor="x", **decades),
@@ -155,6 +109,11 @@ def slices(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
         hovermode="closest",
     )
     return Figure(title, caption, data, drawing, 400)
+
+
+def log_marks(*values: float) -> Json:
+    """Return plain numbers on a logarithmic axis."""
+    return {"tickvals": list(values), "ticktext": [f"{v:g}" for v in values]}
 
 
 def _grid(shown: Sequence[Point]) -> tuple[FloatArray, FloatArray]:
