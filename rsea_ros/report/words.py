@@ -7,34 +7,23 @@ import math
 from rsea_ros.documents.units import plain
 
 CHANNELS = {
-    "command": "commanded motor torque",
-    "motor_torque": "motor torque",
-    "position": "position",
-    "velocity": "velocity",
-    "ft": "F/T torque",
-    "deflection": "spring deflection",
+    "command": "commanded motor torque", "motor_torque": "motor torque", "position": "position",
+    "velocity": "velocity", "ft": "F/T torque", "deflection": "spring deflection",
     "reference": "reference position",
-}
+}  # fmt: skip
 
 PARAMETERS = {
     "rotor.reflected_inertia": "Rotor inertia, reflected",
-    "rotor.reflected_damping": "Rotor damping, reflected",
-    "gear.ratio": "Gear ratio",
-    "gear.stiffness": "Gear stiffness",
-    "gear.damping": "Gear damping",
-    "chassis.inertia": "Spring chassis inertia",
-    "spring.stiffness": "Spring stiffness",
+    "rotor.reflected_damping": "Rotor damping, reflected", "gear.ratio": "Gear ratio",
+    "gear.stiffness": "Gear stiffness", "gear.damping": "Gear damping",
+    "chassis.inertia": "Spring chassis inertia", "spring.stiffness": "Spring stiffness",
     "spring.damping": "Spring damping",
-}
+}  # fmt: skip
 
 SYMBOLS = {
-    "rotor.reflected_inertia": "J_m",
-    "rotor.reflected_damping": "b_m",
-    "gear.ratio": "N",
-    "chassis.inertia": "J_sc",
-    "spring.stiffness": "K_s",
-    "spring.damping": "b_s",
-}
+    "rotor.reflected_inertia": "J_m", "rotor.reflected_damping": "b_m", "gear.ratio": "N",
+    "chassis.inertia": "J_sc", "spring.stiffness": "K_s", "spring.damping": "b_s",
+}  # fmt: skip
 """As in the paper; what stands after _ is an index."""
 
 _PROPER = {"coulomb": "Coulomb", "lugre": "LuGre", "stribeck": "Stribeck", "ft": "F/T"}

@@ -24,7 +24,7 @@ from rsea_ros.report.figures.figure import (
     layout,
     line,
     names_beside,
-)
+)  # fmt: skip
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
 from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
 from rsea_ros.report.page import Block, bullets, key_numbers, page, section
@@ -45,12 +45,9 @@ LEARNING = (
 def control_report(study: Study, provenance: Provenance | None = None) -> str:
     """Return the page."""
     blocks: list[Block] = [
-        key_numbers(_keys(study)),
-        section("Gains", bullets(gains_words(study))),
-        *_following(study),
-        _impedance_figure(study),
-        *control_tables(study),
-    ]
+        key_numbers(_keys(study)), section("Gains", bullets(gains_words(study))), *_following(study),
+        _impedance_figure(study), *control_tables(study),
+    ]  # fmt: skip
     footer = [
         f"{m.name}: {m.torque:g} N·m, "
         f"{f'{m.speed:.3g} rad/s' if math.isfinite(m.speed) else 'speed not stated'} ({m.source})"

@@ -111,14 +111,11 @@ def design_json(asked: SpringDesign, least: SpringDesign, robust: SpringDesign |
         "least_stiffness=least"
     )
     return {
-        "schema": 1,
-        **pick(asked, "requirement unit=unit.name train=unit.train"),
+        "schema": 1, **pick(asked, "requirement unit=unit.name train=unit.train"),
         "by_train": [pick(row, train) for row in by_train(r, asked.unit, asked.stiffness)],
-        "least_stiffness_by_demand": stiffness_bounds(r, asked.unit),
-        "asked": _design(asked),
-        "least": _design(least),
-        "robust": _design(robust) if robust else None,
-    }
+        "least_stiffness_by_demand": stiffness_bounds(r, asked.unit), "asked": _design(asked),
+        "least": _design(least), "robust": _design(robust) if robust else None,
+    }  # fmt: skip
 
 
 def _design(d: SpringDesign) -> dict[str, Any]:

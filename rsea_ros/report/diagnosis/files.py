@@ -36,12 +36,9 @@ OverlayWriter = Callable[[Mapping[str, Record], Path], None]
 
 
 def write_diagnosis(
-    diagnosis: Diagnosis,
-    record: Record,
-    out: Destination | str | Path,
-    write: OverlayWriter,
+    diagnosis: Diagnosis, record: Record, out: Destination | str | Path, write: OverlayWriter,
     provenance: Provenance | None = None,
-) -> Path:
+) -> Path:  # fmt: skip
     """Write diagnosis.json, model.yaml, overlay.mcap and report.html, and return the report's path.
 
     record: the first one diagnosed, as it was read. Raises OutputError for a name that is taken, OSError or

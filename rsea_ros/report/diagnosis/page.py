@@ -103,14 +103,11 @@ def _cause(cause: Cause, d: Diagnosis) -> Html:
         label = f"{name.replace('_', ' ')}, 95 % interval{model}"
         sizes.append((Html(f"{value}{small} {escape(unit)}"), label))
     return section(
-        words.sentence(f"{words.effect(cause.name)}: {share}"),
-        key_numbers(sizes),
-        how_sure,
-        equation(cause.equation) if cause.equation else "",
-        say.evidence(cause),
+        words.sentence(f"{words.effect(cause.name)}: {share}"), key_numbers(sizes), how_sure,
+        equation(cause.equation) if cause.equation else "", say.evidence(cause),
         f"95 % interval of that gain: {interval}; on the training data it is {train}.",
         f"These data do not distinguish it from {rivals}." if rivals else "",
-    )
+    )  # fmt: skip
 
 
 def _tried(d: Diagnosis) -> Html:

@@ -13,13 +13,9 @@ from rsea_ros.report.page import Html
 
 _PARTS = ("command", "motor", "gear", "encoder", "spring", "F/T sensor", "support")
 _OF_PORT = {
-    Port.COMMAND: "motor",
-    Port.MOTOR: "motor",
-    Port.GEAR: "gear",
-    Port.SPRING: "spring",
-    Port.SENSOR: "F/T sensor",
-    Port.STRUCTURE: "gear",
-}
+    Port.COMMAND: "motor", Port.MOTOR: "motor", Port.GEAR: "gear", Port.SPRING: "spring",
+    Port.SENSOR: "F/T sensor", Port.STRUCTURE: "gear",
+}  # fmt: skip
 _BOX, _HEIGHT = 104, 40
 _ROW, _COLUMN = 128, 56
 """From a part to the next one, side by side and, for phones, one below the other."""

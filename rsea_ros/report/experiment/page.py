@@ -38,7 +38,7 @@ from rsea_ros.report.figures.figure import (
     line,
     names_beside,
     numbers,
-)
+)  # fmt: skip
 from rsea_ros.report.figures.palette import AFTER, BEFORE, QUIET, TRUTH
 from rsea_ros.report.page import Block, Html, bullets, key_numbers, page, section, table
 from rsea_ros.report.result_files import EXPERIMENT_JSON, MODEL, REPORT, Provenance, json_text
@@ -58,12 +58,9 @@ def check_session_free(out: Path) -> None:
 
 
 def write_campaign(
-    outcome: CampaignOutcome,
-    campaign: Campaign,
-    out: Path,
-    notes: tuple[str, ...] = (),
+    outcome: CampaignOutcome, campaign: Campaign, out: Path, notes: tuple[str, ...] = (),
     provenance: Provenance | None = None,
-) -> Path:
+) -> Path:  # fmt: skip
     """Write experiment.json, model.yaml, report.html and the commands; return the report's path.
 
     model.yaml: the rig with the likeliest cause and the values of all records together.
@@ -182,12 +179,9 @@ def density_of(command: FloatArray, rate: float) -> tuple[FloatArray, FloatArray
 
 
 def campaign_page(
-    outcome: CampaignOutcome,
-    rig: str,
-    limits: RunLimits,
-    notes: tuple[str, ...] = (),
+    outcome: CampaignOutcome, rig: str, limits: RunLimits, notes: tuple[str, ...] = (),
     provenance: Provenance | None = None,
-) -> str:
+) -> str:  # fmt: skip
     """Return the page of a session: the remaining causes after each run. notes: on its making."""
     title, kicker = words.sentence(end_sentence(outcome)), f"A session of experiments · {rig}"
     return page(title, kicker, _session(outcome, limits, notes), (), provenance)

@@ -89,16 +89,13 @@ def limit_rows(p: Proposal, stated: dict[str, float]) -> list[tuple[str, str, st
     """Return each quantity: expected, at the level that is stated, limit, unit."""
     return [
         (
-            n,
-            f"{expected:.4g}",
-            f"{p.peaks.at_level[n]:.4g}",
-            f"{stated[n]:.4g}" if n in stated else "none",
+            n, f"{expected:.4g}", f"{p.peaks.at_level[n]:.4g}", f"{stated[n]:.4g}" if n in stated else "none",
             plain(unit),
         )
         for n, unit, expected in (
             (n, u, p.peaks.expected[n]) for n, u in UNITS.items() if n in p.peaks.expected
         )
-    ]
+    ]  # fmt: skip
 
 
 def known_causes(weighing: RunWeighing) -> str:
@@ -182,15 +179,12 @@ def run_count(outcome: CampaignOutcome) -> tuple[str, str]:
 def advice_json(advice: Advice) -> dict[str, Any]:
     """Return the contents of experiment.json. Infinite numbers are null."""
     return {
-        "schema": SCHEMA,
-        "sentence": verdict(advice),
+        "schema": SCHEMA, "sentence": verdict(advice),
         "causes": {h.name: strict(h.probability) for h in advice.hypotheses},
-        "excluded": strict(advice.excluded),
-        "limits": strict(advice.asked.limits.finite_limits()),
-        "limits_hold_with_probability": LEVEL,
-        "run": _run(advice.proposal),
+        "excluded": strict(advice.excluded), "limits": strict(advice.asked.limits.finite_limits()),
+        "limits_hold_with_probability": LEVEL, "run": _run(advice.proposal),
         "no_run_separates": [_proof(x) for x in advice.proofs],
-    }
+    }  # fmt: skip
 
 
 def campaign_json(outcome: CampaignOutcome, campaign: Campaign) -> dict[str, Any]:

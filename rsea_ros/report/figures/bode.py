@@ -21,7 +21,7 @@ from rsea_ros.report.figures.figure import (
     layout,
     line,
     names_beside,
-)
+)  # fmt: skip
 from rsea_ros.report.figures.palette import AFTER, MEASURED, QUIET, faint
 
 _SIDE = Z95 / np.sqrt(2.0)

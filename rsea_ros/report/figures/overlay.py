@@ -39,13 +39,9 @@ class Simulated:
 
 
 def overlay_figure(
-    title: str,
-    channel: str,
-    t: FloatArray,
-    measured: FloatArray,
-    simulations: Sequence[Simulated],
+    title: str, channel: str, t: FloatArray, measured: FloatArray, simulations: Sequence[Simulated],
     caption: str = "",
-) -> Figure:
+) -> Figure:  # fmt: skip
     """Return the figure of one channel. t: s."""
     keep = sample_extremes(measured, measured - simulations[-1].values)
     unit = words.unit(UNITS[channel])

@@ -18,7 +18,7 @@ from rsea_ros.report.figures.figure import (
     layout,
     line,
     names_beside,
-)
+)  # fmt: skip
 from rsea_ros.report.figures.palette import QUIET, faint
 
 
@@ -63,13 +63,9 @@ class Mark:
 
 
 def response_figure(
-    title: str,
-    responses: Sequence[ResponseCurve],
-    marks: Sequence[Mark] = (),
-    caption: str = "",
-    decibel: tuple[float, float] | None = None,
-    phase: bool = True,
-) -> Figure:
+    title: str, responses: Sequence[ResponseCurve], marks: Sequence[Mark] = (), caption: str = "",
+    decibel: tuple[float, float] | None = None, phase: bool = True,
+) -> Figure:  # fmt: skip
     """Return gain and phase over frequency; marks are vertical lines. decibel: range of the gain axis."""
     data: list[Json] = []
     for r in responses:

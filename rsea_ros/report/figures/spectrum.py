@@ -29,13 +29,9 @@ class SpectrumLine:
 
 
 def residual_figure(
-    title: str,
-    channel: str,
-    frequency: FloatArray,
-    curves: Sequence[SpectrumLine],
-    noise: float,
+    title: str, channel: str, frequency: FloatArray, curves: Sequence[SpectrumLine], noise: float,
     caption: str = "",
-) -> Figure:
+) -> Figure:  # fmt: skip
     """Return the densities of residuals over frequency, Hz. noise: density of the noise floor."""
     unit, floor, ends = words.unit(UNITS[channel]), np.full(2, noise), frequency[[0, -1]]
     drawn = [(c, *in_bands(frequency, c.density)) for c in curves]

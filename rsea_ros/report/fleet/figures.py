@@ -117,15 +117,12 @@ def _shares(naming: Naming, title: str, since: list[Json], steps: Steps) -> Figu
     asked, named = steps.count(naming.time_s), steps.count(naming.time_s[naming.named])
     some = asked > 0
     bars = {
-        "type": "bar",
-        "name": "recordings",
-        "width": _BAR * steps.days,
-        "x": dates(*steps.middle[some]),
+        "type": "bar", "name": "recordings", "width": _BAR * steps.days, "x": dates(*steps.middle[some]),
         "y": numbers(100.0 * named[some] / asked[some]),
         "marker": {"color": faint(BEFORE if naming.kind == "cause" else MEASURED, 0.8)},
         "customdata": np.column_stack([named[some], asked[some]]).tolist(),
         "hovertemplate": "%{customdata[0]} of %{customdata[1]} recordings<extra></extra>",
-    }
+    }  # fmt: skip
     drawing = layout(
         xaxis=_date_axis(steps), yaxis=axis("%", range=[0.0, 102.0]), shapes=since, margin=_MARGIN
     )

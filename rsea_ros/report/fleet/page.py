@@ -29,13 +29,9 @@ _ROWS = 60
 
 
 def write_fleet_report(
-    history: Table,
-    recordings: Table,
-    out: Destination | Path | str,
-    *,
-    store: Path | str | None = None,
+    history: Table, recordings: Table, out: Destination | Path | str, *, store: Path | str | None = None,
     settings: TrendSettings = DEFAULT,
-) -> Path:
+) -> Path:  # fmt: skip
     """Write index.html and a page for each joint, and return the path of index.html.
 
     history, recordings: as of trends.fleet_trends. store: the folder that the paths in `artefacts` start

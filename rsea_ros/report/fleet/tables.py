@@ -54,13 +54,9 @@ def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) 
 
 
 def joint_table(
-    joints: Sequence[str],
-    fleet: FleetTrends,
-    alarmed: Mapping[str, Sequence[Alarm]],
-    latest: Mapping[str, str],
-    recordings: Table,
-    links: Links,
-) -> Html:
+    joints: Sequence[str], fleet: FleetTrends, alarmed: Mapping[str, Sequence[Alarm]],
+    latest: Mapping[str, str], recordings: Table, links: Links,
+) -> Html:  # fmt: skip
     """Return a row for each joint. latest: causes that its latest recording names."""
     of, done = np.asarray(recordings["joint"], str), np.asarray(recordings["outcome"], str) == "done"
     dated = np.isfinite(np.asarray(recordings["time_s"], float))

@@ -27,7 +27,7 @@ from rsea_ros.report.identification.words import (
     statics_sentences,
     value_text,
     verdict_sentence,
-)
+)  # fmt: skip
 from rsea_ros.report.page import (
     Block,
     Html,

@@ -124,11 +124,8 @@ def terminal_table(identification: Identification, truth: Mapping[str, float] | 
 
     table = Table(box=None, pad_edge=False, title_justify="left", header_style="dim")
     for title, justify in (
-        ("parameter", "left"),
-        ("value ± 95 %", "right"),
-        ("unit", "left"),
-        ("rig", "right"),
-    ):
+        ("parameter", "left"), ("value ± 95 %", "right"), ("unit", "left"), ("rig", "right"),
+    ):  # fmt: skip
         table.add_column(title, justify=justify, style="dim" if title == "unit" else None)  # type: ignore[arg-type]
     if truth is not None:
         table.add_column("true", justify="right")

@@ -20,7 +20,7 @@ from rsea_ros.report.figures.figure import (
     names_beside,
     numbers,
     points,
-)
+)  # fmt: skip
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, QUIET, faint
 from rsea_ros.report.law.words import NAMES, UNITS
 

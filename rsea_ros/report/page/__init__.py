@@ -36,12 +36,9 @@ def html(text: str) -> str:
 
 
 def page(
-    title: str,
-    kicker: str,
-    blocks: Iterable[Block],
-    footer: Sequence[str] = (),
+    title: str, kicker: str, blocks: Iterable[Block], footer: Sequence[str] = (),
     provenance: Provenance | None = None,
-) -> str:
+) -> str:  # fmt: skip
     """Return the document. title: the verdict in a sentence. kicker: the subject, above the title."""
     blocks = list(blocks)
     body, contents = _number_sections("\n".join(_block(block, i) for i, block in enumerate(blocks)))

@@ -47,21 +47,12 @@ def paper_report(tests: PaperTests) -> str:
     first = next(iter(tests.moving.values()))
     rig = load_rig("paper_moving_output")
     blocks: list[Block] = [
-        key_numbers(_keys()),
-        tables.claims_table(claims()),
-        tables.findings_list(findings()),
-        tables.equations_section(),
-        tables.table_1(_drawings()),
-        tables.table_2(_rig_values()),
-        *figures.figure_9(),
-        figures.figure_15(tests.high_impedance),
-        figures.figure_18(first),
-        figures.figure_18_as_printed(),
-        tables.moving_table(tests.moving),
-        figures.figure_20(),
-        tables.bands_table(actuator_bands()),
-        tables.arrangements_table(arrangements(rig), limits(rig)),
-    ]
+        key_numbers(_keys()), tables.claims_table(claims()), tables.findings_list(findings()),
+        tables.equations_section(), tables.table_1(_drawings()), tables.table_2(_rig_values()),
+        *figures.figure_9(), figures.figure_15(tests.high_impedance), figures.figure_18(first),
+        figures.figure_18_as_printed(), tables.moving_table(tests.moving), figures.figure_20(),
+        tables.bands_table(actuator_bands()), tables.arrangements_table(arrangements(rig), limits(rig)),
+    ]  # fmt: skip
     return page(_title(first), _KICKER, blocks, _FOOTER)
 
 
@@ -119,14 +110,10 @@ def _drawings() -> list[tuple[str, str]]:
 def _rig_values() -> dict[str, float]:
     rig = load_rig("paper_moving_output")
     names = {
-        "J_m": "rotor.reflected_inertia",
-        "J_sc": "chassis.inertia",
-        "b_s": "spring.damping",
-        "b_m": "rotor.reflected_damping",
-        "b_ld": "housing_end.damping",
-        "K_ld": "housing_end.stiffness",
+        "J_m": "rotor.reflected_inertia", "J_sc": "chassis.inertia", "b_s": "spring.damping",
+        "b_m": "rotor.reflected_damping", "b_ld": "housing_end.damping", "K_ld": "housing_end.stiffness",
         "K_s": "spring.stiffness",
-    }
+    }  # fmt: skip
     values = {symbol: rig[name] for symbol, name in names.items()}
     return {**values, "J_od": 0.010, "J_ld": rig["housing_end.inertia"] - 0.010}
 
