@@ -88,7 +88,7 @@ def _decibel(ratio: FloatArray) -> FloatArray:
 
 
 def _layout(shown: FrequencyResponse, has_model: bool, limit: float) -> Json:
-    names = [("measured<br>95 % band<br>", MEASURED), *([("<br><b>model</b>", AFTER)] if has_model else [])]
+    names = [*([("<b>model</b>", AFTER)] if has_model else []), ("measured,<br>95 % band", MEASURED)]
     above, below = (words.unit(UNITS[n]) for n in (shown.output, shown.input))
     reference = "" if above == below else f" re 1 {above} per {below}"
     return layout(
