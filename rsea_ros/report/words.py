@@ -97,7 +97,7 @@ def quantity(value: float, of: str, digits: int = 3) -> str:
 
 def unit_factor(value: float, of: str) -> tuple[float, str]:
     """Return the factor that makes a value readable, and its unit then: 6.1e-6 rad gives 1e6, `µrad`."""
-    simple = of and " " not in of.split("/")[0] and of != "1"
+    simple = of and " " not in of.split("/")[0] and not of.startswith("1")
     if not simple or value == 0.0 or not math.isfinite(value) or abs(value) >= 0.1:
         return 1.0, unit(of)
     factor, prefix = next((p for p in _PREFIXES if abs(value) >= 0.999 * p[0]), _PREFIXES[-1])
@@ -115,6 +115,18 @@ def span(low: float, high: float, of: str) -> str:
     ends = (round(end, decimals) for end in (low, high))
     low_text, high_text = (minus(f"{end:.{max(0, decimals)}f}") if end else "0" for end in ends)
     return f"{low_text} to {high_text} {prefixed}".rstrip()
+
+
+def measured(value: float, low: float, high: float, of: str) -> tuple[str, str, str]:
+    """Return value, doubt and unit: ("4.0045", " ± 0.0029", "mrad"), or lopsided " −0.1/+1.4"."""
+    factor, unit = unit_factor(value, of)
+    return *with_doubt(value * factor, low * factor, high * factor), unit
+
+
+def measured_text(value: float, low: float, high: float, of: str) -> str:
+    """Return the same in one text, `4.0045 ± 0.0029 mrad`."""
+    text, doubt, unit = measured(value, low, high, of)
+    return f"{text}{doubt} {unit}".rstrip()
 
 
 LOPSIDED = 1.5

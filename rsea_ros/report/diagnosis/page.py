@@ -97,7 +97,7 @@ def _cause(cause: Cause, d: Diagnosis) -> Html:
     rivals = list_names([words.effect(n) for n in cause.confusable_with])
     sizes = []
     for name, p in num.sizes(cause).items():
-        value, doubt, unit = num.estimate(p)
+        value, doubt, unit = words.measured(p.value, *p.ci95, p.unit)
         small = f" <small>{doubt.strip()}</small>" if doubt else ""
         model = f", of which the simulation ± {num.model_half_width(p)}" if p.model_sd > 0.0 else ""
         label = f"{name.replace('_', ' ')}, 95 % interval{model}"

@@ -125,9 +125,8 @@ def size(weighing: RunWeighing, name: str) -> str:
     noise = abs(unknown.outer(at + sd) - unknown.outer(at - sd)) / 2.0
     clock = CLOCK_DOUBT if main.unit == "s" else 0.0
     half = Z95 * math.hypot(noise, DEFAULT.sizes.model_error * value, clock)
-    factor, unit = words.unit_factor(value, main.unit)
-    number, doubt = words.with_doubt(*(factor * v for v in (value, value - half, value + half)))
-    return f"{main.name.replace('_', ' ')} {number}{doubt} {'' if main.unit == '1' else unit}".rstrip()
+    text = words.measured_text(value, value - half, value + half, main.unit)
+    return f"{main.name.replace('_', ' ')} {text}"
 
 
 def end_sentence(outcome: CampaignOutcome) -> str:

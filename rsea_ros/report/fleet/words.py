@@ -51,9 +51,7 @@ def name(about: str) -> str:
 
 def value(v: Interval, unit: str) -> str:
     """Return a value with its 95 % interval and unit, `3.90 ± 0.08 mrad`; a bare number in percent."""
-    factor, shown = (100.0, "%") if unit == "1" else words.unit_factor(v.value, unit)
-    text, doubt = words.with_doubt(v.value * factor, v.low * factor, v.high * factor)
-    return f"{text}{doubt} {shown}".strip()
+    return words.measured_text(*v.times(100.0), "%") if unit == "1" else words.measured_text(*v, unit)
 
 
 def percent(share: float) -> str:

@@ -91,7 +91,7 @@ def _blocks(i: Identification) -> Iterator[Block]:
     if i.statics is not None:
         yield section("Slow ramps against the locked output", bullets(statics_sentences(i.statics)))
     models = i.models or (None,) * len(i.responses)
-    yield from (bode_figure(r, m) for r, m in zip(i.responses, models, strict=True))
+    yield from map(bode_figure, i.responses, models)
     by_name = {o.channel: o for o in i.overlays}  # the motor torque only repeats the command
     for overlay in [by_name[n] for n in SENSED if n in by_name] or i.overlays:
         yield _over_time(i, overlay)

@@ -113,7 +113,7 @@ def test_json_sentence_and_page_name_the_same_channel(diagnosed):
     ],
 )
 def test_small_angles_and_times_have_a_prefix(estimate, text):
-    assert num.estimate(estimate) == text
+    assert words.measured(estimate.value, *estimate.ci95, estimate.unit) == text
 
 
 def test_an_experiment_is_described_with_its_units():
