@@ -56,10 +56,5 @@ def time_figure(diagnosis: Diagnosis, channel: str) -> Figure:
         return overlay_figure(title, channel, before.t, before.measured, [simulated])
     title = f"{name} over time: {fit} → {d.extended_fit_percent[channel]:.2f} % explained"
     both = [Simulated("before", BEFORE, before.simulated), Simulated("after", AFTER, after.simulated)]
-    figure = overlay_figure(title, channel, before.t, before.measured, both)
-    t = before.t - before.t[0]
-    edges = np.searchsorted(t, np.arange(0.0, max(t[-1], 1e-9), _FIRST_VIEW))
-    power = np.add.reduceat((before.simulated - after.simulated) ** 2, edges)[: max(1, len(edges) - 1)]
-    start = _FIRST_VIEW * int(np.argmax(power))
-    xaxis = {**figure.layout["xaxis"], "range": [start, start + _FIRST_VIEW]}
-    return replace(figure, layout={**figure.layout, "xaxis": xaxis})
+    apart = before.simulated - after.simulated
+    return overlay_figure(title, channel, before.t, before.measured, both, _FIRST_VIEW, apart)

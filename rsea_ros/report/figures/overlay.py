@@ -21,7 +21,6 @@ MOST_SAMPLES = 45_000
 _MEASURED, _RESIDUAL = 1.0 / 2000.0, 1.0 / 64.0
 """Steps of the drawn values, of their standard deviation: an eighth of a pixel, also of a tenfold zoom."""
 _MICROSECOND = 1e-6
-_FIRST_VIEW = 6.0
 STEPS = 60_000
 """Of the whole range of a packed trace, at the least: 16 bits hold them."""
 _LEVEL = 6
@@ -40,9 +39,12 @@ class Simulated:
 
 def overlay_figure(
     title: str, channel: str, t: FloatArray, measured: FloatArray, simulations: Sequence[Simulated],
-    caption: str = "",
+    view: float = 6.0, lively: FloatArray | None = None,
 ) -> Figure:  # fmt: skip
-    """Return the figure of one channel. t: s."""
+    """Return the figure of one channel. t: s.
+
+    It opens with the `view` s in which a signal moves most. lively: that signal, by default the measured one.
+    """
     keep = sample_extremes(measured, measured - simulations[-1].values)
     unit = words.unit(UNITS[channel])
     pauses = pauses_of(t[keep])
@@ -61,8 +63,9 @@ def overlay_figure(
         "residuals": [residual(s) for s in simulations],
         "unit": unit,
     }
-    caption = caption or "Drag to zoom, double-click to see the whole record; every zoom draws all samples."
-    drawn = _layout(channel, unit, simulations, _liveliest(t - t[0], measured))
+    caption = "Drag to zoom, double-click to see the whole record; every zoom draws all samples."
+    opening = _liveliest(t - t[0], measured if lively is None else lively, view)
+    drawn = _layout(channel, unit, simulations, opening)
     return Figure(title, caption, [], drawn, 460, "overlay", extra)
 
 
@@ -101,14 +104,12 @@ def sample_extremes(measured: FloatArray, residual: FloatArray) -> npt.NDArray[n
     return np.unique(np.concatenate([*kept, [n - 1]]))
 
 
-def _liveliest(t: FloatArray, measured: FloatArray) -> tuple[float, float]:
-    """Return the stretch in which the channel moves most, where the figure opens."""
-    if t[-1] <= 2.0 * _FIRST_VIEW:
+def _liveliest(t: FloatArray, signal: FloatArray, view: float) -> tuple[float, float]:
+    if t[-1] <= 2.0 * view:
         return 0.0, float(t[-1])
-    edges = np.searchsorted(t, np.arange(0.0, t[-1], _FIRST_VIEW))
-    spread = np.add.reduceat((measured - measured.mean()) ** 2, edges)[:-1]
-    start = _FIRST_VIEW * int(np.argmax(spread))
-    return start, start + _FIRST_VIEW
+    edges = np.searchsorted(t, np.arange(0.0, t[-1], view))
+    start = view * int(np.argmax(np.add.reduceat((signal - signal.mean()) ** 2, edges)[:-1]))
+    return start, start + view
 
 
 def _layout(channel: str, unit: str, simulations: Sequence[Simulated], view: tuple[float, float]) -> Json:
