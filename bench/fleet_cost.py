@@ -161,7 +161,7 @@ def _row(number: int, when: datetime, rng: np.random.Generator) -> dict[str, obj
 
 def reading(count: int = 100_000) -> bool:
     """Read and report a store of 100 000 rows."""
-    from rsea_ros.report.fleet.files import write_fleet_report
+    from rsea_ros.report.fleet.page import write_fleet_report
 
     with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:
         store = make_store(Path(folder) / "store", count)

@@ -27,7 +27,7 @@ import numpy as np
 from fleet_simulated import fleet
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-from rsea_ros.report.fleet import write_fleet_report
+from rsea_ros.report.fleet.page import write_fleet_report
 
 DRAWN = """document.readyState === 'complete' && location.protocol === 'file:' &&
   [...document.querySelectorAll('.figure')].every((f) => f.dataset.drawn) &&

@@ -27,7 +27,7 @@ from rsea_ros.laws.learn import learn
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Record
-from rsea_ros.report.law.files import write_law
+from rsea_ros.report.law.page import write_law
 from rsea_ros.report.law.words import headline, law_lines
 
 

@@ -15,7 +15,7 @@ from diagnosis_cases import plan
 from diagnosis_outcome import Outcome, run_case
 
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.report.diagnosis.settings import value_text
+from rsea_ros.report.diagnosis.page import value_text
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -12,7 +12,7 @@ from rsea_ros.model.extent import check_pace
 from rsea_ros.model.inverse import is_inverse, require_position
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import Record
-from rsea_ros.report.check.terminal import warnings
+from rsea_ros.report.check import warnings
 
 
 def check_records(

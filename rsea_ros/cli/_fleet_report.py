@@ -18,7 +18,7 @@ def add_report(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the pages and print their path."""
     from rsea_ros.fleet import history, recordings
-    from rsea_ros.report.fleet.files import INDEX, write_fleet_report
+    from rsea_ros.report.fleet.page import INDEX, write_fleet_report
 
     place = results_place(args, Path("out") / f"fleet-{Path(args.store).name}", (INDEX,))
     page = write_fleet_report(history(args.store), recordings(args.store), place, store=args.store)

@@ -11,7 +11,7 @@ from datetime import date, datetime
 from typing import Any
 
 from rsea_ros.cli._columns import columns
-from rsea_ros.report.json_values import strict
+from rsea_ros.report.result_files import strict
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _WIDEST = 60

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rsea_ros.model.rig_file import rig_path
-from rsea_ros.report.provenance import Provenance, provenance_of
+from rsea_ros.report.result_files import Provenance, provenance_of
 
 
 def provenance(verb: str, files: Sequence[str | Path], rig: str = "") -> Provenance:

@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         for bag, record in zip(args.bags, records, strict=True)
     ]
     if args.json:
-        from rsea_ros.report.check.json import check_json
+        from rsea_ros.report.check import check_json
 
         print(json.dumps(check_json(checks), indent=1, allow_nan=False, ensure_ascii=False))
     else:
@@ -84,7 +84,7 @@ def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[
 def _print(checks: list[Findings]) -> None:
     from rich.console import Console
 
-    from rsea_ros.report.check.terminal import check_lines, summary
+    from rsea_ros.report.check import check_lines, summary
 
     console = Console()
     for findings in checks:

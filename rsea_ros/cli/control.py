@@ -10,7 +10,7 @@ from rsea_ros.cli._output import add_json, add_results, print_file, results_plac
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._runs import RIG
 from rsea_ros.outputs.new_files import NewFiles
-from rsea_ros.report.file_names import CONTROL_JSON, REPORT
+from rsea_ros.report.result_files import CONTROL_JSON, REPORT
 
 if TYPE_CHECKING:
     from rsea_ros.control.study import MotorLimits, Study
@@ -47,9 +47,9 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.control.loads import lightest
     from rsea_ros.control.study import study
     from rsea_ros.model.rig_file import load_rig
-    from rsea_ros.report.control.json import control_json
     from rsea_ros.report.control.page import control_report
-    from rsea_ros.report.json_values import json_text
+    from rsea_ros.report.control.tables import control_json
+    from rsea_ros.report.result_files import json_text
 
     place = results_place(args, "out/control", (CONTROL_JSON, REPORT), [args.rig, args.free])
     _check_rates(args.rate)
@@ -103,11 +103,11 @@ def _print(result: Study, report: Path) -> None:
     console = Console()
     for line in tables.gains_words(result):
         console.print(line, highlight=False)
-    rates = [f"{at.design.rate:g} Hz" for at in result.rates]
+    rates = tables.rates(result)
     blocks = [
-        (tables.trial_head(result), tables.trial_rows(result)),
+        (["trial", "required", *rates], tables.trial_rows(result)),
         (["compensated", "sine", *rates], tables.compensation_rows(result)),
-        (["motor", "amplitude", "clamped: limit from", "free: limit from"], tables.reach_rows(result)),
+        (tables.REACH_HEAD, tables.reach_rows(result)),
     ]
     for head, rows in blocks:
         shown = Table(*head, box=None, pad_edge=False, header_style="dim")

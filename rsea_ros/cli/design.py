@@ -12,7 +12,7 @@ from rsea_ros.cli._output import add_json, add_results, path, print_file, result
 from rsea_ros.design.requirement import Requirement, check_magnitude
 from rsea_ros.model.train import TRAINS
 from rsea_ros.outputs.new_files import NewFiles
-from rsea_ros.report.file_names import DESIGN_JSON, REPORT
+from rsea_ros.report.result_files import DESIGN_JSON, REPORT
 
 HELP = "compute spring stiffness and spring rate from torque, bandwidth and inertia by the paper's method"
 EXAMPLE = "rsea design --torque 200 --bandwidth 50 --inertia 0.01"
@@ -79,9 +79,9 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.design.motor_gear_units import unit_named
     from rsea_ros.design.spring_design import least_stiffness, spring_design
     from rsea_ros.design.tolerance import robust_stiffness
-    from rsea_ros.report.design.json import design_json
     from rsea_ros.report.design.page import design_report
-    from rsea_ros.report.json_values import json_text
+    from rsea_ros.report.design.tables import design_json
+    from rsea_ros.report.result_files import json_text
 
     place = results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
     check_magnitude("stiffness", args.stiffness, "N m/rad")

@@ -17,7 +17,7 @@ from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, eac
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.records.record import Record
-from rsea_ros.report.file_names import DIAGNOSIS, DIAGNOSIS_JSON, MODEL
+from rsea_ros.report.result_files import DIAGNOSIS, DIAGNOSIS_JSON, MODEL
 
 HELP = "find the causes of the simulation error: name, size, gain, extended model"
 EXAMPLE = "rsea diagnose run.mcap --rig my_bench.yaml --out results"
@@ -115,7 +115,7 @@ def _print(result: Diagnosis, report: Path) -> None:
     from rich.console import Console
 
     from rsea_ros.report.diagnosis.terminal import terminal_lines
-    from rsea_ros.report.rig.words import command
+    from rsea_ros.report.rig import command
     from rsea_ros.report.wrapped_lines import command_row
 
     console, width = Console(), _lines.columns()

@@ -15,7 +15,7 @@ from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.outputs.new_files import Destination, NewFiles
-from rsea_ros.report.file_names import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MODEL, REPORT
+from rsea_ros.report.result_files import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MODEL, REPORT
 
 if TYPE_CHECKING:
     from rsea_ros.experiment.advice import Advice
@@ -127,15 +127,15 @@ def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -
     """Write run.csv, experiment.json and report.html; return the report's path."""
     from rsea_ros.cli._provenance import provenance
     from rsea_ros.experiment.run_limits import run_text
-    from rsea_ros.report.experiment.json import advice_json
     from rsea_ros.report.experiment.page import advice_page
-    from rsea_ros.report.json_values import json_text, with_provenance
+    from rsea_ros.report.experiment.words import advice_json
+    from rsea_ros.report.result_files import json_text
 
     source = provenance("experiment", args.bag)
     with NewFiles(place) as new:
         if advice.proposal is not None:
             new.write(COMMANDS, run_text(advice.proposal.command, advice.proposal.rate))
-        new.write(EXPERIMENT_JSON, json_text(with_provenance(advice_json(advice), source)))
+        new.write(EXPERIMENT_JSON, json_text(advice_json(advice), source))
         return new.write(REPORT, advice_page(advice, source))
 
 

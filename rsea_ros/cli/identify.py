@@ -14,7 +14,7 @@ from rsea_ros.cli._progress import progress
 from rsea_ros.cli._runs import OFF_RIG, add_rig, add_runs, off_rig, rig_choice
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
 from rsea_ros.identification.result import Verdict
-from rsea_ros.report.file_names import IDENTIFICATION, IDENTIFICATION_JSON, MODEL
+from rsea_ros.report.result_files import IDENTIFICATION, IDENTIFICATION_JSON, MODEL
 
 if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.identification.identify import (
             identify,
         )  # takes 0.7 s, which a refused bag need not wait for
-        from rsea_ros.report.identification.files import write_results
+        from rsea_ros.report.identification.page import write_results
 
         result = replace(identify(records, rig, tell), rig_choice=rig_choice(args))
         report = write_results(result, place, provenance("identify", args.bags, args.rig))
@@ -65,12 +65,15 @@ def run(args: argparse.Namespace) -> int:
 
 def _print(result: Identification, report: Path) -> None:
     """Print the verdict, the table, and a line for each remark."""
-    from rsea_ros.report.fault_words import fault_lines
-    from rsea_ros.report.identification.statics_sentences import statics_sentences
-    from rsea_ros.report.identification.terminal import terminal_table
-    from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
-    from rsea_ros.report.remark_words import remark_sentences
-    from rsea_ros.report.rig.words import right_rig, split_off_rig
+    from rsea_ros.report.identification.words import (
+        doubt_sentences,
+        next_command,
+        statics_sentences,
+        terminal_table,
+        verdict_sentence,
+    )
+    from rsea_ros.report.remark_words import fault_lines, remark_sentences
+    from rsea_ros.report.rig import right_rig, split_off_rig
 
     say(verdict_sentence(result))
     following = next_command(result)

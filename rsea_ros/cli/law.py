@@ -11,7 +11,7 @@ from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, prin
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._runs import add_rig, add_runs, rig_choice
 from rsea_ros.cli._topics import add_topic_options, add_window_options, each_once, topic_map
-from rsea_ros.report.file_names import LAW, LAW_JSON
+from rsea_ros.report.result_files import LAW, LAW_JSON
 
 HELP = "fit a law to the residual that no known effect explains, and write it as an effect file"
 EXAMPLE = "rsea law run.mcap --rig results/model.yaml --out law"
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.cli._provenance import provenance
         from rsea_ros.laws.effect_source import LawProvenance
         from rsea_ros.laws.learn import learn
-        from rsea_ros.report.law.files import write_law
+        from rsea_ros.report.law.page import write_law
 
         where = provenance("law", args.bags, args.rig)
         bags = {Path(path).name: digest for path, digest in list(where.files.items())[: len(args.bags)]}
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         print_file(report.parent / LAW_JSON)
     else:
         from rsea_ros.report.law.words import gain_sentence, headline, law_lines
-        from rsea_ros.report.rig.words import rig_named
+        from rsea_ros.report.rig import rig_named
 
         say(headline(result))
         print(f"rig         {rig_named(result.rig_name, result.rig_choice)}")

@@ -19,7 +19,7 @@ from rsea_ros.model.prediction_errors import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import check_free, write_text
 from rsea_ros.records.stamps import repair_stamps
-from rsea_ros.report.json_values import fault_json, numbers
+from rsea_ros.report.result_files import fault_json, pick
 
 HELP = "simulate a model on the commands of a bag and print its errors as JSON"
 EXAMPLE = "rsea predict results/model.yaml other_run.mcap"
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out:
         write_text(args.out, _table(comparisons), force=args.force)
     errors = {
-        n: numbers({"rms_error": c.rms_error, "fit_percent": c.fit_percent}) for n, c in comparisons.items()
+        n: pick(c, "rms_error fit_percent") for n, c in comparisons.items()
     }
     with np.errstate(all="ignore"):
         faults_json = [fault_json(fault) for fault in check_record(record, rig, args.axis).faults]

@@ -28,9 +28,8 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.records.record import UNITS, Fault, Record
-from rsea_ros.report.file_names import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODEL, REPORT
-from rsea_ros.report.identification.json import identification_json
-from rsea_ros.report.json_values import finite, json_text
+from rsea_ros.report.identification.words import identification_json
+from rsea_ros.report.result_files import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODEL, REPORT, json_text, strict
 
 _MAIN = ("ft", "deflection", "position", "velocity")
 """Channels that show how well a fit is; the first that a recording has stands in the row."""
@@ -79,7 +78,7 @@ def _diagnose(row: Row, record: Record, rig: Rig, *, page: bool) -> dict[str, st
     backlash for a softer spring, by an amount that depends on the day's work (docs/fleet-trends.md).
     """
     from rsea_ros.diagnosis.diagnose import diagnose
-    from rsea_ros.report.diagnosis.json import diagnosis_json
+    from rsea_ros.report.diagnosis.files import diagnosis_json
     from rsea_ros.report.diagnosis.page import diagnosis_report
 
     try:
@@ -104,26 +103,26 @@ def identification_columns(result: Identification) -> dict[str, Any]:
     main = next((n for n in _MAIN if n in times), next(iter(times), ""))
     return {
         "verdict": result.verdict,
-        "residual": finite(times.get(main, math.nan)),
+        "residual": strict(times.get(main, math.nan)),
         "parameters": [_parameter(p) for p in result.parameters],
     }
 
 
 def _parameter(p: ParameterEstimate) -> dict[str, Any]:
-    low, high = map(finite, p.ci95)
+    low, high = map(strict, p.ci95)
     identifiable = p.is_identifiable
-    return {"name": p.name, "value": finite(p.value), "low": low, "high": high, "unit": p.unit,
+    return {"name": p.name, "value": strict(p.value), "low": low, "high": high, "unit": p.unit,
             "identifiable": identifiable}  # fmt: skip
 
 
 def _cause(cause: Any) -> dict[str, Any]:
     sizes = [
-        {"name": name, "value": finite(e.value), "low": finite(e.ci95[0]), "high": finite(e.ci95[1]),
+        {"name": name, "value": strict(e.value), "low": strict(e.ci95[0]), "high": strict(e.ci95[1]),
          "unit": e.unit}
         for name, e in cause.parameters.items()
     ]  # fmt: skip
-    return {"name": cause.name, "status": cause.status, "probability": finite(cause.probability),
-            "gain": finite(cause.gain_holdout), "sizes": sizes}  # fmt: skip
+    return {"name": cause.name, "status": cause.status, "probability": strict(cause.probability),
+            "gain": strict(cause.gain_holdout), "sizes": sizes}  # fmt: skip
 
 
 def excitation(record: Record) -> list[dict[str, Any]]:
@@ -142,7 +141,7 @@ def excitation(record: Record) -> list[dict[str, Any]]:
         if channel in record and np.isfinite(record[channel].y).any():
             span = float(np.nanmax(record[channel].y) - np.nanmin(record[channel].y))
             figures.append((f"{channel}_span", span, unit))
-    return [{"name": n, "value": finite(v), "unit": u} for n, v, u in figures]
+    return [{"name": n, "value": strict(v), "unit": u} for n, v, u in figures]
 
 
 def faults(listed: Iterable[Fault]) -> list[dict[str, Any]]:

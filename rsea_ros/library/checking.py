@@ -28,7 +28,7 @@ class Checks:
 
     def summary(self) -> str:
         """Return the findings in plain text."""
-        from rsea_ros.report.check.terminal import check_lines
+        from rsea_ros.report.check import check_lines
 
         return "\n".join(line.plain for line in check_lines(self.result))
 

@@ -39,7 +39,7 @@ class Diagnosed:
     @property
     def sentence(self) -> str:
         """The verdict in a sentence, as in diagnosis.json."""
-        from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
+        from rsea_ros.report.diagnosis.words import diagnosis_sentence
 
         return diagnosis_sentence(self.result)
 

@@ -15,9 +15,9 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.outputs.new_files import Destination
 from rsea_ros.records.record import Record
-from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
-from rsea_ros.report.fault_words import fault_lines
-from rsea_ros.report.file_names import REPORT
+from rsea_ros.report.diagnosis.words import diagnosis_sentence
+from rsea_ros.report.remark_words import fault_lines
+from rsea_ros.report.result_files import REPORT
 
 _POLL = 0.02
 """s that the executor rests between two looks at a thread that still works."""

@@ -31,11 +31,10 @@ from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._trial import Ears, LiveRun
 from rsea_ros.outputs.new_files import Destination, unused_path
 from rsea_ros.records.record import Record
-from rsea_ros.report.campaign.files import check_session_free, write_campaign
-from rsea_ros.report.campaign.words import end_sentence, known_causes
 from rsea_ros.report.diagnosis.files import write_diagnosis
-from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
-from rsea_ros.report.experiment.words import shape_words
+from rsea_ros.report.diagnosis.words import diagnosis_sentence
+from rsea_ros.report.experiment.page import check_session_free, write_campaign
+from rsea_ros.report.experiment.words import end_sentence, known_causes, shape_words
 
 DEFAULT = "out/experiment"
 TABLE = (

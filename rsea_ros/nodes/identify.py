@@ -29,10 +29,10 @@ from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
 from rsea_ros.outputs.new_files import check_free, unused_path
 from rsea_ros.records.record import Record
-from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
-from rsea_ros.report.fault_words import fault_lines
-from rsea_ros.report.file_names import IDENTIFICATION
+from rsea_ros.report.diagnosis.words import diagnosis_sentence
 from rsea_ros.report.identification.words import verdict_sentence
+from rsea_ros.report.remark_words import fault_lines
+from rsea_ros.report.result_files import IDENTIFICATION
 
 DEFAULT = "out/identify"
 TABLE = (
@@ -121,7 +121,7 @@ class IdentifyNode:
         """Identify and write the results, or do nothing when stopped before."""
         from rsea_ros.checks.carried import with_check_faults
         from rsea_ros.identification.identify import identify
-        from rsea_ros.report.identification.files import write_results
+        from rsea_ros.report.identification.page import write_results
 
         if not self._done:
             return

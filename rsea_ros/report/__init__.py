@@ -1,7 +1,6 @@
 """From results to pages, tables and files: values in, text out.
 
-A folder for each result: check, identification, diagnosis, law, experiment, campaign, design, control,
-paper, fleet. There page.py is its HTML, json.py its file for programs, words.py its sentences, terminal.py
-what a verb prints, files.py what a verb writes. All use figures/ (values for plotly.js) and page/ (the
-frame, HTML, tables).
+Each result has words (sentences, JSON for programs) and a page (HTML and the files beside it), some also
+figures, tables and a terminal's text. All use page/ (the builder), figures/ (values for plotly.js),
+result_files (names, JSON from fields, provenance), words (names, units, numbers) and remark_words.
 """

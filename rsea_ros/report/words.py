@@ -7,34 +7,23 @@ import math
 from rsea_ros.documents.units import plain
 
 CHANNELS = {
-    "command": "commanded motor torque",
-    "motor_torque": "motor torque",
-    "position": "position",
-    "velocity": "velocity",
-    "ft": "F/T torque",
-    "deflection": "spring deflection",
+    "command": "commanded motor torque", "motor_torque": "motor torque", "position": "position",
+    "velocity": "velocity", "ft": "F/T torque", "deflection": "spring deflection",
     "reference": "reference position",
-}
+}  # fmt: skip
 
 PARAMETERS = {
     "rotor.reflected_inertia": "Rotor inertia, reflected",
-    "rotor.reflected_damping": "Rotor damping, reflected",
-    "gear.ratio": "Gear ratio",
-    "gear.stiffness": "Gear stiffness",
-    "gear.damping": "Gear damping",
-    "chassis.inertia": "Spring chassis inertia",
-    "spring.stiffness": "Spring stiffness",
+    "rotor.reflected_damping": "Rotor damping, reflected", "gear.ratio": "Gear ratio",
+    "gear.stiffness": "Gear stiffness", "gear.damping": "Gear damping",
+    "chassis.inertia": "Spring chassis inertia", "spring.stiffness": "Spring stiffness",
     "spring.damping": "Spring damping",
-}
+}  # fmt: skip
 
 SYMBOLS = {
-    "rotor.reflected_inertia": "J_m",
-    "rotor.reflected_damping": "b_m",
-    "gear.ratio": "N",
-    "chassis.inertia": "J_sc",
-    "spring.stiffness": "K_s",
-    "spring.damping": "b_s",
-}
+    "rotor.reflected_inertia": "J_m", "rotor.reflected_damping": "b_m", "gear.ratio": "N",
+    "chassis.inertia": "J_sc", "spring.stiffness": "K_s", "spring.damping": "b_s",
+}  # fmt: skip
 """As in the paper; what stands after _ is an index."""
 
 _PROPER = {"coulomb": "Coulomb", "lugre": "LuGre", "stribeck": "Stribeck", "ft": "F/T"}
@@ -108,7 +97,7 @@ def quantity(value: float, of: str, digits: int = 3) -> str:
 
 def unit_factor(value: float, of: str) -> tuple[float, str]:
     """Return the factor that makes a value readable, and its unit then: 6.1e-6 rad gives 1e6, `µrad`."""
-    simple = of and " " not in of.split("/")[0] and of != "1"
+    simple = of and " " not in of.split("/")[0] and not of.startswith("1")
     if not simple or value == 0.0 or not math.isfinite(value) or abs(value) >= 0.1:
         return 1.0, unit(of)
     factor, prefix = next((p for p in _PREFIXES if abs(value) >= 0.999 * p[0]), _PREFIXES[-1])
@@ -126,6 +115,18 @@ def span(low: float, high: float, of: str) -> str:
     ends = (round(end, decimals) for end in (low, high))
     low_text, high_text = (minus(f"{end:.{max(0, decimals)}f}") if end else "0" for end in ends)
     return f"{low_text} to {high_text} {prefixed}".rstrip()
+
+
+def measured(value: float, low: float, high: float, of: str) -> tuple[str, str, str]:
+    """Return value, doubt and unit: ("4.0045", " ± 0.0029", "mrad"), or lopsided " −0.1/+1.4"."""
+    factor, unit = unit_factor(value, of)
+    return *with_doubt(value * factor, low * factor, high * factor), unit
+
+
+def measured_text(value: float, low: float, high: float, of: str) -> str:
+    """Return the same in one text, `4.0045 ± 0.0029 mrad`."""
+    text, doubt, unit = measured(value, low, high, of)
+    return f"{text}{doubt} {unit}".rstrip()
 
 
 LOPSIDED = 1.5

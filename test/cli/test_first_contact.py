@@ -15,7 +15,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import OutputError
 from rsea_ros.model.rig_file import load_rig, rig_names
 from rsea_ros.outputs.new_files import NewFiles
-from rsea_ros.report.check.terminal import check_lines
+from rsea_ros.report.check import check_lines
 
 
 def test_a_table_given_for_a_bag_is_sent_to_import(tmp_path, capsys):

@@ -14,7 +14,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.cli.diagnose import readable
 from rsea_ros.cli.main import main
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.report.json_values import fault_json
+from rsea_ros.report.result_files import fault_json
 
 RIG = "paper_high_impedance"
 

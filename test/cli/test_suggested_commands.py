@@ -16,7 +16,7 @@ from rsea_ros.cli import diagnose, identify
 from rsea_ros.cli._runs import rig_choice
 from rsea_ros.cli._topics import topic_map
 from rsea_ros.cli.main import attach_axis, main
-from rsea_ros.report.rig.words import command
+from rsea_ros.report.rig import command
 
 OPTIONS = [
     ["--axis=-torque.x", "--window", "5:20"],

@@ -23,18 +23,17 @@ from rsea_ros.identification import identify
 from rsea_ros.laws import learn
 from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.records.record import Record
-from rsea_ros.report import file_names
-from rsea_ros.report.control import json as control_json
+from rsea_ros.report import result_files
 from rsea_ros.report.control import page as control_page
-from rsea_ros.report.design import json as design_json
+from rsea_ros.report.control import tables as control_tables
 from rsea_ros.report.design import page as design_page
+from rsea_ros.report.design import tables as design_tables
 from rsea_ros.report.diagnosis import files as diagnosis_files
-from rsea_ros.report.experiment import json as experiment_json
 from rsea_ros.report.experiment import page as experiment_page
-from rsea_ros.report.fleet import files as fleet_files
-from rsea_ros.report.identification import files as results
-from rsea_ros.report.law import files as law_files
-from rsea_ros.report.paper import json as paper_json
+from rsea_ros.report.experiment import words as experiment_words
+from rsea_ros.report.fleet import page as fleet_page
+from rsea_ros.report.identification import page as results
+from rsea_ros.report.law import page as law_page
 from rsea_ros.report.paper import page as paper_page
 
 RIG = "paper_high_impedance"
@@ -77,13 +76,13 @@ WRITERS = {
     "export of another kind": (["export", "--urdf", RIG, "--out", "out/new.urdf"], ["new.urdf"]),
     "rig": (["rig", "new", "arm", "--out", "out/new.yaml"], ["new.yaml"]),
     "fleet": (["fleet", "report", "store", "--out", "out"], ["index.html", "joint-knee.html"]),
-    "law": (["law", "run.mcap", "--json", "--out", "out"], list(file_names.LAW)),
+    "law": (["law", "run.mcap", "--json", "--out", "out"], list(result_files.LAW)),
     "experiment": (
-        ["experiment", RIG, "--limits", "torque=1", "--json", "--out", "out"], list(file_names.EXPERIMENT)
+        ["experiment", RIG, "--limits", "torque=1", "--json", "--out", "out"], list(result_files.EXPERIMENT)
     ),
     "design": (["design", "--json", "--out", "out"], ["design.json", "report.html"]),
-    "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(file_names.IDENTIFICATION)),
-    "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(file_names.DIAGNOSIS)),
+    "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(result_files.IDENTIFICATION)),
+    "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(result_files.DIAGNOSIS)),
     "control": (["control", "--json", "--out", "out"], ["control.json", "report.html"]),
     "paper": (["paper", "--json", "--out", "out"], ["one.mcap", "paper.json", "report.html"]),
 }
@@ -105,16 +104,16 @@ def prepare(record: Record, folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
         (diagnosis_files, "diagnosis_json", JSON), (diagnosis_files, "diagnosis_report", "page"),
         (diagnosis_files, "overlay_records", {"/rsea": record}),
         (results, "rig_text", "rig"), (diagnosis_files, "rig_text", "rig"),
-        (control_json, "control_json", JSON), (control_page, "control_report", "page"),
-        (design_json, "design_json", JSON), (design_page, "design_report", "page"),
-        (paper_json, "paper_json", JSON), (paper_page, "paper_report", "page"),
-        (learn, "learn", result), (law_files, "law_json", JSON), (law_files, "law_report", "page"),
-        (law_files, "rig_text", "rig"), (experiment, "_possible", ((), {}, {})), (advice, "advise", result),
-        (run_file, "run_text", "t,u"), (experiment_json, "advice_json", JSON),
+        (control_tables, "control_json", JSON), (control_page, "control_report", "page"),
+        (design_tables, "design_json", JSON), (design_page, "design_report", "page"),
+        (paper_page, "paper_json", JSON), (paper_page, "paper_report", "page"),
+        (learn, "learn", result), (law_page, "law_json", JSON), (law_page, "law_report", "page"),
+        (law_page, "rig_text", "rig"), (experiment, "_possible", ((), {}, {})), (advice, "advise", result),
+        (run_file, "run_text", "t,u"), (experiment_words, "advice_json", JSON),
         (experiment_page, "advice_page", "page"), (store_columns, "history", {}),
         (store_columns, "recordings", {}),
-        (fleet_files, "fleet_trends", result), (fleet_files, "alarms_of", []), (fleet_files, "_steps", None),
-        (fleet_files, "joint_page", "page"), (fleet_files, "fleet_page", "page"),
+        (fleet_page, "fleet_trends", result), (fleet_page, "alarms_of", []), (fleet_page, "_steps", None),
+        (fleet_page, "joint_page", "page"), (fleet_page, "fleet_page", "page"),
     ):  # fmt: skip
         monkeypatch.setattr(module, names, lambda *words, value=value, **named: value)
     monkeypatch.setattr(paper, "_tests", lambda args, new, tell: write_record(record, new.stage("one.mcap")))

@@ -11,8 +11,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
-from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
-from rsea_ros.report.diagnosis.words import headline
+from rsea_ros.report.diagnosis.words import diagnosis_sentence, headline
 from rsea_ros.report.remark_words import remark_sentences
 
 

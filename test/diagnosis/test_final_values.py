@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import rsea_ros as rsea
-from rsea_ros.report.diagnosis.json import diagnosis_json
+from rsea_ros.report.diagnosis.files import diagnosis_json
 
 RATE, SECONDS = 280.0, 12.0
 TEMPLATE = Path(__file__).resolve().parents[2] / "config" / "templates" / "rig.yaml"

@@ -12,7 +12,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
-from rsea_ros.report.diagnosis.json import diagnosis_json
+from rsea_ros.report.diagnosis.files import diagnosis_json
 
 FEW = DiagnosisSettings(max_causes=1, without=tuple(set(catalogue()) - {"coulomb_friction"}))
 

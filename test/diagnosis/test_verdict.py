@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 from hypothesis import given
@@ -12,7 +13,7 @@ from rsea_ros.diagnosis.criteria import verdict_of
 from rsea_ros.diagnosis.naming.conclusion import main_channel
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.report.diagnosis.sentences import verdict_sentence
+from rsea_ros.report.diagnosis.words import diagnosis_sentence
 
 FLOOR = DEFAULT.floor.reached
 RATIOS = st.fixed_dictionaries({n: st.floats(0.3, 300.0) for n in ("ft", "position", "motor_torque")})
@@ -37,6 +38,11 @@ def test_the_sentence_speaks_of_a_channel_that_bears_the_verdict_out(ratios):
     score = score_of(ratios)
     verdict = verdict_of([score])
     channel = main_channel(score, "ft") if verdict == "unexplained" else "ft"
-    sentence = verdict_sentence(verdict, (), channel, score.ratio(channel), score.ratio(channel), ())
+    rms = {channel: score.ratio(channel)}
+    diagnosis = SimpleNamespace(
+        verdict=verdict, channel=channel, causes=(), faults=(), remarks=(), at_noise_floor=False,
+        noise_rms={channel: 1.0}, residual_rms=rms, extended_residual_rms=rms,
+    )  # fmt: skip
+    sentence = diagnosis_sentence(diagnosis)
     number = float(re.search(r"([\d.]+) times the noise", sentence)[1])
     assert (number <= FLOOR) == (verdict == "nothing_wrong"), sentence

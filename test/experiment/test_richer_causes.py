@@ -16,7 +16,7 @@ from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_limits import RunLimits
 from rsea_ros.experiment.shared_name import SharedName
-from rsea_ros.report.campaign.words import end_sentence, shared_words
+from rsea_ros.report.experiment.words import end_sentence, shared_words
 
 FRICTION = ("coulomb_friction", "stribeck_friction")
 STUCK = {"coulomb_torque": 0.8, "stribeck_torque": 0.7, "stribeck_velocity": 0.05}

@@ -9,18 +9,26 @@ import numpy as np
 
 from rsea_ros.control.following import Following
 from rsea_ros.control.spread import Spread
-from rsea_ros.control.study import AtRate, Study
+from rsea_ros.control.study import Study
 from rsea_ros.model import outputs
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.report import words
-from rsea_ros.report.control.tables import control_tables, gains_words, typeset
-from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
+from rsea_ros.report.control.tables import control_tables, gains_words, rates, typeset
+from rsea_ros.report.figures.figure import (
+    Figure,
+    Json,
+    axis,
+    band,
+    frequency_axis,
+    layout,
+    line,
+    names_beside,
+)  # fmt: skip
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
 from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
-from rsea_ros.report.page.frame import Block, page
-from rsea_ros.report.page.html import bullets, key_numbers, section
-from rsea_ros.report.provenance import Provenance
+from rsea_ros.report.page import Block, bullets, key_numbers, page, section
+from rsea_ros.report.result_files import Provenance
 
 _COLOURS = (AFTER, BEFORE, TRUTH)
 
@@ -29,22 +37,24 @@ BAND = (
     "of 33 Hz at the sensor, whose own ringing is not in the torque)."
 )
 LEARNING = (
-    "Here the loads are half, once and twice the inertia. Slow or small motion teaches nothing of "
-    "the load; then only feedback is left."
+    "Here the loads are half, once and twice the inertia. Slow or small motion teaches nothing of the load; "
+    "then only feedback is left."
 )
 
 
 def control_report(study: Study, provenance: Provenance | None = None) -> str:
     """Return the page."""
     blocks: list[Block] = [
-        key_numbers(_keys(study)),
-        section("Gains", bullets(list(gains_words(study)))),
-        _tracking_figure(study),
-        _free(study),
-        _impedance_figure(study),
-        *control_tables(study),
+        key_numbers(_keys(study)), section("Gains", bullets(gains_words(study))), *_following(study),
+        _impedance_figure(study), *control_tables(study),
+    ]  # fmt: skip
+    footer = [
+        f"{m.name}: {m.torque:g} N·m, "
+        f"{f'{m.speed:.3g} rad/s' if math.isfinite(m.speed) else 'speed not stated'} ({m.source})"
+        for m in study.reaches
     ]
-    return page(verdict(study), f"Torque control · {study.rig.name}", blocks, _footer(study, provenance))
+    footer.append("rsea control. All in SI. One sample of delay and the hold are in every number.")
+    return page(verdict(study), f"Torque control · {study.rig.name}", blocks, footer, provenance)
 
 
 def verdict(study: Study) -> str:
@@ -55,72 +65,49 @@ def verdict(study: Study) -> str:
         for t in at.trials
         if t.met is False
     ]
-    slowest = study.rates[0]
-    reached = f"Stable on all {slowest.swept.cases} benches of the set, from locked to free"
+    reached = f"Stable on all {study.rates[0].swept.cases} benches of the set, from locked to free"
     if any(at.swept.unstable for at in study.rates):
         reached = "Unstable on part of the set"
     return f"{reached}; missed: {'; '.join(missed)}" if missed else f"{reached}, with every margin kept"
 
 
-def _crossover(at: AtRate) -> float:
-    return at.design.margins["locked"].crossover
-
-
 def _keys(study: Study) -> list[tuple[str, str]]:
-    at = study.rates[0]
+    at, locked = study.rates[0], study.rates[0].design.margins["locked"]
     value = {trial.what: trial for trial in at.trials}
     errors = [(f"{t.value:.1f} %", f"error, {name}") for name, t in value.items() if t.unit == "%"][:1]
     return [
         (f"{study.resonance:.1f} Hz", "open-loop resonance"),
-        (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz"),
-        (words.minus(f"{at.design.margins['locked'].phase:.0f}°"), "phase margin, locked"),
+        (f"{locked.crossover:.1f} Hz", f"crossover at {at.design.rate:g} Hz"),
+        (words.minus(f"{locked.phase:.0f}°"), "phase margin, locked"),
         (words.minus(f"{at.swept.margins.phase:.0f}°"), "phase margin, worst"),
         *errors,
     ]
 
 
-def _tracking_figure(study: Study) -> Figure:
-    """Return T_d over desired torque of the clamped actuator, with its band over the set."""
-    seen = [(at, at.locked, at.locked_spread) for at in study.rates]
-    reached = " and ".join(f"{at.locked.bandwidth:.0f} Hz at {at.design.rate:g} Hz" for at in study.rates)
-    return _following_figure(study, study.rig, f"Held at both ends, torque follows to {reached}", seen)
-
-
-def _free(study: Study) -> Figure:
-    """Return the same with the free load, which the controller does not know."""
-    seen = [(at, at.free, at.free_spread) for at in study.rates]
-    return _following_figure(study, study.free, _free_title(study), seen, LEARNING)
-
-
-def _free_title(study: Study) -> str:
-    first = study.rates[0].free
+def _following(study: Study) -> list[Figure]:
+    """Return T_d over desired torque with its band over the set: clamped, and on an unknown free load."""
+    first, rate = study.rates[0].free, f"{study.rates[0].design.rate:g} Hz"
     followed = np.nonzero(np.abs(first.gain) < 3.0)[0]
-    if not len(followed):
-        return "On an unknown free load small torques are not followed"
-    return (
-        f"On an unknown free load small torques are followed from {first.hz[followed[0]]:g} to "
-        f"{first.bandwidth:.0f} Hz at {study.rates[0].design.rate:g} Hz"
-    )
+    free = "On an unknown free load small torques are not followed"
+    if len(followed):
+        ends = f"{first.hz[followed[0]]:g} to {first.bandwidth:.0f} Hz at {rate}"
+        free = f"On an unknown free load small torques are followed from {ends}"
+    reached = " and ".join(f"{at.locked.bandwidth:.0f} Hz at {at.design.rate:g} Hz" for at in study.rates)
+    locked = f"Held at both ends, torque follows to {reached}"
+    return [
+        _following_figure(study, study.rig, locked, [(at.locked, at.locked_spread) for at in study.rates]),
+        _following_figure(
+            study, study.free, free, [(at.free, at.free_spread) for at in study.rates], LEARNING
+        ),
+    ]
 
 
 def _following_figure(
-    study: Study,
-    rig: Rig,
-    title: str,
-    seen: Sequence[tuple[AtRate, Following, Spread]],
-    more: str = "",
+    study: Study, rig: Rig, title: str, seen: Sequence[tuple[Following, Spread]], more: str = ""
 ) -> Figure:
     curves = [
-        ResponseCurve(
-            f"{at.design.rate:g} Hz",
-            colour,
-            curve.hz,
-            curve.torque,
-            2.0,
-            band=_band(curve, apart),
-            phase=curve.phase,
-        )
-        for (at, curve, apart), colour in zip(seen, _COLOURS, strict=False)
+        ResponseCurve(rate, colour, c.hz, c.torque, 2.0, band=_band(c, apart), phase=c.phase)
+        for rate, (c, apart), colour in zip(rates(study), seen, _COLOURS, strict=False)
     ]
     hz = np.geomspace(1.0, 0.45 * max(at.design.rate for at in study.rates), 300)
     opened = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
@@ -142,26 +129,16 @@ def _band(curve: Following, apart: Spread) -> Band:
 
 def _impedance_figure(study: Study) -> Figure:
     """Return the output impedance."""
-    first = study.rates[0].impedance
-    items = [(f"{at.design.rate:g} Hz", at.impedance.hz, at.impedance.controlled, c, "solid")
-             for at, c in zip(study.rates, _COLOURS, strict=False)]  # fmt: skip
+    first, shades = study.rates[0].impedance, list(zip(study.rates, _COLOURS, strict=False))
+    items = [
+        (f"{at.design.rate:g} Hz", at.impedance.hz, at.impedance.controlled, c, "solid") for at, c in shades
+    ]
     items += [("motor off", first.hz, first.motor_off, QUIET, "dash"),
               ("passive spring", first.hz, first.spring, MEASURED, "dot")]  # fmt: skip
-    data: list[Json] = [
-        band(at.softness.hz, at.softness.low, at.softness.high, faint(c, 0.18))
-        for at, c in zip(study.rates, _COLOURS, strict=False)
-    ]
-    data += [
-        line(
-            hz, np.abs(z), name, colour, line={"color": colour, "width": 1.8, "dash": dash},
-            hovertemplate="%{y:.3g} N·m per rad/s",
-        )
-        for name, hz, z, colour, dash in items
-    ]  # fmt: skip
-    names = [
-        label(name, 1.015, 1.0 - 0.08 * i, colour, xref="paper", yref="paper", yanchor="top")
-        for i, (name, _, _, colour, _) in enumerate(items)
-    ]
+    data = [band(at.softness.hz, at.softness.low, at.softness.high, faint(c, 0.18)) for at, c in shades]
+    for name, hz, z, colour, dash in items:
+        look: Json = {"line": {"color": colour, "width": 1.8, "dash": dash}}
+        data.append(line(hz, np.abs(z), name, colour, hovertemplate="%{y:.3g} N·m per rad/s", **look))
     one = int(np.argmin(np.abs(first.hz - 1.0)))
     softer = abs(first.spring[one]) / abs(first.controlled[one])
     highest = max(float(at.impedance.hz[-1]) for at in study.rates)
@@ -173,18 +150,8 @@ def _impedance_figure(study: Study) -> Figure:
         layout=layout(
             xaxis=frequency_axis(float(first.hz[0]), highest),
             yaxis=axis("N·m per rad/s", type="log"),
-            annotations=names,
+            annotations=names_beside([(name, colour) for name, _, _, colour, _ in items], 0.08),
             margin={"l": 64, "r": 150, "t": 12, "b": 48},
         ),
         height=400,
     )
-
-
-def _footer(study: Study, provenance: Provenance | None) -> list[str]:
-    motors = [f"{m.name}: {m.torque:g} N·m, {_speed(m.speed)} ({m.source})" for m in study.reaches]
-    about = "rsea control. All in SI. One sample of delay and the hold are in every number."
-    return [*motors, about, *(provenance.lines if provenance else ())]
-
-
-def _speed(speed: float) -> str:
-    return f"{speed:.3g} rad/s" if math.isfinite(speed) else "speed not stated"

@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.records.record import FloatArray
-from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, numbers
+from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, numbers, points
 from rsea_ros.report.figures.palette import INK, faint
 
 _SHADES = [[0.0, "#eef3f8"], [0.5, "#7fa8cf"], [1.0, "#123f6d"]]
@@ -27,9 +27,9 @@ class Point:
     side: str = "top center"
 
 
-def bandwidth_contours(title: str, points: Sequence[Point], caption: str = "") -> Figure:
+def bandwidth_contours(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
     """Return lines of equal bandwidth by Eq. (7) with actuators among them."""
-    k, j = _grid(points)
+    k, j = _grid(shown)
     contours: Json = {
         "type": "contour",
         "x": numbers(k),
@@ -46,7 +46,7 @@ def bandwidth_contours(title: str, points: Sequence[Point], caption: str = "") -
         yaxis=axis("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
         hovermode="closest",
     )
-    return Figure(title, caption, [contours, *(_named(p) for p in points)], plane, 480)
+    return Figure(title, caption, [contours, *(_named(p) for p in shown)], plane, 480)
 
 
 def _named(p: Point) -> Json:
@@ -64,49 +64,24 @@ def _named(p: Point) -> Json:
     }
 
 
-def slices(title: str, points: Sequence[Point], caption: str = "") -> Figure:
+def slices(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
     """Return Fig. 9 (b) and (c): bandwidth over inertia at some stiffnesses, and the other way round."""
-    k, j = _grid(points)
-    data: list[Json] = []
-    names: list[Json] = []
-    second: Json = {"xaxis": "x2", "yaxis": "y2", "hovertemplate": "%{y:.1f} Hz"}
-    shades = ["#9db9d6", "#5f8fbf", "#1864ab"]
-    for value, shade in zip((200.0, 600.0, 1800.0), shades, strict=True):
-        y = undamped_band(value, j)
-        data.append(line(1e3 * j, y, f"{value:.0f} N·m/rad", shade, hovertemplate="%{y:.1f} Hz"))
-        names.append(_end(f"{value:.0f} N·m/rad", 1e3 * j[-1], y[-1], shade, ""))
-    for value, shade in zip((1e-2, 3e-3, 1e-3), shades, strict=True):
-        y = undamped_band(k, value)
-        data.append(line(k, y, f"{1e3 * value:g} g·m²", shade, **second))
-        names.append(_end(f"{1e3 * value:g} g·m²", k[-1], y[-1], shade, "2"))
-    for p in points:
-        z = float(undamped_band(p.stiffness, p.inertia))
-        marker = {
-            "type": "scatter",
-            "mode": "markers",
-            "marker": {"size": 9, "color": p.colour},
-            "name": p.name,
-        }
-        data += [
-            {**marker, "x": [1e3 * abs(p.inertia)], "y": [z]},
-            {**marker, "x": [p.stiffness], "y": [z], "xaxis": "x2", "yaxis": "y2"},
-        ]
-    return Figure(title, caption, data, _two(names), 400)
-
-
-def _end(text: str, x: float, y: float, colour: str, which: str) -> Json:
-    at = {"xref": f"x{which}", "yref": f"y{which}"}
-    return label(text, float(np.log10(x)), float(np.log10(y)), colour, **at, xshift=6)
-
-
-def log_marks(*values: float) -> Json:
-    """Return plain numbers on a logarithmic axis."""
-    return {"tickvals": list(values), "ticktext": [f"{v:g}" for v in values]}
-
-
-def _two(names: list[Json]) -> Json:
-    decades = {"type": "log", **log_marks(0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)}
-    return layout(
+    k, j = _grid(shown)
+    shades = ("#9db9d6", "#5f8fbf", "#1864ab")
+    views = [(f"{v:.0f} N·m/rad", 1e3 * j, undamped_band(v, j), "") for v in (200.0, 600.0, 1800.0)]
+    views += [(f"{1e3 * v:g} g·m²", k, undamped_band(k, v), "2") for v in (1e-2, 3e-3, 1e-3)]
+    data, names = [], []
+    for (name, x, y, which), shade in zip(views, shades * 2, strict=True):
+        place: Json = {"xaxis": f"x{which}", "yaxis": f"y{which}"} if which else {}
+        data.append(line(x, y, name, shade, hovertemplate="%{y:.1f} Hz", **place))
+        at: Json = {"xref": f"x{which}", "yref": f"y{which}", "xshift": 6}
+        names.append(label(name, float(np.log10(x[-1])), float(np.log10(y[-1])), shade, **at))
+    for p in shown:
+        z, dot = [float(undamped_band(p.stiffness, p.inertia))], {"size": 9, "color": p.colour}
+        data.append(points([1e3 * abs(p.inertia)], z, p.name, marker=dot))
+        data.append(points([p.stiffness], z, p.name, marker=dot, xaxis="x2", yaxis="y2"))
+    decades = {"type": "log"} | log_marks(0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
+    drawing = layout(
         xaxis=axis("inertia, g·m²", domain=[0.0, 0.4], anchor="y", **decades),
         yaxis=axis("bandwidth, Hz", anchor="x", **decades),
         xaxis2=axis("stiffness, N·m/rad", domain=[0.56, 0.97], anchor="y2", **decades),
@@ -114,11 +89,17 @@ def _two(names: list[Json]) -> Json:
         annotations=names,
         hovermode="closest",
     )
+    return Figure(title, caption, data, drawing, 400)
 
 
-def _grid(points: Sequence[Point]) -> tuple[FloatArray, FloatArray]:
+def log_marks(*values: float) -> Json:
+    """Return plain numbers on a logarithmic axis."""
+    return {"tickvals": list(values), "ticktext": [f"{v:g}" for v in values]}
+
+
+def _grid(shown: Sequence[Point]) -> tuple[FloatArray, FloatArray]:
     """Return stiffnesses and inertias that hold the points with room around."""
-    k, j = (np.abs([getattr(p, n) for p in points]) for n in ("stiffness", "inertia"))
+    k, j = (np.abs([getattr(p, n) for p in shown]) for n in ("stiffness", "inertia"))
     stiffness: FloatArray = np.geomspace(min(100.0, k.min() / 2), max(4000.0, 1.5 * k.max()), 40)
     inertia: FloatArray = np.geomspace(min(3e-4, j.min() / 2), max(2e-2, 1.5 * j.max()), 40)
     return stiffness, inertia

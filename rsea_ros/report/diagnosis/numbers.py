@@ -75,22 +75,7 @@ def sizes(cause: Cause) -> dict[str, CauseParameter]:
     return {n: p for n, p in cause.parameters.items() if p.value < _END * ends.get(n, math.inf)}
 
 
-def estimate(estimate: CauseParameter) -> tuple[str, str, str]:
-    """Return value, doubt and unit: ("4.0045", " ± 0.0029", "mrad"), or lopsided " −0.1/+1.4"."""
-    factor, prefix = _prefix(estimate)
-    low, high = estimate.ci95
-    value, doubt = words.with_doubt(estimate.value * factor, low * factor, high * factor)
-    return value, doubt, prefix + words.unit(estimate.unit)
-
-
-def model_half_width(estimate: CauseParameter) -> tuple[str, str]:
-    """Return the half-width of the simulation's own error at 95 % and its unit: ("0.0147", "N·m")."""
-    factor, prefix = _prefix(estimate)
-    return words.number(Z95 * estimate.model_sd * factor, 2), prefix + words.unit(estimate.unit)
-
-
-def _prefix(estimate: CauseParameter) -> tuple[float, str]:
-    """Return the factor and prefix that make a small angle or time readable."""
-    if estimate.unit not in ("rad", "s") or not 0.0 < abs(estimate.value) < 0.1:
-        return 1.0, ""
-    return (1e3, "m") if abs(estimate.value) >= 1e-3 else (1e6, "µ")
+def model_half_width(estimate: CauseParameter) -> str:
+    """Return the half-width of the simulation's own error at 95 % with its unit: `0.0147 N·m`."""
+    factor, unit = words.unit_factor(estimate.value, estimate.unit)
+    return f"{words.number(Z95 * estimate.model_sd * factor, 2)} {unit}".rstrip()

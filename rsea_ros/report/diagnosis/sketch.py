@@ -9,43 +9,35 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.report import words
+from rsea_ros.report.page import Html
 
 _PARTS = ("command", "motor", "gear", "encoder", "spring", "F/T sensor", "support")
 _OF_PORT = {
-    Port.COMMAND: "motor",
-    Port.MOTOR: "motor",
-    Port.GEAR: "gear",
-    Port.SPRING: "spring",
-    Port.SENSOR: "F/T sensor",
-    Port.STRUCTURE: "gear",
-}
+    Port.COMMAND: "motor", Port.MOTOR: "motor", Port.GEAR: "gear", Port.SPRING: "spring",
+    Port.SENSOR: "F/T sensor", Port.STRUCTURE: "gear",
+}  # fmt: skip
 _BOX, _HEIGHT = 104, 40
-_ROW, _COLUMN = (128, 0), (0, 56)
+_ROW, _COLUMN = 128, 56
 """From a part to the next one, side by side and, for phones, one below the other."""
-_ANCHORS = {_PARTS[0]: ("start", 0), _PARTS[-1]: ("end", _BOX)}
-"""Of the names below the outer parts, which the edge would otherwise cut off: anchor, and x in the part."""
 
 
-def sketch(causes: Sequence[str]) -> str:
-    """Return the drawing, empty without a cause. causes: names of effects, the largest first."""
-    return _drawing(causes, "sketch", "900 92", _ROW)
+def sketch(causes: Sequence[str]) -> Html:
+    """Return the drawing, in a row and, for phones, in a column; empty without a cause.
 
-
-def upright_sketch(causes: Sequence[str]) -> str:
-    """Return the same drawing one part below the other, for screens as wide as a phone's."""
-    return _drawing(causes, "upright sketch", f"344 {len(_PARTS) * _COLUMN[1] - 8}", _COLUMN)
-
-
-def _drawing(causes: Sequence[str], kind: str, size: str, step: tuple[int, int]) -> str:
+    causes: names of effects, the largest first.
+    """
     if not causes:
-        return ""
+        return Html()
     marked = {part_of(effect_named(name)): name for name in reversed(causes)}
-    boxes = "".join(_box(i, part, marked.get(part, ""), step) for i, part in enumerate(_PARTS))
     spoken = escape(", ".join(f"{name} at the {part}" for part, name in marked.items()))
-    return (
-        f'<svg class="{kind}" viewBox="0 0 {size}" role="img" aria-label="{spoken}">'
-        f"<title>{spoken}</title>{boxes}</svg>"
-    )
+    drawings = []
+    for kind, size in (("sketch", "900 92"), ("upright sketch", f"344 {len(_PARTS) * _COLUMN - 8}")):
+        boxes = "".join(
+            _box(i, part, marked.get(part, ""), kind != "sketch") for i, part in enumerate(_PARTS)
+        )
+        look = f'class="{kind}" viewBox="0 0 {size}" role="img" aria-label="{spoken}"'
+        drawings.append(f"<svg {look}><title>{spoken}</title>{boxes}</svg>")
+    return Html("".join(drawings))
 
 
 def part_of(effect: Effect) -> str:
@@ -55,30 +47,26 @@ def part_of(effect: Effect) -> str:
     return effect.part if effect.part in _PARTS else _OF_PORT[effect.port]
 
 
-def _box(index: int, part: str, culprit: str, step: tuple[int, int]) -> str:
-    """Return a part with the line to the next one, in orange with its cause where it is to blame."""
-    x, y = index * step[0] + 2, index * step[1] + 4
-    text = f'x="{x + _BOX // 2}" y="{y + _HEIGHT // 2 + 5}"'
-    link = "" if part == _PARTS[-1] else f"<line {_link(x, y, step)}/>"
+def _box(index: int, part: str, culprit: str, upright: bool) -> str:
+    """Return a part with the line to the next one, in orange with its cause where it is to blame.
+
+    The name of the cause stands under its part in a row, where the edge would cut off those of the outer
+    parts if they were centred, and right of it in a column.
+    """
+    x, y = (2, index * _COLUMN + 4) if upright else (index * _ROW + 2, 4)
+    middle, level = x + _BOX // 2, y + _HEIGHT // 2
+    if upright:
+        line, beside = (middle, middle, y + _HEIGHT, y + _COLUMN), (x + _BOX + 10, level + 5, "start")
+    else:
+        line, beside = (x + _BOX, x + _ROW, level, level), (middle, y + _HEIGHT + 24, "middle")
+        if part in (_PARTS[0], _PARTS[-1]):
+            beside = (x, beside[1], "start") if part == _PARTS[0] else (x + _BOX, beside[1], "end")
+    link = '<line x1="{}" x2="{}" y1="{}" y2="{}"/>'.format(*line) if part != _PARTS[-1] else ""
     name = escape(words.effect(culprit)) if culprit else ""
-    under = f'<text class="cause" {_beside(part, x, y, step)}>{name}</text>' if culprit else ""
+    place = 'x="{}" y="{}" style="text-anchor:{}"'.format(*beside)
+    under = f'<text class="cause" {place}>{name}</text>' if culprit else ""
     return (
         f'<g class="{"culprit" if culprit else "part"}">{link}'
         f'<rect x="{x}" y="{y}" width="{_BOX}" height="{_HEIGHT}" rx="6"/>'
-        f"<text {text}>{escape(part)}</text>{under}</g>"
+        f'<text x="{middle}" y="{level + 5}">{escape(part)}</text>{under}</g>'
     )
-
-
-def _link(x: int, y: int, step: tuple[int, int]) -> str:
-    """Return the ends of the line from a part at x, y to the next one."""
-    if step == _ROW:
-        return f'x1="{x + _BOX}" x2="{x + step[0]}" y1="{y + _HEIGHT // 2}" y2="{y + _HEIGHT // 2}"'
-    return f'x1="{x + _BOX // 2}" x2="{x + _BOX // 2}" y1="{y + _HEIGHT}" y2="{y + step[1]}"'
-
-
-def _beside(part: str, x: int, y: int, step: tuple[int, int]) -> str:
-    """Return where the name of a cause is drawn: under its part in a row, right of it in a column."""
-    if step == _COLUMN:
-        return f'x="{x + _BOX + 10}" y="{y + _HEIGHT // 2 + 5}" style="text-anchor:start"'
-    anchor, at = _ANCHORS.get(part, ("middle", _BOX / 2))
-    return f'x="{x + at:g}" y="{y + _HEIGHT + 24}" style="text-anchor:{anchor}"'

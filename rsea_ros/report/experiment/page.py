@@ -1,141 +1,168 @@
-"""The page of a designed run: the causes that it separates, its demands on the bench, its command."""
+"""The pages of a designed run and of a session of runs: causes, separations, demands, commands."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from rsea_ros.experiment.advice import Advice
+from rsea_ros.experiment.advice import Advice, Proof
+from rsea_ros.experiment.campaign import Campaign, CampaignOutcome
 from rsea_ros.experiment.proposal import Proposal
+from rsea_ros.experiment.run_limits import RunLimits, run_text
+from rsea_ros.model.rig_file import rig_text
+from rsea_ros.outputs.new_files import NewFiles, check_free
 from rsea_ros.records.record import FloatArray
+from rsea_ros.report import words
 from rsea_ros.report.experiment.words import (
     LEVEL_WORDS,
+    by_probability,
+    campaign_json,
     decided_words,
+    end_sentence,
     limit_rows,
     plain_name,
     proof_words,
+    run_count,
     shape_words,
+    size,
     verdict,
-)
-from rsea_ros.report.figures.figure import Figure, axis, frequency_axis, label, layout, line
-from rsea_ros.report.figures.palette import AFTER, BEFORE, QUIET
-from rsea_ros.report.page.frame import Block, page
-from rsea_ros.report.page.html import bullets, key_numbers, section
-from rsea_ros.report.page.html_table import table
-from rsea_ros.report.provenance import Provenance
+)  # fmt: skip
+from rsea_ros.report.figures.figure import (
+    Figure,
+    Json,
+    axis,
+    frequency_axis,
+    layout,
+    line,
+    names_beside,
+    numbers,
+)  # fmt: skip
+from rsea_ros.report.figures.palette import AFTER, BEFORE, QUIET, TRUTH
+from rsea_ros.report.page import Block, Html, bullets, key_numbers, page, section, table
+from rsea_ros.report.result_files import EXPERIMENT_JSON, MODEL, REPORT, Provenance, json_text
+
+_COLOURS = (AFTER, BEFORE, TRUTH, "#862e9c", "#5c940d", "#0b7285")
+_DASH = ("solid", "dash", "dot", "dashdot")
+_SHOWN, _ROWS = 0.02, 8
+"""Causes of a session that the page shows: the probability at least, and how many in a row of the table."""
+
+
+def check_session_free(out: Path) -> None:
+    """Refuse, before any run, a folder that holds files of a session: no run is played and then lost.
+
+    Raises OutputError for the first of them.
+    """
+    check_free([*(out / name for name in (EXPERIMENT_JSON, MODEL, REPORT)), *sorted(out.glob("run-*"))])
+
+
+def write_campaign(
+    outcome: CampaignOutcome, campaign: Campaign, out: Path, notes: tuple[str, ...] = (),
+    provenance: Provenance | None = None,
+) -> Path:  # fmt: skip
+    """Write experiment.json, model.yaml, report.html and the commands; return the report's path.
+
+    model.yaml: the rig with the likeliest cause and the values of all records together.
+    """
+    with NewFiles(out) as new:
+        for k, p in _played(outcome):
+            new.write(f"run-{k}.csv", run_text(p.command, p.rate))
+        new.write(EXPERIMENT_JSON, json_text(campaign_json(outcome, campaign), provenance))
+        new.write(MODEL, rig_text(outcome.weighing.hypotheses()[0].rig))
+        text = campaign_page(outcome, campaign.rig.name, campaign.asked.limits, notes, provenance)
+        return new.write(REPORT, text)
+
+
+def _played(outcome: CampaignOutcome) -> list[tuple[int, Proposal]]:
+    return [(k, r.proposal) for k, r in enumerate(outcome.rounds, 1) if r.proposal is not None]
 
 
 def advice_page(advice: Advice, provenance: Provenance | None = None) -> str:
     """Return the page of an offline design."""
-    blocks: list[Block] = [_causes(advice)]
+    kicker = f"The next experiment · {advice.hypotheses[0].problem.rig.name}"
+    return page(verdict(advice), kicker, _advice(advice), (), provenance)
+
+
+def _advice(advice: Advice) -> Iterator[Block]:
     p = advice.proposal
     if p is not None:
-        blocks = [
-            key_numbers(_keys(p)),
-            *blocks,
-            *([_separations(p)] if len(p.names) > 1 else []),
-            command_figure(p),
-            spectrum_figure([("run", p)]),
+        keys = [
+            (f"{p.duration:.3g} s", "of excitation"),
+            (f"{p.peaks.at_level['torque']:.3g} N·m", "largest torque"),
         ]
-        blocks += [limits_section(p, advice.asked.limits.finite_limits())]
-    if advice.proofs:
-        blocks.append(section("Not separable by any run", bullets([proof_words(x) for x in advice.proofs])))
-    rig = advice.hypotheses[0].problem.rig.name
-    return page(
-        verdict(advice), f"The next experiment · {rig}", blocks, provenance.lines if provenance else ()
-    )
-
-
-def _keys(p: Proposal) -> list[tuple[str, str]]:
-    worst = p.worst
-    keys = [
-        (f"{p.duration:.3g} s", "of excitation"),
-        (f"{p.peaks.at_level['torque']:.3g} N·m", "largest torque"),
-    ]
-    if worst is not None:
-        keys.append(
-            (f"{worst[2]:.3g}", f"S of {plain_name(worst[0])} over {plain_name(worst[1])}, the worst pair")
+        if p.worst is not None:
+            true, rival, s = p.worst
+            keys.append((f"{s:.3g}", f"S of {plain_name(true)} over {plain_name(rival)}, the worst pair"))
+        yield key_numbers(
+            keys if len(p.names) == 1 else [*keys, (decided_words(p), "expected to be decided")]
         )
-    return keys if len(p.names) == 1 else [*keys, (decided_words(p), "expected to be decided")]
-
-
-def _causes(advice: Advice) -> str:
     rows = [(plain_name(h.name), f"{h.probability:.3f}") for h in advice.hypotheses]
     rows += [(f"{plain_name(n)} (excluded by the records)", f"{p:.1g}") for n, p in advice.excluded.items()]
-    return section("Still possible", table(("cause", "probability"), rows, {1}))
+    yield section("Still possible", table(("cause", "#probability"), rows))
+    if p is not None:
+        yield from [_separations(p)] if len(p.names) > 1 else []
+        yield command_figure(p)
+        yield spectrum_figure([("run", p)])
+        yield _demands(p, advice.asked.limits)
+    yield from _proofs(advice.proofs)
 
 
-def _separations(p: Proposal) -> str:
+def _separations(p: Proposal) -> Html:
+    def number(value: float) -> str:
+        return f"{value:.2g}" if value < 1e4 else f"{value:.0e}"
+
     rows = [
-        (plain_name(a), *("" if a == b else _number(p.table[i, j]) for j, b in enumerate(p.names)))
+        (plain_name(a), *("" if a == b else number(p.table[i, j]) for j, b in enumerate(p.names)))
         for i, a in enumerate(p.names)
     ]
     caption = (
         "S, row true, column its rival: twice the expected gain of the logarithm of the odds after the rival "
         "has been fitted to the run. 6 makes odds of twenty to one."
     )
-    head = ("true \\ rival", *(plain_name(n) for n in p.names))
-    return section("Causes that the run separates", table(head, rows, range(1, len(head))), caption=caption)
+    head = ("true \\ rival", *(f"#{plain_name(n)}" for n in p.names))
+    return section("Causes that the run separates", table(head, rows), caption=caption)
 
 
-def _number(value: float) -> str:
-    return f"{value:.2g}" if value < 1e4 else f"{value:.0e}"
-
-
-def limits_section(p: Proposal, stated: dict[str, float]) -> str:
+def _demands(p: Proposal, limits: RunLimits) -> Html:
     """Return the peaks of a run beside the limits of the bench."""
-    head = ("quantity", "expected", "at level", "limit", "unit")
-    return section(
-        "Demands on the bench",
-        table(head, limit_rows(p, stated), {1, 2, 3}),
-        caption=f"At level: {LEVEL_WORDS}.",
+    rows = table(
+        ("quantity", "#expected", "#at level", "#limit", "unit"), limit_rows(p, limits.finite_limits())
     )
+    return section("Demands on the bench", rows, caption=f"At level: {LEVEL_WORDS}.")
+
+
+def _proofs(proofs: Sequence[Proof]) -> list[Html]:
+    return [section("Not separable by any run", bullets(map(proof_words, proofs)))] if proofs else []
 
 
 def command_figure(p: Proposal) -> Figure:
     """Return the command over time."""
-    t = np.arange(len(p.command)) / p.rate
+    t, caption = (
+        np.arange(len(p.command)) / p.rate,
+        "Commanded motor torque at the gear output; it begins and ends",
+    )
+    drawn = line(t, p.command, "command", AFTER, 1.0, hovertemplate="%{y:.3g} N·m")
+    plane = layout(xaxis=axis("time, s"), yaxis=axis("torque, N·m"))
     return Figure(
-        f"The run: {shape_words(p)}",
-        "Commanded motor torque at the gear output; it begins and ends at zero under a raised cosine.",
-        [line(t, p.command, "command", AFTER, 1.0, hovertemplate="%{y:.3g} N·m")],
-        layout(xaxis=axis("time, s"), yaxis=axis("torque, N·m")),
-        height=300,
+        f"The run: {shape_words(p)}", f"{caption} at zero under a raised cosine.", [drawn], plane, 300
     )
 
 
 def spectrum_figure(runs: Sequence[tuple[str, Proposal]]) -> Figure:
     """Return the amplitude spectral densities of runs."""
-    traces, notes = [], []
-    tops = []
+    traces, names = [], []
     for k, (name, p) in enumerate(runs):
         f, density = density_of(p.command, p.rate)
         colour = (AFTER, BEFORE, QUIET)[k % 3]
-        traces.append(
-            line(
-                f, density, name, colour, line={"color": colour, "width": 1.4, "dash": _DASH[k % 4]},
-                hovertemplate="%{y:.3g} N·m/√Hz",
-            )
-        )
-        at = int(np.argmax(density))
-        notes.append(label(name, float(np.log10(f[at])), float(np.log10(density[at])) + 0.12, colour))
-        tops.append(density.max())
-    top = float(np.log10(max(tops)))
-    return Figure(
-        "Where the runs put their power" if len(runs) > 1 else "Where the run puts its power",
-        "Amplitude spectral density of the command.",
-        traces,
-        layout(
-            xaxis=frequency_axis(0.2, 140.0),
-            yaxis=axis("N·m/√Hz", type="log", range=[top - 3.0, top + 0.3]),
-            annotations=notes,
-        ),
-        height=320,
-    )
-
-
-_DASH = ("solid", "dash", "dot", "dashdot")
+        look: Json = {"line": {"color": colour, "width": 1.4, "dash": _DASH[k % 4]}}
+        traces.append(line(f, density, name, colour, hovertemplate="%{y:.3g} N·m/√Hz", **look))
+        names.append((name, colour))
+    top = float(np.log10(max(y for trace in traces for y in trace["y"])))
+    height = axis("N·m/√Hz", type="log", range=[top - 3.0, top + 0.3])
+    title = "Where the runs put their power" if len(runs) > 1 else "Where the run puts its power"
+    drawing = layout(xaxis=frequency_axis(0.2, 140.0), yaxis=height, annotations=names_beside(names, 0.075))
+    return Figure(title, "Amplitude spectral density of the command.", traces, drawing, height=320)
 
 
 def density_of(command: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
@@ -144,10 +171,73 @@ def density_of(command: FloatArray, rate: float) -> tuple[FloatArray, FloatArray
     power = np.abs(np.fft.rfft(command)) ** 2 * 2.0 / (rate * n)
     frequency = np.fft.rfftfreq(n, 1.0 / rate)
     edges = np.unique(np.concatenate([np.arange(1, 8), np.geomspace(8, len(power) - 1, 60).astype(int)]))
-    starts = edges[:-1]
-    counts = np.diff(edges)
-    smooth = np.add.reduceat(power, starts)[: len(counts)]
-    smooth[-1] = power[starts[-1] : edges[-1]].sum()
-    middle = np.add.reduceat(frequency, starts)[: len(counts)]
-    middle[-1] = frequency[starts[-1] : edges[-1]].sum()
-    return middle / counts, np.sqrt(smooth / counts)
+
+    def mean(values: FloatArray) -> FloatArray:
+        return np.asarray(np.add.reduceat(values[: edges[-1]], edges[:-1]) / np.diff(edges), float)
+
+    return mean(np.asarray(frequency, float)), np.sqrt(mean(np.asarray(power, float)))
+
+
+def campaign_page(
+    outcome: CampaignOutcome, rig: str, limits: RunLimits, notes: tuple[str, ...] = (),
+    provenance: Provenance | None = None,
+) -> str:  # fmt: skip
+    """Return the page of a session: the remaining causes after each run. notes: on its making."""
+    title, kicker = words.sentence(end_sentence(outcome)), f"A session of experiments · {rig}"
+    return page(title, kicker, _session(outcome, limits, notes), (), provenance)
+
+
+def _session(outcome: CampaignOutcome, limits: RunLimits, notes: Sequence[str]) -> Iterator[Block]:
+    weighing, played = outcome.weighing, _played(outcome)
+    yield key_numbers([
+        (f"{weighing.probability[outcome.cause]:.1%}", plain_name(outcome.cause)),
+        (f"{outcome.seconds:.3g} s", "of excitation"),
+        run_count(outcome),
+        (f"{weighing.left:.2f}", "times the noise remains"),
+    ])  # fmt: skip
+    yield probability_figure(outcome)
+    yield _rounds(outcome)
+    if played:
+        yield spectrum_figure([(f"run {k}", p) for k, p in played])
+        yield from (command_figure(p) for _, p in played)
+        yield _demands(played[-1][1], limits)
+    yield from _proofs(outcome.proofs)
+    if notes:
+        yield section("Method", bullets(notes))
+
+
+def probability_figure(outcome: CampaignOutcome) -> Figure:
+    """Return the probability of each cause before the first run and after each."""
+    rounds = [r.weighing.probability for r in outcome.rounds]
+    x = np.arange(len(rounds), dtype=float)
+    names = sorted({n for r in rounds for n, p in r.items() if p >= _SHOWN})
+    names.sort(key=lambda n: -rounds[-1].get(n, 0.0))
+    traces, shown = [], []
+    for k, name in enumerate(names):
+        colour = _COLOURS[k] if k < len(_COLOURS) else QUIET
+        y, dot = np.array([r.get(name, 0.0) for r in rounds]), {"size": 7, "color": colour}
+        hover = {"mode": "lines+markers", "marker": dot, "hovertemplate": "probability %{y:.3f}"}
+        traces.append(line(x, y, plain_name(name), colour, 2.2, **hover))
+        shown.append((plain_name(name), colour))
+    ticks = ["first records" if not k else f"after run {k}" for k in range(len(rounds))]
+    drawing = layout(
+        xaxis=axis(tickvals=numbers(x), ticktext=ticks, range=[-0.2, float(x[-1]) + 0.2]),
+        yaxis=axis("probability", range=[-0.03, 1.06]),
+        annotations=names_beside(shown, 0.075),
+        margin={"l": 64, "r": 180, "t": 12, "b": 48},
+    )
+    caption = (
+        "Probability of each cause by all records up to there. Each cause weighed here is as likely as any "
+        "other before the first record."
+    )
+    return Figure("Remaining causes after each run", caption, traces, drawing, height=360)
+
+
+def _rounds(outcome: CampaignOutcome) -> Html:
+    rows = []
+    for k, r in enumerate(outcome.rounds):
+        order = by_probability(r.weighing, 0.0)
+        possible = ", ".join(f"{plain_name(n)} {p:.2f}" for n, p in order[:_ROWS] if p >= _SHOWN)
+        run = f"{shape_words(r.proposal)}; {r.proposal.resolved:.0%} expected" if r.proposal else ""
+        rows.append((f"run {k}" if k else "first records", possible, size(r.weighing, order[0][0]), run))
+    return section("Run by run", table(("after", "possible", "size of the likeliest", "next run"), rows))

@@ -1,6 +1,9 @@
-"""Bode figure: measured response with its 95 % band, the model, and the coherence."""
+"""Bode figure: measured response with its 95 % band, the model, their ratio, the coherence; its finding."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -8,129 +11,144 @@ from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import UNITS, ComplexArray, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.bode_words import caption, finding
-from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
+from rsea_ros.report.figures.figure import (
+    Figure,
+    Json,
+    axis,
+    band,
+    frequency_axis,
+    label,
+    layout,
+    line,
+    names_beside,
+)  # fmt: skip
 from rsea_ros.report.figures.palette import AFTER, MEASURED, QUIET, faint
-from rsea_ros.report.figures.thinned import thin
 
 _SIDE = Z95 / np.sqrt(2.0)
 """Half-width of the 95 % interval of a circular complex variable along one direction, in its sd."""
-_ROWS = {"gain": [0.64, 1.0], "phase": [0.39, 0.6], "ratio": [0.165, 0.35], "coherence": [0.0, 0.125]}
+_CIRCLE = float(np.sqrt(-np.log(0.05)))
+"""Radius of the circle that holds 95 % of a circular complex normal variable, in its sd."""
+_AGREES, _STRAYS = 0.9, 2.5
+"""Share of lines within the circle; radii that chance alone takes no line farther from a right model."""
+_COHERENT = 0.9
 _MOST_DECIBEL = 12.0
+_PER_DECADE = 50
+_SMALLEST = 1e-100
+"""Standard deviation whose inverse square is still a number."""
+Values = TypeVar("Values", FloatArray, ComplexArray)
+Sides = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) -> Figure:
-    """Return gain, phase and coherence over frequency. model: at the measured frequencies."""
-    shown, shown_model = thin(measured, model)
-    data = [*_gain(shown, shown_model), *_phase(shown, shown_model), *_ratio(shown, shown_model)]
-    data.append(
-        line(shown.frequency, shown.coherence, "coherence", QUIET, 1.2, yaxis="y4", hovertemplate="%{y:.3f}")
-    )
-    return Figure(
-        title=finding(measured, model),
-        caption=caption(measured),
-        data=data,
-        layout=_layout(shown, shown_model),
-        height=720,
-    )
-
-
-def _gain(shown: FrequencyResponse, model: ComplexArray | None) -> list[Json]:
-    side = _SIDE * shown.sd / np.abs(shown.response)
-    decibel = 20.0 * np.log10(np.abs(shown.response))
-    low, high = (decibel + _decibel(1.0 + s) for s in (-side, side))
-    gain = None if model is None else 20.0 * np.log10(np.abs(model))
-    return _measured_and_model(shown.frequency, (low, decibel, high), gain, "y", "%{y:.2f} dB")
-
-
-def _phase(shown: FrequencyResponse, model: ComplexArray | None) -> list[Json]:
-    reference = shown.response if model is None else model
+    """Return gain, phase, ratio and coherence over frequency. model: at the measured frequencies."""
+    shown, fit = thin(measured, model)
+    hz, response = shown.frequency, shown.response
+    side = _SIDE * shown.sd / np.abs(response)
+    low, high = _decibel(1.0 - side), _decibel(1.0 + side)
+    gain = 20.0 * np.log10(np.abs(response))
+    reference = response if fit is None else fit
     smooth = np.unwrap(np.angle(reference))
-    measured = np.degrees(smooth + np.angle(shown.response / reference))
-    side = np.degrees(np.arcsin(np.minimum(_SIDE * shown.sd / np.abs(shown.response), 1.0)))
-    phase = None if model is None else np.degrees(smooth)
-    return _measured_and_model(
-        shown.frequency, (measured - side, measured, measured + side), phase, "y2", "%{y:.1f}°"
+    phase = np.degrees(smooth + np.angle(response / reference))
+    turn = np.degrees(np.arcsin(np.minimum(side, 1.0)))
+    model_gain, model_phase = 20.0 * np.log10(np.abs(reference)), np.degrees(smooth)
+    data = _curves(hz, (gain + low, gain, gain + high), fit is not None, model_gain, "y", "%{y:.2f} dB")
+    data += _curves(hz, (phase - turn, phase, phase + turn), fit is not None, model_phase, "y2", "%{y:.1f}°")
+    limit = 1.0
+    if fit is not None:  # the ratio shows small departures: of trusted lines, and the tolerance
+        ratio, trusted = _decibel(np.abs(response / fit)), shown.coherence > 0.5
+        reach = (np.abs(ratio) + high)[trusted]
+        limit = min(_MOST_DECIBEL, max(0.1, 1.2 * float(np.quantile(reach, 0.98)) if trusted.any() else 1.2))
+        data += [
+            line(hz[[0, -1]], np.zeros(2), "model", AFTER, 1.6, yaxis="y3", hoverinfo="skip"),
+            band(hz, ratio + low, ratio + high, faint(MEASURED, 0.28), yaxis="y3"),
+            line(hz, ratio, "measured / model", MEASURED, 1.6, yaxis="y3", hovertemplate="%{y:.3f} dB"),
+        ]
+    data.append(line(hz, shown.coherence, "coherence", QUIET, 1.2, yaxis="y4", hovertemplate="%{y:.3f}"))
+    return Figure(
+        finding(measured, model), _caption(measured), data, _layout(shown, fit is not None, limit), 720
     )
 
 
-def _measured_and_model(
-    hz: FloatArray,
-    measured: tuple[FloatArray, FloatArray, FloatArray],
-    model: FloatArray | None,
-    yaxis: str,
-    hover: str,
+def _curves(
+    hz: FloatArray, measured: Sides, has_model: bool, model: FloatArray, y: str, hover: str
 ) -> list[Json]:
     """Return the measured values with their band, and the model's on top. measured: low, middle, high."""
     low, middle, high = measured
-    place = {"yaxis": yaxis, "hovertemplate": hover}
     traces = [
-        band(hz, low, high, faint(MEASURED, 0.28), yaxis=yaxis),
-        line(hz, middle, "measured", faint(MEASURED, 0.55), 5.0, **place),
+        band(hz, low, high, faint(MEASURED, 0.28), yaxis=y),
+        line(hz, middle, "measured", faint(MEASURED, 0.55), 5.0, yaxis=y, hovertemplate=hover),
     ]
-    return traces if model is None else [*traces, line(hz, model, "model", AFTER, 1.6, **place)]
-
-
-def _ratio(shown: FrequencyResponse, model: ComplexArray | None) -> list[Json]:
-    """Return the gain of the measurement over the model's, where small departures show."""
-    if model is None:
-        return []
-    side = _SIDE * shown.sd / np.abs(shown.response)
-    ratio = _decibel(np.abs(shown.response / model))
-    low, high = (ratio + _decibel(1.0 + s) for s in (-side, side))
-    nothing = np.zeros(2)
-    return [
-        line(shown.frequency[[0, -1]], nothing, "model", AFTER, 1.6, yaxis="y3", hoverinfo="skip"),
-        band(shown.frequency, low, high, faint(MEASURED, 0.28), yaxis="y3"),
-        line(
-            shown.frequency, ratio, "measured / model", MEASURED, 1.6, yaxis="y3", hovertemplate="%{y:.3f} dB"
-        ),
-    ]
-
-
-def _ratio_range(shown: FrequencyResponse, model: ComplexArray | None) -> list[float]:
-    """Return a range in dB that shows the deviations of trusted lines and the tolerance."""
-    if model is None:
-        return [-1.0, 1.0]
-    trusted = shown.coherence > 0.5
-    reach = np.abs(_decibel(np.abs(shown.response / model))) + _decibel(
-        1.0 + _SIDE * shown.sd / np.abs(shown.response)
+    return (
+        [*traces, line(hz, model, "model", AFTER, 1.6, yaxis=y, hovertemplate=hover)] if has_model else traces
     )
-    most = float(np.quantile(reach[trusted], 0.98)) if trusted.any() else 1.0
-    limit = min(_MOST_DECIBEL, max(0.1, 1.2 * most))
-    return [-limit, limit]
 
 
 def _decibel(ratio: FloatArray) -> FloatArray:
-    decibel: FloatArray = 20.0 * np.log10(np.maximum(ratio, 0.05))
-    return decibel
+    return np.asarray(20.0 * np.log10(np.maximum(ratio, 0.05)))
 
 
-def _layout(shown: FrequencyResponse, model: ComplexArray | None) -> Json:
-    end = 20.0 * float(np.log10(np.abs(shown.response[-1])))
-    labels = [label("measured<br>95 % band", 1.01, end, MEASURED, xref="paper", yref="y", yanchor="bottom")]
-    if model is not None:
-        labels.append(
-            label("<b>model</b>", 1.01, end, AFTER, xref="paper", yref="y", yanchor="top", yshift=-4)
-        )
-    labels.append(label("measured<br>÷ model", 1.01, 0.0, MEASURED, xref="paper", yref="y3"))
+def _layout(shown: FrequencyResponse, has_model: bool, limit: float) -> Json:
+    names = [*([("<b>model</b>", AFTER)] if has_model else []), ("measured,<br>95 % band", MEASURED)]
+    above, below = (words.unit(UNITS[n]) for n in (shown.output, shown.input))
+    reference = "" if above == below else f" re 1 {above} per {below}"
     return layout(
         xaxis=frequency_axis(shown.frequency[0], shown.frequency[-1], anchor="y4"),
-        yaxis=axis(f"gain, dB{_reference(shown)}", domain=_ROWS["gain"]),
-        yaxis2=axis("phase, °", domain=_ROWS["phase"], dtick=90),
-        yaxis3=axis("gain, dB", domain=_ROWS["ratio"], range=_ratio_range(shown, model), nticks=5),
-        yaxis4=axis("coherence", domain=_ROWS["coherence"], range=[0, 1.08], tickvals=[0, 0.5, 1]),
-        annotations=labels,
+        yaxis=axis(f"gain, dB{reference}", domain=[0.64, 1.0]),
+        yaxis2=axis("phase, °", domain=[0.39, 0.6], dtick=90),
+        yaxis3=axis("gain, dB", domain=[0.165, 0.35], range=[-limit, limit], nticks=5),
+        yaxis4=axis("coherence", domain=[0.0, 0.125], range=[0, 1.08], tickvals=[0, 0.5, 1]),
+        annotations=[
+            *names_beside(names, 0.04),
+            label("measured<br>÷ model", 1.015, 0.0, MEASURED, xref="paper", yref="y3"),
+        ],
         hoversubplots="axis",
     )
 
 
-def _reference(response: FrequencyResponse) -> str:
-    """Return the value of 0 dB, for a response with a unit."""
-    over = _unit(response)
-    return f" re 1 {over}" if over else ""
+def finding(measured: FrequencyResponse, model: ComplexArray | None) -> str:
+    """Return the sentence: where model and measurement agree, or where they part the most."""
+    ratio, f = f"{words.channel(measured.output)} per {words.channel(measured.input)}", measured.frequency
+    span = f"{words.number(f[0], 2)} to {words.number(f[-1], 3)} Hz"
+    if model is None:
+        return words.sentence(f"{ratio}, measured from {span}")
+    distance = np.abs(measured.response - model) / (_CIRCLE * np.maximum(measured.sd, 1e-300))
+    share = float(np.mean(distance < 1.0))
+    trusted = np.where(measured.coherence > 0.5, distance, 0.0)
+    worst = int(np.argmax(trusted))
+    circle = f"{ratio}: the model {{}} the measured 95 % circle"
+    if share >= _AGREES and trusted[worst] < _STRAYS:
+        at = f"at {100.0 * share:.0f} % of the frequencies from {span}"
+        return words.sentence(f"{circle.format('lies in')} {at}")
+    decibel = 20.0 * np.log10(np.abs(model[worst] / measured.response[worst]))
+    where = words.minus(f"{words.number(f[worst])} Hz ({decibel:+.1f} dB)")
+    return words.sentence(f"{circle.format('leaves')}, most at {where}")
 
 
-def _unit(response: FrequencyResponse) -> str:
-    above, below = (words.unit(UNITS[n]) for n in (response.output, response.input))
-    return "" if above == below else f"{above} per {below}"
+def _caption(measured: FrequencyResponse) -> str:
+    """Return how far to trust the measurement and how it was made."""
+    high = measured.frequency[measured.coherence > _COHERENT]
+    reach = f"Coherence is above {_COHERENT:g} up to {words.number(high[-1])} Hz. " if len(high) else ""
+    return (
+        f"{reach}{words.sentence(measured.method)}, {len(measured.frequency)} frequencies; hold of the "
+        "command and acquisition instants are taken out. Averaged in bands of 5 % for drawing."
+    )
+
+
+def thin(
+    measured: FrequencyResponse, model: ComplexArray | None
+) -> tuple[FrequencyResponse, ComplexArray | None]:
+    """Return measurement and model averaged in the same narrow bands of equal ratio, weighted by 1/sd²."""
+    weight = 1.0 / np.maximum(measured.sd, max(1e-9 * np.abs(measured.response).max(), _SMALLEST)) ** 2
+    bands = np.floor(np.log10(measured.frequency) * _PER_DECADE)
+    starts = np.flatnonzero(np.diff(bands, prepend=-np.inf))
+    total = np.add.reduceat(weight, starts)
+
+    def mean(values: Values) -> Values:
+        averaged: Any = np.add.reduceat(values * weight, starts) / total
+        return averaged  # type: ignore[no-any-return]
+
+    shown = replace(
+        measured, frequency=mean(measured.frequency), response=mean(measured.response),
+        coherence=mean(measured.coherence), sd=1.0 / np.sqrt(total), noise=None, distortion=None,
+    )  # fmt: skip
+    return shown, None if model is None else mean(model)

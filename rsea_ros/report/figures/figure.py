@@ -138,3 +138,16 @@ def label(text: str, x: float, y: float, colour: str, **parts: Any) -> Json:
         "font": {"size": 12, "color": colour},
     }
     return {**base, **parts}
+
+
+def points(x: FloatArray | Sequence[Any], y: Sequence[float | None], name: str, **parts: Any) -> Json:
+    """Return a trace of points; x: numbers, or dates as text."""
+    return {"type": "scatter", "mode": "markers", "x": list(x), "y": list(y), "name": name, **parts}
+
+
+def names_beside(items: Sequence[tuple[str, str]], step: float, x: float = 1.015) -> list[Json]:
+    """Return the names of curves, each with its colour, one below the other right of the figure."""
+    return [
+        label(name, x, 1.0 - step * i, colour, xref="paper", yref="paper", yanchor="top")
+        for i, (name, colour) in enumerate(items)
+    ]

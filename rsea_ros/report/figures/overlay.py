@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout
-from rsea_ros.report.figures.packing import pack
+from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, names_beside
 from rsea_ros.report.figures.palette import MEASURED, faint
 
 MOST_SAMPLES = 45_000
@@ -19,7 +21,9 @@ MOST_SAMPLES = 45_000
 _MEASURED, _RESIDUAL = 1.0 / 2000.0, 1.0 / 64.0
 """Steps of the drawn values, of their standard deviation: an eighth of a pixel, also of a tenfold zoom."""
 _MICROSECOND = 1e-6
-_FIRST_VIEW = 6.0
+STEPS = 60_000
+"""Of the whole range of a packed trace, at the least: 16 bits hold them."""
+_LEVEL = 6
 _PAUSE, _PERIODS = 1.0, 10.0
 """s, and sample periods: a longer pause of the samples shows as a gap of the line."""
 
@@ -34,36 +38,35 @@ class Simulated:
 
 
 def overlay_figure(
-    title: str,
-    channel: str,
-    t: FloatArray,
-    measured: FloatArray,
-    simulations: Sequence[Simulated],
-    caption: str = "",
-) -> Figure:
-    """Return the figure of one channel. t: s."""
+    title: str, channel: str, t: FloatArray, measured: FloatArray, simulations: Sequence[Simulated],
+    view: float = 6.0, lively: FloatArray | None = None,
+) -> Figure:  # fmt: skip
+    """Return the figure of one channel. t: s.
+
+    It opens with the `view` s in which a signal moves most. lively: that signal, by default the measured one.
+    """
     keep = sample_extremes(measured, measured - simulations[-1].values)
     unit = words.unit(UNITS[channel])
     pauses = pauses_of(t[keep])
     shown = measured[keep]
     shown[list(pauses)] = np.nan
+
+    def residual(simulated: Simulated) -> Json:
+        values = shown - simulated.values[keep]
+        y = pack(values, _fineness(values, _RESIDUAL))
+        return {"name": simulated.name, "colour": simulated.colour, "y": y}
+
     extra = {
         "t": pack(without(pauses, t[keep] - t[0]), _MICROSECOND),
         "pauses": list(pauses.items()),
         "measured": {"colour": MEASURED, "y": pack(shown, _fineness(measured, _MEASURED))},
-        "residuals": [_residual(s, shown - s.values[keep]) for s in simulations],
+        "residuals": [residual(s) for s in simulations],
         "unit": unit,
     }
-    return Figure(
-        title=title,
-        caption=caption
-        or "Drag to zoom, double-click to see the whole record; every zoom draws all samples.",
-        data=[],
-        layout=_layout(channel, unit, simulations, _liveliest(t - t[0], measured)),
-        height=460,
-        kind="overlay",
-        extra=extra,
-    )
+    caption = "Drag to zoom, double-click to see the whole record; every zoom draws all samples."
+    opening = _liveliest(t - t[0], measured if lively is None else lively, view)
+    drawn = _layout(channel, unit, simulations, opening)
+    return Figure(title, caption, [], drawn, 460, "overlay", extra)
 
 
 def pauses_of(t: FloatArray) -> dict[int, float]:
@@ -84,14 +87,6 @@ def without(pauses: Mapping[int, float], t: FloatArray) -> FloatArray:
     return np.asarray(t - np.cumsum(lost))
 
 
-def _residual(simulated: Simulated, values: FloatArray) -> Json:
-    return {
-        "name": simulated.name,
-        "colour": simulated.colour,
-        "y": pack(values, _fineness(values, _RESIDUAL)),
-    }
-
-
 def _fineness(values: FloatArray, part: float) -> float:
     """Return the step that a trace may be rounded to: a part of its standard deviation."""
     return part * float(np.nanstd(values)) if np.isfinite(values).any() else 0.0
@@ -109,33 +104,45 @@ def sample_extremes(measured: FloatArray, residual: FloatArray) -> npt.NDArray[n
     return np.unique(np.concatenate([*kept, [n - 1]]))
 
 
-def _liveliest(t: FloatArray, measured: FloatArray) -> tuple[float, float]:
-    """Return the stretch in which the channel moves most, where the figure opens."""
-    if t[-1] <= 2.0 * _FIRST_VIEW:
+def _liveliest(t: FloatArray, signal: FloatArray, view: float) -> tuple[float, float]:
+    if t[-1] <= 2.0 * view:
         return 0.0, float(t[-1])
-    edges = np.searchsorted(t, np.arange(0.0, t[-1], _FIRST_VIEW))
-    spread = np.add.reduceat((measured - measured.mean()) ** 2, edges)[:-1]
-    start = _FIRST_VIEW * int(np.argmax(spread))
-    return start, start + _FIRST_VIEW
+    edges = np.searchsorted(t, np.arange(0.0, t[-1], view))
+    start = view * int(np.argmax(np.add.reduceat((signal - signal.mean()) ** 2, edges)[:-1]))
+    return start, start + view
 
 
 def _layout(channel: str, unit: str, simulations: Sequence[Simulated], view: tuple[float, float]) -> Json:
-    names = [label("measured", 1.01, 1.0, MEASURED, xref="paper", yref="paper", yanchor="top")]
-    for i, s in enumerate(simulations):
-        y = 1.0 - 0.055 * (i + 1)
-        names.append(label(f"<b>{s.name}</b>", 1.01, y, s.colour, xref="paper", yref="paper", yanchor="top"))
-    names.append(
-        label("residual", 1.01, 0.22, simulations[-1].colour, xref="paper", yref="paper", yanchor="top")
+    names = names_beside(
+        [("measured", MEASURED), *((f"<b>{s.name}</b>", s.colour) for s in simulations)], 0.055, 1.01
     )
+    last: Json = {"xref": "paper", "yref": "paper", "yanchor": "top"}
+    names.append(label("residual", 1.01, 0.22, simulations[-1].colour, **last))
+    title, zero = {"text": "%{x} s"}, faint(MEASURED, 0.4)
     return layout(
-        xaxis=axis(
-            "time, s", anchor="y2", range=list(view), hoverformat=".3f", unifiedhovertitle={"text": "%{x} s"}
-        ),
+        xaxis=axis("time, s", anchor="y2", range=list(view), hoverformat=".3f", unifiedhovertitle=title),
         yaxis=axis(f"{words.channel(channel)}, {unit}", domain=[0.3, 1.0]),
-        yaxis2=axis(
-            f"residual, {unit}", domain=[0.0, 0.22], zeroline=True, zerolinecolor=faint(MEASURED, 0.4)
-        ),
+        yaxis2=axis(f"residual, {unit}", domain=[0.0, 0.22], zeroline=True, zerolinecolor=zero),
         annotations=names,
         hoversubplots="axis",
         margin={"l": 72, "r": 110, "t": 12, "b": 48},
     )
+
+
+def pack(values: FloatArray, step: float = 0.0) -> dict[str, Any]:
+    """Return values in few bytes for page.js: value k = first + slope·k + step·(whole number k).
+
+    step: allowed rounding, in the unit of the values; 0: the resolution of 16 bits. Not-a-number becomes a
+    gap. The line goes through the ends: stamps lie on it but for their jitter.
+    """
+    values, first, slope = np.asarray(values, dtype=float), 0.0, 0.0
+    if len(values) >= 2 and np.isfinite(values[[0, -1]]).all():
+        first, slope = float(values[0]), float(values[-1] - values[0]) / (len(values) - 1)
+    off = values - (first + slope * np.arange(len(values)))
+    known = np.isfinite(off)
+    low, high = (float(off[known].min()), float(off[known].max())) if known.any() else (0.0, 0.0)
+    step = max(step, (high - low) / STEPS) or 1.0
+    whole = np.where(known, np.round((off - low) / step), 2.0**16 - 1.0).astype("<u2")
+    planes = np.concatenate([whole & 0xFF, whole >> 8]).astype(np.uint8)
+    data = base64.b64encode(gzip.compress(planes.tobytes(), _LEVEL, mtime=0)).decode("ascii")
+    return {"first": first + low, "slope": slope, "step": step, "data": data}

@@ -8,7 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.records.record import ComplexArray, FloatArray
-from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
+from rsea_ros.report.figures.figure import (
+    Figure,
+    Json,
+    axis,
+    band,
+    frequency_axis,
+    label,
+    layout,
+    line,
+    names_beside,
+)  # fmt: skip
 from rsea_ros.report.figures.palette import QUIET, faint
 
 
@@ -53,13 +63,9 @@ class Mark:
 
 
 def response_figure(
-    title: str,
-    responses: Sequence[ResponseCurve],
-    marks: Sequence[Mark] = (),
-    caption: str = "",
-    decibel: tuple[float, float] | None = None,
-    phase: bool = True,
-) -> Figure:
+    title: str, responses: Sequence[ResponseCurve], marks: Sequence[Mark] = (), caption: str = "",
+    decibel: tuple[float, float] | None = None, phase: bool = True,
+) -> Figure:  # fmt: skip
     """Return gain and phase over frequency; marks are vertical lines. decibel: range of the gain axis."""
     data: list[Json] = []
     for r in responses:
@@ -83,49 +89,23 @@ def _layout(
     phase: bool,
 ) -> Json:
     low, high = min(r.hz[0] for r in responses), max(r.hz[-1] for r in responses)
+    turned = [np.ptp(r.degrees) for r in responses]
+    turned += [np.ptp(np.concatenate(r.band.phase)) for r in responses if r.band is not None]
+    tick = 90.0 if max(turned) <= 720.0 else 180.0  # not more than eight marks
+    parts = {"yaxis2": axis("phase, °", domain=[0.0, 0.36], dtick=tick)} if phase else {}
+    notes = [
+        label(m.text, float(np.log10(m.hz)), 1.0, QUIET, yref="paper", yanchor="bottom", xanchor=m.anchor)
+        for m in marks
+    ]
+    stroke: Json = {"type": "line", "xref": "x", "yref": "paper"}
+    style = {"color": QUIET, "width": 1, "dash": "dot"}
     gain = axis("gain, dB", domain=[0.44, 1.0] if phase else [0.0, 1.0])
-    if decibel:
-        gain["range"] = list(decibel)
-    parts = {"yaxis2": axis("phase, °", domain=[0.0, 0.36], dtick=_phase_tick(responses))} if phase else {}
     return layout(
         xaxis=frequency_axis(low, high, anchor="y2" if phase else "y"),
-        yaxis=gain,
+        yaxis={**gain, "range": list(decibel)} if decibel else gain,
         **parts,
-        annotations=[*_names(responses), *(_note(mark) for mark in marks)],
-        shapes=[_stroke(mark.hz) for mark in marks],
+        annotations=[*names_beside([(r.name, r.colour) for r in responses], 0.075), *notes],
+        shapes=[{**stroke, "x0": m.hz, "x1": m.hz, "y0": 0.0, "y1": 1.0, "line": style} for m in marks],
         hoversubplots="axis",
         margin={"l": 64, "r": 190, "t": 34, "b": 48},
     )
-
-
-def _phase_tick(responses: Sequence[ResponseCurve]) -> float:
-    """Return 90 degrees, or 180 where that would be more than eight marks."""
-    turned = [np.ptp(r.degrees) for r in responses]
-    turned += [np.ptp(np.concatenate(r.band.phase)) for r in responses if r.band is not None]
-    return 90.0 if max(turned) <= 720.0 else 180.0
-
-
-def _names(responses: Sequence[ResponseCurve]) -> list[Json]:
-    return [
-        label(r.name, 1.015, 1.0 - 0.075 * i, r.colour, xref="paper", yref="paper", yanchor="top")
-        for i, r in enumerate(responses)
-    ]
-
-
-def _note(mark: Mark) -> Json:
-    return label(
-        mark.text, float(np.log10(mark.hz)), 1.0, QUIET, yref="paper", yanchor="bottom", xanchor=mark.anchor
-    )
-
-
-def _stroke(hz: float) -> Json:
-    return {
-        "type": "line",
-        "xref": "x",
-        "yref": "paper",
-        "x0": hz,
-        "x1": hz,
-        "y0": 0.0,
-        "y1": 1.0,
-        "line": {"color": QUIET, "width": 1, "dash": "dot"},
-    }

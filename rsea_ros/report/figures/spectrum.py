@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import Figure, Json, axis, frequency_axis, label, layout, line
+from rsea_ros.report.figures.figure import Figure, Json, axis, frequency_axis, layout, line, names_beside
 from rsea_ros.report.figures.palette import NOISE, QUIET
 
 _PER_DECADE = 40
@@ -17,10 +17,6 @@ _LONGEST = 4096
 ABOVE_FLOOR = 2.0
 """Times the noise floor, from which a density of a band stands above it and does not merely scatter."""
 _TINY = 1e-300
-_LABEL = 0.06
-"""Height of a label, of the figure's."""
-_NEAR_AN_END = 0.1
-"""Share of the frequency axis within which a centred label would reach beyond its end, on a phone."""
 
 
 @dataclass(frozen=True)
@@ -33,36 +29,22 @@ class SpectrumLine:
 
 
 def residual_figure(
-    title: str,
-    channel: str,
-    frequency: FloatArray,
-    curves: Sequence[SpectrumLine],
-    noise: float,
+    title: str, channel: str, frequency: FloatArray, curves: Sequence[SpectrumLine], noise: float,
     caption: str = "",
-) -> Figure:
+) -> Figure:  # fmt: skip
     """Return the densities of residuals over frequency, Hz. noise: density of the noise floor."""
-    unit = words.unit(UNITS[channel])
-    floor = np.full(2, noise)
-    ends = np.array([frequency[0], frequency[-1]])
+    unit, floor, ends = words.unit(UNITS[channel]), np.full(2, noise), frequency[[0, -1]]
     drawn = [(c, *in_bands(frequency, c.density)) for c in curves]
     data: list[Json] = [line(ends, floor, "noise floor", NOISE, 6.0, hoverinfo="skip")]
     data += [line(f, d, c.name, c.colour, 1.8, hovertemplate=f"%{{y:.3g}} {unit}/√Hz") for c, f, d in drawn]
-    reach = _range([*(d for _, _, d in drawn), floor])
-    top = max(range(len(drawn)), key=lambda i: float(drawn[i][2].max()))
-    items = [(f"<b>{c.name}</b>", c.colour, float(d[-1])) for i, (c, _, d) in enumerate(drawn) if i != top]
-    names = _apart([*items, ("noise floor", QUIET, noise)], gap=_LABEL * (reach[1] - reach[0]))
-    names.append(_at_peak(*drawn[top]))
-    return Figure(
-        title=title,
-        caption=caption,
-        data=data,
-        layout=layout(
-            xaxis=frequency_axis(frequency[0], frequency[-1]),
-            yaxis=axis(f"density, {unit}/√Hz", type="log", dtick=1, exponentformat="power", range=reach),
-            annotations=names,
-        ),
-        height=380,
-    )
+    exponents = np.log10(np.maximum(np.concatenate([*(d for _, _, d in drawn), floor]), _TINY))
+    low, high = float(exponents.min()), float(exponents.max())
+    lacking = max(0.0, 2.0 - (high - low)) / 2.0  # two decades at least
+    reach = [low - lacking - 0.1, high + lacking + 0.3]
+    height = axis(f"density, {unit}/√Hz", type="log", dtick=1, exponentformat="power", range=reach)
+    names = names_beside([*((f"<b>{c.name}</b>", c.colour) for c in curves), ("noise floor", QUIET)], 0.075)
+    across = frequency_axis(frequency[0], frequency[-1])
+    return Figure(title, caption, data, layout(xaxis=across, yaxis=height, annotations=names), 380)
 
 
 def density(residual: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
@@ -96,40 +78,3 @@ def finding(frequency: FloatArray, values: FloatArray, noise: float, channel: st
     band = f"{words.number(above[0], 2)} to {words.number(above[-1], 2)} Hz"
     most = f"{words.number(f[worst], 2)} Hz ({words.number(ratio[worst], 2)} times)"
     return words.sentence(f"{channel}: the residual stands above the noise floor from {band}, most at {most}")
-
-
-def _exponent(value: float) -> float:
-    """Return the decimal logarithm of a density; a residual that is exactly zero has a low one."""
-    return float(np.log10(max(float(value), _TINY)))
-
-
-def _range(values: Sequence[FloatArray]) -> list[float]:
-    """Return the exponents between which the values lie, two decades at least."""
-    exponents = np.log10(np.maximum(np.concatenate(values), _TINY))
-    low, high = float(exponents.min()), float(exponents.max())
-    lacking = max(0.0, 2.0 - (high - low)) / 2.0
-    return [low - lacking - 0.1, high + lacking + 0.3]
-
-
-def _at_peak(curve: SpectrumLine, frequency: FloatArray, values: FloatArray) -> Json:
-    """Return the label of the highest curve, above its peak; lower ones have theirs at their right end.
-
-    Near an end of the axis it begins or ends at the peak: centred, it would lie on the marks of the axis.
-    """
-    k = int(np.argmax(values))
-    x, y = float(np.log10(frequency[k])), _exponent(values[k])
-    share = (x - np.log10(frequency[0])) / np.log10(frequency[-1] / frequency[0])
-    anchor = "left" if share < _NEAR_AN_END else "right" if share > 1.0 - _NEAR_AN_END else "center"
-    return label(f"<b>{curve.name}</b>", x, y, curve.colour, xanchor=anchor, yanchor="bottom", yshift=4)
-
-
-def _apart(items: Sequence[tuple[str, str, float]], gap: float) -> list[Json]:
-    """Return labels at the right end of curves, moved apart where they would overlap."""
-    placed: list[Json] = []
-    order = sorted(items, key=lambda item: item[2])
-    lowest = -np.inf
-    for text, colour, value in order:
-        height = max(_exponent(value), lowest)
-        lowest = height + gap
-        placed.append(label(text, 1.01, height, colour, xref="paper", yref="y"))
-    return placed

@@ -8,7 +8,8 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
-from rsea_ros.report.file_names import DIAGNOSIS_JSON, IDENTIFICATION_JSON, REPORT
+from rsea_ros.report.page import Html
+from rsea_ros.report.result_files import DIAGNOSIS_JSON, IDENTIFICATION_JSON, REPORT
 
 _RESULTS = (REPORT, DIAGNOSIS_JSON, IDENTIFICATION_JSON)
 """What shows a recording's diagnosis best, in this order."""
@@ -22,14 +23,14 @@ class Links:
     store: Path
     pages: dict[str, str]
 
-    def joint(self, name: str) -> str:
+    def joint(self, name: str) -> Html:
         """Return a link to a joint's page."""
-        return _link(self.pages[name], name) if name in self.pages else escape(name)
+        return _link(self.pages[name], name) if name in self.pages else Html(escape(name))
 
-    def recording(self, name: str, artefacts: str) -> str:
+    def recording(self, name: str, artefacts: str) -> Html:
         """Return a link to the results of a recording; its plain name where it left none."""
         if not artefacts:
-            return escape(name)
+            return Html(escape(name))
         return _link(Path(os.path.relpath(self._best(artefacts), self.out)).as_posix(), name)
 
     def lacks_page(self, artefacts: str) -> bool:
@@ -41,8 +42,8 @@ class Links:
         return next((folder / f for f in _RESULTS if (folder / f).exists()), folder)
 
 
-def _link(target: str, text: str) -> str:
-    return f'<a href="{escape(quote(target))}">{escape(text)}</a>'
+def _link(target: str, text: str) -> Html:
+    return Html(f'<a href="{escape(quote(target))}">{escape(text)}</a>')
 
 
 def page_names(joints: tuple[str, ...]) -> dict[str, str]:

@@ -1,65 +1,114 @@
-"""The page of a fleet: worst joints first, dated changes, joints × weeks, undetermined parameters."""
+"""The pages of a fleet: of the fleet, worst joints first, and of each joint, as files of one folder."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from rsea_ros.documents.wording import list_names
-from rsea_ros.report.fleet.heat_map import heat_map, naming_map, shades
-from rsea_ros.report.fleet.latest import latest_causes
-from rsea_ros.report.fleet.links import Links
-from rsea_ros.report.fleet.tables import (
-    alarm_table,
-    joint_table,
-    undetermined_table,
-    undetermined_trends,
-)
-from rsea_ros.report.fleet.timeline import timeline
-from rsea_ros.report.fleet.words import about, day, name, percent
-from rsea_ros.report.page.frame import Block, page
-from rsea_ros.report.page.html import bullets, fold, key_numbers, paragraph, section
-from rsea_ros.trends.alarms import Alarm, by_joint, worst_first
+from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.report.fleet.joint_page import joint_page
+from rsea_ros.report.fleet.links import Links, page_names
+from rsea_ros.report.fleet.maps import heat_map, naming_map, shades, timeline
+from rsea_ros.report.fleet.tables import alarm_table, joint_table, undetermined_table
+from rsea_ros.report.fleet.words import about, day, latest_causes, name, percent
+from rsea_ros.report.page import Block, Html, bullets, fold, key_numbers, page, section
+from rsea_ros.trends.alarms import Alarm, alarms_of, by_joint, worst_first
+from rsea_ros.trends.fleet_trends import fleet_trends
 from rsea_ros.trends.result import FleetTrends
 from rsea_ros.trends.series import Table
-from rsea_ros.trends.weeks import Steps
+from rsea_ros.trends.settings import DEFAULT, TrendSettings
+from rsea_ros.trends.weeks import Steps, steps_over
 
+INDEX = "index.html"
 _ROWS = 60
 """Joints of a heat map: the first of a larger fleet."""
+
+
+def write_fleet_report(
+    history: Table, recordings: Table, out: Destination | Path | str, *, store: Path | str | None = None,
+    settings: TrendSettings = DEFAULT,
+) -> Path:  # fmt: skip
+    """Write index.html and a page for each joint, and return the path of index.html.
+
+    history, recordings: as of trends.fleet_trends. store: the folder that the paths in `artefacts` start
+    from, `out` by default. Raises ParameterError for a table without its columns, OutputError for a name
+    that is taken, OSError where something cannot be written.
+    """
+    fleet = fleet_trends(history, recordings, settings)
+    alarms = alarms_of(fleet, recordings)
+    steps, groups = _steps(recordings), by_joint(alarms)
+    with NewFiles(out) as new:
+        links = Links(new.folder, Path(store) if store is not None else new.folder, page_names(fleet.joints))
+        for joint, name in links.pages.items():
+            findings = groups.get(joint, [])
+            new.write(name, joint_page(joint, fleet, findings, history, recordings, steps, links))
+        return new.write(INDEX, fleet_page(fleet, alarms, recordings, steps, links))
+
+
+def _steps(recordings: Table) -> Steps:
+    first, last = _period(recordings) or (0.0, 0.0)
+    return steps_over(first, last)
+
+
+def _period(recordings: Table) -> tuple[float, float] | None:
+    """Return the times of the first and the last recording, POSIX s; None where none has a date."""
+    time_s = np.asarray(recordings["time_s"], float)
+    known = time_s[np.isfinite(time_s)]
+    return (float(known.min()), float(known.max())) if known.size else None
 
 
 def fleet_page(
     fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
 ) -> str:
     """Return the page as HTML that opens without a network."""
-    blocks = list(_blocks(fleet, alarms, recordings, steps, links))
-    footer = [_period(recordings), "rsea fleet report. All values in SI, all times UTC."]
-    kicker = f"Fleet of {len(fleet.joints)} joints · {_period(recordings)}"
+    period = " to ".join(map(day, _period(recordings) or ())) or "no date"
+    footer = [period, "rsea fleet report. All values in SI, all times UTC."]
+    kicker = f"Fleet of {len(fleet.joints)} joints · {period}"
+    blocks = _blocks(fleet, alarms, recordings, steps, links)
     return page(_headline(fleet, alarms, recordings), kicker, blocks, footer)
 
 
 def _blocks(
     fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
 ) -> Iterator[Block]:
-    groups = by_joint(alarms)
+    groups, joints = by_joint(alarms), worst_first(fleet.joints, alarms)
     ranked = [a for group in groups.values() for a in group]
-    joints = worst_first(fleet.joints, alarms)
-    latest = latest_causes(joints, recordings)
-    yield key_numbers(_keys(fleet, groups, recordings))
-    yield f"<style>{(Path(__file__).parent / 'fleet.css').read_text(encoding='utf-8')}{shades()}</style>"
+    silent = [
+        t for t in fleet.trends.values() if t.state == "undetermined" or math.isfinite(t.silent_since_s)
+    ]
+    kinds = [a.kind for a in ranked]
+    changes, causes = kinds.count("trend") + kinds.count("change"), [a for a in ranked if a.kind == "cause"]
+    always = sum(a.from_first for a in causes)
+    since = f", {always} from the first recording on" if always else " that appeared"
+    done = int(np.sum(np.asarray(recordings["outcome"], str) == "done"))
+    yield key_numbers([
+        (f"{len(groups)} of {len(fleet.joints)}", "joints need a look"),
+        (str(changes), f"{_plural(changes, 'change')}, {kinds.count('trend')} going on"),
+        (str(len(causes)), f"{_plural(len(causes), 'cause')}{since}"),
+        (_grouped(done), f"recordings used, of {_grouped(len(recordings['joint']))}"),
+        (str(len(silent)), f"of {len(fleet.trends)} trends not determined, or no more"),
+    ])  # fmt: skip
+    style = (Path(__file__).parent / "fleet.css").read_text(encoding="utf-8")
+    yield Html(f"<style>{style}{shades()}</style>")
     yield timeline(ranked, steps, links)
     if ranked:
         yield section("Worst joints first", alarm_table(ranked, links))
     for parameter in _parameters_with_map(fleet, joints[:_ROWS]):
         yield heat_map(parameter, joints[:_ROWS], fleet, steps, links)
     for kind, subject in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
-        yield naming_map(
-            subject, kind, _name_lines(fleet, kind, subject, joints)[:_ROWS], fleet, steps, links
-        )
+        naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, subject)}
+        yield naming_map(subject, kind, [j for j in joints if j in naming][:_ROWS], fleet, steps, links)
+    latest = latest_causes(joints, recordings)
     yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
-    yield _undetermined_text(fleet, links)
+    number = "One trend" if len(silent) == 1 else f"{len(silent)} trends"
+    if silent:
+        yield section(f"{number} not determined", undetermined_table(silent, links))
+    else:
+        yield section("Nothing was left undetermined", "All recordings determine all parameters.")
     yield fold("Certainty of these findings", bullets(_sure(fleet)))
 
 
@@ -83,7 +132,11 @@ def _parameters_with_map(fleet: FleetTrends, shown: Sequence[str]) -> list[str]:
 
 def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:
     if not any(t.state != "undetermined" for t in fleet.trends.values()):
-        return f"Too few recordings yet for trends{_latest(fleet, recordings)}"
+        latest = latest_causes(fleet.joints, recordings)
+        named = "".join(f"; the latest name {cause} in {joint}" for joint, cause in latest.items())
+        if len(latest) > 1:
+            named = f"; the latest of {len(latest)} joints name causes"
+        return f"Too few recordings yet for trends{named}"
     groups = by_joint(alarms)
     if not groups:
         return f"All {len(fleet.joints)} joints are steady"
@@ -92,58 +145,13 @@ def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) ->
     return f"{number} a look, {first} first: {about(groups[first][0])}"
 
 
-def _latest(fleet: FleetTrends, recordings: Table) -> str:
-    """Return what the latest recordings name: the causes of one joint, or the number of joints."""
-    latest = latest_causes(fleet.joints, recordings)
-    if len(latest) > 1:
-        return f"; the latest of {len(latest)} joints name causes"
-    return "".join(f"; the latest name {cause} in {joint}" for joint, cause in latest.items())
-
-
-def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table) -> list[tuple[str, str]]:
-    kinds = [a.kind for group in groups.values() for a in group]
-    changes = kinds.count("trend") + kinds.count("change")
-    done = int(np.sum(np.asarray(recordings["outcome"], str) == "done"))
-    return [
-        (f"{len(groups)} of {len(fleet.joints)}", "joints need a look"),
-        (str(changes), f"{_plural(changes, 'change')}, {kinds.count('trend')} going on"),
-        (str(kinds.count("cause")), _causes_word([a for group in groups.values() for a in group])),
-        (_group_digits(done), f"recordings used, of {_group_digits(len(recordings['joint']))}"),
-        (
-            str(len(undetermined_trends(fleet))),
-            f"of {len(fleet.trends)} trends not determined, or no more",
-        ),
-    ]
-
-
-def _causes_word(alarms: Sequence[Alarm]) -> str:
-    causes = [a for a in alarms if a.kind == "cause"]
-    always = sum(a.from_first for a in causes)
-    word = _plural(len(causes), "cause")
-    return f"{word}, {always} from the first recording on" if always else f"{word} that appeared"
-
-
 def _plural(number: int, word: str) -> str:
     return word if number == 1 else f"{word}s"
 
 
-def _group_digits(number: int) -> str:
+def _grouped(number: int) -> str:
     """Return a number with its thousands apart."""
     return f"{number:,}".replace(",", " ")
-
-
-def _name_lines(fleet: FleetTrends, kind: str, subject: str, joints: Sequence[str]) -> list[str]:
-    naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, subject)}
-    return [j for j in joints if j in naming]
-
-
-def _undetermined_text(fleet: FleetTrends, links: Links) -> str:
-    undetermined = undetermined_trends(fleet)
-    if not undetermined:
-        return section("Nothing was left undetermined", paragraph("All recordings determine all parameters."))
-    number = "One trend" if len(undetermined) == 1 else f"{len(undetermined)} trends"
-    title = f"{number} not determined"
-    return section(title, undetermined_table(undetermined, links))
 
 
 def _sure(fleet: FleetTrends) -> list[str]:
@@ -152,16 +160,10 @@ def _sure(fleet: FleetTrends) -> list[str]:
     lines = [
         f"{fleet.tests} series were tested for any step or ramp, and every cause and fault for the day from "
         f"which on it is named. At most {rate} in 100 of the findings are expected to be false (Benjamini "
-        f"and Hochberg, over all joints and parameters of this look).",
+        "and Hochberg, over all joints and parameters of this look).",
         "Recordings of one day count as one draw: the effect of a day (mounting, grease, zeros) is "
         "estimated from the scatter of the days, by restricted likelihood, and is not a change.",
     ]
     if warm:
         lines.append(f"Change per kelvin, estimated across the joints of this fleet: {list_names(warm)}.")
     return lines
-
-
-def _period(recordings: Table) -> str:
-    time_s = np.asarray(recordings["time_s"], float)
-    known = time_s[np.isfinite(time_s)]
-    return f"{day(known.min())} to {day(known.max())}" if known.size else "no date"

@@ -3,39 +3,38 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 
 import numpy as np
 
 from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import Appearance, Change, Interval, Trend
+from rsea_ros.trends.series import Table
 
 _MONTHS = ("January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
            "November", "December")  # fmt: skip
-
 _MOST = 3
 """Changes that a title names."""
 
 
-def day(time_s: float) -> str:
-    """Return a date as `24 March 2025`."""
+def day(time_s: float, letters: int = 9) -> str:
+    """Return a date as `24 March 2025`. letters: of the month, at most."""
     t = datetime.fromtimestamp(time_s, timezone.utc)
-    return f"{t.day} {_MONTHS[t.month - 1]} {t.year}"
+    return f"{t.day} {_MONTHS[t.month - 1][:letters]} {t.year}"
 
 
 def short_day(time_s: float) -> str:
     """Return a date as `24 Mar 2025`."""
-    t = datetime.fromtimestamp(time_s, timezone.utc)
-    return f"{t.day} {_MONTHS[t.month - 1][:3]} {t.year}"
+    return day(time_s, 3)
 
 
-def dates(time_s: FloatArray) -> list[str]:
+def dates(*time_s: float) -> list[str]:
     """Return times as plotly reads them, UTC, to the minute."""
-    stamps = np.round(np.asarray(time_s, float)).astype("datetime64[s]")
+    stamps = np.round(np.array(time_s, float)).astype("datetime64[s]")
     return [str(s) for s in np.datetime_as_string(stamps, unit="m")]
 
 
@@ -52,9 +51,7 @@ def name(about: str) -> str:
 
 def value(v: Interval, unit: str) -> str:
     """Return a value with its 95 % interval and unit, `3.90 ± 0.08 mrad`; a bare number in percent."""
-    factor, shown = (100.0, "%") if unit == "1" else words.unit_factor(v.value, unit)
-    text, doubt = words.with_doubt(v.value * factor, v.low * factor, v.high * factor)
-    return f"{text}{doubt} {shown}".strip()
+    return words.measured_text(*v.times(100.0), "%") if unit == "1" else words.measured_text(*v, unit)
 
 
 def percent(share: float) -> str:
@@ -79,37 +76,35 @@ def subject(about: str) -> str:
 
 def about(alarm: Alarm) -> str:
     """Return an alarm in a few words, without the date."""
-    if alarm.kind == "fault":
-        return f"{_plain(alarm.about)} in the data"
-    if alarm.kind == "cause":
-        size = f", {value(alarm.size, alarm.unit)}" if alarm.size is not None else ""
-        return f"{cause_name(alarm)}{size}"
-    if alarm.kind == "outlier":
-        side = "above" if alarm.relative > 0.0 else "below"
-        return f"{name(alarm.about)} {amount(alarm.relative)} {side} the fleet"
-    return (
-        f"{name(alarm.about)} {percent(alarm.relative)}"
-        if math.isfinite(alarm.relative)
-        else name(alarm.about)
-    )
+    a = alarm
+    if a.kind == "fault":
+        return f"{_plain(a.about)} in the data"
+    if a.kind == "cause":
+        return f"{cause_name(a)}{f', {value(a.size, a.unit)}' if a.size is not None else ''}"
+    if a.kind == "outlier":
+        return f"{name(a.about)} {_beside(a)} the fleet"
+    return f"{name(a.about)} {percent(a.relative)}" if math.isfinite(a.relative) else name(a.about)
+
+
+def _beside(outlier: Alarm) -> str:
+    return f"{amount(outlier.relative)} {'above' if outlier.relative > 0.0 else 'below'}"
 
 
 def sentence(alarm: Alarm) -> str:
     """Return an alarm as a sentence, with its date."""
-    if alarm.kind == "outlier":
-        side = "above" if alarm.relative > 0.0 else "below"
-        return f"{subject(alarm.about)} is {amount(alarm.relative)} {side} the median of the fleet"
-    start = "the first recording" if alarm.from_first else day(alarm.since_s)
-    since = f"since {start}"
-    if alarm.kind == "fault":
-        return f"{_plain(alarm.about)} in the data {since}"
-    if alarm.kind == "cause":
-        return f"{cause_name(alarm)} {beginning(alarm)}{size_now(alarm)}"
-    up = alarm.size is not None and alarm.size.value > 0.0
-    if alarm.kind == "trend":
+    a = alarm
+    start = "the first recording" if a.from_first else "" if a.kind == "outlier" else day(a.since_s)
+    up = a.size is not None and a.size.value > 0.0
+    if a.kind == "outlier":
+        return f"{subject(a.about)} is {_beside(a)} the median of the fleet"
+    if a.kind == "fault":
+        return f"{_plain(a.about)} in the data since {start}"
+    if a.kind == "cause":
+        return f"{cause_name(a)} {beginning(a)}{size_now(a)}"
+    if a.kind == "trend":
         way = "rising" if up else "falling"
-        return f"{subject(alarm.about)} has been {way} {since}: {percent(alarm.relative)} so far"
-    return f"{subject(alarm.about)} {'rose' if up else 'fell'} by {amount(alarm.relative)} from {start} on"
+        return f"{subject(a.about)} has been {way} since {start}: {percent(a.relative)} so far"
+    return f"{subject(a.about)} {'rose' if up else 'fell'} by {amount(a.relative)} from {start} on"
 
 
 def cause_name(cause: Alarm | Appearance) -> str:
@@ -142,17 +137,17 @@ def doubt_of_date(alarm: Alarm) -> str:
     return f"{' '.join(first)} to {' '.join(last)}" if first else " ".join(last)
 
 
-def finding(trend: Trend) -> str:
-    """Return the title of a parameter's figure."""
-    silent = trend.silent_since_s
-    return _finding(trend) + (f"; cannot be determined since {day(silent)}" if math.isfinite(silent) else "")
-
-
 def undetermined_state(trend: Trend) -> str:
     """Return why a parameter has no trend, in a few words."""
     if not np.mean(trend.series.identifiable) > 0.5:
         return "not enough excitation"
     return "intervals too wide" if math.isfinite(trend.detectable) else "too few days"
+
+
+def finding(trend: Trend) -> str:
+    """Return the title of a parameter's figure."""
+    silent = trend.silent_since_s
+    return _finding(trend) + (f"; cannot be determined since {day(silent)}" if math.isfinite(silent) else "")
 
 
 def _finding(trend: Trend) -> str:
@@ -166,25 +161,40 @@ def _finding(trend: Trend) -> str:
         least = f"{words.number(trend.detectable * factor, 2)} {shown}".rstrip()
         return f"{subject(about)} is steady: no step above {least}{share}"
     if trend.state == "trending" and trend.per_year is not None:
-        way = "rising" if trend.per_year.value > 0.0 else "falling"
-        return f"{subject(about)} is {way}: {percent(trend.relative)} since the first day{_limit(trend)}"
+        way, limit = "rising" if trend.per_year.value > 0.0 else "falling", trend.to_limit_s
+        first, last = (short_day(t) for t in limit[1:]) if limit else ("", "")
+        end = f", at its limit about {day(limit.value)} ({first} to {last})" if limit else ""
+        return f"{subject(about)} is {way}: {percent(trend.relative)} since the first day{end}"
     return f"{subject(about)} {list_names([_movement_text(c, trend) for c in trend.changes[:_MOST]])}"
 
 
 def _movement_text(change: Change, trend: Trend) -> str:
     way = "rose" if change.size.value > 0.0 else "fell"
-    size = change.size.value / abs(trend.first.value) if trend.first and trend.first.value else float("nan")
-    how = f" by {amount(size)}" if math.isfinite(size) else ""
-    return f"{way}{how} {'on' if change.kind == 'step' else 'from'} {day(change.since_s)}" + (
-        " on" if change.kind == "ramp" else ""
+    size = change.size.value / abs(trend.first.value) if trend.first and trend.first.value else math.nan
+    how = f"{way} by {amount(size)}" if math.isfinite(size) else way
+    at = day(change.since_s)
+    return (
+        f"{how} on {at}"
+        if change.kind == "step"
+        else f"{how} from {at}{' on' if change.kind == 'ramp' else ''}"
     )
 
 
-def _limit(trend: Trend) -> str:
-    if trend.to_limit_s is None:
-        return ""
-    first, last = (short_day(t) for t in trend.to_limit_s[1:])
-    return f", at its limit about {day(trend.to_limit_s.value)} ({first} to {last})"
+def latest_causes(joints: Sequence[str], recordings: Table) -> Mapping[str, str]:
+    """Return the sure causes in each joint's latest finished recording as text, for joints with any.
+
+    A joint whose recordings have no date has no latest one.
+    """
+    of, outcome = np.asarray(recordings["joint"], str), np.asarray(recordings["outcome"], str)
+    time_s, latest = np.asarray(recordings["time_s"], float), {}
+    for joint in joints:
+        done = np.flatnonzero((of == joint) & (outcome == "done") & np.isfinite(time_s))
+        held = recordings["causes"][done[np.argmax(time_s[done])]] if done.size else ()
+        causes = held if isinstance(held, (list, tuple, np.ndarray)) else ()
+        sure = [words.effect(str(c["name"])) for c in causes if c.get("status") in ("confirmed", "leading")]
+        if sure:
+            latest[joint] = list_names(sure)
+    return latest
 
 
 def _plain(kind: str) -> str:

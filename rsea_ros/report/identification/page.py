@@ -1,157 +1,232 @@
-"""The report of an identification, as one HTML file."""
+"""The report of an identification, as one HTML file beside identification.json and model.yaml."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
+from html import escape
+from pathlib import Path
+
 import numpy as np
 
-from rsea_ros.identification.result import CLOCKS, Identification, Overlay
-from rsea_ros.records.record import SENSED, UNITS
+from rsea_ros.identification.result import CLOCKS, Identification, Overlay, ParameterEstimate
+from rsea_ros.model.rig_file import rig_text
+from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import SENSED, UNITS, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.overlay import Simulated, overlay_figure
-from rsea_ros.report.figures.palette import AFTER, MEASURED
+from rsea_ros.report.figures.palette import AFTER, BEFORE, GRID, MEASURED, QUIET, faint
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
-from rsea_ros.report.identification.correlation import correlation_section
-from rsea_ros.report.identification.parameters import clock_sentence, parameter_table
-from rsea_ros.report.identification.statics_sentences import statics_sentences
-from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
-from rsea_ros.report.page.frame import Block, page
-from rsea_ros.report.page.html import bullets, code, key_numbers, paragraph, section
-from rsea_ros.report.provenance import Provenance
-from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.report.rig.page import right_rig_block
-from rsea_ros.report.rig.words import rig_named, split_off_rig
+from rsea_ros.report.identification.words import (
+    doubt_sentences,
+    identification_json,
+    next_command,
+    statics_sentences,
+    value_text,
+    verdict_sentence,
+)  # fmt: skip
+from rsea_ros.report.page import (
+    Block,
+    Html,
+    bullets,
+    code,
+    fold,
+    key_numbers,
+    listed,
+    named,
+    page,
+    paragraph,
+    section,
+    table,
+)  # fmt: skip
+from rsea_ros.report.remark_words import fault_lines, remark_sentences
+from rsea_ros.report.result_files import IDENTIFICATION_JSON, MODEL, REPORT, Provenance, json_text
+from rsea_ros.report.rig import rig_named, right_rig_block, split_off_rig
+
+STRONG = 0.9
+"""Correlation from which two values are hardly distinguishable."""
+_WIDTH, _HEIGHT = 190.0, 26.0
+
+
+def write_results(
+    identification: Identification, out: Destination | str | Path, provenance: Provenance | None = None
+) -> Path:
+    """Write identification.json, model.yaml and report.html, and return the report's path: all or none.
+
+    Raises OutputError for a name that is taken, OSError where something cannot be written.
+    """
+    with NewFiles(out) as new:
+        new.write(IDENTIFICATION_JSON, json_text(identification_json(identification), provenance))
+        new.write(MODEL, rig_text(identification.rig))
+        return new.write(REPORT, identification_report(identification, provenance))
 
 
 def identification_report(identification: Identification, provenance: Provenance | None = None) -> str:
     """Return the report as HTML that opens offline."""
-    blocks: list[Block] = [
-        key_numbers(_keys(identification)),
-        _next(identification),
-        right_rig_block(identification.remarks),
-        _parameters(identification),
-        _statics(identification),
-    ]
-    responses = identification.responses
-    models = identification.models or (None,) * len(responses)
-    blocks += [bode_figure(r, m) for r, m in zip(responses, models, strict=True)]
-    for overlay in _shown_overlays(identification):
-        blocks += [_over_time(identification, overlay), _over_frequency(identification, overlay)]
-    blocks += [_undetermined_values(identification), _correlation(identification)]
-    footer = [*_footer(identification), *(provenance.lines if provenance else ())]
-    return page(verdict_sentence(identification), _kicker(identification), blocks, footer)
+    i = identification
+    kicker = f"Identification of {rig_named(i.rig.name, i.rig_choice)} · "
+    damage = [words.sentence(f"{line}.") for line in fault_lines(i.faults)]
+    notes = [*i.notes, *remark_sentences(i.clocks), "rsea identify. All values in SI."]
+    footer = [f"Data: {', '.join(i.sources)}", *damage, *notes]
+    about = i.rig.about or i.rig.name.replace("_", " ")
+    return page(verdict_sentence(i), kicker + about, _blocks(i), footer, provenance)
 
 
-def main_channel(identification: Identification) -> str:
-    """Return the most important channel."""
-    present = [n for n in SENSED if n in identification.residual_rms]
-    return present[0] if present else next(iter(identification.residual_rms), "")
+def _blocks(i: Identification) -> Iterator[Block]:
+    if i.residual_rms:
+        n = next((n for n in SENSED if n in i.residual_rms), next(iter(i.residual_rms)))
+        yield key_numbers([
+            (f"{i.fit_percent[n]:.2f} %", f"of the {words.channel(n)} explained"),
+            (words.quantity(i.residual_rms[n], UNITS[n], 3), "residual, RMS"),
+            (words.quantity(i.noise_rms[n], UNITS[n], 3), "sensor noise, RMS"),
+            (f"{i.duration:.0f} s", f"of data at {i.rate:.0f} Hz"),
+        ])  # fmt: skip
+    if following := next_command(i):
+        yield paragraph(Html(f'<p class="next">To find the cause and its gain: {code(following)}</p>'))
+    yield right_rig_block(i.remarks)
+    yield _parameters(i.parameters)
+    if i.statics is not None:
+        yield section("Slow ramps against the locked output", bullets(statics_sentences(i.statics)))
+    models = i.models or (None,) * len(i.responses)
+    yield from map(bode_figure, i.responses, models)
+    by_name = {o.channel: o for o in i.overlays}  # the motor torque only repeats the command
+    for overlay in [by_name[n] for n in SENSED if n in by_name] or i.overlays:
+        yield _over_time(i, overlay)
+        yield _over_frequency(i, overlay)
+    unclear = (*doubt_sentences(i), *remark_sentences(split_off_rig(i.remarks)[1]))
+    yield undetermined_section(unclear)
+    physical = [k for k, p in enumerate(i.parameters) if not p.name.startswith("clock.")]
+    names = [i.parameters[k].name for k in physical]
+    yield correlation_section(names, i.correlation[np.ix_(physical, physical)])
 
 
-def _next(identification: Identification) -> str:
-    """Return the next step for a residual above the noise."""
-    command = next_command(identification)
-    if not command:
-        return ""
-    return f'<p class="next">To find the cause and its gain: {code(command)}</p>'
+def undetermined_section(sentences: Sequence[str]) -> Html:
+    """Return what data cannot determine, a sentence each."""
+    body = bullets(sentences) if sentences else "The data determine every free value."
+    return section("What these data cannot determine", body)
 
 
-def _keys(identification: Identification) -> list[tuple[str, str]]:
-    n = main_channel(identification)
-    if not n:
-        return []
-    unit, name = UNITS[n], words.channel(n)
-    return [
-        (f"{identification.fit_percent[n]:.2f} %", f"of the {name} explained"),
-        (words.quantity(identification.residual_rms[n], unit, 3), "residual, RMS"),
-        (words.quantity(identification.noise_rms[n], unit, 3), "sensor noise, RMS"),
-        (f"{identification.duration:.0f} s", f"of data at {identification.rate:.0f} Hz"),
-    ]
-
-
-def _kicker(identification: Identification) -> str:
-    about = identification.rig.about or identification.rig.name.replace("_", " ")
-    rig = rig_named(identification.rig.name, identification.rig_choice)
-    return f"Identification of {rig} · {about}"
-
-
-def _parameters(identification: Identification) -> str:
-    clock = clock_sentence(identification.parameters)
+def _parameters(parameters: Sequence[ParameterEstimate]) -> Html:
+    physical = [p for p in parameters if not p.name.startswith(CLOCKS)]
+    settled = sum(p.determined == "yes" for p in physical)
+    share = f"all {settled}" if settled == len(physical) else f"{settled} of {len(physical)}"
     return section(
-        _parameter_finding(identification),
-        parameter_table(identification.parameters),
-        f'<p class="caption under">{clock}</p>' if clock else "",
+        f"The data determine {share} parameters",
+        parameter_table(parameters),
+        paragraph(_clock_sentence(parameters), "caption under"),
         caption="Grey: value of the rig with its 95 % range. Blue: result with its 95 % interval.",
     )
 
 
-def _statics(identification: Identification) -> str:
-    if identification.statics is None:
-        return ""
-    sentences = statics_sentences(identification.statics)
-    return section("Slow ramps against the locked output", bullets(sentences))
+def _clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
+    """Return the time offsets of the sensors; empty if all stamps may be correct."""
+    parts = [
+        f"{words.channel(p.name.split('.')[1])} {words.quantity(p.value, p.unit, 2)} (95 %: "
+        f"{words.quantity(p.ci95[0], p.unit, 2)} to "
+        f"{words.quantity(p.ci95[1], p.unit, 2)}){' of the time passed' if p.unit == 'ppm' else ''}"
+        for p in parameters
+        if p.name.startswith(CLOCKS) and not p.ci95[0] <= 0.0 <= p.ci95[1]
+    ]
+    return f"Sensors read later than their stamps by: {'; '.join(parts)}." if parts else ""
 
 
-def _parameter_finding(identification: Identification) -> str:
-    physical = [p for p in identification.parameters if not p.name.startswith(CLOCKS)]
-    settled = [p for p in physical if p.determined == "yes"]
-    if len(settled) == len(physical):
-        return f"The data determine all {len(physical)} parameters"
-    return f"The data determine {len(settled)} of {len(physical)} parameters"
-
-
-def _shown_overlays(identification: Identification) -> list[Overlay]:
-    """Return the overlays that get a figure; the motor torque is left out, it only repeats the command."""
-    by_name = {o.channel: o for o in identification.overlays}
-    return [by_name[n] for n in SENSED if n in by_name] or list(identification.overlays)
-
-
-def _over_time(identification: Identification, overlay: Overlay) -> Figure:
-    unit, n = UNITS[overlay.channel], overlay.channel
-    title = (
-        f"{words.channel(n)} over time: {identification.fit_percent[n]:.2f} % explained, "
-        f"{words.quantity(identification.residual_rms[n], unit)} RMS left"
+def parameter_table(parameters: Sequence[ParameterEstimate]) -> Html:
+    """Return the physical parameters, sensor clocks left out: value, interval, the rig's, how sure."""
+    return listed(
+        [p for p in parameters if not p.name.startswith(CLOCKS)],
+        ("Parameter", _named),
+        ("#Value ± 95 %", lambda p: Html("<b>{}</b>{}".format(*value_text(p)))),
+        ("Unit", lambda p: Html(f"<span class='unit'>{escape(words.unit(p.unit))}</span>")),
+        ("Compared with the rig", _interval),
+        ("#Rig", lambda p: words.number(p.start, 4)),
+        (
+            "#Change",
+            lambda p: words.signed_text(100.0 * (p.value / p.start - 1.0), 1) + " %" if p.start else "–",
+        ),
+        ("Determined by data", lambda p: p.determined),
     )
+
+
+def _named(p: ParameterEstimate) -> Html:
+    letter, _, index = words.SYMBOLS.get(p.name, "").partition("_")
+    symbol = f"<i>{letter}</i><sub>{index}</sub>" if letter else ""
+    return named(Html(f"{escape(words.parameter(p.name))} {symbol}"), p.name)
+
+
+def _interval(p: ParameterEstimate) -> Html:
+    """Return a small drawing: prior as a grey bar (95 %), its middle, and the result with its interval."""
+    side = Z95 * p.spread * abs(p.start)
+    if not (math.isfinite(side) and side > 0.0):
+        side = max(abs(p.value - p.start), p.ci95[1] - p.ci95[0]) or 1.0
+    reach = 1.15 * max(side, abs(p.value - p.start), *(abs(v - p.start) for v in p.ci95 if math.isfinite(v)))
+
+    def at(value: float) -> str:
+        return f"{_WIDTH / 2.0 * (1.0 + max(-1.0, min(1.0, (value - p.start) / reach))):.1f}"
+
+    def stroke(low: float, high: float, colour: str, width: float) -> str:
+        return (f'<line x1="{at(low)}" x2="{at(high)}" y1="{middle:g}" y2="{middle:g}" '
+                f'stroke="{colour}" stroke-width="{width:g}" stroke-linecap="round"/>')  # fmt: skip
+
+    middle = _HEIGHT / 2.0
+    rig = f"rig {p.start - side:.4g} to {p.start + side:.4g}"
+    spoken = escape(f"{rig}, result {p.value:.4g} {words.unit(p.unit)}".rstrip())
+    return Html(
+        f'<svg class="interval" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{spoken}">'
+        f"<title>{spoken}</title>{stroke(p.start - side, p.start + side, GRID, 8)}"
+        f'<line x1="{at(p.start)}" x2="{at(p.start)}" y1="{middle - 7:g}" y2="{middle + 7:g}" '
+        f'stroke="{QUIET}"/>{stroke(*p.ci95, faint(AFTER, 0.55), 6)}'
+        f'<circle cx="{at(p.value)}" cy="{middle:g}" r="4" fill="{AFTER}"/></svg>'
+    )
+
+
+def _over_time(i: Identification, overlay: Overlay) -> Figure:
+    n = overlay.channel
+    left = f"{i.fit_percent[n]:.2f} % explained, {words.quantity(i.residual_rms[n], UNITS[n])} RMS left"
+    title = words.sentence(f"{words.channel(n)} over time: {left}")
     simulated = Simulated("simulated", AFTER, overlay.simulated)
-    return overlay_figure(words.sentence(title), n, overlay.t, overlay.measured, [simulated])
+    return overlay_figure(title, n, overlay.t, overlay.measured, [simulated])
 
 
-def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
+def _over_frequency(i: Identification, overlay: Overlay) -> Figure:
     n = overlay.channel
     rate = float((len(overlay.t) - 1) / (overlay.t[-1] - overlay.t[0]))
     frequency, values = density(overlay.measured - overlay.simulated, rate)
-    noise = identification.noise_rms[n] / float(np.sqrt(rate / 2.0))
+    noise = i.noise_rms[n] / float(np.sqrt(rate / 2.0))
+    measured = SpectrumLine("measured", MEASURED, density(overlay.measured, rate)[1])
     title = finding(frequency, values, noise, words.channel(n))
-    _, measured = density(overlay.measured, rate)
-    curves = [SpectrumLine("measured", MEASURED, measured), SpectrumLine("residual", AFTER, values)]
-    return residual_figure(title, n, frequency, curves, noise)
+    return residual_figure(title, n, frequency, [measured, SpectrumLine("residual", AFTER, values)], noise)
 
 
-def _undetermined_values(identification: Identification) -> str:
-    title = "What these data cannot determine"
-    others = split_off_rig(identification.remarks)[1]
-    sentences = (*doubt_sentences(identification), *remark_sentences(others))
-    body = bullets(sentences) if sentences else paragraph("The data determine every free value.")
-    return section(title, body)
+def correlation_section(names: Sequence[str], matrix: FloatArray) -> Html:
+    """Return which parameters move together, as shaded cells; empty for fewer than two parameters.
+
+    matrix: (n, n), nan where not defined.
+    """
+    if len(names) < 2:
+        return Html()
+    rows = [[f"{i + 1} {words.parameter(name)}", *map(_cell, matrix[i])] for i, name in enumerate(names)]
+    shown = table(["", *(f"#{i}" for i in range(1, len(names) + 1))], rows, "matrix")
+    return fold("Correlation of the parameters", correlation_finding(names, matrix), shown)
 
 
-def _correlation(identification: Identification) -> str:
-    names = [p.name for p in identification.parameters]
-    physical = [i for i, name in enumerate(names) if not name.startswith("clock.")]
-    return correlation_section(
-        [names[i] for i in physical], identification.correlation[np.ix_(physical, physical)]
+def correlation_finding(names: Sequence[str], matrix: FloatArray) -> str:
+    """Return a sentence on the pair that is least distinguishable."""
+    apart = np.abs(np.where(np.eye(len(names), dtype=bool), 0.0, np.nan_to_num(matrix)))
+    i, k = (int(v) for v in np.unravel_index(int(np.argmax(apart)), apart.shape))
+    pair = (
+        f"{words.parameter(names[i])} and {words.parameter(names[k])} ({words.minus(f'{matrix[i, k]:.2f}')})"
     )
+    if apart[i, k] < STRONG:
+        return f"No two are strongly correlated; the strongest pair is {pair}."
+    return f"Strongly correlated: {pair}. An error in one is compensated by the other."
 
 
-def _footer(identification: Identification) -> list[str]:
-    sources = f"Data: {', '.join(identification.sources)}"
-    damage = [words.sentence(f"{line}.") for line in fault_lines(identification.faults)]
-    return [
-        sources,
-        *damage,
-        *identification.notes,
-        *remark_sentences(identification.clocks),
-        "rsea identify. All values in SI.",
-    ]
+def _cell(value: float) -> str:
+    """Return a cell, the more coloured the stronger the correlation."""
+    if not np.isfinite(value):
+        return "–"
+    shade = faint(AFTER if value >= 0.0 else BEFORE, 0.6 * min(1.0, abs(float(value))))
+    return Html(f"<span style='background:{shade}'>{words.minus(f'{value:.2f}')}</span>")

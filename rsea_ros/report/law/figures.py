@@ -10,7 +10,17 @@ from rsea_ros.laws.result import WrittenLaw
 from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray, IntArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import Figure, Json, axis, band, label, layout, line, numbers
+from rsea_ros.report.figures.figure import (
+    Figure,
+    Json,
+    axis,
+    band,
+    layout,
+    line,
+    names_beside,
+    numbers,
+    points,
+)  # fmt: skip
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, QUIET, faint
 from rsea_ros.report.law.words import NAMES, UNITS
 
@@ -19,32 +29,41 @@ _CURVE = 160
 
 
 def over_figure(written: WrittenLaw) -> Figure:
-    """Return the missing torque and the law over the law's variable."""
-    shown, law = written.shown, written.law
-    x, y, unit = _fold_angle(written), shown.values, "rad" if law.place == "encoder" else "N m"
+    """Return the missing torque and the law over the law's variable; a wave's angle within one period."""
+    shown, law, x, y = written.shown, written.law, written.shown.x, written.shown.values
+    cycles = [p.shape for p in law.parts if p.term.shape == "cycles_per_revolution" and shown.over == "theta"]
+    if cycles and cycles[0]:
+        x = np.mod(x, 2.0 * np.pi / cycles[0])
+    quantity, unit = ("angle", "rad") if law.place == "encoder" else ("torque", words.unit("N m"))
     centre, low, high = _curve(x, shown.law)
     middle, error = _bin_means(x, y, centre)
+    mean = np.flatnonzero(np.isfinite(middle))[::6]
     windows = np.array_split(np.argsort(shown.t), _WINDOWS)
+
+    def cloud(k: IntArray | slice, colour: str, size: float, name: str, visible: bool = True) -> Json:
+        look = {"marker": {"size": size, "color": colour}, "visible": visible, "hoverinfo": "skip"}
+        return points(numbers(x[k]), numbers(y[k]), name, **look)
+
     data: list[Json] = [
-        _points(x, y, faint(MEASURED, 0.28), 3.5, "measured"),
-        *(_points(x[k], y[k], faint(BEFORE, 0.85), 5, "", visible=i == 0)
-          for i, k in enumerate(windows)),
+        cloud(slice(None), faint(MEASURED, 0.28), 3.5, "measured"),
+        *(cloud(k, faint(BEFORE, 0.85), 5, "", i == 0) for i, k in enumerate(windows)),
         band(centre, low, high, faint(AFTER, 0.16)),
-        _bars(centre, middle, error),
-        line(centre, 0.5 * (low + high), "law", AFTER, 2.6, hovertemplate=f"%{{y:.3g}} {words.unit(unit)}"),
+        points(numbers(centre[mean]), numbers(middle[mean]), "mean",
+               marker={"size": 6, "color": INK}, error_y={"type": "data", "array": numbers(error[mean]),
+                                                         "thickness": 1.2, "width": 0, "color": INK}),
+        line(centre, 0.5 * (low + high), "law", AFTER, 2.6, hovertemplate=f"%{{y:.3g}} {unit}"),
     ]  # fmt: skip
-    top = float(np.quantile(np.abs(y), 0.995))
-    quantity = "angle" if unit == "rad" else "torque"
-    wave = "one period of the " if _cycles(written) else ""
+    top = 1.15 * float(np.quantile(np.abs(y), 0.995))
+    wave = "one period of the " if cycles and cycles[0] else ""
     return Figure(
         f"The missing {quantity} over the {NAMES[shown.over]}, and the law in it",
-        f"Grey: missing in the simulation, point by point (one sigma {shown.sd:.2g} {words.unit(unit)}). "
-        "Black: its mean with 95 %. Blue: the law; its band is the spread from its other variables. The "
-        "slider shows one stretch of time in orange.",
+        f"Grey: missing in the simulation, point by point (one sigma {shown.sd:.2g} {unit}). Black: its "
+        "mean with 95 %. Blue: the law; its band is the spread from its other variables. The slider shows "
+        "one stretch of time in orange.",
         data,
         layout(
             xaxis=axis(f"{wave}{NAMES[shown.over]}, {words.unit(UNITS[shown.over])}"),
-            yaxis=axis(f"missing, {words.unit(unit)}", range=[-1.15 * top, 1.15 * top]),
+            yaxis=axis(f"missing, {unit}", range=[-top, top]),
             hovermode="closest", sliders=[_slider(shown.t, windows)],
             margin={"l": 64, "r": 24, "t": 12, "b": 96},
         ),
@@ -65,45 +84,14 @@ def _slider(t: FloatArray, windows: Sequence[IntArray]) -> Json:
             "tickcolor": QUIET, "font": small}  # fmt: skip
 
 
-def _points(
-    x: FloatArray, y: FloatArray, colour: str, size: float, name: str, *, visible: bool = True
-) -> Json:
-    return {"type": "scatter", "mode": "markers", "x": numbers(x), "y": numbers(y), "name": name,
-            "marker": {"size": size, "color": colour}, "visible": visible, "hoverinfo": "skip"}  # fmt: skip
-
-
-def _bars(x: FloatArray, y: FloatArray, error: FloatArray) -> Json:
-    keep = np.isfinite(y)
-    return {"type": "scatter", "mode": "markers", "x": numbers(x[keep][::6]), "y": numbers(y[keep][::6]),
-            "error_y": {"type": "data", "array": numbers(error[keep][::6]), "thickness": 1.2, "width": 0,
-                        "color": INK},
-            "marker": {"size": 6, "color": INK}, "name": "mean"}  # fmt: skip
-
-
-def _cycles(written: WrittenLaw) -> float:
-    cycles = [p.shape for p in written.law.parts if p.term.shape == "cycles_per_revolution"]
-    return cycles[0] if cycles and written.shown.over == "theta" else 0.0
-
-
-def _fold_angle(written: WrittenLaw) -> FloatArray:
-    """Return the variable of the drawing; a wave's angle within one period."""
-    cycles, x = _cycles(written), written.shown.x
-    return np.mod(x, 2.0 * np.pi / cycles) if cycles else x
-
-
 def _curve(x: FloatArray, law: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return places along x, and the 10 to 90 % range of the law at each, by its other variables."""
-    first, last = (float(v) for v in np.quantile(x, [0.002, 0.998]))
+    first, last = np.quantile(x, [0.002, 0.998])
     edges = np.linspace(first, last, _CURVE + 1)
     which = np.clip(np.searchsorted(edges, x) - 1, 0, _CURVE - 1)
-    centre = 0.5 * (edges[1:] + edges[:-1])
-    low, high = np.full(_CURVE, np.nan), np.full(_CURVE, np.nan)
-    for k in range(_CURVE):
-        inside = law[which == k]
-        if len(inside):
-            low[k], high[k] = np.quantile(inside, [0.1, 0.9])
-    keep = np.isfinite(low)
-    return centre[keep], low[keep], high[keep]
+    places = np.unique(which)
+    low, high = (np.array([np.quantile(law[which == k], q) for k in places]) for q in (0.1, 0.9))
+    return 0.5 * (edges[1:] + edges[:-1])[places], low, high
 
 
 def _bin_means(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -119,18 +107,13 @@ def _bin_means(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatA
 
 def time_figure(written: WrittenLaw) -> Figure:
     """Return the missing torque and the law over time."""
-    shown, unit = written.shown, "rad" if written.law.place == "encoder" else "N m"
-    hover = f"%{{y:.3g}} {words.unit(unit)}"
+    shown, unit = written.shown, words.unit("rad" if written.law.place == "encoder" else "N m")
+    curves = (("missing", shown.values, MEASURED, 1.0), ("law", shown.law, AFTER, 1.4))
     data = [
-        line(shown.t, shown.values, "missing", MEASURED, 1.0, hovertemplate=hover),
-        line(shown.t, shown.law, "law", AFTER, 1.4, hovertemplate=hover),
+        line(shown.t, y, name, colour, w, hovertemplate=f"%{{y:.3g}} {unit}") for name, y, colour, w in curves
     ]
-    ends = [label("missing", 1.0, 0.85, MEASURED, xref="paper", yref="paper", xshift=6),
-            label("law", 1.0, 0.72, AFTER, xref="paper", yref="paper", xshift=6)]  # fmt: skip
+    names = names_beside([(name, colour) for name, _, colour, _ in curves], 0.13)
     middle = float(shown.t[len(shown.t) // 2])
-    return Figure(
-        "The same over time", "Drag to look closer, double click to see all.", data,
-        layout(xaxis=axis("time, s", range=[middle, min(middle + 3.0, float(shown.t[-1]))]),
-               yaxis=axis(words.unit(unit)), annotations=ends),
-        300,
-    )  # fmt: skip
+    across = axis("time, s", range=[middle, min(middle + 3.0, float(shown.t[-1]))])
+    plane = layout(xaxis=across, yaxis=axis(unit), annotations=names)
+    return Figure("The same over time", "Drag to look closer, double click to see all.", data, plane, 300)

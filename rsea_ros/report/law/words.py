@@ -1,13 +1,16 @@
-"""Sentences about a law for the residual of a model."""
+"""A law for the residual of a model in sentences, and law.json."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from rsea_ros.laws.law import Law, equation_of
 from rsea_ros.laws.result import LawResult
 from rsea_ros.report import words
+from rsea_ros.report.result_files import pick
 
+SCHEMA = 1
 _CLEARLY = 0.1
 """Share of what the law leaves that another variable must explain to be reported."""
 NAMES = {"w": "speed", "q": "angle", "theta": "rotor's angle", "d": "deflection", "T": "load", "u": "command",
@@ -21,22 +24,18 @@ def headline(result: LawResult) -> str:
     if result.at_floor:
         return "No law is needed: the model is at the noise floor"
     if not result.laws:
-        return f"{_remaining_text(result)} remains, but no law surely reduces it on held-out blocks"
+        ratios = {n: v / result.noise[n] for n, v in result.before.items() if result.noise.get(n)}
+        worst = max(ratios, key=lambda n: ratios[n], default="")
+        size = f" of {words.number(ratios[worst])} times the noise ({words.channel(worst)})" if ratios else ""
+        return f"A residual{size} remains, but no law surely reduces it on held-out blocks"
     law = result.laws[0].law
+    others = any(d.beside > max(_CLEARLY, 2.0 * d.beside_se) for d in result.dependences)
+    also = "" if others else " only"
+    if len(result.laws) > 1:
+        also = f", and of {depends_on(result.laws[1].law, result)}"
     kind = "A learnt law, which names no cause: " if law.is_learnt else ""
-    share = min(100.0 * result.share, 100.0)
-    also = _also(result)
-    sentence = f"{share:.0f} % of the remaining residual is a function of {depends_on(law, result)}{also}"
-    return f"{kind}{sentence}"
-
-
-def _remaining_text(result: LawResult) -> str:
-    """Return the worst residual on the test blocks: `A residual of 1.19 times the noise (F/T torque)`."""
-    ratios = {n: before / result.noise[n] for n, before in result.before.items() if result.noise.get(n)}
-    if not ratios:
-        return "A residual"
-    worst = max(ratios, key=lambda n: ratios[n])
-    return f"A residual of {words.number(ratios[worst])} times the noise ({words.channel(worst)})"
+    share = f"{min(100.0 * result.share, 100.0):.0f} %"
+    return f"{kind}{share} of the remaining residual is a function of {depends_on(law, result)}{also}"
 
 
 def depends_on(law: Law, result: LawResult) -> str:
@@ -48,13 +47,6 @@ def depends_on(law: Law, result: LawResult) -> str:
     around = f"2π/{cycles[0] * ratio:.4g} of the output"
     rotor = "" if ratio == 1.0 else f" ({cycles[0]:.4g} a turn of the rotor)"
     return f"{law.regressor.split(', periodic')[0]}, period {around}{rotor}"
-
-
-def _also(result: LawResult) -> str:
-    if len(result.laws) > 1:
-        return f", and of {depends_on(result.laws[1].law, result)}"
-    others = [d for d in result.dependences if d.beside > max(_CLEARLY, 2.0 * d.beside_se)]
-    return "" if others else " only"
 
 
 def gain_sentence(result: LawResult) -> str:
@@ -77,16 +69,22 @@ def law_lines(result: LawResult) -> list[str]:
 
 def parameter_lines(law: Law) -> list[str]:
     """Return each parameter with its value, interval and unit."""
-    lines, seen = [], set()
-    for part, (c, s) in zip(law.parts, law.names, strict=True):
-        rows = [(c, part.coefficient, part.ci95, part.term.unit)]
-        rows += [(s, part.shape, part.shape_ci95, part.term.shape_unit)] if s and s not in seen else []
-        seen.add(s)
-        lines += [
-            f"{name} = {_value_text(value, ci95)} {words.unit(unit)}".rstrip()
-            for name, value, ci95, unit in rows
-        ]
-    return lines
+    return [
+        f"{n} = {_value_text(*of[:2])} {words.unit(of[2])}".rstrip() for n, of in _parameters(law).items()
+    ]
+
+
+Size = tuple[float, tuple[float, float] | None, str]
+
+
+def _parameters(law: Law) -> dict[str, Size]:
+    """Return value, 95 % interval and unit of each parameter by name, a shape that terms share once."""
+    sizes: dict[str, Size] = {}
+    for part, (coefficient, shape) in zip(law.parts, law.names, strict=True):
+        sizes[coefficient] = (part.coefficient, part.ci95, part.term.unit)
+        if shape:
+            sizes.setdefault(shape, (part.shape, part.shape_ci95, part.term.shape_unit))
+    return sizes
 
 
 def _value_text(value: float, ci95: tuple[float, float] | None) -> str:
@@ -94,3 +92,35 @@ def _value_text(value: float, ci95: tuple[float, float] | None) -> str:
         return f"{value:.4g}"
     middle, half = words.with_interval(value, *ci95)
     return f"{middle} ± {half}" if half else middle
+
+
+def law_json(result: LawResult) -> dict[str, Any]:
+    """Return the contents of law.json."""
+    return {
+        "schema": SCHEMA,
+        "rig": result.rig_name,
+        "sentence": headline(result),
+        "data": pick(result, "bags=sources duration_s=duration"),
+        "at_noise_floor": result.at_floor,
+        "gain": pick(result, "holdout=gain holdout_ci95=gain_ci95 share_of_excess=share"),
+        "residual_rms": pick(result, "before after"),
+        "noise_rms": pick(result, "noise")["noise"],
+        "laws": [_law(w.law) for w in result.laws],
+        "depends_on": [
+            pick(d, "what=regressor at=place share se of_what_the_law_leaves=beside")
+            for d in result.dependences
+        ],
+        "tried": [pick(t, "at=place terms left chosen") for t in result.tried],
+    }
+
+
+def _law(law: Law) -> dict[str, Any]:
+    sizes = {
+        n: {"value": v, "unit": unit, "ci95": list(ci95 or ())}
+        for n, (v, ci95, unit) in _parameters(law).items()
+    }
+    return {
+        "name": law.name, "file": f"{law.name}.py",
+        **pick(law, "at=place depends_on=regressor learnt=is_learnt"), "equation": equation_of(law),
+        "parameters": sizes,
+    }  # fmt: skip

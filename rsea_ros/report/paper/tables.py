@@ -10,10 +10,8 @@ from rsea_ros.paper.bands import TOLERANCES, Bands
 from rsea_ros.paper.claims import TABLE_2, PaperClaim
 from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.paper.paper_finding import PaperFinding
-from rsea_ros.paper.rival_models import HeldOutFit
 from rsea_ros.report import words
-from rsea_ros.report.page.html import equation, section
-from rsea_ros.report.page.html_table import table
+from rsea_ros.report.page import Html, equation, listed, named, paragraph, section, table
 
 EQUATIONS = """\
 (1)   T_d/T_m = K_s / (J_eff s² + b_eff s + K_s)                         lumped
@@ -36,164 +34,167 @@ TABLE_1 = (
 )
 
 
-def claims_table(claims: Sequence[PaperClaim]) -> str:
+def claims_table(claims: Sequence[PaperClaim]) -> Html:
     """Return printed beside our numbers; only results of the paper's own numbers are counted."""
     recomputed = [c for c in claims if c.status == "found"]
     agree = sum(c.agrees for c in recomputed)
-    rows = []
-    for c in claims:
-        unit = words.unit(c.unit)
-        ours = words.number(c.ours, 5)
-        same = "to the last digit" if c.agrees else f"{words.signed_text(100 * c.difference, 2)} %"
-        rows.append([c.where, c.what, c.printed, ours, unit, same, c.status, c.how])
-    head = ["Where", "What", "Printed", "Ours", "", "Difference", "", "Ours comes from"]
-    title = (
-        f"{agree} of the {len(recomputed)} numbers that others of the paper make come out to the last digit"
+    shown = listed(
+        claims,
+        ("Where", lambda c: c.where),
+        ("What", lambda c: c.what),
+        ("#Printed", lambda c: c.printed),
+        ("#Ours", lambda c: words.number(c.ours, 5)),
+        ("", lambda c: words.unit(c.unit)),
+        (
+            "#Difference",
+            lambda c: "to the last digit" if c.agrees else f"{words.signed_text(100 * c.difference, 2)} %",
+        ),
+        ("", lambda c: c.status),
+        ("Ours comes from", lambda c: c.how),
     )
-    caption = (
-        "found: the paper's numbers alone make it, and only these count. silent: one that is needed is not "
-        "printed. unclear: tuned by the paper, or only bounded by other sources."
+    return section(
+        f"{agree} of the {len(recomputed)} numbers that others of the paper make come out to the last digit",
+        shown,
+        caption="found: the paper's numbers alone make it, and only these count. silent: one that is needed "
+        "is not printed. unclear: tuned by the paper, or only bounded by other sources.",
     )
-    return section(title, table(head, rows, numbers=(2, 3, 5)), caption=caption)
 
 
-def findings_list(findings: Sequence[PaperFinding]) -> str:
+def findings_list(findings: Sequence[PaperFinding]) -> Html:
     """Return where the paper contradicts itself or is silent."""
     counts = {status: sum(f.status == status for f in findings) for status in ("found", "silent", "unclear")}
-    rows = "".join(
-        "<tr><td "
-        f"style='white-space:nowrap'>{escape(f.where)}<small>{f.status}</small></td><td>{escape(f.text)}</td></tr>"
-        for f in findings
-    )
     title = (
         f"{counts['found']} contradictions, {counts['unclear']} statements with two readings, "
         f"{counts['silent']} things left unsaid"
     )
-    return section(title, f"<div class='scroll'><table>{rows}</table></div>")
+    return section(title, listed(findings, ("", lambda f: named(f.where, f.status)), ("", lambda f: f.text)))
 
 
-def equations_section() -> str:
+def equations_section() -> Html:
     """Return the equations as printed, with ours."""
     return section("The equations as printed, and where the equations of motion differ", equation(EQUATIONS))
 
 
-def table_1(drawings: Sequence[tuple[str, str]]) -> str:
+def table_1(drawings: Sequence[tuple[str, str]]) -> Html:
     """Return Table 1 and the drawings, (caption, SVG)."""
-    head = ["Mechanical", "Impedance", "Electrical", "Impedance"]
-    figures = "".join(f"<h3>{escape(caption)}</h3>{svg}" for caption, svg in drawings)
     return section(
         "Table 1 and Figs. 6 to 8: the same machine as a circuit",
-        table(head, TABLE_1),
-        figures,
+        table(["Mechanical", "Impedance", "Electrical", "Impedance"], TABLE_1),
+        *(Html(f"<h3>{escape(caption)}</h3>{svg}") for caption, svg in drawings),
         caption="Torque is voltage, velocity is current. The netlist of any rig is solved by nodal "
         "analysis and agrees with the equations of motion to 1e-9 (test/model/test_circuit.py).",
     )
 
 
-def table_2(rig_values: Mapping[str, float]) -> str:
+def table_2(rig_values: Mapping[str, float]) -> Html:
     """Return Table 2 beside the rigs' values."""
-    rows = []
-    for name, (printed, unit) in TABLE_2.items():
-        used = (
-            words.number(rig_values[name], 4)
-            if name in rig_values
-            else "clamped, exact"
-            if printed == "1e8"
-            else "behind the clamp"
-        )
-        rows.append([name, printed, words.unit(unit), used])
-    head = ["Parameter", "Printed", "", "In our rigs"]
-    caption = "The paper's proximal end (lp) is the one fixed to the frame; units without the per-radian."
-    return section(
-        "Table 2, as printed and as simulated here", table(head, rows, numbers=(1, 3)), caption=caption
+
+    def used(name: str) -> str:
+        if name in rig_values:
+            return words.number(rig_values[name], 4)
+        return "clamped, exact" if TABLE_2[name][0] == "1e8" else "behind the clamp"
+
+    shown = listed(
+        TABLE_2,
+        ("Parameter", str),
+        ("#Printed", lambda n: TABLE_2[n][0]),
+        ("", lambda n: words.unit(TABLE_2[n][1])),
+        ("#In our rigs", used),
     )
+    caption = "The paper's proximal end (lp) is the one fixed to the frame; units without the per-radian."
+    return section("Table 2, as printed and as simulated here", shown, caption=caption)
 
 
-def bands_table(actuators: Mapping[str, Bands]) -> str:
+def bands_table(actuators: Mapping[str, Bands]) -> Html:
     """Return Eq. (7) and the exact bands of the actuators."""
-    tolerances = [f"±{db:g} dB" + (f", ±{deg:g}°" if deg < 90 else "") for db, deg in TOLERANCES]
-    parts = []
+    tolerances = [f"#±{db:g} dB" + (f", ±{deg:g}°" if deg < 90 else "") for db, deg in TOLERANCES]
+    parts, none = [], [""] * (len(tolerances) - 1)
     for name, b in actuators.items():
-        first = ["Eq. (7) as printed", f"{b.eq_7:.1f}", *[""] * (len(tolerances) - 1)]
-        low, high = map(words.hertz, b.spin_range)
-        spin = ["Eq. (7) with the rotor's spin", f"{b.eq_7_spin:.1f}", *[""] * (len(tolerances) - 1)]
-        doubt = ["the same over 90 % of J_m", f"{low} to {high}", *[""] * (len(tolerances) - 1)]
-        rows = [first, spin, doubt, *([row.what, *(words.hertz(v) for v in row.hz)] for row in b.rows)]
+        rows = [
+            ["Eq. (7) as printed", f"{b.eq_7:.1f}", *none],
+            ["Eq. (7) with the rotor's spin", f"{b.eq_7_spin:.1f}", *none],
+            ["the same over 90 % of J_m", " to ".join(map(words.hertz, b.spin_range)), *none],
+            *([row.what, *(words.hertz(v) for v in row.hz)] for row in b.rows),
+        ]
         motor = ", ".join(f"{t:.2g} N·m at {f:.3g} Hz" for f, t in b.motor_limit.items())
         limits = f"Amplitude: {b.spring_limit:.0f} N·m at 5° of the spring; from the motor {motor}."
-        body = table(["|T_d/T_p| within, Hz", *tolerances], rows, numbers=range(1, 5))
-        under = f"<p class='caption under'>{escape(limits)}</p>"
-        parts.append(f"<h3>{escape(name)}</h3>{body}{under}")
-    title = (
-        "Up to where each is a pure torque source depends on the tolerance, the sensor and the rotor's spin"
-    )
+        body = table(["|T_d/T_p| within, Hz", *tolerances], rows)
+        parts += [Html(f"<h3>{escape(name)}</h3>"), body, paragraph(limits, "caption under")]
     return section(
-        title,
+        "Up to where each is a pure torque source depends on the tolerance, the sensor and the rotor's spin",
         *parts,
         caption="Exact: roots of polynomials in the frequency. Motor: continuous torque, both ends clamped. "
         "J_m within the rig's spread: Table 2's for the platform, our estimate for the prototype. Which "
-        "spline "
-        "of the prototype's drive is held is not printed: n = −160 or +161, never +160.",
+        "spline of the prototype's drive is held is not printed: n = −160 or +161, never +160.",
     )
 
 
-def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> str:
+def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> Html:
     """Return transfer functions and limits of all arrangements."""
-    body = [
-        [
-            words.train(r.train),
-            words.signed_text(r.ratio, 0),
-            f"{r.outer:.4f}",
-            words.signed_text(r.inner, 5),
-            "T_d/T_m = (b_s s + K_s)/den",
-            "T_p/T_m = (J_in s² + b_s s + K_s)/den",
-        ]
-        for r in rows
-    ]
-    head = ["Train", "n", "J_out, kg·m²", "J_in, kg·m²", "T-RSEA", ""]
-    reached = [
-        [x.what, x.of.split(",")[0], _values(x), " → ".join(f"{e:.1e}" for e in x.errors)] for x in limits
-    ]
+
+    def at(limit: Limit) -> str:
+        return (
+            " → ".join(words.number(v, 1) if v < 1e4 else f"{v:.0e}" for v in limit.values)
+            if limit.of
+            else ""
+        )
+
+    shown = listed(
+        rows,
+        ("Train", lambda r: words.train(r.train)),
+        ("#n", lambda r: words.signed_text(r.ratio, 0)),
+        ("#J_out, kg·m²", lambda r: f"{r.outer:.4f}"),
+        ("#J_in, kg·m²", lambda r: words.signed_text(r.inner, 5)),
+        ("T-RSEA", lambda r: "T_d/T_m = (b_s s + K_s)/den"),
+        ("", lambda r: "T_p/T_m = (J_in s² + b_s s + K_s)/den"),
+    )
+    reached = listed(
+        limits,
+        ("Limit", lambda x: x.what),
+        ("of", lambda x: x.of.split(",")[0]),
+        ("at", at),
+        ("#largest difference, 0.5 to 140 Hz", lambda x: " → ".join(f"{e:.1e}" for e in x.errors)),
+    )
     return section(
         "T-RSEA and RT-RSEA, every train, lumped and unlumped: one table",
         equation(
             "den = J_out s² + (b_m + b_s) s + K_s\nJ_out = J_sc + n² J_r      J_in = J_sc + n J_r "
             "(lumped: J_out)      J_r = J_m/N²"
         ),
-        table(head, body, numbers=range(1, 4)),
-        "<h3>Limits</h3>",
-        table(["Limit", "of", "at", "largest difference, 0.5 to 140 Hz"], reached, numbers=(3,)),
-        caption="Both ends clamped, the platform's values. An RT-RSEA is "
-        "the same machine held by the other end: T_d and T_p change places.",
+        shown,
+        Html("<h3>Limits</h3>"),
+        reached,
+        caption="Both ends clamped, the platform's values. An RT-RSEA is the same machine held by the other "
+        "end: T_d and T_p change places.",
     )
 
 
-def _values(limit: Limit) -> str:
-    return " → ".join(words.number(v, 1) if v < 1e4 else f"{v:.0e}" for v in limit.values) if limit.of else ""
-
-
-def moving_table(tests: Mapping[str, MovingOutput]) -> str:
+def moving_table(tests: Mapping[str, MovingOutput]) -> Html:
     """Return how much of the held-out torque each model explains, for every test and sensor."""
-    rows = [
-        _moving_row(name, rival.name, held_out)
-        for name, test in tests.items()
-        for rival in test.rivals
-        for held_out in rival.held_out
+    rows = []
+    for name, model, j in (
+        (n, r.name, j) for n, test in tests.items() for r in test.rivals for j in r.held_out
+    ):
+        end = "spring end" if j.sensor == "spring_end" else "housing end (never fitted)"
+        share = (
+            f"{100 * j.explained:.2f} %"
+            if j.explained > 0.0
+            else f"none: off by {j.rms_error / j.rms:.0f} times"
+        )
+        rows.append([name.replace("_", " "), model, end, share, f"{j.rms_error:.3f}", f"{j.rms:.2f}"])
+    head = [
+        "Bench",
+        "Model",
+        "Sensor",
+        "#Variance explained, held out",
+        "#RMS error, N·m",
+        "#RMS torque, N·m",
     ]
-    head = ["Bench", "Model", "Sensor", "Variance explained, held out", "RMS error, N·m", "RMS torque, N·m"]
     return section(
         "With both ends moving a sensor at the distal end alone cannot tell the models apart; one at the "
         "other end can",
-        table(head, rows, numbers=(3, 4, 5)),
+        table(head, rows),
         caption="Fitted to the first half of the spring end's record, tested on the second half, and on "
-        "the other sensor, which no fit has seen. The lumped model is fitted with loose priors. The "
-        "benches are unlumped by construction.",
+        "the other sensor, which no fit has seen. The lumped model is fitted with loose priors. The benches "
+        "are unlumped by construction.",
     )
-
-
-def _moving_row(bench: str, model: str, j: HeldOutFit) -> list[str]:
-    end = "spring end" if j.sensor == "spring_end" else "housing end (never fitted)"
-    share = (
-        f"{100 * j.explained:.2f} %" if j.explained > 0.0 else f"none: off by {j.rms_error / j.rms:.0f} times"
-    )
-    return [bench.replace("_", " "), model, end, share, f"{j.rms_error:.3f}", f"{j.rms:.2f}"]

@@ -18,12 +18,11 @@ from rsea_ros.records.record import Fault
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
-from rsea_ros.report.diagnosis.json import diagnosis_json
-from rsea_ros.report.diagnosis.profile import BINS, Profile, profiles
-from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
-from rsea_ros.report.diagnosis.settings import settings_section
+from rsea_ros.report.diagnosis.files import diagnosis_json
+from rsea_ros.report.diagnosis.page import settings_section
 from rsea_ros.report.diagnosis.terminal import terminal_lines
-from rsea_ros.report.diagnosis.where import finding, where_figure
+from rsea_ros.report.diagnosis.where import BINS, Profile, finding, profiles, where_figure
+from rsea_ros.report.diagnosis.words import diagnosis_sentence
 
 
 def terminal(diagnosis):
@@ -114,7 +113,7 @@ def test_json_sentence_and_page_name_the_same_channel(diagnosed):
     ],
 )
 def test_small_angles_and_times_have_a_prefix(estimate, text):
-    assert num.estimate(estimate) == text
+    assert words.measured(estimate.value, *estimate.ci95, estimate.unit) == text
 
 
 def test_an_experiment_is_described_with_its_units():

@@ -1,7 +1,9 @@
-"""Figures show the values, and hold no number that JSON cannot hold."""
+"""Figures show the values, and hold no number that JSON cannot hold; packed traces come back."""
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 from dataclasses import asdict
 
@@ -9,19 +11,19 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification.result import Identification
-from rsea_ros.report.figures.bode import bode_figure
+from rsea_ros.report.figures.bode import bode_figure, thin
 from rsea_ros.report.figures.figure import Figure, line
 from rsea_ros.report.figures.overlay import (
     MOST_SAMPLES,
     Simulated,
     overlay_figure,
+    pack,
     pauses_of,
     sample_extremes,
     without,
 )
 from rsea_ros.report.figures.palette import AFTER, BEFORE
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
-from rsea_ros.report.figures.thinned import thin
 
 
 def as_json(figure: Figure) -> str:
@@ -117,12 +119,42 @@ def test_a_curve_without_a_unit_under_the_pointer_is_refused() -> None:
     assert line(ones, ones, "run", AFTER, hovertemplate="%{y:.3g} N·m")["hovertemplate"].endswith("N·m")
 
 
-@pytest.mark.parametrize(("peak", "anchor"), [(0.12, "left"), (6.0, "center"), (138.0, "right")])
-def test_the_name_of_the_highest_curve_stays_in_the_figure(peak: float, anchor: str) -> None:
-    """Centred above a peak at 0.4 Hz it lay on the marks of the axis, on a phone."""
-    frequency = np.linspace(0.1, 139.0, 5000)
-    curve = SpectrumLine("measured", AFTER, 1.0 + np.exp(-((frequency - peak) ** 2)))
+def test_every_curve_is_named_beside_the_figure_in_its_colour() -> None:
+    """Centred above a peak at 0.4 Hz a name lay on the marks of the axis, on a phone."""
+    frequency = np.linspace(0.1, 139.0, 500)
+    curve = SpectrumLine("measured", AFTER, 1.0 + np.exp(-((frequency - 0.4) ** 2)))
     drawn = residual_figure("t", "ft", frequency, [curve], 1e-2)
-    (name,) = [a for a in drawn.layout["annotations"] if "measured" in a["text"]]
-    assert name["xanchor"] == anchor
+    names = drawn.layout["annotations"]
+    assert [n["text"] for n in names] == ["<b>measured</b>", "noise floor"]
+    assert names[0]["font"]["color"] == AFTER and all(n["x"] > 1.0 and n["xref"] == "paper" for n in names)
     assert "N·m/√Hz" in drawn.data[1]["hovertemplate"]
+
+
+def unpack(values):
+    """Unpack as page.js does."""
+    planes = np.frombuffer(gzip.decompress(base64.b64decode(values["data"])), np.uint8).astype(int)
+    low, high = np.split(planes, 2)
+    whole = low + 256 * high
+    back = values["first"] + values["slope"] * np.arange(len(whole)) + values["step"] * whole
+    return np.where(whole == 65535, np.nan, back)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.01])
+def test_values_come_back_to_half_a_step(step):
+    values = 1e3 + np.cumsum(np.random.default_rng(1).standard_normal(5000))
+    small = pack(values, step)
+    assert small["step"] == pytest.approx(max(step, small["step"]))
+    assert unpack(small) == pytest.approx(values, abs=0.501 * small["step"])
+    assert small["step"] <= max(step, np.ptp(values) / 30_000)
+
+
+def test_even_stamps_cost_nothing():
+    stamps = np.arange(40_000) / 280.0
+    small = pack(stamps, 1e-6)
+    assert unpack(small) == pytest.approx(stamps, abs=1e-6)
+    assert len(small["data"]) < 500
+
+
+@pytest.mark.parametrize("values", [[], [3.0], [2.0, 2.0], [np.nan, 1.0, 2.0], [np.nan, np.nan]])
+def test_short_and_broken_traces_come_back(values):
+    assert unpack(pack(np.array(values))) == pytest.approx(values, nan_ok=True, abs=1e-4)

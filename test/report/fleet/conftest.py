@@ -14,7 +14,7 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "trends"))  # for `fle
 from fleet_histories import cause, history, recordings
 from worn_fleet import JOINTS, WORN
 
-from rsea_ros.report.fleet import write_fleet_report
+from rsea_ros.report.fleet.page import write_fleet_report
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ import numpy as np
 from fleet_histories import START, cause, history, recordings
 from worn_fleet import JOINTS
 
-from rsea_ros.report.fleet import write_fleet_report
+from rsea_ros.report.fleet.page import write_fleet_report
 
 
 def test_a_cause_in_the_latest_recording_is_reported_before_a_trend_exists(tmp_path):

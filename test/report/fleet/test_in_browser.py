@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from rsea_ros.report.fleet import write_fleet_report
+from rsea_ros.report.fleet.page import write_fleet_report
 from test.watch.browser import Browser
 
 COLOURS = (

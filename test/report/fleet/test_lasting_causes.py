@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fleet_histories import cause, history, recordings
 
-from rsea_ros.report.fleet import write_fleet_report
+from rsea_ros.report.fleet.page import write_fleet_report
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from rsea_ros.errors import OutputError
-from rsea_ros.report.fleet import write_fleet_report
 from rsea_ros.report.fleet.links import page_names
+from rsea_ros.report.fleet.page import write_fleet_report
 from rsea_ros.trends import alarms
 
 

@@ -15,9 +15,8 @@ from rich.console import Console
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report import words
-from rsea_ros.report.identification import files as results
-from rsea_ros.report.identification.json import identification_json
-from rsea_ros.report.identification.terminal import terminal_table
+from rsea_ros.report.identification import page as results
+from rsea_ros.report.identification.words import identification_json, terminal_table
 
 
 def test_all_files_are_written_and_none_is_partial(identification: Identification, tmp_path: Path) -> None:
@@ -57,7 +56,7 @@ def test_terminal_table_sets_truth_beside(identification: Identification) -> Non
 
 
 def test_reports_do_not_import_the_plotting_library(tmp_path: Path) -> None:
-    code = "import sys, rsea_ros.report.identification.files; sys.exit('plotly' in sys.modules)"
+    code = "import sys, rsea_ros.report.identification.page; sys.exit('plotly' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -8,12 +8,10 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from rsea_ros.report.diagnosis.sketch import sketch, upright_sketch
+from rsea_ros.report.diagnosis.sketch import sketch
 from rsea_ros.report.figures.figure import Figure, axis, label, layout, line
 from rsea_ros.report.figures.palette import BEFORE, INK
-from rsea_ros.report.page.frame import page
-from rsea_ros.report.page.html import equation
-from rsea_ros.report.page.html_table import table, table_of_cells
+from rsea_ros.report.page import Html, equation, page, table
 from test.watch.browser import Browser
 
 CAUSE = ["ft_gain_error"]
@@ -40,7 +38,7 @@ LIGHT, DARK = ([{"name": "prefers-color-scheme", "value": value}] for value in (
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
-    drawn = sketch(CAUSE) + upright_sketch(CAUSE) + equation(LAW)
+    drawn = Html(sketch(CAUSE) + equation(LAW))
     (folder / "page.html").write_text(page("t", "k", [drawn, CURVE], []))
     with closing(Browser(folder)) as made:
         made.open((folder / "page.html").as_uri())
@@ -155,9 +153,9 @@ BOXES = """[...document.querySelectorAll('tbody td')].slice(1).map((cell) => {
 def cards(tmp_path_factory):
     """A table on a phone: a short value with a note, and a sentence."""
     folder = tmp_path_factory.mktemp("cards")
-    value = "1500 <sub>r</sub><small>noted</small>"
-    rows = table_of_cells(["name", "value", "about"], [["K_s", value, LONG]])
-    code = "<code style='display: block; width: 10ch'>1234567 --rig</code>"
+    value = Html("1500 <sub>r</sub><small>noted</small>")
+    rows = table(["name", "value", "about"], [["K_s", value, LONG]])
+    code = Html("<code style='display: block; width: 10ch'>1234567 --rig</code>")
     (folder / "page.html").write_text(page("t", "k", [rows, code], []))
     with closing(Browser(folder)) as made:
         made.open((folder / "page.html").as_uri(), width=400)

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from rsea_ros.report.page.html_table import table
+from rsea_ros.report.page import table
 from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit, lumped_circuit
 from rsea_ros.report.paper.docs import documentation_figures
 from rsea_ros.report.paper.figures import figure_9, figure_18_as_printed, figure_20
@@ -54,7 +54,7 @@ def test_figures_are_json():
 
 
 def test_a_table_is_escaped_and_aligned():
-    html = table(["a", "b"], [["<i>", "1"]], numbers=(1,))
+    html = table(["a", "#b"], [["<i>", "1"]])
     assert "&lt;i&gt;" in html
     assert "<td class='number'>1</td>" in html
 

@@ -1,12 +1,16 @@
-"""Which rig a result was made with, and what speaks against it, in words."""
+"""Which rig a result was made with, and what speaks against it: in words, as HTML, for programs."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from typing import Any
 
 from rsea_ros.identification.result import Remark
 from rsea_ros.model.rig_file import RigChoice
+from rsea_ros.report.page import Html, bullets, code, section
+from rsea_ros.report.remark_words import remark_sentences
+from rsea_ros.report.result_files import MODEL, strict
 
 
 def rig_named(name: str, choice: RigChoice) -> str:
@@ -47,3 +51,25 @@ def command(verb: str, sources: Sequence[str], name: str, choice: RigChoice, rig
     """
     options = ["--rig", rig or choice.option or name, *choice.topics, *choice.part]
     return shlex.join(["rsea", verb, *sources, *options])
+
+
+def right_rig_block(remarks: Sequence[Remark], command: str = "") -> Html:
+    """Return the values that differ from the rig and what to do about it; empty for none.
+
+    command: makes a rig of the fitted values; without one, model.yaml beside the page is that rig.
+    """
+    off, _ = split_off_rig(remarks)
+    if not off:
+        return Html()
+    remedy = Html(f"<p>{right_rig('' if command else MODEL)} {code(command) if command else ''}</p>")
+    return section("Values that differ from the rig", bullets(remark_sentences(off)), remedy)
+
+
+def rig_json(choice: RigChoice, remarks: Sequence[Remark]) -> dict[str, Any]:
+    """Return how the rig was given, and each value that is far from it."""
+    off = []
+    for remark in split_off_rig(remarks)[0]:
+        stated, fitted, low, high, spreads = remark.values
+        off.append({"name": remark.names[0], "rig": stated, "fitted": fitted, "ci95": [low, high],
+                    "unit": remark.unit, "spreads": spreads})  # fmt: skip
+    return {"rig_option": choice.option or None, "rig_is_default": choice.is_default, "off_rig": strict(off)}

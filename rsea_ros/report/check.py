@@ -1,29 +1,25 @@
-"""The findings of a check on a terminal, one line each."""
+"""The findings of a check: on a terminal, one line each, and for programs (docs/check.md)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 from rich.text import Text
 
-from rsea_ros.checks.finding import Finding, Findings
+from rsea_ros.checks.finding import Finding, Findings, worst
 from rsea_ros.report import words
-from rsea_ros.report.rig.words import rig_in_brackets
+from rsea_ros.report.result_files import fault_json, pick, strict
+from rsea_ros.report.rig import rig_in_brackets
 from rsea_ros.report.wrapped_lines import WIDTH, wrap
 
+SCHEMA = 1
 _LIGHT, _KIND, _CHANNEL = 7, 14, 25
 """Columns."""
 _STYLES = {"green": "green", "amber": "yellow", "red": "bold red"}
-_KINDS = {
-    "wrong_rig": "rig fits",
-    "dead_channel": "dead channel",
-    "clock_offset": "clock offset",
-    "clock_drift": "clock drift",
-    "identifiability": "determined",
-    "rig_value": "rig's value?",
-    "missing_topic": "missing",
-}
+_KINDS = {"wrong_rig": "rig fits", "identifiability": "determined", "rig_value": "rig's value?",
+          "missing_topic": "missing"}  # fmt: skip
 _DOUBTED = {"wrong_rig": "wrong rig?", "identifiability": "undetermined"}
 """Names of kinds whose plain name would say the opposite of an amber or red light."""
 SAID_ELSEWHERE = ("identifiability", "rig_value", "noise", "excitation", "rest")
@@ -38,29 +34,23 @@ def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
     lines = []
     for f in _each_remedy_once(findings.findings):
         head = f"{f.light:<{_LIGHT}}{f'{kind(f)} ':<{_KIND}}{f'{_channel(f)} ':<{_CHANNEL}}"
-        text = wrap(f"{head}{_finding_text(f)}", width, min(len(head), _LIGHT + _KIND + _CHANNEL))
+        said = f"{number(f)} {f.detail}" if f.unit == "1" else ", ".join(filter(None, (number(f), f.detail)))
+        if f.light != "green":
+            said = "; ".join(filter(None, (said, f.expected and f"expected {f.expected}", f.remedy)))
+        text = wrap(f"{head}{said}", width, min(len(head), _LIGHT + _KIND + _CHANNEL))
         lines.append(Text.assemble((text[:_LIGHT], _STYLES[f.light]), text[_LIGHT:]))
     return lines
 
 
-def _finding_text(f: Finding) -> str:
-    value = number(f)
-    text = f"{value} {f.detail}" if f.unit == "1" else ", ".join(filter(None, (value, f.detail)))
-    if f.light == "green":
-        return text
-    return "; ".join(filter(None, (text, f.expected and f"expected {f.expected}", f.remedy)))
-
-
 def warnings(findings: Findings) -> list[str]:
     """Return a line for each amber or red finding that a fit's results would not repeat; rig first."""
-    chosen = [f for f in findings.findings if f.light != "green" and not _said_elsewhere(f)]
     reported = {(f.kind, f.channel) for f in findings.faults}
-    chosen = [f for f in chosen if f.kind == "wrong_rig" or (f.kind, f.channel) not in reported]
+    chosen = [
+        f for f in findings.findings
+        if f.light != "green" and (f.kind not in SAID_ELSEWHERE or (f.kind, f.light) == ("excitation", "red"))
+        and (f.kind == "wrong_rig" or (f.kind, f.channel) not in reported)
+    ]  # fmt: skip
     return [sentence(f) for f in _each_remedy_once(sorted(chosen, key=lambda f: f.kind != "wrong_rig"))]
-
-
-def _said_elsewhere(f: Finding) -> bool:
-    return f.kind in SAID_ELSEWHERE and (f.kind, f.light) != ("excitation", "red")
 
 
 def _each_remedy_once(findings: Iterable[Finding]) -> Iterator[Finding]:
@@ -106,3 +96,25 @@ def summary(checks: Sequence[Findings]) -> str:
     counts = ", ".join(f"{lights.count(light)} {light}" for light in ("red", "amber", "green"))
     first = checks[0]
     return f"checked against {rig_in_brackets(first.rig_name, first.rig_choice)}: {counts}"
+
+
+def check_json(checks: Sequence[Findings]) -> dict[str, Any]:
+    """Return the contents of the JSON of `rsea check`; infinite numbers and NaN are null."""
+    first = checks[0]
+    return {
+        "schema": SCHEMA,
+        **pick(first, "rig=rig_name"),
+        "rig_option": first.rig_choice.option or None,
+        "rig_is_default": first.rig_choice.is_default,
+        "light": worst([c.light for c in checks]),
+        "records": [
+            {**pick(c, "bag=source light"), "findings": [_finding(f) for f in c.findings],
+             "faults": [fault_json(f) for f in c.faults]}
+            for c in checks
+        ],
+    }  # fmt: skip
+
+
+def _finding(f: Finding) -> dict[str, Any]:
+    interval = None if f.low is None or f.high is None else strict([f.low, f.high])
+    return {**pick(f, "light kind channel value unit"), "ci95": interval, **pick(f, "expected detail remedy")}

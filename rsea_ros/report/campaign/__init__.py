@@ -1,1 +1,0 @@
-"""A session of experiments: page, sentences, experiment.json."""
