@@ -33,25 +33,6 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.identification.settings import IntervalSettings, NoiseSettings
 
 MOST_CAUSES = 4
-__all__ = [
-    "DEFAULT",
-    "MOST_CAUSES",
-    "AcceptanceSettings",
-    "BlockSettings",
-    "DiagnosisSettings",
-    "EvidenceSettings",
-    "FitSettings",
-    "FloorSettings",
-    "ForwardSettings",
-    "IntervalSettings",
-    "NamingSettings",
-    "NextRunSettings",
-    "NoiseSettings",
-    "PieceSettings",
-    "Setting",
-    "SizeSettings",
-    "StretchSettings",
-]
 
 
 @dataclass(frozen=True)
