@@ -11,7 +11,8 @@ from rsea_ros.diagnosis.candidate import Candidate, FitSetup, fit_candidate
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.score import Score, score, score_on
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, IntervalSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.identification.settings import IntervalSettings
 from rsea_ros.diagnosis.stretches import spread_over
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import Case, Problem, case_from, simulate_cases

@@ -14,7 +14,8 @@ from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.naming.contribution import rows_of
 from rsea_ros.diagnosis.naming.flexible import flexible
 from rsea_ros.diagnosis.score import gain_of
-from rsea_ros.diagnosis.settings import DEFAULT, IntervalSettings, NoiseSettings
+from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.identification.settings import IntervalSettings, NoiseSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.confidence import confidence_of
