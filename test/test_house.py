@@ -6,7 +6,7 @@ import ast
 
 from import_graph import MODULES, ROOT, imports, name_of
 
-LINES, FILES, SMALL, LOOSE = 73_100, 678, 150, 8
+LINES, FILES, SMALL, LOOSE = 72_850, 635, 147, 8
 """At most: gross lines and files of rsea_ros and msg_adapters, files of up to 30 code lines (effects apart),
 files at the root of rsea_ros. They may fall. What raises one needs a decision that says what went for it."""
 IMPORT_SHARE = 0.095
@@ -84,7 +84,7 @@ def code_lines(text):
         elif isinstance(node, (ast.Import, ast.ImportFrom)):
             skipped.update(range(node.lineno, node.end_lineno + 1))
     lines = enumerate(text.splitlines(), 1)
-    return sum(1 for k, line in lines if k not in skipped and line.strip() and not line.strip().startswith("#"))
+    return sum(1 for k, x in lines if k not in skipped and x.strip() and not x.strip().startswith("#"))
 
 
 def import_lines(text):

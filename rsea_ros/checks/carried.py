@@ -9,14 +9,13 @@ import numpy as np
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.expected import is_still
 from rsea_ros.checks.finding import Findings, unused_sentence
-from rsea_ros.checks.running_clock import at_rates
+from rsea_ros.checks.rig_findings import at_rates
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import list_names
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import check_pace
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.fault_kinds import FAULT_KINDS
-from rsea_ros.records.record import UNITS, Channel, Record
+from rsea_ros.records.record import FAULT_KINDS, UNITS, Channel, Record
 from rsea_ros.records.stamps import repair_stamps
 
 _FEWEST = 0.1

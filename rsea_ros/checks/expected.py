@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.checks.channel_spectra import Quotient, quotient
+from rsea_ros.checks.response_shape import Quotient, quotient
 from rsea_ros.errors import RseaError
 from rsea_ros.model.extent import is_too_fast
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.identification.even_stamps import SCATTER
+from rsea_ros.identification.fit import SCATTER
 from rsea_ros.model.extent import AS_SECONDS, FAST, SKIPPED_START, SLOW, is_slow, is_too_fast
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig

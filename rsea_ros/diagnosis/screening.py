@@ -17,7 +17,7 @@ import numpy as np
 from rsea_ros.diagnosis.settings import ForwardSettings
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.alternatives import add_effect
+from rsea_ros.identification.fit import add_effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns, power, solve
 from rsea_ros.identification.unknowns import start_vector, theta_with

@@ -13,18 +13,16 @@ from rsea_ros.diagnosis.candidate import (
     Candidate,
     FitSetup,
     fit_candidate,
+    in_units_of,
     leaves_only_noise,
     refit,
-)
-from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, loss_excess, preference
-from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
-from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses, stated_starts
-from rsea_ros.diagnosis.problem_variants import (
-    in_units_of,
     with_clocks,
     with_doubled_step,
     without_clocks,
 )
+from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, loss_excess, preference
+from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
+from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses, stated_starts
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.screening import ScreenedEffect, best_guess, continue_fit, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -32,12 +30,11 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
-from rsea_ros.identification.alternatives import add_effect
-from rsea_ros.identification.estimates import is_off_rig
+from rsea_ros.identification.confidence import is_off_rig
+from rsea_ros.identification.fit import add_effect
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Solution, power, solve
+from rsea_ros.identification.solver import Pools, Solution, power, solve
 from rsea_ros.identification.unknowns import apply, idle, start_vector, unknowns_of_effect
-from rsea_ros.identification.workers import Pools
 from rsea_ros.records.record import FloatArray
 
 

@@ -1,13 +1,13 @@
 """Noise level of the residuals: white or coloured, from channels that witness each other.
 
 A floor is never above the residual's white part, which no law of the bench can make; and where all of a
-residual passes for noise of the sensor (coloured.py) it equals that residual. That noise is called coloured
+residual passes for noise of the sensor it equals that residual. That noise is called coloured
 only where it exceeds its white part by more than the doubt of that part, which is large in short records.
 
 Sensor noise is stationary; its spectrum falls with frequency and is flat below what a block of a second
 resolves; whitened, it is nearly Gaussian; and it is independent of the command, of the motion, and of
 other sensors. A residual that passes all of these tests is noise, however large; one that fails in any point
-is a misfit. The limits (noise_settings.py) were set between noise of first order with a memory of up to
+is a misfit. The limits (settings.py) were set between noise of first order with a memory of up to
 0.25 s and mild effects, inside and outside the catalogue, of the second bench in test/independent.
 
 The command; laws of friction, play, springs, ripple and drift over the simulated motion; and the

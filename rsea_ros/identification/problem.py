@@ -13,11 +13,10 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
 from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
-from rsea_ros.model.drive import Drive
+from rsea_ros.model.drive import Drive, outside_gaps, zero_unknown
 from rsea_ros.model.extent import SKIPPED_START
 from rsea_ros.model.inverse import CUT_OFF, Motion, acting_torque, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.position_loop import with_command
-from rsea_ros.model.restarts import outside_gaps, zero_unknown
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS

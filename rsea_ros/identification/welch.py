@@ -26,8 +26,7 @@ import numpy as np
 from numpy.fft import rfft
 from numpy.polynomial.polynomial import polyval
 
-from rsea_ros.identification.local_polynomial import Lines, detrend, widen
-from rsea_ros.identification.resample import Aligned
+from rsea_ros.identification.local_polynomial import Aligned, Lines, detrend, widen
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
 from rsea_ros.records.spectra import next_fast_length
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.signal import periodogram, welch
 
-from rsea_ros.diagnosis.residual_peaks import interpolate_peak, peaks
+from rsea_ros.diagnosis.initial_guess import interpolate_peak, peaks
 from rsea_ros.laws.columns import CaseModel, ResidualRows
 from rsea_ros.laws.terms import (
     COMMAND_TERMS,

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rsea_ros.diagnosis.candidate import on_blocks
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
-from rsea_ros.diagnosis.problem_variants import on_blocks
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lend

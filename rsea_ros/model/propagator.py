@@ -10,8 +10,7 @@ from scipy.linalg import expm
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.model.equations import Mechanics, mechanics, train_ratio
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.step import Linear
 from rsea_ros.records.record import FloatArray
 

@@ -21,7 +21,7 @@ from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.experiment.campaign import Budget, Campaign, CampaignOutcome, Round
 from rsea_ros.experiment.joint_weighing import USUAL, causes_from, diagnose_together
 from rsea_ros.experiment.proposal import LONGEST, RATES, DesignRequest, Proposal
-from rsea_ros.experiment.run_limits import limits_from
+from rsea_ros.experiment.run_shape import limits_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter

@@ -6,8 +6,7 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.documents.wording import list_names
-from rsea_ros.records.fault_kinds import MASKED
-from rsea_ros.records.record import Fault
+from rsea_ros.records.record import MASKED, Fault
 from rsea_ros.report import words
 
 

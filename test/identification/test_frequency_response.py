@@ -8,7 +8,7 @@ import pytest
 from rsea_ros.errors import ChannelError, IdentificationError
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response, responses_of
-from rsea_ros.identification.resample import AtRestError
+from rsea_ros.identification.local_polynomial import AtRestError
 from rsea_ros.identification.result import ComplexArray, FrequencyResponse
 from rsea_ros.model import outputs
 from rsea_ros.model.rig import EffectSetting, Rig

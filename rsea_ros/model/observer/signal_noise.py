@@ -30,8 +30,7 @@ from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 from rsea_ros.documents.units import plain
 from rsea_ros.errors import RigError
 from rsea_ros.model.propagator import state_space
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.records.record import UNITS, FloatArray
 
 NOTHING: Mapping[str, float] = MappingProxyType({})

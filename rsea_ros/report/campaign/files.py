@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rsea_ros.experiment.campaign import Campaign, CampaignOutcome
-from rsea_ros.experiment.run_limits import run_text
+from rsea_ros.experiment.run_shape import run_text
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import NewFiles, check_free
 from rsea_ros.report.campaign.json import campaign_json

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.experiment.campaign import CampaignOutcome
-from rsea_ros.experiment.run_limits import RunLimits
+from rsea_ros.experiment.run_shape import RunLimits
 from rsea_ros.report.campaign.words import end_sentence, run_count, size
 from rsea_ros.report.experiment.page import command_figure, limits_section, spectrum_figure
 from rsea_ros.report.experiment.words import plain_name, proof_words, shape_words

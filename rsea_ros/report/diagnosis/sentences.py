@@ -9,8 +9,7 @@ from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Verdict
 from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.result import is_unexcited, silent_channels
-from rsea_ros.records.fault_kinds import MASKED
-from rsea_ros.records.record import Fault
+from rsea_ros.records.record import MASKED, Fault
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.rig.words import values_off

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.documents.setting import Setting
+from rsea_ros.identification.settings import Setting
 from rsea_ros.report import words
 from rsea_ros.report.page.html import fold, paragraph
 from rsea_ros.report.page.html_table import table_of_rows

@@ -9,7 +9,7 @@ from rsea_ros.documents.wording import list_names
 from rsea_ros.experiment.advice import Advice, Proof
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.proposal import LEVEL, Proposal
-from rsea_ros.experiment.run_limits import UNITS
+from rsea_ros.experiment.run_shape import UNITS
 from rsea_ros.report import words
 
 _NARROWER = 1.01

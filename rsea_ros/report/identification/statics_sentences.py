@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rsea_ros.identification.statics import Statics
+from rsea_ros.identification.result import Statics
 from rsea_ros.report import words
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rsea_ros.documents.wording import list_names
-from rsea_ros.identification.record_checks import explained_by_lost_cycles
+from rsea_ros.identification.identify import explained_by_lost_cycles
 from rsea_ros.identification.result import Identification
 from rsea_ros.report import words
 from rsea_ros.report.remark_words import coloured_noise
