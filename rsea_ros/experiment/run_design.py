@@ -3,8 +3,8 @@
 Shapes of every kind are tried, from the shortest run to the length that no chance of deciding could make
 worth its seconds; the best is refined by Nelder and Mead's method (scipy), which needs no smooth
 objective: gear friction and stops give none. Where full fits of the rivals leave it nothing to decide, the
-longest run is designed instead. separation.py
-rates shapes by simulation and has the measure. The final amplitude is the largest with which proposal.py keeps all limits.
+longest run is designed instead. separation.py rates shapes by simulation and has the measure. The final
+amplitude is the largest with which proposal.py keeps all limits.
 """
 
 from __future__ import annotations

@@ -29,7 +29,8 @@ from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._trial import Ears, LiveRun
-from rsea_ros.outputs.new_files import Destination, unused_path
+from rsea_ros.outputs.files import unused_path
+from rsea_ros.outputs.new_files import Destination
 from rsea_ros.records.record import Record
 from rsea_ros.report.campaign.files import check_session_free, write_campaign
 from rsea_ros.report.campaign.words import end_sentence, known_causes
