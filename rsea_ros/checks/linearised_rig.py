@@ -17,6 +17,7 @@ import numpy as np
 
 from rsea_ros.checks.response_shape import FittedShape
 from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.confidence import inverse_of, sum_by_block
 from rsea_ros.identification.problem import Case, Problem, case_from, channels_that_tell
 from rsea_ros.identification.settings import INTERVALS
 from rsea_ros.identification.solver import jacobian
@@ -179,21 +180,11 @@ def gauss_newton_step(
     off = state.theta - start_vector(setting.values)
     at = np.concatenate([off, -state.offset, -state.drift, np.zeros(2 * m)])
     normal = matrix.T @ matrix + np.diag(prior)
-    scale = np.sqrt(np.diag(normal) + 1e-300)
-    inverse = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+    inverse = inverse_of(normal)
     step = -inverse @ (matrix.T @ rows.residual + prior * at)
-    scores = _scores(rows, rows.residual + matrix @ step)
+    scores = sum_by_block(matrix, rows.residual + matrix @ step, rows.block)
     covariance = inverse @ (scores.T @ scores + np.diag(prior)) @ inverse
     return step, np.sqrt(np.maximum(np.diag(covariance), np.diag(inverse)))
-
-
-def _scores(rows: LinearisedRows, left: FloatArray) -> FloatArray:
-    """Return the sum of the scores of each block, shape (blocks, unknowns)."""
-    first = np.flatnonzero(np.diff(rows.block, prepend=-1))
-    parts = np.add.reduceat(rows.matrix * left[:, None], first, axis=0)
-    scores = np.zeros((int(rows.block.max()) + 1, rows.matrix.shape[1]))
-    np.add.at(scores, rows.block[first], parts)
-    return scores
 
 
 def _doubt(u: Unknown) -> float:

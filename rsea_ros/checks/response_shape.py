@@ -23,6 +23,7 @@ import numpy as np
 
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.frequency_response import model_responses
+from rsea_ros.identification.solver import Descent, descend
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector, unknowns_of_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray, IntArray
@@ -150,7 +151,8 @@ DELAY_DOUBT = 0.02
 _WIDER = 3.0
 _LEAST = 0.3
 """One sigma of the logarithm of a rig's value, where the rig states less."""
-_ITERATIONS = 12
+_ITERATIONS, _PARTS = 12, (1.0, 0.3, 0.1)
+"""Steps of the fit, and parts of one that are tried until it helps."""
 _STEP = 1e-4
 _DELAYS = np.arange(-0.06, 0.0605, 1e-3)
 """s. Where a fit of a delay may begin."""
@@ -213,38 +215,15 @@ class ShapeFit:
         centre = np.concatenate([self._start, gain, np.zeros(len(gain))])
         begin = [self._size(k) if priors[n].doubt > 1.0 else gain[k] for k, n in enumerate(self.channels)]
         theta = np.concatenate([self._start, begin, self._delays(sign)])
-        theta, residual, cost = self._least(theta, centre, np.array(doubt), sign)
-        return self._shape(theta, residual, cost, self._data_shares(theta, residual, np.array(doubt), sign))
+        end = descend(
+            lambda at: self._residual(at, sign), lambda at, r: self._slope(at, r, sign), theta,
+            np.diag(np.array(doubt) ** -2.0), centre=centre, is_robust=True, rounds=_ITERATIONS, parts=_PARTS,
+        )  # fmt: skip
+        return self._shape(end, self._data_shares(end, np.array(doubt), sign))
 
     def _size(self, k: int) -> float:
         """Return the logarithm of a channel's gain over all its lines."""
         return float(np.median(np.log(np.abs(self._value[self._of == k]))))
-
-    def _least(
-        self, theta: FloatArray, centre: FloatArray, doubt: FloatArray, sign: FloatArray
-    ) -> tuple[FloatArray, FloatArray, float]:
-        """Return theta, residual and cost where that is least: Gauss-Newton, steps cut until they help."""
-
-        def cost_of(r: FloatArray, at: FloatArray) -> float:
-            return float(np.sum(np.log1p(r**2)) + np.sum(((at - centre) / doubt) ** 2))
-
-        residual = self._residual(theta, sign)
-        cost = cost_of(residual, theta)
-        for _ in range(_ITERATIONS):
-            slope, weight = self._slope(theta, residual, sign), 1.0 / (1.0 + residual**2)
-            normal = (slope * weight[:, None]).T @ slope + np.diag(doubt**-2.0)
-            right = slope.T @ (weight * residual) + (theta - centre) / doubt**2
-            step = -np.linalg.lstsq(normal, right, rcond=None)[0]
-            trials = [(theta + share * step) for share in (1.0, 0.3, 0.1)]
-            trial = ((at, r, cost_of(r, at)) for at in trials for r in [self._residual(at, sign)])
-            better = next((t for t in trial if t[2] < cost), None)
-            if better is None:
-                break
-            done = cost - better[2] < max(1e-3 * cost, 0.01)
-            theta, residual, cost = better
-            if done:
-                break
-        return theta, residual, cost
 
     def _residual(self, theta: FloatArray, sign: FloatArray) -> FloatArray:
         """Return the residual of ln R over its doubt: of the size of all lines, then of their phase."""
@@ -310,16 +289,15 @@ class ShapeFit:
         share = np.cumsum(weight[of][rising])
         return float(residual[of][rising][int(np.searchsorted(share, 0.5 * share[-1]))])
 
-    def _data_shares(
-        self, theta: FloatArray, residual: FloatArray, doubt: FloatArray, sign: FloatArray
-    ) -> FloatArray:
+    def _data_shares(self, end: Descent, doubt: FloatArray, sign: FloatArray) -> FloatArray:
         """Return for each value the share of its information that the lines provide."""
-        slope, weight = self._slope(theta, residual, sign), 1.0 / (1.0 + residual**2)
+        slope, weight = self._slope(end.theta, end.residual, sign), 1.0 / (1.0 + end.residual**2)
         normal = ((slope * weight[:, None]).T @ slope) * np.outer(doubt, doubt) + np.eye(len(doubt))
         shares: FloatArray = 1.0 - np.diag(np.linalg.inv(normal))
         return shares
 
-    def _shape(self, theta: FloatArray, residual: FloatArray, cost: float, shares: FloatArray) -> FittedShape:
+    def _shape(self, end: Descent, shares: FloatArray) -> FittedShape:
+        theta, residual = end.theta, end.residual
         n, m, lines = len(self._start), len(self.channels), len(self._of)
         misfit = np.hypot(residual[:lines], residual[lines:]) * self._sd
         measured = self._share * np.abs(self._value) ** 2
@@ -335,7 +313,7 @@ class ShapeFit:
             delay=dict(zip(self.channels, theta[n + m :].tolist(), strict=True)),
             error={c: self._middle(misfit, k, self._share) for k, c in enumerate(self.channels)},
             error_measured={c: self._middle(misfit, k, measured) for k, c in enumerate(self.channels)},
-            cost=cost,
+            cost=end.cost,
         )
 
 

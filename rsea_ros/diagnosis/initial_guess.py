@@ -26,6 +26,7 @@ import numpy as np
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE, Port
+from rsea_ros.identification.noise_level import residual_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.start import LARGEST, torque_size
 from rsea_ros.identification.unknowns import WELL_KNOWN, theta_with
@@ -168,11 +169,6 @@ def _load(rig: Rig, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
         return rig["spring.stiffness"] * q
     inertia, damping, stiffness = (rig[f"spring_end.{n}"] for n in ("inertia", "damping", "stiffness"))
     return inertia * a + damping * v + stiffness * q
-
-
-def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
-    """Return measured less simulated, zero where masked."""
-    return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
 
 
 def on_even_clock(t: FloatArray, values: FloatArray, rate: float) -> FloatArray:

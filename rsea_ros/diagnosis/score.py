@@ -48,7 +48,7 @@ def missed_response(
     """
     if not isinstance(case.drive, Drive):
         return 0.0
-    u = command_at(case.drive, case.t[channel])
+    u = case.drive.command_at(case.t[channel])
     parts = _segments(blocks, case.mask[channel])
     if len(parts) < rule.response_blocks:
         return 0.0
@@ -66,7 +66,7 @@ def lost_above(case: Case, channel: str) -> float | None:
     if not isinstance(case.drive, Drive):
         return None
     t = case.t[channel]
-    u, y = command_at(case.drive, t), case.measured[channel]
+    u, y = case.drive.command_at(t), case.measured[channel]
     rate, length = 1.0 / float(np.median(np.diff(t))), min(_LINES, len(t) // _SEGMENTS)
     if length < _SHORTEST:
         return None
@@ -80,12 +80,6 @@ def lost_above(case: Case, channel: str) -> float | None:
     below = (np.cumsum(is_lost) - is_lost) / count
     edges = np.flatnonzero(is_lost & (above >= _MOST) & (below <= 1.0 - _MOST))
     return float(frequency[edges[0]]) if len(edges) and 0 < edges[0] < _MOST * len(frequency) else None
-
-
-def command_at(drive: Drive, t: FloatArray) -> FloatArray:
-    """Return the command that acts at times, N m."""
-    steps = ((t - drive.start) / drive.step).astype(np.int64)
-    return np.asarray(drive.command[np.clip(steps, 0, len(drive.command) - 1)])
 
 
 def _segments(blocks: IntArray, good: BoolArray) -> list[IntArray]:

@@ -321,14 +321,10 @@ def _where(before: RunWeighing | None, name: str) -> FloatArray | None:
 
 def _weigh(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> RunWeighing:
     scale = scale_of(solutions)
-    fits = {n: WeighedCause(n, s, log_evidence(s, scale), _rms_left(s)) for n, s in solutions.items()}
+    fits = {n: WeighedCause(n, s, log_evidence(s, scale), s.rms) for n, s in solutions.items()}
     logs = np.array([f.log_evidence for f in fits.values()])
     shares = np.exp(logs - logs.max())
     return RunWeighing(cases, fits, dict(zip(fits, (shares / shares.sum()).tolist(), strict=True)), scale)
-
-
-def _rms_left(solution: Solution) -> float:
-    return float(np.sqrt(np.mean(solution.residual**2)))
 
 
 SHORTEST = 4.2

@@ -20,7 +20,7 @@ from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_o
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_shape import FEWEST, Shape, command_of, largest_share, of_command, of_response
 from rsea_ros.identification.problem import Case
-from rsea_ros.identification.solver import Map, jacobian, power, serial
+from rsea_ros.identification.solver import Map, descend, jacobian, power, serial
 from rsea_ros.records.record import MEASURED, BoolArray, FloatArray
 
 INSIDE = 0.9
@@ -131,26 +131,13 @@ def refit(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial) ->
     predicted = replace(true.problem, cases=(case,)).outputs(true.if_there())[0]
     problem = replace(rival.problem, cases=(replace(case, measured=predicted),))
     low, high = rival.bounds()
-    theta, start, known = rival.theta, rival.theta, rival.information
-    residual = problem.residual(theta)
-    cost = power(residual)
-    for _ in range(_REFITS):
-        slope = jacobian(problem, theta, residual, run)
-        right = slope.T @ residual + known @ (theta - start)
-        step = -np.linalg.solve(slope.T @ slope + known, right)
-        for _ in range(4):
-            trial = np.clip(theta + step, low, high)
-            shifted = problem.residual(trial)
-            paid = power(shifted) + float((trial - start) @ known @ (trial - start))
-            if paid < cost:
-                break
-            step = 0.3 * step
-        else:
-            break
-        fallen, theta, residual, cost = cost - paid, trial, shifted, paid
-        if fallen < 0.01 * cost:
-            break
-    return Refit(cost, power(residual))
+    end = descend(
+        lambda theta: problem.residual(np.clip(theta, low, high)),
+        lambda theta, r: jacobian(problem, theta, r, run),
+        rival.theta, rival.information, rounds=_REFITS, enough=0.01,
+        parts=(1.0, 0.3, 0.09, 0.027),
+    )  # fmt: skip
+    return Refit(end.cost, power(end.residual))
 
 
 def decided_share(hypotheses: Sequence[Hypothesis], chances: FloatArray) -> float:

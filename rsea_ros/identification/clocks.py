@@ -180,14 +180,14 @@ def with_drifts(solution: Solution, run: Map = serial) -> Solution:
     behind the fit, and behind the rig as stated, which no drift has led astray. Offsets are left to the test.
     """
     problem = solution.problem
-    if is_inverse(problem.rig) or _rms(solution) <= MISFIT:
+    if is_inverse(problem.rig) or solution.rms <= MISFIT:
         return solution
     for theta in (solution.theta, start_vector(problem.unknowns)):
         rates = _drifts(problem, theta)
         added = clock_rates(sorted(rates))
         begin = np.concatenate([theta, [rates[u.name.split(".")[1]] for u in added]])
         free = replace(problem, unknowns=(*problem.unknowns, *added))
-        if added and _rms(drifting := solve(free, begin, run=run)) <= MISFIT:
+        if added and (drifting := solve(free, begin, run=run)).rms <= MISFIT:
             return drifting
     return solution
 
@@ -202,10 +202,6 @@ def _drifts(problem: Problem, theta: FloatArray) -> dict[str, float]:
             if line is not None and line.is_clear:
                 rates.setdefault(n, []).append(-1e6 * line.rate)
     return {n: float(np.median(values)) for n, values in rates.items()}
-
-
-def _rms(solution: Solution) -> float:
-    return float(np.sqrt(np.mean(solution.residual**2)))
 
 
 def free_clocks(solution: Solution, required: RequiredClocks) -> tuple[Problem, FloatArray]:

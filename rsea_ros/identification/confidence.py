@@ -105,13 +105,17 @@ def _alike(case: Case) -> float:
 def _block_scores(solution: Solution, rule: IntervalSettings) -> FloatArray:
     """Return the score of each block, shape (blocks, unknowns): S'S is the scatter of their sum."""
     blocks = sample_blocks(solution.problem, rule.block)
-    scores = np.zeros((blocks.max() + 1, solution.jacobian.shape[1]))
-    for column, derivative in zip(scores.T, solution.jacobian.T, strict=True):
-        column[:] = np.bincount(blocks, derivative * solution.residual, minlength=len(scores))
+    scores = sum_by_block(solution.jacobian, solution.residual, blocks)
     counted = len(np.unique(blocks))
     free = max(counted - len(solution.theta), counted / rule.most_corrected)
     result: FloatArray = scores * np.sqrt(counted / free)
     return result
+
+
+def sum_by_block(matrix: FloatArray, residual: FloatArray, blocks: IntArray) -> FloatArray:
+    """Return the score of every block, the sum of derivative times residual, shape (blocks, unknowns)."""
+    rows: list[FloatArray] = [np.bincount(blocks, column * residual) for column in matrix.T]
+    return np.column_stack(rows) if rows else np.zeros((int(blocks.max()) + 1, 0))
 
 
 def sample_blocks(problem: Problem, length: float) -> IntArray:

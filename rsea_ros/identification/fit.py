@@ -95,23 +95,23 @@ def fit(
     problem = Problem(tuple(cases), rig, unknowns, MEASURED)
     solution = solve(problem, _better_start(problem, start, run), run=run)
     outputs = problem.outputs(solution.theta)
-    known = _with_noise_of(problem, outputs)
+    known = with_noise_of(problem, outputs)
     if _has_changed(problem.cases, known):
         solution = solve(replace(problem, cases=known), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
-        known = _with_noise_of(solution.problem, outputs)
+        known = with_noise_of(solution.problem, outputs)
     drifting = with_drifts(solution, run)
     if drifting is not solution:
         solution, problem = drifting, drifting.problem
         outputs = problem.outputs(solution.theta)
-        known = _with_noise_of(problem, outputs)
+        known = with_noise_of(problem, outputs)
     required = required_clocks(solution, run)
     if required.clocks:
         solution = solve(*free_clocks(solution, required), run=run)
         solution = solve(*without_needless(solution), run=run)
         problem = solution.problem
         outputs = problem.outputs(solution.theta)
-        known = _with_noise_of(problem, outputs)
+        known = with_noise_of(problem, outputs)
     for _ in range(_REWEIGHTINGS):
         ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < MISFIT:
@@ -122,7 +122,7 @@ def fit(
     return solution, known, required
 
 
-def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
+def with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
     """Return the cases with the noise that the residual of simulated outputs shows."""
     ratio = problem.rig["gear.ratio"]
     return tuple(reestimate_noise(c, out, ratio) for c, out in zip(problem.cases, outputs, strict=True))

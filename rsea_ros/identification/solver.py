@@ -50,6 +50,11 @@ class Solution:
         """Return every unknown in SI."""
         return {u.name: u.outer(float(t)) for u, t in zip(self.problem.unknowns, self.theta, strict=True)}
 
+    @property
+    def rms(self) -> float:
+        """Return the RMS of the residual over the noise."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
 
 Map = Callable[[Callable[[int], FloatArray], Sequence[int]], Sequence[FloatArray]]
 
@@ -193,6 +198,56 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
             matrix = jacobian(problem, theta, residual, run)
         is_fresh = not kept
     return Solution(problem, theta, residual, matrix, cost)
+
+
+@dataclass(frozen=True)
+class Descent:
+    """Where a descent ended: the residual without its prior, shape (m,), and the cost with it."""
+
+    theta: FloatArray
+    residual: FloatArray
+    cost: float
+
+
+def descend(
+    residual: Callable[[FloatArray], FloatArray],
+    slope: Callable[[FloatArray, FloatArray], FloatArray],
+    theta: FloatArray,
+    information: FloatArray,
+    *,
+    centre: FloatArray | None = None,
+    is_robust: bool = False,
+    rounds: int = 15,
+    enough: float = 1e-3,
+    parts: Sequence[float] = (1.0, 0.5, 0.25, 0.1, 0.03),
+) -> Descent:
+    """Minimise a residual beside a prior by Gauss-Newton, every step cut until it helps.
+
+    slope: derivatives (m, n) at theta and its residual. information: of the prior, (n, n), about `centre`, or
+    the start. is_robust: rows that do not fit count less (Cauchy). enough: relative fall of the cost that is
+    too small to go on. parts: of a step, tried until the cost falls.
+    """
+    start = theta if centre is None else centre
+
+    def at(place: FloatArray) -> Descent:
+        r, off = residual(place), place - start
+        size = float(np.sum(np.log1p(r**2))) if is_robust else power(r)
+        return Descent(place, r, size + float(off @ information @ off))
+
+    best = at(theta)
+    for _ in range(rounds):
+        matrix = slope(best.theta, best.residual)
+        weighted = matrix / (1.0 + best.residual**2)[:, None] if is_robust else matrix
+        right = weighted.T @ best.residual + information @ (best.theta - start)
+        step = -np.linalg.lstsq(weighted.T @ matrix + information, right, rcond=None)[0]
+        trials = (at(best.theta + part * step) for part in parts)
+        better = next((t for t in trials if t.cost < best.cost), None)
+        if better is None:
+            break
+        fall, best = best.cost - better.cost, better
+        if fall < enough * (best.cost + fall):
+            break
+    return best
 
 
 def broyden_update(matrix: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:

@@ -281,6 +281,11 @@ class Drive:
         """Length of the record, s."""
         return self.step * len(self.command)
 
+    def command_at(self, t: FloatArray) -> FloatArray:
+        """Return the command that acts at instants t, s, in its unit."""
+        steps = ((t - self.start) / self.step).astype(np.int64)
+        return self.command[np.clip(steps, 0, len(self.command) - 1)]
+
 
 def steps_per_sample(period: float, longest: float = LONGEST_STEP) -> int:
     """Return how many steps a command period is divided into."""

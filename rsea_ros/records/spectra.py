@@ -16,7 +16,7 @@ from rsea_ros.records.record import ComplexArray, FloatArray
 def segment_spectra(values: FloatArray, length: int) -> ComplexArray:
     """Return the spectrum of each segment of `length` samples, shape (segments, length // 2 + 1)."""
     parts = np.lib.stride_tricks.sliding_window_view(values, length)[:: length - length // 2]
-    return np.asarray(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * _hann(length), axis=1))
+    return np.asarray(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * hann(length), axis=1))
 
 
 def power_density(values: FloatArray, rate: float, length: int) -> tuple[FloatArray, FloatArray]:
@@ -37,11 +37,12 @@ def cross_density(
     one_sided[0] = 1.0
     if length % 2 == 0:
         one_sided[-1] = 1.0
-    density = one_sided * product.mean(axis=0) / (rate * np.sum(_hann(length) ** 2))
+    density = one_sided * product.mean(axis=0) / (rate * np.sum(hann(length) ** 2))
     return np.asarray(np.fft.rfftfreq(length, 1.0 / rate), np.float64), density
 
 
-def _hann(length: int) -> FloatArray:
+def hann(length: int) -> FloatArray:
+    """Return the periodic Hann window, shape (length,)."""
     return np.hanning(length + 1)[:-1]
 
 
