@@ -114,7 +114,7 @@ def _block_scores(solution: Solution, rule: IntervalSettings) -> FloatArray:
 
 def sum_by_block(matrix: FloatArray, residual: FloatArray, blocks: IntArray) -> FloatArray:
     """Return the score of every block, the sum of derivative times residual, shape (blocks, unknowns)."""
-    rows: list[FloatArray] = [np.bincount(blocks, column * residual) for column in matrix.T]
+    rows = [np.bincount(blocks, column * residual).astype(np.float64) for column in matrix.T]
     return np.column_stack(rows) if rows else np.zeros((int(blocks.max()) + 1, 0))
 
 
