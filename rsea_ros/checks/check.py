@@ -7,11 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.checks.expected import Side, is_commanded, is_full_of_gaps, quotients, sides
+from rsea_ros.checks.expected import (
+    Side,
+    far_off,
+    in_step,
+    is_commanded,
+    is_full_of_gaps,
+    lag_behind,
+    lag_findings,
+    open_findings,
+    quotients,
+    sides,
+)
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings, unused_sentence
 from rsea_ros.checks.gains import Readings, gain_findings, readings_of, strangers
-from rsea_ros.checks.lag import far_off, in_step, lag_behind, lag_findings, open_findings
 from rsea_ros.checks.linearised_rig import LinearisedFit, linear_of
 from rsea_ros.checks.response_shape import Quotient, quotient
 from rsea_ros.checks.rig_findings import (

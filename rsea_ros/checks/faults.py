@@ -15,12 +15,12 @@ from rsea_ros.checks.expected import (
     MotionBeside,
     Side,
     is_commanded,
+    lag_behind,
     motion_beside,
     quotients,
     sides,
     witness_of,
 )
-from rsea_ros.checks.lag import lag_behind
 from rsea_ros.checks.stamp_findings import rounded_stamps
 from rsea_ros.identification.noise import FEW, step_of
 from rsea_ros.model.inverse import is_inverse

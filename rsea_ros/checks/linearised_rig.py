@@ -24,8 +24,8 @@ from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import Unknown, clocks, start_vector, unknowns_of_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import drive_of
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import SENSED, BoolArray, Channel, FloatArray, IntArray, Record
+from rsea_ros.records.statistics import Z95
 
 _LEAST_MISFIT = 0.5
 _BLOCKS = 40

@@ -27,7 +27,7 @@ from rsea_ros.identification.solver import Descent, descend
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector, unknowns_of_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray, IntArray
-from rsea_ros.records.spectra import next_fast_length, segment_spectra
+from rsea_ros.records.statistics import next_fast_length, segment_spectra
 
 _SEGMENTS = 5
 """A record is cut into segments of a fifth: slow ramps still have their line, and nine of them overlap."""

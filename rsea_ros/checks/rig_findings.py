@@ -42,8 +42,8 @@ from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.inverse import CUT_OFF, Motion, motion_from
 from rsea_ros.model.rig import CLOCK_DOUBT, Rig
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import SENSED, Channel, FloatArray, Record
+from rsea_ros.records.statistics import Z95
 
 _ALLOWED = 3.0 * CLOCK_DOUBT
 """s. As far as a fit lets a sensor's clock move."""

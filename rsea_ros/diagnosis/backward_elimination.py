@@ -24,8 +24,8 @@ from rsea_ros.diagnosis.criteria import (
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.score import likelier_by
-from rsea_ros.diagnosis.screening import screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.step_fits import screen
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess

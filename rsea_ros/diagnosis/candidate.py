@@ -16,8 +16,8 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive, coarser
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import Z95
 
 
 def on_blocks(

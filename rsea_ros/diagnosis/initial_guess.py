@@ -35,7 +35,7 @@ from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.inverse import Motion, smooth
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import BoolArray, FloatArray
-from rsea_ros.records.spectra import power_density
+from rsea_ros.records.statistics import power_density
 
 _FEWEST_PERIODS = 2.0
 """As often a ripple must have repeated over the rotor's travel: one period may be anything."""

@@ -24,7 +24,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.model.drive import Drive
 from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray, IntArray
-from rsea_ros.records.spectra import cross_density, power_density
+from rsea_ros.records.statistics import cross_density, power_density
 
 _LOST = 0.5
 """Coherence^2 below which more than half of a channel's power has nothing to do with the command."""

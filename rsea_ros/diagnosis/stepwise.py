@@ -35,9 +35,8 @@ from rsea_ros.diagnosis.candidate import (
 from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.result import Reason
-from rsea_ros.diagnosis.screening import ScreenedEffect
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.step_fits import StepFits
+from rsea_ros.diagnosis.step_fits import ScreenedEffect, StepFits
 from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import is_off_rig

@@ -16,8 +16,8 @@ from rsea_ros.experiment.joint_weighing import problem_of, vector_at, weights_of
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.rig import EffectSetting, Quantity, Rig
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import SENSED
+from rsea_ros.records.statistics import Z95
 
 SPREAD = 0.2
 """Relative, one sigma: the doubt of a cause's parameter whose file states no interval."""

@@ -22,14 +22,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, WatchSettings, unexplained_finding
-from rsea_ros.health.hypotheses import CHANNELS, Bank, ChangeHypothesis, LookEvidence, whiten
-from rsea_ros.health.look import FILTER_SETTLING, Look
+from rsea_ros.health.hypotheses import (
+    CHANNELS,
+    FILTER_SETTLING,
+    Bank,
+    ChangeHypothesis,
+    Look,
+    LookEvidence,
+    whiten,
+)
 from rsea_ros.health.recursive_estimates import Cusum, Estimates, Scatter, threshold
 from rsea_ros.model.observer.log import BatchObserver
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import Z95
 
 FREEDOM = 4.0
 WHITE = 2.5 * 0.19366

@@ -21,20 +21,22 @@ from rsea_ros.health.changes import CandidateCauses, Changes
 from rsea_ros.health.health_finding import HealthFinding, Sensors, WatchSettings, sensor_findings
 from rsea_ros.health.hypotheses import (
     FACTOR,
+    FEWEST,
     GAINS,
     Bank,
     ChangeHypothesis,
+    Cutter,
+    Look,
     LookEvidence,
     hypotheses_of,
     nuisances_of,
 )
-from rsea_ros.health.look import FEWEST, Cutter, Look
 from rsea_ros.health.recursive_estimates import ChangeEstimate, scatter_of
 from rsea_ros.model.observer.log import STATE
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray, IntArray
+from rsea_ros.records.statistics import Z95
 
 _CERTAIN = 1e-6
 """Doubt of what has none, in its smallest change: such a parameter does not move."""

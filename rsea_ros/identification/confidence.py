@@ -29,8 +29,8 @@ from rsea_ros.identification.unknowns import Unknown, apply
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig import FIELDS, Rig
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray, IntArray
+from rsea_ros.records.statistics import Z95
 
 _WEAK = 100.0
 """Of the prior's information: below it forward differences may take curvature for information."""

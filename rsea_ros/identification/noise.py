@@ -19,7 +19,7 @@ from numpy.fft import irfft, rfft
 from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.model.rig import Sensor
 from rsea_ros.records.record import BoolArray, Channel, ComplexArray, FloatArray, IntArray, Record
-from rsea_ros.records.spectra import hann, segment_spectra
+from rsea_ros.records.statistics import hann, segment_spectra
 
 FEW = 0.2
 """Share of the samples: with more different values than that, a channel has no steps worth the name."""

@@ -17,8 +17,7 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.start import joint_start
 from rsea_ros.laws.candidates import TermCandidate, candidates_of, columns_of
-from rsea_ros.laws.columns import CaseModel, case_model, rows_of
-from rsea_ros.laws.result import Tried
+from rsea_ros.laws.law import Tried
 from rsea_ros.laws.sparse_regression import (
     HELD_BACK,
     MOST_TERMS,
@@ -31,6 +30,7 @@ from rsea_ros.laws.sparse_regression import (
     simplest,
     standard_error,
 )
+from rsea_ros.laws.variables import CaseModel, case_model, rows_of
 from rsea_ros.model.extent import bound_values
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig

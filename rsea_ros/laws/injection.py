@@ -33,8 +33,7 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.laws.terms import PORTS, Place
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.sampling import sample
-from rsea_ros.model.simulation import Machine, build, run
+from rsea_ros.model.simulation import Machine, build, run, sample
 from rsea_ros.model.step import OUTPUTS, Calls
 from rsea_ros.records.record import FloatArray
 

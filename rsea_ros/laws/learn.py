@@ -28,12 +28,11 @@ from rsea_ros.laws.choice import (
     make_search,
     summarize_models,
 )
-from rsea_ros.laws.columns import CaseModel
 from rsea_ros.laws.effect_source import LawProvenance
 from rsea_ros.laws.file import Draft, Refined, effect_from, finish_laws, refine, register
-from rsea_ros.laws.law import FittedTerm, Law, LearntCurve, join_names, ranges_of
-from rsea_ros.laws.result import LawResult, WrittenLaw
+from rsea_ros.laws.law import FittedTerm, Law, LawResult, LearntCurve, WrittenLaw, join_names, ranges_of
 from rsea_ros.laws.sparse_regression import SELECTION, Dependence, Gram, SparseLaw, dependences
+from rsea_ros.laws.variables import CaseModel
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import Record

@@ -25,8 +25,8 @@ import numpy as np
 
 from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.laws.candidates import TermCandidate
-from rsea_ros.laws.columns import GROUPS, ResidualRows
 from rsea_ros.laws.terms import Place
+from rsea_ros.laws.variables import GROUPS, ResidualRows
 from rsea_ros.records.record import FloatArray, IntArray
 
 _GRAM_RIDGE = 1e-6

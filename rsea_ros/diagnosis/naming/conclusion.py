@@ -42,8 +42,8 @@ from rsea_ros.identification.result import ParameterEstimate, Remark
 from rsea_ros.identification.solver import Pools, solve
 from rsea_ros.model.prediction_errors import fit_percent
 from rsea_ros.model.rig import CLOCK_DOUBT
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import MEASURED
+from rsea_ros.records.statistics import Z95
 
 
 def cause_of(

@@ -11,7 +11,7 @@ from rsea_ros.experiment.campaign import CampaignOutcome
 from rsea_ros.experiment.hypothesis import NOTHING
 from rsea_ros.experiment.joint_weighing import RunWeighing
 from rsea_ros.model.rig import CLOCK_DOUBT
-from rsea_ros.records.normal import Z95
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.experiment.words import plain_name
 

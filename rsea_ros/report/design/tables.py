@@ -9,7 +9,7 @@ from dataclasses import replace
 from rsea_ros.design.by_train import WithTrain, sense_unknown
 from rsea_ros.design.spring_design import Check, SpringDesign, spring_design
 from rsea_ros.design.tolerance import Margin, margins, spreads_of
-from rsea_ros.records.normal import Z90
+from rsea_ros.records.statistics import Z90
 from rsea_ros.report import words
 from rsea_ros.report.page.html import section
 from rsea_ros.report.page.html_table import table

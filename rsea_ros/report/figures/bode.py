@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import UNITS, ComplexArray, FloatArray
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.bode_words import caption, finding
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line

@@ -8,8 +8,8 @@ from html import escape
 
 import numpy as np
 
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import (

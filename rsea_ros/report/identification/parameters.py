@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 
 from rsea_ros.identification.result import CLOCKS, ParameterEstimate
-from rsea_ros.records.normal import Z95
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, GRID, QUIET, faint
 from rsea_ros.report.page.html_table import table_of_rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rsea_ros.effects.catalogue import lend
-from rsea_ros.laws.result import LawResult
+from rsea_ros.laws.law import LawResult
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.report.file_names import BASE, LAW_JSON, MODEL, REPORT

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rsea_ros.laws.law import Law, equation_of
-from rsea_ros.laws.result import LawResult
+from rsea_ros.laws.law import Law, LawResult, equation_of
 from rsea_ros.report.json_values import numbers
 from rsea_ros.report.law.words import headline
 

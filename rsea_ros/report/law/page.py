@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rsea_ros.laws.law import about_of, equation_of
-from rsea_ros.laws.result import LawResult, WrittenLaw
+from rsea_ros.laws.law import LawResult, WrittenLaw, about_of, equation_of
 from rsea_ros.report import words
 from rsea_ros.report.file_names import BASE
 from rsea_ros.report.law.figures import over_figure, time_figure

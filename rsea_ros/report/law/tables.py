@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from html import escape
 
-from rsea_ros.laws.result import LawResult
-from rsea_ros.records.normal import Z95
+from rsea_ros.laws.law import LawResult
 from rsea_ros.records.record import UNITS as CHANNEL_UNITS
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, QUIET, faint
 from rsea_ros.report.law.words import gain_sentence

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rsea_ros.laws.law import Law, equation_of
-from rsea_ros.laws.result import LawResult
+from rsea_ros.laws.law import Law, LawResult, equation_of
 from rsea_ros.report import words
 
 _CLEARLY = 0.1

@@ -1,9 +1,8 @@
-"""Spectra by Welch's method (half-overlapping Hann segments without their means), and fast lengths for them.
+"""Quantiles of the normal distribution, spectra by Welch's method, and fast lengths for them.
 
 Source: Welch, IEEE Trans. Audio Electroacoust. 15, 1967. The same as scipy.signal.welch and csd, whose import
-takes longer than a diagnosis that finds nothing wrong.
-
-scipy.fft has the same function, but imports for 0.15 s at every start; numpy.fft transforms alike.
+takes longer than a diagnosis that finds nothing wrong. scipy.fft has the lengths, but imports for 0.15 s at
+every start; numpy.fft transforms alike.
 """
 
 from __future__ import annotations
@@ -11,6 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.records.record import ComplexArray, FloatArray
+
+Z95 = 1.959964
+"""Standard deviations from the middle of a 95 % interval to its end."""
+Z90 = 1.6449
+"""The same of a 90 % interval."""
+MAD_TO_SD = 1.4826
+"""Standard deviation of normal values over their median absolute deviation."""
 
 
 def segment_spectra(values: FloatArray, length: int) -> ComplexArray:
