@@ -102,10 +102,7 @@ def check_record(
 
 def _no_targets(record: Record) -> Finding:
     return Finding(
-        "red",
-        "topics",
-        "reference",
-        expected="the target positions that drove the run",
+        "red", "topics", "reference", expected="the target positions that drove the run",
         detail=f"only {', '.join(record.channels)}",
         remedy="record the targets, or name their topic with --topic desired_position=…",
     )
@@ -126,11 +123,7 @@ def _topics(record: Record, rig: Rig) -> list[Finding]:
         return [Finding("green", "topics", "", float(len(record.channels)), "1", detail=have)]
     return [
         Finding(
-            "red",
-            "topics",
-            "command",
-            expected="the torques that drove the run",
-            detail=f"only {have}",
+            "red", "topics", "command", expected="the torques that drove the run", detail=f"only {have}",
             remedy="record the commands, or name their topic with --topic",
         )
     ]
@@ -141,11 +134,7 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
     if is_full_of_gaps(checked.record):
         return [
             Finding(
-                "red",
-                "gaps",
-                "",
-                expected="a record without long gaps",
-                detail="it is mostly gaps",
+                "red", "gaps", "", expected="a record without long gaps", detail="it is mostly gaps",
                 remedy="cut it with --from and --to",
             )
         ]
@@ -275,14 +264,8 @@ def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) ->
     turned = "-" if float(np.sum(alive[best].weight * alive[best].value.real)) < 0.0 else ""
     return [
         Finding(
-            "amber",
-            "sign",
-            "ft",
-            alive[best].related,
-            "1",
-            expected="the actuator's axis",
-            detail=f"{best} follows the command",
-            remedy=f"--axis {turned}{best}",
+            "amber", "sign", "ft", alive[best].related, "1", expected="the actuator's axis",
+            detail=f"{best} follows the command", remedy=f"--axis {turned}{best}",
         )
     ]
 

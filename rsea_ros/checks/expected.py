@@ -240,12 +240,7 @@ def lag_findings(lags: Mapping[str, float], channels: int) -> list[Finding]:
     against = "all that was measured" if all_of_them else "the command"
     return [
         Finding(
-            "red",
-            "clock_offset",
-            name,
-            late,
-            "s",
-            expected="0",
+            "red", "clock_offset", name, late, "s", expected="0",
             detail=f"stamped {abs(late):.3g} s {'late' if late > 0.0 else 'early'} against {against}",
             remedy=f"stamp all by one clock, or move these stamps with --shift {name}={-late:.4g}",
         )
@@ -319,9 +314,7 @@ def open_findings(lags: Mapping[str, float | None], record: Record) -> list[Find
     """Return a finding for each slow channel whose clock these data leave open."""
     return [
         Finding(
-            "green",
-            "clock_offset",
-            n,
+            "green", "clock_offset", n,
             detail=f"not determined: {len(record[n])} samples at {record[n].rate:.3g} Hz do not show it",
             remedy="record it faster",
         )

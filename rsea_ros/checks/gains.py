@@ -273,13 +273,8 @@ def strangers(quotients: Sequence[Quotient]) -> list[Finding]:
     return [
         Finding(
             "red" if max(q.measured / q.predicted, q.predicted / q.measured) > _APART else "amber",
-            "wrong_rig",
-            q.channel,
-            q.measured / q.predicted,
-            "1",
-            expected="about 1",
-            detail="times what the rig would give, and hardly anything in common with it",
-            remedy=RIGHT_RIG,
+            "wrong_rig", q.channel, q.measured / q.predicted, "1", expected="about 1",
+            detail="times what the rig would give, and hardly anything in common with it", remedy=RIGHT_RIG,
         )
         for q in quotients
     ]
@@ -290,13 +285,7 @@ def _of_channel(r: ChannelCorrection, axis: str) -> list[Finding]:
     if r.sign < 0.0:
         findings.append(
             Finding(
-                "red",
-                "sign",
-                r.channel,
-                -1.0,
-                "1",
-                expected="1",
-                detail="turned against the rig",
+                "red", "sign", r.channel, -1.0, "1", expected="1", detail="turned against the rig",
                 remedy=_turn(r.channel, axis),
             )
         )
@@ -305,12 +294,8 @@ def _of_channel(r: ChannelCorrection, axis: str) -> list[Finding]:
     if r.odd or not findings:
         findings.append(
             Finding(
-                "red" if r.odd else "green",
-                "wrong_rig" if r.odd else "scale",
-                r.channel,
-                math.exp(r.gain),
-                "1",
-                expected="about 1",
+                "red" if r.odd else "green", "wrong_rig" if r.odd else "scale", r.channel, math.exp(r.gain),
+                "1", expected="about 1",
                 detail=f"times what the rig would give{', which fits no unit' if r.odd else ''}",
                 remedy=RIGHT_RIG if r.odd else "",
             )
@@ -328,13 +313,7 @@ def _scale_finding(r: ChannelCorrection, factor: Factor) -> Finding:
         value, detail = measured, f"times SI; {meanings} would be {factor.value:.3g}: no unit explains it all"
         remedy = f"`scale: {1.0 / measured:.3g}` for {r.channel} in the import map, if it is {_BY_A_CONSTANT}"
     return Finding(
-        "red",
-        "scale",
-        r.channel,
-        value,
-        "1",
-        expected="1, SI at the gear output",
-        detail=detail,
+        "red", "scale", r.channel, value, "1", expected="1, SI at the gear output", detail=detail,
         remedy=remedy,
     )
 
@@ -363,14 +342,8 @@ def _of_rig(shape: FittedShape, rig: Rig) -> list[Finding]:
             light: Light = "red" if times > _FAR and not soft else "amber"
             findings.append(
                 Finding(
-                    light,
-                    "wrong_rig",
-                    name,
-                    value,
-                    rig.unit(name),
-                    expected=f"{rig[name]:.4g}",
-                    detail=f"{factor:.2g} times the rig's value",
-                    remedy=RIGHT_RIG,
+                    light, "wrong_rig", name, value, rig.unit(name), expected=f"{rig[name]:.4g}",
+                    detail=f"{factor:.2g} times the rig's value", remedy=RIGHT_RIG,
                 )
             )
     for name, error in shape.error.items():
@@ -380,14 +353,8 @@ def _of_rig(shape: FittedShape, rig: Rig) -> list[Finding]:
             far = error > _FOREIGN and not rig.rigid_spring
             findings.append(
                 Finding(
-                    "red" if far else "amber",
-                    "wrong_rig",
-                    name,
-                    math.exp(error),
-                    "1",
-                    expected="about 1",
-                    detail="off: its response has another shape than the rig's",
-                    remedy=RIGHT_RIG,
+                    "red" if far else "amber", "wrong_rig", name, math.exp(error), "1", expected="about 1",
+                    detail="off: its response has another shape than the rig's", remedy=RIGHT_RIG,
                 )
             )
     if not findings:

@@ -334,8 +334,6 @@ def _linear(
     return LinearisedFit(
         offset={c: Number(float(state.offset[k]), float(late[k])) for k, c in enumerate(setting.timed)},
         drift={c: Number(float(state.drift[k]), float(grows[k])) for k, c in enumerate(setting.timed)},
-        misfit=dict(zip(setting.timed, rows.left.misfit.tolist(), strict=True)),
-        settled=settled,
-        problem=rows.left.problem,
-        theta=state.theta,
+        misfit=dict(zip(setting.timed, rows.left.misfit.tolist(), strict=True)), settled=settled,
+        problem=rows.left.problem, theta=state.theta,
     )

@@ -106,16 +106,11 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
     return Quotient(
         channel=channel,
         frequency=np.add.reduceat(np.arange(len(cross)) + _FIRST, bands) / width / (length * period),
-        value=s_yp / s_pp,
-        coherence=coherence,
+        value=s_yp / s_pp, coherence=coherence,
         sd=np.sqrt(np.maximum(1.0 - coherence, 1e-6) / (2.0 * np.maximum(coherence, 1e-9) * averages)),
-        weight=np.add.reduceat(share, bands),
-        segments=segments,
-        lines=1.0 / float(np.sum(share**2)),
-        related=float(np.sum(share * np.abs(cross) ** 2 / (power_y * power_p))),
-        measured=float(np.std(y)),
-        predicted=float(np.std(p)),
-        captured=_captured_share(pp, p),
+        weight=np.add.reduceat(share, bands), segments=segments, lines=1.0 / float(np.sum(share**2)),
+        related=float(np.sum(share * np.abs(cross) ** 2 / (power_y * power_p))), measured=float(np.std(y)),
+        predicted=float(np.std(p)), captured=_captured_share(pp, p),
     )
 
 

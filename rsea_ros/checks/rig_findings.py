@@ -82,15 +82,8 @@ def _offset(name: str, offset: Number, linear: LinearisedFit) -> Finding:
             light, detail = "amber", f"{1e6 * apart:.4g} µs later than {best}, {_RELATIVE}"
     remedy = "stamp both at acquisition by one clock" if light == "amber" else ""
     return Finding(
-        light,
-        "clock_offset",
-        name,
-        1e6 * offset.value,
-        "µs",
-        1e6 * low,
-        1e6 * high,
-        expected=f"within {1e6 * _ALLOWED:.0f} µs of the others",
-        detail=detail + _beside(linear, name),
+        light, "clock_offset", name, 1e6 * offset.value, "µs", 1e6 * low, 1e6 * high,
+        expected=f"within {1e6 * _ALLOWED:.0f} µs of the others", detail=detail + _beside(linear, name),
         remedy=remedy,
     )
 
@@ -107,13 +100,7 @@ def drift_finding(light: Light, name: str, drift: Number, duration: float, besid
     """Return the finding of a drift (s/s). duration: of the record, s. beside: what else it may be."""
     low, high = drift.ci95
     return Finding(
-        light,
-        "clock_drift",
-        name,
-        1e6 * drift.value,
-        "ppm",
-        1e6 * low,
-        1e6 * high,
+        light, "clock_drift", name, 1e6 * drift.value, "ppm", 1e6 * low, 1e6 * high,
         expected=f"within {1e6 * _ALLOWED / duration:.3g} ppm",
         detail="; ".join(filter(None, ("of its clock against the command's", beside))),
         remedy="discipline the clocks (PTP, chrony), or stamp by one" if light == "amber" else "",
@@ -160,11 +147,8 @@ def value_findings(linear: LinearisedFit, rig: Rig) -> list[Finding]:
 def _identifiability(p: ParameterEstimate) -> Finding:
     amber = p.determined == "no"
     return Finding(
-        "amber" if amber else "green",
-        "identifiability",
-        p.name,
-        50.0 * (p.ci95[1] - p.ci95[0]) / Z95 / (abs(p.value) or 1.0),
-        "%",
+        "amber" if amber else "green", "identifiability", p.name,
+        50.0 * (p.ci95[1] - p.ci95[0]) / Z95 / (abs(p.value) or 1.0), "%",
         expected="below the rig's spread",
         detail="one sigma, only with what the rig states" if amber else "one sigma that these data leave",
         remedy="measure it separately, or excite it more" if amber else "",
@@ -174,16 +158,9 @@ def _identifiability(p: ParameterEstimate) -> Finding:
 def _far(remark: Remark, rig: Rig) -> Finding:
     (name,), (stated, value, low, high, spreads) = remark.names, remark.values
     return Finding(
-        "amber",
-        "rig_value",
-        name,
-        value,
-        remark.unit,
-        low,
-        high,
+        "amber", "rig_value", name, value, remark.unit, low, high,
         expected=f"{stated:.4g}, to {100.0 * FAR * rig.spread(name):.3g} %",
-        detail=f"fitted, {spreads:.2g} of the rig's stated spreads away",
-        remedy=RIGHT_RIG,
+        detail=f"fitted, {spreads:.2g} of the rig's stated spreads away", remedy=RIGHT_RIG,
     )
 
 
@@ -300,13 +277,7 @@ def impedance_findings(side: Side | None, rig: Rig) -> list[Finding]:
 
 def _another(key: str, value: float, unit: str, expected: float, detail: str) -> Finding:
     return Finding(
-        "red",
-        "wrong_rig",
-        f"spring_end.{key}",
-        value,
-        unit,
-        expected=f"{expected:.3g}",
-        detail=detail,
+        "red", "wrong_rig", f"spring_end.{key}", value, unit, expected=f"{expected:.3g}", detail=detail,
         remedy=RIGHT_RIG,
     )
 
@@ -336,12 +307,8 @@ def _fit(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> Impedance
     stiffness_sd, inertia_sd = np.linalg.norm(inverse, axis=1) / size
     misfit = np.abs(z.real - rows @ [stiffness, inertia]) / np.abs(z)
     return ImpedanceFit(
-        stiffness=float(stiffness),
-        stiffness_sd=float(stiffness_sd),
-        inertia=float(inertia),
-        inertia_sd=float(inertia_sd),
-        left=float(np.median(misfit)),
-        lowest=float(w[0]) / (2.0 * math.pi),
+        stiffness=float(stiffness), stiffness_sd=float(stiffness_sd), inertia=float(inertia),
+        inertia_sd=float(inertia_sd), left=float(np.median(misfit)), lowest=float(w[0]) / (2.0 * math.pi),
     )
 
 
@@ -366,11 +333,7 @@ def restoring_findings(record: Record, rig: Rig) -> list[Finding]:
         return []
     return [
         Finding(
-            "red",
-            "wrong_rig",
-            "spring_end.stiffness",
-            100.0 * (1.0 - (held / without) ** 2),
-            "%",
+            "red", "wrong_rig", "spring_end.stiffness", 100.0 * (1.0 - (held / without) ** 2), "%",
             expected="0",
             detail="of the torque that the rig leaves open follows the position: a spring or a pendulum",
             remedy=RIGHT_RIG,

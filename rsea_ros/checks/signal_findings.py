@@ -49,14 +49,8 @@ def excitation(record: Record, rig: Rig) -> list[Finding]:
     if float(np.ptp(command.y)) == 0.0:
         return [
             Finding(
-                "red",
-                "excitation",
-                "command",
-                float(command.y[0]),
-                "N m",
-                expected="a command that changes",
-                detail="the command never changes",
-                remedy=_EXCITE,
+                "red", "excitation", "command", float(command.y[0]), "N m",
+                expected="a command that changes", detail="the command never changes", remedy=_EXCITE,
             )
         ]
     low, high = band(record)
@@ -65,14 +59,8 @@ def excitation(record: Record, rig: Rig) -> list[Finding]:
     natural = natural_frequency(rig)
     if natural is not None and high < 0.5 * natural:
         first = Finding(
-            "amber",
-            "excitation",
-            "command",
-            rms,
-            "N m",
-            expected=f"a band beyond {natural:.3g} Hz",
-            detail=detail,
-            remedy="excite up to twice the rig's natural frequency",
+            "amber", "excitation", "command", rms, "N m", expected=f"a band beyond {natural:.3g} Hz",
+            detail=detail, remedy="excite up to twice the rig's natural frequency",
         )
     else:
         first = Finding("green", "excitation", "command", rms, "N m", detail=detail)
@@ -84,13 +72,8 @@ def _rest(share: float) -> list[Finding]:
         return []
     return [
         Finding(
-            "amber" if share > _MOSTLY else "green",
-            "rest",
-            "",
-            100.0 * share,
-            "%",
-            expected=f"less than {100.0 * _MOSTLY:.0f} %",
-            detail="of the record is at rest",
+            "amber" if share > _MOSTLY else "green", "rest", "", 100.0 * share, "%",
+            expected=f"less than {100.0 * _MOSTLY:.0f} %", detail="of the record is at rest",
             remedy="cut it with --from and --to" if share > _MOSTLY else "",
         )
     ]
@@ -121,13 +104,8 @@ def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]
         unit = UNITS[name]
         findings.append(
             Finding(
-                "amber" if loud else "green",
-                "noise",
-                name,
-                noise,
-                unit,
-                expected=f"about {stated:.3g}" if stated else "",
-                detail=_times(noise, stated),
+                "amber" if loud else "green", "noise", name, noise, unit,
+                expected=f"about {stated:.3g}" if stated else "", detail=_times(noise, stated),
                 remedy="look at cable and filter, or state this noise in the rig" if loud else "",
             )
         )
@@ -161,11 +139,7 @@ def offset_findings(record: Record, compared: Mapping[str, Side]) -> list[Findin
         return []
     return [
         Finding(
-            "red" if abs(offset) > _FAR * largest else "amber",
-            "offset",
-            "ft",
-            offset,
-            "N m",
+            "red" if abs(offset) > _FAR * largest else "amber", "offset", "ft", offset, "N m",
             expected=f"less than {largest:.3g}, the largest torque of the run",
             detail=f"{abs(offset) / largest:.2g} times that torque at all times",
             remedy="set the sensor's zero, look at its mount, or give the constant in the import map",
@@ -183,11 +157,7 @@ def angle_offset_findings(rig: Rig, compared: Mapping[str, Side]) -> list[Findin
         return []
     return [
         Finding(
-            "red",
-            "offset",
-            "position",
-            middle - rest,
-            "rad",
+            "red", "offset", "position", middle - rest, "rad",
             expected=f"motion about {rest:.3g}, where the rig rests",
             detail=f"all of the motion is about {middle:.4g} rad; fits compare its changes alone",
             remedy="`zero_unknown: true` for position in the rig, or give the constant in the import map",
@@ -226,12 +196,7 @@ def standstill_findings(record: Record) -> list[Finding]:
         return []
     return [
         Finding(
-            "amber",
-            "standstill",
-            "",
-            length,
-            "s",
-            expected="motion while the command changes",
+            "amber", "standstill", "", length, "s", expected="motion while the command changes",
             detail=f"from {t[first]:.4g} s to {t[last]:.4g} s nothing moves while the command goes on",
             remedy="was the motor on, the command above the friction? If not, cut the record there",
         )
@@ -344,12 +309,7 @@ def _finding(name: str, number: int, centred: bool, period: float) -> Finding:
     of = "a centred moving average" if centred else "a moving average"
     takes = "spring and damping that are not the machine's" if centred else "its lag for the machine's"
     return Finding(
-        "amber",
-        "smoothing",
-        name,
-        1e3 * number * period,
-        "ms",
-        expected="none",
+        "amber", "smoothing", name, 1e3 * number * period, "ms", expected="none",
         detail=f"looks like {of} of {number} samples",
         remedy=f"log the sensor unfiltered: a fit takes {takes}",
     )

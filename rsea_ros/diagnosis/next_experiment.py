@@ -66,20 +66,14 @@ def playable_rate(rate: float) -> float:
 
 
 def allowed_run(
-    rig: Rig,
-    like: Case,
-    kind: str,
-    settings: ExcitationSettings,
-    peak: float,
-    limits: DriverLimits | None = None,
+    rig: Rig, like: Case, kind: str, settings: ExcitationSettings, peak: float
 ) -> AllowedRun | None:
     """Return a run of at most a peak that stays within the limits in simulation; None where none does.
 
     like: the case of the present run, whose travel is the largest where nothing else bounds it. settings:
     amplitude and noise count by their ratio.
     """
-    limits = limits or DriverLimits()
-    bounds = _bounds(rig, like, limits)
+    bounds = _bounds(rig, like, DriverLimits())
     for _ in range(_TRIES):
         try:
             scaled, command = _scale(kind, settings, peak)
@@ -141,10 +135,7 @@ def _simulate(
     shown = {n: outputs[n] for n in like.measured}
     case = Case(
         replace(drive, at={n: drive.at[n] for n in shown}, impulse={n: drive.impulse[n] for n in shown}),
-        {n: blank[n].t for n in shown},
-        shown,
-        like.noise,
-        {n: np.ones(len(t), bool) for n in shown},
+        {n: blank[n].t for n in shown}, shown, like.noise, {n: np.ones(len(t), bool) for n in shown},
     )
     return case, outputs
 

@@ -34,7 +34,6 @@ from rsea_ros.identification.problem import Case, Problem, case_from
 from rsea_ros.identification.solver import Map, Solution, power, serial, solve
 from rsea_ros.identification.unknowns import Unknown, idle, unknowns_of_effect
 from rsea_ros.model.rig import EffectSetting, Rig
-from rsea_ros.progress import Progress
 from rsea_ros.records.record import MEASURED, BoolArray, FloatArray, Record
 
 _SIZES = 1.0
@@ -332,11 +331,11 @@ SHORTEST = 4.2
 
 
 def diagnose_together(
-    records: Sequence[Record], rig: Rig, causes: Sequence[str], tell: Progress | None = None
+    records: Sequence[Record], rig: Rig, causes: Sequence[str]
 ) -> Diagnosis:
     """Return the diagnosis of all records together, which weighs causes by held-out data."""
     others = tuple(name for name in catalogue() if name not in causes)
-    return diagnose(list(records), rig, None, tell, DiagnosisSettings(without=others))
+    return diagnose(list(records), rig, settings=DiagnosisSettings(without=others))
 
 
 USUAL = (

@@ -217,14 +217,10 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
     sd = np.sqrt(np.diag(confidence.covariance))
     return tuple(
         ParameterEstimate(
-            name=u.name,
-            value=u.outer(float(theta)),
+            name=u.name, value=u.outer(float(theta)),
             unit=in_motion(u.unit, linear=solution.problem.rig.linear),
-            ci95=interval(u, float(theta), float(s)),
-            start=u.start,
-            spread=u.spread,
-            told_by_data=float(share),
-            spreads_off=u.sigmas(float(theta)),
+            ci95=interval(u, float(theta), float(s)), start=u.start, spread=u.spread,
+            told_by_data=float(share), spreads_off=u.sigmas(float(theta)),
         )
         for u, theta, s, share in zip(
             solution.problem.unknowns, solution.theta, sd, confidence.data_share, strict=True

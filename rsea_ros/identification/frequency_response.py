@@ -34,7 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.fft import irfft, rfft
@@ -99,10 +99,8 @@ def welch(aligned: Aligned) -> Lines:
     s_yy = np.sum(np.abs(y) ** 2, axis=0) + _TINY
     keep = slice(_FIRST_LINE, None)
     return Lines(
-        method="Welch",
-        frequency=(np.arange(u.shape[1]) / (length * aligned.period))[keep],
-        response=response[keep],
-        sd=widen(spread, effective - 1.0)[keep],
+        method="Welch", frequency=(np.arange(u.shape[1]) / (length * aligned.period))[keep],
+        response=response[keep], sd=widen(spread, effective - 1.0)[keep],
         coherence=np.minimum(np.abs(response) ** 2 * s_uu / s_yy, 1.0)[keep],
         noise=(np.sqrt(2.0 * residual / np.sum(_window(length) ** 2) / length))[keep],
     )
@@ -318,12 +316,10 @@ def multisine(aligned: Aligned, periods: Periods) -> Lines:
     freedom = (count - 1) * (1.0 + odd / (variance[excited] / count + 1e-300))
     power = np.abs(mean_y[excited]) ** 2
     return Lines(
-        method="multisine",
-        frequency=excited / (periods.length * aligned.period),
+        method="multisine", frequency=excited / (periods.length * aligned.period),
         response=mean_y[excited] / mean_u[excited],
         sd=widen(spread, np.minimum(freedom, count - 1 + _SMOOTHED)),
-        coherence=power / (power + variance[excited] + 1e-300),
-        noise=levels.noise * np.sqrt(count),
+        coherence=power / (power + variance[excited] + 1e-300), noise=levels.noise * np.sqrt(count),
         distortion=levels.total,
     )
 
@@ -372,18 +368,6 @@ HIGHEST = 0.45
 """Of the sample rate: above it an image is as large as the response itself."""
 
 
-def estimate_response(record: Record, output: str, input: str = "command") -> FrequencyResponse:
-    """Return output per input. An input that is itself measured counts through the command, which no sensor
-    noise reaches: (output / command) / (input / command).
-
-    Raises ChannelError for a missing channel and IdentificationError for one too short.
-    """
-    response = _per_command(record, output)
-    if input == "command":
-        return response
-    return _ratio(response, _per_command(record, input))
-
-
 def sampled_lines(aligned: Aligned) -> Lines:
     """Return the sampled response by the method that the command allows."""
     periods = find_periods(aligned.command)
@@ -392,33 +376,18 @@ def sampled_lines(aligned: Aligned) -> Lines:
     return welch(aligned) if suits(aligned) else local_polynomial(aligned)
 
 
-def _per_command(record: Record, output: str) -> FrequencyResponse:
+def estimate_response(record: Record, output: str) -> FrequencyResponse:
+    """Return output per command.
+
+    Raises ChannelError for a missing channel and IdentificationError for one too short.
+    """
     aligned = align(record, output)
     lines = sampled_lines(aligned).up_to(HIGHEST * min(1.0 / aligned.period, aligned.rate))
     response, sd = unfold(aligned, lines.frequency, lines.response, lines.sd)
     return FrequencyResponse(
-        input="command",
-        output=output,
-        frequency=lines.frequency,
-        response=response,
-        coherence=lines.coherence,
-        sd=sd,
-        method=lines.method,
-        noise=lines.noise,
+        input="command", output=output, frequency=lines.frequency, response=response,
+        coherence=lines.coherence, sd=sd, method=lines.method, noise=lines.noise,
         distortion=lines.distortion,
-    )
-
-
-def _ratio(output: FrequencyResponse, input: FrequencyResponse) -> FrequencyResponse:
-    """Return the quotient of two responses to the same command, on the lines of the first."""
-    below, below_sd, below_coherence = (
-        np.interp(output.frequency, input.frequency, v) for v in (input.response, input.sd, input.coherence)
-    )
-    response = output.response / below
-    relative = np.hypot(output.sd / np.abs(output.response), below_sd / np.abs(below))
-    coherence = np.minimum(output.coherence, below_coherence)
-    return replace(
-        output, input=input.output, response=response, sd=np.abs(response) * relative, coherence=coherence
     )
 
 

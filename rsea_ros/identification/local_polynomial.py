@@ -75,15 +75,10 @@ def align(record: Record, name: str) -> Aligned:
         )
     index = np.arange(first, last + 1, dtype=np.float64)
     return Aligned(
-        name=name,
-        start=start + first * period,
-        period=period,
+        name=name, start=start + first * period, period=period,
         command=held_mean(command, start + period * np.append(index, last + 1.0)),
-        output=_at(place, channel.y, index + offset),
-        delay=offset * period,
-        measured=_outside_gaps(place - offset, index),
-        offsets=_offsets(place - offset) + offset,
-        held=held,
+        output=_at(place, channel.y, index + offset), delay=offset * period,
+        measured=_outside_gaps(place - offset, index), offsets=_offsets(place - offset) + offset, held=held,
         rate=channel.rate,
     )
 
@@ -183,12 +178,8 @@ class Lines:
         """Return the lines up to a frequency, Hz."""
         n = int(np.searchsorted(self.frequency, highest, side="right"))
         return Lines(
-            method=self.method,
-            frequency=self.frequency[:n],
-            response=self.response[:n],
-            sd=self.sd[:n],
-            coherence=self.coherence[:n],
-            noise=None if self.noise is None else self.noise[:n],
+            method=self.method, frequency=self.frequency[:n], response=self.response[:n], sd=self.sd[:n],
+            coherence=self.coherence[:n], noise=None if self.noise is None else self.noise[:n],
             distortion=None if self.distortion is None else self.distortion[:n],
         )
 
@@ -237,10 +228,8 @@ def local_polynomial(aligned: Aligned) -> Lines:
     signal = np.abs(response) ** 2 * power
     return Lines(
         method="local polynomial",
-        frequency=np.array([centre for centre, _ in bands]) / (n * aligned.period),
-        response=response,
-        sd=widen(np.sqrt(variance), freedom),
-        coherence=signal / (signal + noise + 1e-300),
+        frequency=np.array([centre for centre, _ in bands]) / (n * aligned.period), response=response,
+        sd=widen(np.sqrt(variance), freedom), coherence=signal / (signal + noise + 1e-300),
         noise=np.sqrt(2.0 * noise / n),
     )
 

@@ -63,10 +63,8 @@ def statics_of(record: Record, rig: Rig) -> Statics | None:
     if not np.isfinite(stiffness) or not (forward.any() and backward.any()):
         return None
     return Statics(
-        torque=end,
-        travel=float(np.median(angle[forward]) - np.median(angle[backward])),
-        stiffness=stiffness,
-        lost_motion=_lost_motion(command, angle, end),
+        torque=end, travel=float(np.median(angle[forward]) - np.median(angle[backward])),
+        stiffness=stiffness, lost_motion=_lost_motion(command, angle, end),
         limit=reached if reached < SATURATED * end else None,
     )
 

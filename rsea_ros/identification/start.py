@@ -66,12 +66,8 @@ def _choose_lines(response: FrequencyResponse) -> FrequencyResponse:
         wanted = np.geomspace(response.frequency[good[0]], response.frequency[good[-1]], _LINES)
         good = good[np.unique(np.searchsorted(response.frequency[good], wanted).clip(0, len(good) - 1))]
     return FrequencyResponse(
-        input=response.input,
-        output=response.output,
-        frequency=response.frequency[good],
-        response=response.response[good],
-        coherence=response.coherence[good],
-        sd=response.sd[good],
+        input=response.input, output=response.output, frequency=response.frequency[good],
+        response=response.response[good], coherence=response.coherence[good], sd=response.sd[good],
         method=response.method,
     )
 

@@ -132,12 +132,9 @@ def with_injection(machine: Machine, torque: FloatArray, port: Port, kind: float
     first[port + 1 :] += 1
     series = np.concatenate([[kind], torque, torque[-1:]])
     changed = Calls(
-        first=first,
-        address=np.insert(calls.address, at, _inject.address),
-        p_at=np.insert(calls.p_at, at, len(calls.p)),
-        x_at=np.insert(calls.x_at, at, 0),
-        p=np.concatenate([calls.p, series]),
-        nonlinear=calls.nonlinear or port in (Port.GEAR, Port.SPRING),
+        first=first, address=np.insert(calls.address, at, _inject.address),
+        p_at=np.insert(calls.p_at, at, len(calls.p)), x_at=np.insert(calls.x_at, at, 0),
+        p=np.concatenate([calls.p, series]), nonlinear=calls.nonlinear or port in (Port.GEAR, Port.SPRING),
     )
     return replace(machine, calls=changed)
 

@@ -99,10 +99,7 @@ class Law:
         """Return the law with fitted parameters and their intervals, by name."""
         parts = tuple(
             replace(
-                part,
-                coefficient=values[c],
-                shape=values[s] if s else 0.0,
-                ci95=ci95.get(c),
+                part, coefficient=values[c], shape=values[s] if s else 0.0, ci95=ci95.get(c),
                 shape_ci95=ci95.get(s),
             )
             for part, (c, s) in zip(self.parts, self.names, strict=True)

@@ -168,12 +168,8 @@ def curve_of(
     used = [c.part[2] for k in columns if (c := candidates[k - first]).part]
     curve = LearntCurve(spline.over, spline.factor, x, beta @ basis_of(x, knots)[used])
     law = Law(
-        _name_with_place(f"learnt_law_of_{_slug(dependence.regressor)}", place),
-        place,
-        dependence.regressor,
-        (),
-        {},
-        curve,
+        _name_with_place(f"learnt_law_of_{_slug(dependence.regressor)}", place), place,
+        dependence.regressor, (), {}, curve,
     )
     return replace(law, ranges=ranges_of(law, _all_letters(cases)))
 

@@ -113,9 +113,9 @@ class Gram:
             out[at] = self.loss(columns, self.fit(columns, inside, ridge))[at]
         return out
 
-    def squares_left(self, columns: IntArray, ridge: float = _GRAM_RIDGE) -> FloatArray:
+    def squares_left(self, columns: IntArray) -> FloatArray:
         """Return the squares left by a fit on all but the test blocks, (groups, channels)."""
-        return self.loss(columns, self.fit(columns, groups_of([s for f in FOLDS for s in f]), ridge))
+        return self.loss(columns, self.fit(columns, SELECTION))
 
 
 def groups_of(sets: Sequence[int]) -> IntArray:

@@ -317,12 +317,7 @@ def rows_of(problem: Problem, theta: FloatArray) -> ResidualRows:
     names = tuple(dict.fromkeys(n for _, n in masks))
     which = np.concatenate([np.full(k, names.index(n)) for k, (_, n) in zip(sizes, masks, strict=True)])
     return ResidualRows(
-        residual=-residual,
-        nominal=jacobian(problem, theta, residual),
-        prior=np.array([1.0 / u.reach for u in problem.unknowns]),
-        group=np.concatenate(groups),
-        channel=which,
-        channels=names,
-        masks=masks,
-        problem=problem,
+        residual=-residual, nominal=jacobian(problem, theta, residual),
+        prior=np.array([1.0 / u.reach for u in problem.unknowns]), group=np.concatenate(groups),
+        channel=which, channels=names, masks=masks, problem=problem,
     )

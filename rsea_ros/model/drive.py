@@ -339,17 +339,12 @@ def drive_from(
     beside = {n: beside_mean(knots, torque, held, a) if jumps else np.zeros(len(a)) for n, a in at.items()}
     ends = np.asarray(start + step * np.arange(1, count + 1), np.float64)
     return Drive(
-        step=step,
-        start=start,
-        command=held,
-        at=MappingProxyType(at),
+        step=step, start=start, command=held, at=MappingProxyType(at),
         impulse=MappingProxyType({n: step * b for n, b in beside.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
         angle=angle_at(record, ends),
         initial=(0.0, 0.0) if from_rest else first_state(record) if targeted else initial_state(record),
-        hold=steps,
-        jumps=jumps,
-        restarts=restarts(record, start, step, from_rest=from_rest),
+        hold=steps, jumps=jumps, restarts=restarts(record, start, step, from_rest=from_rest),
     )
 
 
@@ -371,14 +366,10 @@ def coarser(drive: Drive) -> Drive:
         return np.asarray(drive.step * (np.interp(inside, ends, brought) - pairwise))
 
     return replace(
-        drive,
-        step=2.0 * drive.step,
-        command=pairs.mean(axis=1),
+        drive, step=2.0 * drive.step, command=pairs.mean(axis=1),
         at={n: at / 2.0 for n, at in drive.at.items()},
         impulse={n: i + beside(drive.at[n]) for n, i in drive.impulse.items()},
-        reference=drive.reference[:steps:2],
-        angle=drive.angle[1:steps:2],
-        hold=drive.hold // 2,
+        reference=drive.reference[:steps:2], angle=drive.angle[1:steps:2], hold=drive.hold // 2,
         restarts=tuple((k // 2, state) for k, state in drive.restarts),
         spans=tuple((first // 2, end // 2) for first, end in drive.spans),
     )

@@ -112,10 +112,7 @@ def mechanics(rig: Rig, *, linear_gravity: bool = True) -> Mechanics:
             f"rig {rig.name}: the mass matrix is singular, expected an inertia on every part that can move"
         )
     return Mechanics(
-        mass=mass,
-        damping=damping,
-        stiffness=stiffness,
-        ports=PORT_DIRECTIONS @ placement,
+        mass=mass, damping=damping, stiffness=stiffness, ports=PORT_DIRECTIONS @ placement,
         placement=placement,
     )
 

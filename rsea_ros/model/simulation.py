@@ -122,12 +122,10 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
 def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
     """Return the drive of a rig from a record. Raises ChannelError where its commands are missing."""
     return drive_from(
-        with_command(record, rig),
-        refine=refine,
+        with_command(record, rig), refine=refine,
         closed_loop=rig.loop is None and rig.controller is not None and "reference" in record,
         from_rest="position" in record and zero_unknown(record, rig, "position"),
-        targeted=rig.loop is not None,
-        hold=rig.hold,
+        targeted=rig.loop is not None, hold=rig.hold,
     )
 
 

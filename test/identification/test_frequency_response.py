@@ -123,17 +123,6 @@ def test_a_sensor_faster_than_the_command_leaves_no_bias() -> None:
     assert phase < 1.0
 
 
-def test_torque_over_position_is_that_of_spring_and_damper() -> None:
-    rig = load_rig("paper_high_impedance")
-    response = estimate_response(
-        synthesize(rig, command_of("chirp", 160.0), noise=False), "ft", input="position"
-    )
-    wanted = rig["spring.stiffness"] + 2j * np.pi * response.frequency * rig["spring.damping"]
-    inside = (response.frequency > 1.0) & (response.frequency < 100.0)
-    assert response.input == "position"
-    assert float(np.max(np.abs(response.response / wanted - 1.0)[inside])) < 0.01
-
-
 def test_motor_torque_follows_the_command() -> None:
     record = synthesize(load_rig("paper_high_impedance"), command_of("white_noise", 60.0), noise=False)
     response = estimate_response(record, "motor_torque")

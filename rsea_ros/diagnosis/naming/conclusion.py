@@ -66,14 +66,9 @@ def cause_of(
     return Cause(
         name=effect.name,
         parameters=sizes(effect.name, parameters_of(last.solution, last.confidence), rule),
-        gain_train=train,
-        gain_holdout=held_out,
-        gain_holdout_ci95=interval,
-        times_noise=(without.test.ratio(channel), with_it.test.ratio(channel)),
-        equation=effect.equation,
-        channel=channel,
-        status=named.status or "leading",
-        probability=named.probability,
+        gain_train=train, gain_holdout=held_out, gain_holdout_ci95=interval,
+        times_noise=(without.test.ratio(channel), with_it.test.ratio(channel)), equation=effect.equation,
+        channel=channel, status=named.status or "leading", probability=named.probability,
     )
 
 
@@ -94,12 +89,9 @@ def alternative_of(
     resamples = settings.acceptance.resamples
     held_out, interval = gain(claim.with_it, claim.without, evidence.channel, resamples)
     return Alternative(
-        name=claim.name,
-        instead_of=instead_of,
+        name=claim.name, instead_of=instead_of,
         parameters=sizes(claim.name, parameters_of(solution, confidence), settings.sizes),
-        gain_holdout=held_out,
-        gain_holdout_ci95=interval,
-        channel=evidence.channel,
+        gain_holdout=held_out, gain_holdout_ci95=interval, channel=evidence.channel,
         probability=probability,
     )
 

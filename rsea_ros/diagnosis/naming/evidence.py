@@ -74,14 +74,11 @@ def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence)
     every = _sums(rows.block, cc, cr)
     total = max(float(cc.sum()), 1e-300)
     return Signature(
-        scale=1.0 + float(held_out[1].sum() / max(held_out[0].sum(), 1e-300)),
-        spread=_spread(*held_out),
-        overall=_spread(*every),
-        chance=_by_chance(rows, c, r),
+        scale=1.0 + float(held_out[1].sum() / max(held_out[0].sum(), 1e-300)), spread=_spread(*held_out),
+        overall=_spread(*every), chance=_by_chance(rows, c, r),
         amplitude=_spread(*_sums(_parts_by(np.abs(c), cc, rule.parts), cc, cr)),
         time=_spread(*_sums(_parts_by(rows.block.astype(float), cc, rule.parts), cc, cr)),
-        frequency=_over_frequency(rows, c, r, rule.bands),
-        share=total / max(float(r @ r), 1e-300),
+        frequency=_over_frequency(rows, c, r, rule.bands), share=total / max(float(r @ r), 1e-300),
         kept=total / max(float(rows.contribution @ rows.contribution), 1e-300),
         carried=_serial_correlation(*every),
     )
@@ -209,15 +206,11 @@ def evidence_for(
     )
     gained, (low, _) = gain(claim.with_it, claim.without, channel, settings.acceptance.resamples)
     return Evidence(
-        name=claim.name,
-        signature=signature(rows, settings.evidence),
-        flexible=flexible(problem, claim.theta, claim.name, rows, settings),
-        channel=channel,
-        gain=gained,
+        name=claim.name, signature=signature(rows, settings.evidence),
+        flexible=flexible(problem, claim.theta, claim.name, rows, settings), channel=channel, gain=gained,
         gain_low=low,
         is_sure=preference(claim.with_it, claim.without, parameters, settings.acceptance).sure,
-        weight=claim.weight,
-        before=claim.without.ratio(claim.without.worst),
+        weight=claim.weight, before=claim.without.ratio(claim.without.worst),
         left=weights.ratio(weights.worst),
         at_edge=is_at_edge(problem, claim.theta, claim.name, settings.acceptance.near_bound),
         siblings=len(problem.added) - 1,

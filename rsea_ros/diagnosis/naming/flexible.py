@@ -70,12 +70,9 @@ def rows_of(
     which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
     block, tests, runs = _blocks_of_rows(problem, settings.blocks)
     return ContributionRows(
-        contribution=contribution,
-        residual=-error,
+        contribution=contribution, residual=-error,
         others=jacobian_columns(problem, theta, error, which, run),
-        prior=np.array([1.0 / problem.unknowns[i].reach for i in which]),
-        block=block,
-        tests=tests,
+        prior=np.array([1.0 / problem.unknowns[i].reach for i in which]), block=block, tests=tests,
         runs=runs,
     )
 
