@@ -52,7 +52,7 @@ def check_diagnosable(record: Record) -> None:
             f"{record.source}: no measurement beside the command{reason}, expected one of ft, position and "
             "velocity, stamped by the command's clock"
         )
-    if all(_constant(c) for c in measured):
+    if all(c.is_still for c in measured):
         raise IdentificationError(
             f"{record.source}: every measured channel holds one value, expected motion: "
             "is the drive enabled, are the sensors alive?"
@@ -63,7 +63,7 @@ def check_diagnosable(record: Record) -> None:
 def require_motion(record: Record) -> None:
     """Raise IdentificationError for a record in which the command never changes and nothing moves."""
     command = record.driving
-    if command is None or not len(command) or not _constant(command) or not is_still(record):
+    if command is None or not len(command) or not command.is_still or not is_still(record):
         return
     unit = UNITS["command" if "command" in record else "reference"]
     raise IdentificationError(
@@ -77,11 +77,6 @@ def _rises_rarely(channel: Channel) -> bool:
     step = np.diff(channel.t)
     rising = np.count_nonzero(step > 0.0)
     return bool(rising < np.count_nonzero(step < 0.0) or rising < _FEWEST * len(channel))
-
-
-def _constant(channel: Channel) -> bool:
-    finite = channel.y[np.isfinite(channel.y)]
-    return not len(finite) or float(np.ptp(finite)) == 0.0
 
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",

@@ -79,7 +79,9 @@ class ForwardStep:
             overlooked = self.fits.find_overlooked(_others(screened, finalists))
             finalists += overlooked
             models += self.fits.fit_all(overlooked)
-        if self.fits.is_far and all(self._is_far(m) for m in self._acceptable(models)):
+        if self.fits.is_far and all(
+            is_far_from_floor(m, self.settings) for m in self._acceptable(models)
+        ):
             models += self.fits.on_measured_angle()
         contenders = self._acceptable(models) or self._pairs(finalists)
         chosen, equals = self._choose(contenders)
@@ -103,9 +105,6 @@ class ForwardStep:
 
     def _acceptable(self, models: Sequence[Candidate]) -> list[Candidate]:
         return [m for m in models if is_acceptable(m, self.current, self.settings)]
-
-    def _is_far(self, model: Candidate) -> bool:
-        return is_far_from_floor(model, self.settings)
 
     def _choose(self, models: Sequence[Candidate]) -> tuple[Candidate | None, tuple[Candidate, ...]]:
         """Return the model to accept and those that do as well."""

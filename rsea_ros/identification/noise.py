@@ -120,7 +120,7 @@ def noise_floor(record: Record, name: str, sensor: Sensor, rule: NoiseSettings =
     """
     t, y = _finite(record[name])
     least = least_noise(y, sensor, rule)
-    stated = math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0))
+    stated = sensor.level
     if len(y) < _FEWEST:
         return max(float(np.std(np.diff(y, 2))) / math.sqrt(6.0) if len(y) > 3 else 0.0, stated, least)
     if stated > 0.0 and record[name].rate < rule.slower * record["command"].rate:

@@ -137,6 +137,11 @@ class Sensor:
     clock_doubt: float = CLOCK_DOUBT
     clock_rate: float = 0.0
 
+    @property
+    def level(self) -> float:
+        """The RMS of noise and rounding together: the error of a rounded value is even over a quantum."""
+        return math.hypot(self.noise, self.quantum / math.sqrt(12.0))
+
 
 @dataclass(frozen=True)
 class EffectSetting:

@@ -83,7 +83,7 @@ def _sigma(rig: Rig, channel: str, noise_rms: Mapping[str, float]) -> float:
     if channel not in rig.sensors:
         return math.inf
     sensor = rig.sensors[channel]
-    sigma = noise_rms.get(channel, math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0)))
+    sigma = noise_rms.get(channel, sensor.level)
     if not sigma > 0.0:
         raise RigError(
             f"rig {rig.name}: sensors.{channel}.noise = {sigma:g} {plain(UNITS[channel])}, "
