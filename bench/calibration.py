@@ -29,7 +29,7 @@ from rsea_ros.diagnosis.diagnose import nominal_problem, search
 from rsea_ros.diagnosis.evaluation import held_out_data
 from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, weigh
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.identification.workers import worker_pools
+from rsea_ros.identification.solver import worker_pools
 
 CACHE = Path("out/calibration/evidence.jsonl")
 TABLE = Path(__file__).resolve().parents[1] / "rsea_ros/diagnosis/naming/status.py"

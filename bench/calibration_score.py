@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.diagnosis.naming.evidence import Evidence
+from rsea_ros.diagnosis.naming.evidence import Evidence, Signature
 from rsea_ros.diagnosis.naming.flexible import Flexible
-from rsea_ros.diagnosis.naming.signature import Signature
 from rsea_ros.diagnosis.naming.status import COEFFICIENTS, features, probabilities_and_status
 
 OUTSIDE = ("off", "taken_out")

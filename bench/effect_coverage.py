@@ -28,7 +28,7 @@ from json_log import append_to_log, read_log
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.normal import Z95
+from rsea_ros.records.statistics import Z95
 
 PERIODIC = ("phase", "cycles_per_revolution")
 """Parameters with several values that mean the same."""

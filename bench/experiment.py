@@ -45,9 +45,9 @@ from rsea_ros.experiment.hypothesis import motion  # noqa: E402
 from rsea_ros.experiment.joint_weighing import USUAL, weigh  # noqa: E402
 from rsea_ros.experiment.proposal import DesignRequest  # noqa: E402
 from rsea_ros.experiment.run_design import propose  # noqa: E402
-from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response  # noqa: E402
+from rsea_ros.experiment.run_shape import RunLimits, largest_share, of_command, of_response  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
-from rsea_ros.identification.workers import worker_pools  # noqa: E402
+from rsea_ros.identification.solver import worker_pools  # noqa: E402
 from rsea_ros.model.rig_file import load_rig, save_rig  # noqa: E402
 from rsea_ros.model.simulation import synthesize  # noqa: E402
 from rsea_ros.records.record import Channel  # noqa: E402

@@ -15,13 +15,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 from independent.bench import Bench, record_command
 
 from rsea_ros.health.health_finding import HealthFinding, WatchSettings
-from rsea_ros.health.look import events_of
+from rsea_ros.health.hypotheses import events_of
 from rsea_ros.health.monitor import Monitor
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.rig import EffectSetting, Quantity, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import Channel, FloatArray, Record
+from rsea_ros.records.statistics import Z95
 
 RATE, PIECE = 280.0, 60.0
 DOUBT: Mapping[str, float] = {

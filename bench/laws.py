@@ -31,9 +31,8 @@ from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import simulate_cases
-from rsea_ros.laws.fitting import gain_of
-from rsea_ros.laws.learn import learn
-from rsea_ros.laws.result import LawResult
+from rsea_ros.laws.law import LawResult
+from rsea_ros.laws.learn import gain_of, learn
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Record

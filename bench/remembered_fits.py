@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.diagnosis import screening
+from rsea_ros.diagnosis import step_fits as screening
 from rsea_ros.diagnosis.naming import evidence
 from rsea_ros.identification import confidence, solver
 from rsea_ros.identification.problem import Case, Problem

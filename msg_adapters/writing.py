@@ -21,7 +21,7 @@ from msg_adapters.sqlite_storage import SqliteStorage
 from msg_adapters.topic_map import check_topic, definition
 from rsea_ros.errors import BagError, OutputError
 from rsea_ros.outputs import files
-from rsea_ros.outputs.new_files import Stage, make_stage
+from rsea_ros.outputs.files import LockedFolder, make_stage
 from rsea_ros.processes import hold_signals
 from rsea_ros.records.record import IntArray
 
@@ -95,7 +95,7 @@ class BagWriter:
         self._flushed = time.monotonic()
         self._disk = ThreadPoolExecutor(1, "disk")
         self._syncing: Future[None] | None = None
-        self._stage: Stage | None = None
+        self._stage: LockedFolder | None = None
 
     def __enter__(self) -> BagWriter:
         self._check_name()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from scipy.fft import next_fast_len
 
-from rsea_ros.records.spectra import next_fast_length
+from rsea_ros.records.statistics import next_fast_length
 
 
 @pytest.mark.parametrize("real", [False, True])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from msg_adapters.decoding import COUNTERS
 from rsea_ros.checks.faults import FINDERS
-from rsea_ros.records.fault_kinds import FAULT_KINDS
+from rsea_ros.records.record import FAULT_KINDS
 
 ROOT = Path(__file__).resolve().parents[1]
 TELLING = {"Fault", "tell", "add"}

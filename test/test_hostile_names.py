@@ -25,9 +25,8 @@ from rsea_ros.laws.law import FittedTerm, Law
 from rsea_ros.laws.terms import GEAR_TERMS
 from rsea_ros.model.rig_file import RigChoice, load_rig, rig_text
 from rsea_ros.report.figures.figure import Figure
-from rsea_ros.report.page.frame import page
-from rsea_ros.report.page.html import code
-from rsea_ros.report.rig.words import command
+from rsea_ros.report.page import code, page
+from rsea_ros.report.rig import command
 
 RIG = load_rig("paper_high_impedance")
 CODE = "__import__('os').system('touch pwned')"

@@ -17,7 +17,7 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import identify
-from rsea_ros.identification.statics import Statics, statics_of
+from rsea_ros.identification.result import Statics, statics_of
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Record

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from rsea_ros.outputs import files, replaced
-from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, make_stage, remove_left
-from rsea_ros.outputs.replaced import KIND, LEFT_AFTER, make_locked, name_of, put_back
+from rsea_ros.outputs import files
+from rsea_ros.outputs.files import LEFT_AFTER, OLD, make_locked, make_stage, name_of, put_back, remove_left
+from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
 
 CALLS = ("link", "rename", "fsync", "unlink", "rmdir")
 
@@ -41,7 +41,7 @@ def kill_after(work: Callable[[], object], n: int) -> bool:
     """Do the work in a child that is killed before its n-th step; return whether it reached that step."""
     pid = os.fork()
     if pid == 0:
-        files.os = replaced.os = Killer(n)
+        files.os = Killer(n)
         try:
             work()
         finally:
@@ -123,7 +123,7 @@ def test_a_bag_is_never_lost(tmp_path):
 
 def aside(folder: Path, name: str) -> Path:
     """Return the folder in which a killed writer has put a file aside."""
-    locked = make_locked(folder, KIND)
+    locked = make_locked(folder, OLD)
     (locked.path / name).write_text("old")
     locked.release()
     return locked.path
@@ -139,7 +139,7 @@ def test_a_file_that_has_taken_the_name_since_is_kept_too(tmp_path):
 
 
 def test_files_put_aside_by_a_running_writer_stay(tmp_path):
-    locked = make_locked(tmp_path, KIND)
+    locked = make_locked(tmp_path, OLD)
     (locked.path / "a").write_text("old")
     put_back(tmp_path)
     assert (locked.path / "a").exists()
@@ -150,7 +150,7 @@ def test_files_put_aside_by_a_running_writer_stay(tmp_path):
 
 def test_files_put_aside_by_another_user_or_machine_stay(tmp_path, monkeypatch):
     path = aside(tmp_path, "a")
-    other = path.rename(tmp_path / path.name.replace(name_of(KIND), ".rsea-old-00000000-"))
+    other = path.rename(tmp_path / path.name.replace(name_of(OLD), ".rsea-old-00000000-"))
     put_back(tmp_path)
     assert (other / "a").exists()
     mine = other.rename(path)
@@ -182,6 +182,6 @@ def test_a_file_that_cannot_be_put_back_stays_and_stops_nobody(tmp_path, monkeyp
         def rename(self, *names):
             raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(replaced, "os", Refusing())
+    monkeypatch.setattr(files, "os", Refusing())
     check_free([tmp_path / "b"])
     assert (path / "a").read_text() == "old"

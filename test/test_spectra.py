@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from rsea_ros.records.spectra import cross_density, power_density
+from rsea_ros.records.statistics import cross_density, power_density
 
 RATE = 280.0
 

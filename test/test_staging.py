@@ -13,12 +13,11 @@ from pathlib import Path
 import pytest
 
 from msg_adapters import BagWriter
-from rsea_ros.outputs.files import give_names
-from rsea_ros.outputs.new_files import KIND, NewFiles, make_stage, remove_left
-from rsea_ros.outputs.replaced import LEFT_AFTER, PREFIX, name_of
+from rsea_ros.outputs.files import LEFT_AFTER, PREFIX, STAGE, give_names, make_stage, name_of, remove_left
+from rsea_ros.outputs.new_files import NewFiles
 
 KILLED = (
-    "import os, signal, sys; from pathlib import Path; from rsea_ros.outputs.new_files import make_stage\n"
+    "import os, signal, sys; from pathlib import Path; from rsea_ros.outputs.files import make_stage\n"
     "stage = make_stage(Path(sys.argv[1]))\n"
     "(stage.path / 'report.html').write_text('half of it')\n"
     "os.kill(os.getpid(), signal.SIGKILL)"
@@ -97,13 +96,13 @@ def replaced_file(folder: Path) -> Path:
 
 def link_of_that_name(folder: Path) -> Path:
     (folder / "target").mkdir()
-    path = folder / f"{name_of(KIND)}0123456789abcdef"
+    path = folder / f"{name_of(STAGE)}0123456789abcdef"
     path.symlink_to(folder / "target")
     return path
 
 
 def file_of_that_name(folder: Path) -> Path:
-    path = folder / f"{name_of(KIND)}0123456789abcdef"
+    path = folder / f"{name_of(STAGE)}0123456789abcdef"
     path.write_text("of somebody")
     return age(path)
 
@@ -131,8 +130,9 @@ def test_files_put_aside_can_be_removed_only_once_all_new_ones_have_their_names(
         path.mkdir()
         (path / "file").write_text(path.name)
     seen = []
-    monkeypatch.setattr("rsea_ros.outputs.files.remove", seen.append)
-    give_names([(source, target)], force=True)
+    with monkeypatch.context() as patch:
+        patch.setattr("rsea_ros.outputs.files.remove", seen.append)
+        give_names([(source, target)], force=True)
     (aside,) = seen
     assert (aside / "target" / "file").read_text() == "target"
     assert (target / "file").read_text() == "source"

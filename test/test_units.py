@@ -10,7 +10,7 @@ import pytest
 
 import rsea_ros as rsea
 from rsea_ros.documents.units import same_unit
-from rsea_ros.model.rig_fields import FIELDS
+from rsea_ros.model.rig import FIELDS
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.records.record import UNITS
 

@@ -11,7 +11,6 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 ALLOWED = {
     "rsea_ros/outputs/files.py",
-    "rsea_ros/outputs/replaced.py",  # gives names back
     "rsea_ros/hardware/peer/serial_line.py",  # names a link to its terminal
     "msg_adapters/compression.py",  # unpacks into a temporary folder
 }

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from msg_adapters.tables.column_units import CHANNELS, FACTORS
 from msg_adapters.tables.expression import FUNCTIONS
-from rsea_ros.documents.fields import NEEDED, Key, table
+from rsea_ros.documents.strict_yaml import NEEDED, Key, table
 
 RATES = (1e-3, 1e6)
 """Hz, of a file without stamps."""

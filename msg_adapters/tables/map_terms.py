@@ -11,7 +11,7 @@ from msg_adapters.tables.column_units import CHANNELS, FACTORS, LINEAR, unit
 from msg_adapters.tables.elements import choose_element
 from msg_adapters.tables.expression import Expression, parse
 from msg_adapters.tables.map_keys import TERM
-from rsea_ros.documents.fields import NEEDED, Key
+from rsea_ros.documents.strict_yaml import NEEDED, Key
 from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import FieldError
 

@@ -8,7 +8,7 @@ from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.diagnose import diagnose, nominal_problem, searched_effects
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.diagnosis.step_fits import StepFits
-from rsea_ros.identification.workers import worker_pools
+from rsea_ros.identification.solver import worker_pools
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import Record
 

@@ -9,14 +9,13 @@ import numpy as np
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.expected import is_still
 from rsea_ros.checks.finding import Findings, unused_sentence
-from rsea_ros.checks.running_clock import at_rates
+from rsea_ros.checks.rig_findings import at_rates
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import list_names
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import check_pace
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.fault_kinds import FAULT_KINDS
-from rsea_ros.records.record import UNITS, Channel, Record
+from rsea_ros.records.record import FAULT_KINDS, UNITS, Channel, Record
 from rsea_ros.records.stamps import repair_stamps
 
 _FEWEST = 0.1
@@ -53,7 +52,7 @@ def check_diagnosable(record: Record) -> None:
             f"{record.source}: no measurement beside the command{reason}, expected one of ft, position and "
             "velocity, stamped by the command's clock"
         )
-    if all(_constant(c) for c in measured):
+    if all(c.is_still for c in measured):
         raise IdentificationError(
             f"{record.source}: every measured channel holds one value, expected motion: "
             "is the drive enabled, are the sensors alive?"
@@ -64,7 +63,7 @@ def check_diagnosable(record: Record) -> None:
 def require_motion(record: Record) -> None:
     """Raise IdentificationError for a record in which the command never changes and nothing moves."""
     command = record.driving
-    if command is None or not len(command) or not _constant(command) or not is_still(record):
+    if command is None or not len(command) or not command.is_still or not is_still(record):
         return
     unit = UNITS["command" if "command" in record else "reference"]
     raise IdentificationError(
@@ -78,11 +77,6 @@ def _rises_rarely(channel: Channel) -> bool:
     step = np.diff(channel.t)
     rising = np.count_nonzero(step > 0.0)
     return bool(rising < np.count_nonzero(step < 0.0) or rising < _FEWEST * len(channel))
-
-
-def _constant(channel: Channel) -> bool:
-    finite = channel.y[np.isfinite(channel.y)]
-    return not len(finite) or float(np.ptp(finite)) == 0.0
 
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",

@@ -7,34 +7,46 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.checks.channel_spectra import Quotient, quotient
-from rsea_ros.checks.encoder_findings import jump_findings, smoothing_findings
-from rsea_ros.checks.expected import Side, is_commanded, is_full_of_gaps, quotients, sides
+from rsea_ros.checks.expected import (
+    Side,
+    far_off,
+    in_step,
+    is_commanded,
+    is_full_of_gaps,
+    lag_behind,
+    lag_findings,
+    open_findings,
+    quotients,
+    sides,
+)
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings, unused_sentence
-from rsea_ros.checks.gain_findings import gain_findings, strangers
-from rsea_ros.checks.gains import Readings, readings_of
-from rsea_ros.checks.lag import far_off, in_step, lag_behind, lag_findings, open_findings
+from rsea_ros.checks.gains import Readings, gain_findings, readings_of, strangers
 from rsea_ros.checks.linearised_rig import LinearisedFit, linear_of
-from rsea_ros.checks.machine_impedance import impedance_findings, restoring_findings
-from rsea_ros.checks.rig_findings import clock_findings, value_findings
-from rsea_ros.checks.running_clock import (
+from rsea_ros.checks.response_shape import Quotient, quotient
+from rsea_ros.checks.rig_findings import (
     at_rates,
+    clock_findings,
     clock_rates,
     drift_findings,
+    impedance_findings,
     lag_lines,
+    restoring_findings,
+    value_findings,
     with_rates,
 )
 from rsea_ros.checks.signal_findings import (
     angle_offset_findings,
     excitation,
+    jump_findings,
     noises,
     offset_findings,
+    smoothing_findings,
     standstill_findings,
 )
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.workers import one_blas_thread
+from rsea_ros.identification.solver import one_blas_thread
 from rsea_ros.model.extent import bound_values, is_too_fast
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.position_loop import with_command
@@ -90,10 +102,7 @@ def check_record(
 
 def _no_targets(record: Record) -> Finding:
     return Finding(
-        "red",
-        "topics",
-        "reference",
-        expected="the target positions that drove the run",
+        "red", "topics", "reference", expected="the target positions that drove the run",
         detail=f"only {', '.join(record.channels)}",
         remedy="record the targets, or name their topic with --topic desired_position=…",
     )
@@ -114,11 +123,7 @@ def _topics(record: Record, rig: Rig) -> list[Finding]:
         return [Finding("green", "topics", "", float(len(record.channels)), "1", detail=have)]
     return [
         Finding(
-            "red",
-            "topics",
-            "command",
-            expected="the torques that drove the run",
-            detail=f"only {have}",
+            "red", "topics", "command", expected="the torques that drove the run", detail=f"only {have}",
             remedy="record the commands, or name their topic with --topic",
         )
     ]
@@ -129,11 +134,7 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
     if is_full_of_gaps(checked.record):
         return [
             Finding(
-                "red",
-                "gaps",
-                "",
-                expected="a record without long gaps",
-                detail="it is mostly gaps",
+                "red", "gaps", "", expected="a record without long gaps", detail="it is mostly gaps",
                 remedy="cut it with --from and --to",
             )
         ]
@@ -263,14 +264,8 @@ def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) ->
     turned = "-" if float(np.sum(alive[best].weight * alive[best].value.real)) < 0.0 else ""
     return [
         Finding(
-            "amber",
-            "sign",
-            "ft",
-            alive[best].related,
-            "1",
-            expected="the actuator's axis",
-            detail=f"{best} follows the command",
-            remedy=f"--axis {turned}{best}",
+            "amber", "sign", "ft", alive[best].related, "1", expected="the actuator's axis",
+            detail=f"{best} follows the command", remedy=f"--axis {turned}{best}",
         )
     ]
 

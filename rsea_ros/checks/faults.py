@@ -1,30 +1,272 @@
-"""Faults of the data, found before any physics, reported and masked. One function a kind.
+"""Faults of the data, found before any physics, reported and masked: one function a kind.
 
 Each takes a channel and returns which samples are bad, shape (n,). A sample that is masked is never fitted.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.checks.expected import Side, is_commanded, sides
-from rsea_ros.checks.frozen import (
-    SMALLEST_SHARE,
-    dead_channels,
-    frozen_samples,
-    longest,
-    simultaneous_holds,
-    while_others_moved,
+from rsea_ros.checks.expected import (
+    MotionBeside,
+    Side,
+    is_commanded,
+    lag_behind,
+    motion_beside,
+    quotients,
+    sides,
+    witness_of,
 )
 from rsea_ros.checks.stamp_findings import rounded_stamps
 from rsea_ros.identification.noise import FEW, step_of
+from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.holds import repeats_of
-from rsea_ros.records.record import BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.records.record import MEASURED, BoolArray, Channel, Fault, FloatArray, Record
 from rsea_ros.records.stamps import repair_stamps
+
+SMALLEST_SHARE = 1e-3
+"""Of a channel's samples: fewer repeats are no fault."""
+_SLOW = 0.25
+"""Of the samples: a sensor that repeats more of them is slower than the log."""
+_COARSE_STEPS = 0.5
+"""Share of the changes that are by one quantum: a sensor that skipped samples would catch up by several."""
+_MOVED = 0.3
+"""Share of the suspect samples that must fall into motion; a sensor that freezes at any time reaches more."""
+_MOVED_OF_NOISY = 0.1
+"""The same for long runs of a sensor whose noise would change its value even at standstill."""
+_COMMANDED = 0.8
+"""Of a run that two sensors hold: the share in which the command changes; at rest it does not."""
+_STEADY = 0.1
+"""Of the turned angle: a velocity and a position that agree so well both measure a steady speed."""
+_LONG_RUN = 20.0
+"""Times the usual run of equal values: a longer one is no slow sensor."""
+_LONGEST_RUN = 0.5
+"""s. No coarse quantum holds a value so long while the machine moves."""
+_HELD = 0.95
+"""Share of the samples: a channel that repeats so many is held; a coarse one in motion repeats fewer."""
+_DITHER = 0.5
+"""Of the step between values: noise above it changes the value at standstill too; a step alone has 0.3."""
+_NONE = 1e-5
+"""Of a signal's RMS: no sensor has less noise, a simulation without noise has none."""
+_QUIETEST = 0.1
+"""Quantile of the noise of stretches of the record: in the quietest, motion adds least to it."""
+_STRETCH = 32
+"""Samples of a stretch, enough for the median of their fourth differences."""
+
+
+def frozen_samples(channel: Channel, name: str) -> BoolArray:
+    """Return which samples repeat the one before more often than a quantum explains.
+
+    With a quantum, neighbouring values may be equal by chance; then as many differ by one quantum, plus or
+    minus three standard deviations. Where most values that change do so by one quantum, the quantum explains
+    all but long runs. A sensor that repeats every other sample or more is slower than the log,
+    which is no fault; but a few runs far longer than all others are.
+    """
+    if name in ("command", "reference"):
+        return np.zeros(len(channel), bool)
+    step = np.diff(channel.y, prepend=np.nan)
+    repeat: BoolArray = step == 0.0
+    moving = np.abs(step[np.isfinite(step) & ~repeat])
+    if not len(moving):
+        return repeat
+    by_one = moving < 1.5 * float(moving.min())
+    if by_one.mean() > _COARSE_STEPS:
+        return repeat & in_long_runs(repeat, channel.rate)
+    by_chance = float(by_one.sum()) / 2.0
+    surplus = float(repeat.sum()) - 1.5 * by_chance - 3.0 * float(np.sqrt(repeat.sum()))
+    is_fault = max(5.0, SMALLEST_SHARE * len(channel)) < surplus < _SLOW * len(channel)
+    return repeat if is_fault else repeat & in_long_runs(repeat, channel.rate)
+
+
+def in_long_runs(repeat: BoolArray, rate: float) -> BoolArray:
+    """Return which samples lie in a run of repeats far longer than the usual one. rate: Hz."""
+    return _in_runs(repeat, _LONGEST_RUN * rate)
+
+
+def _in_runs(repeat: BoolArray, least: float) -> BoolArray:
+    """Return which samples lie in a run of repeats far longer than the usual one and than some samples."""
+    number = np.cumsum(~repeat)
+    length = np.bincount(number)
+    usual = float(np.quantile(length[length > 0], 0.95))
+    long: BoolArray = length[number] > max(_LONG_RUN * usual, least)
+    return long
+
+
+def simultaneous_holds(record: Record, name: str) -> BoolArray:
+    """Return the samples at which a sensor and another one hold their values while the command changes.
+
+    Both have noise, which never holds two sensors at once, so nothing need have moved.
+    """
+    channel, driving = record[name], record.driving
+    held = _held_runs(record, name)
+    if not held.any() or driving is None:
+        return np.zeros(len(held), bool)
+    changes = np.diff(driving.y, append=driving.y[-1:]) != 0.0
+    commanded = changes[np.clip(np.searchsorted(driving.t, channel.t, side="right") - 1, 0, len(changes) - 1)]
+    run = np.cumsum(np.diff(held, prepend=False) & held)
+    share = np.bincount(run[held], commanded[held]) / np.maximum(np.bincount(run[held]), 1)
+    held = held & (share[np.minimum(run, len(share) - 1)] > _COMMANDED)
+    together = np.zeros(len(channel), bool)
+    for other in (n for n in MEASURED if n in record and n != name):
+        runs = _held_runs(record, other)
+        nearest = np.clip(np.searchsorted(record[other].t, channel.t), 0, len(runs) - 1)
+        together |= runs[nearest]
+    return held & together
+
+
+def _held_runs(record: Record, name: str) -> BoolArray:
+    """Return the long runs of repeats of a sensor with noise; none for any other channel."""
+    channel = record[name]
+    repeat: BoolArray = np.diff(channel.y, prepend=np.nan) == 0.0
+    runs = _in_runs(repeat, _LONG_RUN) if name in MEASURED and repeat.any() else np.zeros(len(repeat), bool)
+    return runs & repeat if runs.any() and _dithers(channel) else np.zeros(len(repeat), bool)
+
+
+def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str) -> BoolArray:
+    """Return the suspect samples, none if the machine mostly stood still then.
+
+    A sensor that holds a value while nothing moves is sound: at rest, at a limit of the torque, stuck. One
+    that freezes does so in fast and in slow motion alike, a coarse one rather in slow motion.
+    """
+    motion = _motion(record, name, suspect, kind) if suspect.any() else None
+    if motion is None or not motion.moved.any():
+        return suspect if motion is None else np.zeros(len(suspect), bool)
+    if kind != "frozen_samples":
+        return _mostly(suspect, motion.moved)
+    if name == "velocity" and "position" in record:
+        suspect = suspect & ~_at_steady_speed(record, suspect)
+    long = suspect & in_long_runs(suspect, record[name].rate)
+    fast = motion.moved & (motion.speed > np.median(motion.speed[motion.moved]))
+    share = _MOVED_OF_NOISY if long.any() and _dithers(record[name]) else _MOVED
+    return _mostly(long, motion.moved, share) | _mostly(suspect & ~long, fast)
+
+
+def _at_steady_speed(record: Record, suspect: BoolArray) -> BoolArray:
+    """Return the samples of runs in which the position turned as the held velocity says."""
+    velocity, position = record["velocity"], record["position"]
+    steady = np.zeros(len(suspect), bool)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], suspect, [False]]).astype(np.int8)))
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        span = velocity.t[[first, end - 1]]
+        expected = float(velocity.y[first] * np.ptp(span))
+        turned = float(np.diff(np.interp(span, position.t, position.y))[0])
+        steady[first:end] = expected != 0.0 and abs(turned - expected) < _STEADY * abs(expected)
+    return steady
+
+
+def _mostly(suspect: BoolArray, clearly: BoolArray, share: float = _MOVED) -> BoolArray:
+    """Return the suspect samples if enough of them fall into motion, else none."""
+    enough = suspect.any() and clearly[suspect].mean() > share
+    return suspect if enough else np.zeros(len(suspect), bool)
+
+
+def _motion(record: Record, name: str, suspect: BoolArray, kind: str) -> MotionBeside | None:
+    """Return how the best witness moved at the samples of a channel, None without a witness.
+
+    Sensors that are held with the channel are no witnesses. Where none is left, the command speaks for a
+    motion only if the noise of one of them would have shown at standstill.
+    """
+    if kind != "frozen_samples":
+        return motion_beside(record, name, witness_of(record, name))
+    long = suspect & in_long_runs(suspect, record[name].rate)
+    at = record[name].t[long if long.any() else suspect]  # a quantum repeats values by chance
+    held = {n for n in record.channels if n != "command" and _is_held(record[n], at)}
+    witness = witness_of(record, name, but=held - {name})
+    others = witness_of(record, name)
+    alone = others != witness and witness in (None, "command", "motor_torque")
+    shown = not alone or any(_dithers(record[n]) for n in held)
+    return motion_beside(record, name, witness if shown else others)
+
+
+def _is_held(channel: Channel, at: FloatArray) -> bool:
+    """Return whether a channel repeats its value at nearly all of some times, s."""
+    repeats = np.diff(channel.y, prepend=np.nan) == 0.0
+    nearest = np.clip(np.searchsorted(channel.t, at), 0, len(channel) - 1)
+    return bool(np.mean(repeats[nearest]) > _HELD)
+
+
+def _dithers(channel: Channel) -> bool:
+    """Return whether the noise of a sensor is large enough to change its value at standstill."""
+    moving = channel.y[np.diff(channel.y, prepend=np.nan) != 0.0]
+    size = len(moving) // _STRETCH
+    if size < 2:
+        return False
+    fourth = np.abs(np.diff(moving[: size * _STRETCH].reshape(size, _STRETCH), 4, axis=1))
+    white = np.median(fourth, axis=1) / 0.6745 / math.sqrt(70.0)
+    least = max(_DITHER * step_of(channel.y), _NONE * float(np.std(moving)))
+    return bool(np.quantile(white, _QUIETEST) > least)
+
+
+def longest(channel: Channel, marked: BoolArray) -> str:
+    """Return from when to when the longest run of marked samples lasts, for people; empty for short ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
+    first, last = edges[::2], edges[1::2] - 1
+    k = int(np.argmax(last - first)) if len(first) else 0
+    if not len(first) or channel.t[last[k]] - channel.t[first[k]] < _LONGEST_RUN:
+        return ""
+    return f"at {channel.y[first[k]]:.4g} from {channel.t[first[k]]:.4g} s to {channel.t[last[k]]:.4g} s"
+
+
+_VISIBLE = 3.0
+"""Times the sensor's noise: a smaller signal than that may well be lost in it."""
+_CONFIRMED = 0.5
+"""Correlation of a speed with the rate of the position, far above what noise has by chance, either sign."""
+_SHOWS = 0.3
+"""Of the channel's RMS: a predicted signal so large would show in it, whatever else is in the channel."""
+
+
+def dead_channels(
+    record: Record, compared: Mapping[str, Side], rig: Rig, frozen: Collection[str] = ()
+) -> list[Fault]:
+    """Return a fault for every sensor that does not measure. record: finite values, rising stamps.
+
+    compared: the record beside the rig's simulation.
+    frozen: channels of which a part is held, which says why they have little to do with the command.
+    Where the signal that the rig's simulation predicts is below the noise, no sensor is
+    called dead.
+    """
+    if not is_commanded(record):
+        return []
+    constant = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in MEASURED}
+    # A torque also has friction that no motion shows.
+    responses = {} if is_inverse(rig) else quotients(compared)
+    for n, q in responses.items():
+        shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
+        alone = shows and q.is_unrelated and not lag_behind(record, rig, n, compared[n])
+        if n in constant and not constant[n] and n not in frozen and alone and not _is_confirmed(record, n):
+            constant[n] = "noise that has nothing to do with the command"
+    return [Fault("dead_channel", n, 1.0, detail) for n, detail in constant.items() if detail]
+
+
+def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:
+    """Return the fault of a channel that holds one value although its signal must have changed."""
+    if len(channel) < 2 or float(np.ptp(channel.y)) > 0.0:
+        return ""
+    if side is not None and float(np.std(side.p)) < _VISIBLE * _noise(rig, name):
+        return ""
+    return f"constant at {channel.y[0]:.4g}"
+
+
+def _is_confirmed(record: Record, name: str) -> bool:
+    """Return whether position and velocity agree: one is the rate of the other, whatever the rig says."""
+    if name not in ("position", "velocity") or not {"position", "velocity"} <= record.channels.keys():
+        return False
+    position, velocity = record["position"], record["velocity"]
+    rate = np.interp(velocity.t, position.t, np.gradient(position.y, position.t))
+    if not (np.std(rate) > 0.0 and np.std(velocity.y) > 0.0):
+        return False
+    return bool(abs(np.corrcoef(rate, velocity.y)[0, 1]) > _CONFIRMED)
+
+
+def _noise(rig: Rig, name: str) -> float:
+    sensor = rig.sensors.get(name)
+    return max(sensor.noise, sensor.quantum) if sensor else 0.0
+
 
 _AROUND = 10
 _SPIKE = 12.0

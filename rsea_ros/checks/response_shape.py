@@ -1,24 +1,143 @@
-"""The rig's shape fitted to the measured quotients: values of the rig, a gain and a delay for each channel.
+"""Measured channels over those of the rig's simulation, by frequency, and the rig's shape fitted to them.
+
+Both are sampled at the same stamps, so hold, sampling and leakage are alike in both, and the quotient
+
+    R = sum_k Y_k P_k* / sum_k |P_k|^2
+
+over half-overlapping Hann segments k is 1 at every line where the rig is right. Elsewhere the rig's values, a
+gain and a delay for each channel are fitted,
 
     ln R(f) = ln(G(f; theta) / G(f; theta_0)) + g - i 2 pi f tau
 
-with R measured over predicted (channel_spectra.py) at the rig's values theta_0. Priors: theta by the rig's
+with theta_0 the rig's values. Priors: theta by the rig's
 spread, widened because a rig is a guess; g and tau by the caller. Lines that do not fit count less (Cauchy).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.checks.channel_spectra import Quotient, usable
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.frequency_response import model_responses
+from rsea_ros.identification.solver import Descent, descend
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector, unknowns_of_rig
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray
+from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray, IntArray
+from rsea_ros.records.statistics import next_fast_length, segment_spectra
+
+_SEGMENTS = 5
+"""A record is cut into segments of a fifth: slow ramps still have their line, and nine of them overlap."""
+_LONGEST = 8.0
+"""s. Of a segment, where the record has more than five such."""
+_FEWEST = 16
+"""Samples of a segment, at rates that put fewer into its longest."""
+_LINES = 48
+_ENOUGH = 0.3
+"""Of the predicted power: lines that hold less say nothing of a channel."""
+_FIRST = 2
+_TINY = 1e-300
+FALSE_ALARM = 1e-3
+
+
+@dataclass(frozen=True)
+class Quotient:
+    """Measured over predicted in bands of about equal width on a logarithmic scale.
+
+    frequency: Hz, shape (n,). value: complex, shape (n,). coherence: 0 to 1, shape (n,).
+    sd: standard deviation of ln(value), shape (n,). weight: share of the predicted power, shape (n,).
+    segments: how many independent ones. lines: how many lines bear the predicted power. related: coherence
+    of all lines, each by its share of the predicted power.
+    measured, predicted: RMS without mean, in the channel's unit. captured: share of the predicted power that
+    these lines hold.
+    """
+
+    channel: str
+    frequency: FloatArray
+    value: ComplexArray
+    coherence: FloatArray
+    sd: FloatArray
+    weight: FloatArray
+    segments: float
+    lines: float
+    related: float
+    measured: float
+    predicted: float
+    captured: float
+
+    @property
+    def is_unrelated(self) -> bool:
+        """Whether the channel has no more in common with the prediction than noise has by chance."""
+        single = 1.0 - FALSE_ALARM ** (1.0 / max(self.segments - 1.0, 1.0))
+        chance = 1.0 / self.segments
+        limit = chance + (single - chance) / math.sqrt(max(self.lines, 1.0))
+        return bool(self.related < limit and self.captured > _ENOUGH)
+
+
+def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quotient | None:
+    """Return the quotient of measured y and predicted p at stamps t (s), None for too few samples."""
+    if len(t) < 64 or not np.isfinite(p).all():
+        return None
+    period = float(np.median(np.diff(t)))
+    even = np.arange(t[0], t[-1], period)
+    y, p = (np.interp(even, t, v) for v in (y, p))
+    if len(even) < _FEWEST * _SEGMENTS or not (np.std(p) > 0.0 and np.std(y) > 0.0):
+        return None
+    longest = next_fast_length(max(_FEWEST, int(_LONGEST / period)))
+    length = min(len(even) // _SEGMENTS, longest)
+    pp = _segments(p, length)
+    if _captured_share(pp, p) < _ENOUGH:  # slow: its lines lie below those of short segments
+        length = len(even) // _SEGMENTS
+        pp = _segments(p, length)
+    yy = _segments(y, length)
+    cross = np.sum(yy * pp.conj(), axis=0)
+    power_y, power_p = (np.sum(np.abs(v) ** 2, axis=0) + _TINY for v in (yy, pp))
+    segments = len(yy) / (1.0 + 2.0 / 36.0) if len(yy) > 1 else 1.0
+    share = power_p / power_p.sum()
+    bands = _bands(len(cross))
+    s_yp: ComplexArray = np.add.reduceat(cross, bands)
+    s_pp, s_yy = (np.add.reduceat(v, bands) for v in (power_p, power_y))
+    width = np.diff(np.append(bands, len(cross)))
+    coherence = np.abs(s_yp) ** 2 / (s_pp * s_yy)
+    averages = np.maximum(segments * width, 2.0)
+    return Quotient(
+        channel=channel,
+        frequency=np.add.reduceat(np.arange(len(cross)) + _FIRST, bands) / width / (length * period),
+        value=s_yp / s_pp, coherence=coherence,
+        sd=np.sqrt(np.maximum(1.0 - coherence, 1e-6) / (2.0 * np.maximum(coherence, 1e-9) * averages)),
+        weight=np.add.reduceat(share, bands), segments=segments, lines=1.0 / float(np.sum(share**2)),
+        related=float(np.sum(share * np.abs(cross) ** 2 / (power_y * power_p))), measured=float(np.std(y)),
+        predicted=float(np.std(p)), captured=_captured_share(pp, p),
+    )
+
+
+def _captured_share(spectra: ComplexArray, values: FloatArray) -> float:
+    """Return the share of a signal's power that its segments' lines hold."""
+    length = 2.0 * spectra.shape[1]
+    power = 2.0 * float(np.mean(np.sum(np.abs(spectra) ** 2, axis=1))) / (0.375 * length**2)
+    return float(power / np.var(values))
+
+
+def usable(q: Quotient) -> BoolArray:
+    """Return the informative bands: coherent, and with more than a trace of the predicted power."""
+    keep: BoolArray = (q.coherence > 0.3) & (q.weight > 1e-7 * q.weight.max()) & np.isfinite(q.sd)
+    return keep
+
+
+def _segments(values: FloatArray, length: int) -> ComplexArray:
+    """Return the spectra of half-overlapping Hann segments from the second line on, shape (k, lines)."""
+    spectra = segment_spectra(values, length)
+    return spectra[:, _FIRST : int(0.9 * spectra.shape[1])]
+
+
+def _bands(lines: int) -> IntArray:
+    """Return where each band begins, shape (bands,)."""
+    edges = np.geomspace(1.0, lines + 1.0, _LINES + 1)[:-1]
+    return np.unique(np.floor(edges).astype(np.int64) - 1)
+
 
 MODEL_ERROR = 0.1
 """Of ln R: what a linear model leaves of a good bench with friction and play."""
@@ -27,7 +146,8 @@ DELAY_DOUBT = 0.02
 _WIDER = 3.0
 _LEAST = 0.3
 """One sigma of the logarithm of a rig's value, where the rig states less."""
-_ITERATIONS = 12
+_ITERATIONS, _PARTS = 12, (1.0, 0.3, 0.1)
+"""Steps of the fit, and parts of one that are tried until it helps."""
 _STEP = 1e-4
 _DELAYS = np.arange(-0.06, 0.0605, 1e-3)
 """s. Where a fit of a delay may begin."""
@@ -90,38 +210,15 @@ class ShapeFit:
         centre = np.concatenate([self._start, gain, np.zeros(len(gain))])
         begin = [self._size(k) if priors[n].doubt > 1.0 else gain[k] for k, n in enumerate(self.channels)]
         theta = np.concatenate([self._start, begin, self._delays(sign)])
-        theta, residual, cost = self._least(theta, centre, np.array(doubt), sign)
-        return self._shape(theta, residual, cost, self._data_shares(theta, residual, np.array(doubt), sign))
+        end = descend(
+            lambda at: self._residual(at, sign), lambda at, r: self._slope(at, r, sign), theta,
+            np.diag(np.array(doubt) ** -2.0), centre=centre, is_robust=True, rounds=_ITERATIONS, parts=_PARTS,
+        )  # fmt: skip
+        return self._shape(end, self._data_shares(end, np.array(doubt), sign))
 
     def _size(self, k: int) -> float:
         """Return the logarithm of a channel's gain over all its lines."""
         return float(np.median(np.log(np.abs(self._value[self._of == k]))))
-
-    def _least(
-        self, theta: FloatArray, centre: FloatArray, doubt: FloatArray, sign: FloatArray
-    ) -> tuple[FloatArray, FloatArray, float]:
-        """Return theta, residual and cost where that is least: Gauss-Newton, steps cut until they help."""
-
-        def cost_of(r: FloatArray, at: FloatArray) -> float:
-            return float(np.sum(np.log1p(r**2)) + np.sum(((at - centre) / doubt) ** 2))
-
-        residual = self._residual(theta, sign)
-        cost = cost_of(residual, theta)
-        for _ in range(_ITERATIONS):
-            slope, weight = self._slope(theta, residual, sign), 1.0 / (1.0 + residual**2)
-            normal = (slope * weight[:, None]).T @ slope + np.diag(doubt**-2.0)
-            right = slope.T @ (weight * residual) + (theta - centre) / doubt**2
-            step = -np.linalg.lstsq(normal, right, rcond=None)[0]
-            trials = [(theta + share * step) for share in (1.0, 0.3, 0.1)]
-            trial = ((at, r, cost_of(r, at)) for at in trials for r in [self._residual(at, sign)])
-            better = next((t for t in trial if t[2] < cost), None)
-            if better is None:
-                break
-            done = cost - better[2] < max(1e-3 * cost, 0.01)
-            theta, residual, cost = better
-            if done:
-                break
-        return theta, residual, cost
 
     def _residual(self, theta: FloatArray, sign: FloatArray) -> FloatArray:
         """Return the residual of ln R over its doubt: of the size of all lines, then of their phase."""
@@ -187,16 +284,15 @@ class ShapeFit:
         share = np.cumsum(weight[of][rising])
         return float(residual[of][rising][int(np.searchsorted(share, 0.5 * share[-1]))])
 
-    def _data_shares(
-        self, theta: FloatArray, residual: FloatArray, doubt: FloatArray, sign: FloatArray
-    ) -> FloatArray:
+    def _data_shares(self, end: Descent, doubt: FloatArray, sign: FloatArray) -> FloatArray:
         """Return for each value the share of its information that the lines provide."""
-        slope, weight = self._slope(theta, residual, sign), 1.0 / (1.0 + residual**2)
+        slope, weight = self._slope(end.theta, end.residual, sign), 1.0 / (1.0 + end.residual**2)
         normal = ((slope * weight[:, None]).T @ slope) * np.outer(doubt, doubt) + np.eye(len(doubt))
         shares: FloatArray = 1.0 - np.diag(np.linalg.inv(normal))
         return shares
 
-    def _shape(self, theta: FloatArray, residual: FloatArray, cost: float, shares: FloatArray) -> FittedShape:
+    def _shape(self, end: Descent, shares: FloatArray) -> FittedShape:
+        theta, residual = end.theta, end.residual
         n, m, lines = len(self._start), len(self.channels), len(self._of)
         misfit = np.hypot(residual[:lines], residual[lines:]) * self._sd
         measured = self._share * np.abs(self._value) ** 2
@@ -212,7 +308,7 @@ class ShapeFit:
             delay=dict(zip(self.channels, theta[n + m :].tolist(), strict=True)),
             error={c: self._middle(misfit, k, self._share) for k, c in enumerate(self.channels)},
             error_measured={c: self._middle(misfit, k, measured) for k, c in enumerate(self.channels)},
-            cost=cost,
+            cost=end.cost,
         )
 
 

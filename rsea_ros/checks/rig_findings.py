@@ -1,25 +1,49 @@
-"""Findings on the rig's own values: what a linear fit moves, and how far from what the rig states.
+"""Findings on the rig: its own values, the clocks of its sensors, and another machine than it states.
 
-The linearised fit does not say that: it leaves the gains free, which a common factor of the values imitates.
+Values are those of a fit without gains: the linearised fit leaves them free, which a common factor imitates.
+
+A sensor's clock may run so fast or slow that the phases turn within the record. The lag behind the rig's
+simulation, followed from second to second (identification/clocks.py), says how fast; taken out, the rest is
+small enough for the linearised fit. Where the rig misfits even so, the line itself is the number: a cause in
+the machine moves the lags of all sensors, a clock only those of its sensor.
+
+Another machine than a rig without a spring states shows in its impedance,
+
+    torque / position = Z(f) = K - J w^2 + i w b,    w = 2 pi f
+
+measured as Z_0 / R with Z_0 the rig's and R the torque that the rig's inverse model makes of the measured
+motion over the torque that acted: the torque has far less noise than a motion differentiated twice.
+
+and in the torque that acted, by least squares along the measured motion, without and with restoring terms:
+
+    T = J q'' + b q' + c sign(q') + T_0 (+ K q + G sin(q - q_0))
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.checks.gain_findings import RIGHT_RIG
+from rsea_ros.checks.gains import RIGHT_RIG, inertia_spread
 from rsea_ros.checks.linearised_rig import BESIDE, LinearisedFit, Number
-from rsea_ros.identification.confidence import confidence_of
-from rsea_ros.identification.estimates import FAR, off_rig, parameters_of
+from rsea_ros.checks.response_shape import Quotient, quotient
+from rsea_ros.errors import RseaError
+from rsea_ros.identification.clocks import BLOCK, LEAST_RISE, SCATTER, LagLine, lag_line
+from rsea_ros.identification.confidence import FAR, confidence_of, off_rig, parameters_of
 from rsea_ros.identification.fit import reweight
 from rsea_ros.identification.result import ParameterEstimate, Remark
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import unknowns_of_rig
+from rsea_ros.model.equations import mechanics
+from rsea_ros.model.inverse import CUT_OFF, Motion, motion_from
 from rsea_ros.model.rig import CLOCK_DOUBT, Rig
-from rsea_ros.records.normal import Z95
+from rsea_ros.records.record import SENSED, Channel, FloatArray, Record
+from rsea_ros.records.statistics import Z95
 
 _ALLOWED = 3.0 * CLOCK_DOUBT
 """s. As far as a fit lets a sensor's clock move."""
@@ -58,15 +82,8 @@ def _offset(name: str, offset: Number, linear: LinearisedFit) -> Finding:
             light, detail = "amber", f"{1e6 * apart:.4g} µs later than {best}, {_RELATIVE}"
     remedy = "stamp both at acquisition by one clock" if light == "amber" else ""
     return Finding(
-        light,
-        "clock_offset",
-        name,
-        1e6 * offset.value,
-        "µs",
-        1e6 * low,
-        1e6 * high,
-        expected=f"within {1e6 * _ALLOWED:.0f} µs of the others",
-        detail=detail + _beside(linear, name),
+        light, "clock_offset", name, 1e6 * offset.value, "µs", 1e6 * low, 1e6 * high,
+        expected=f"within {1e6 * _ALLOWED:.0f} µs of the others", detail=detail + _beside(linear, name),
         remedy=remedy,
     )
 
@@ -83,13 +100,7 @@ def drift_finding(light: Light, name: str, drift: Number, duration: float, besid
     """Return the finding of a drift (s/s). duration: of the record, s. beside: what else it may be."""
     low, high = drift.ci95
     return Finding(
-        light,
-        "clock_drift",
-        name,
-        1e6 * drift.value,
-        "ppm",
-        1e6 * low,
-        1e6 * high,
+        light, "clock_drift", name, 1e6 * drift.value, "ppm", 1e6 * low, 1e6 * high,
         expected=f"within {1e6 * _ALLOWED / duration:.3g} ppm",
         detail="; ".join(filter(None, ("of its clock against the command's", beside))),
         remedy="discipline the clocks (PTP, chrony), or stamp by one" if light == "amber" else "",
@@ -136,11 +147,8 @@ def value_findings(linear: LinearisedFit, rig: Rig) -> list[Finding]:
 def _identifiability(p: ParameterEstimate) -> Finding:
     amber = p.determined == "no"
     return Finding(
-        "amber" if amber else "green",
-        "identifiability",
-        p.name,
-        50.0 * (p.ci95[1] - p.ci95[0]) / Z95 / (abs(p.value) or 1.0),
-        "%",
+        "amber" if amber else "green", "identifiability", p.name,
+        50.0 * (p.ci95[1] - p.ci95[0]) / Z95 / (abs(p.value) or 1.0), "%",
         expected="below the rig's spread",
         detail="one sigma, only with what the rig states" if amber else "one sigma that these data leave",
         remedy="measure it separately, or excite it more" if amber else "",
@@ -150,14 +158,203 @@ def _identifiability(p: ParameterEstimate) -> Finding:
 def _far(remark: Remark, rig: Rig) -> Finding:
     (name,), (stated, value, low, high, spreads) = remark.names, remark.values
     return Finding(
-        "amber",
-        "rig_value",
-        name,
-        value,
-        remark.unit,
-        low,
-        high,
+        "amber", "rig_value", name, value, remark.unit, low, high,
         expected=f"{stated:.4g}, to {100.0 * FAR * rig.spread(name):.3g} %",
-        detail=f"fitted, {spreads:.2g} of the rig's stated spreads away",
+        detail=f"fitted, {spreads:.2g} of the rig's stated spreads away", remedy=RIGHT_RIG,
+    )
+
+
+_STEEPEST = 1.8e-3
+"""s/s. The lag is followed from block to block up to 2 ms/s; no line near that is trusted."""
+_STRAIGHT = 0.2
+"""As SCATTER, beside a misfit of the rig."""
+
+
+def lag_lines(compared: Mapping[str, Side], start: float) -> dict[str, LagLine]:
+    """Return the line through the lags of every sensor that shows one. start: of the record, s."""
+    lines = {n: lag_line(s.t, s.y, s.p, start) for n, s in compared.items() if n in SENSED}
+    return {n: line for n, line in lines.items() if line is not None}
+
+
+def clock_rates(lines: Mapping[str, LagLine]) -> dict[str, float]:
+    """Return the rate (s/s) at which channels come later and later than predicted, where a line shows it."""
+    return {n: line.rate for n, line in lines.items() if _rises(line, SCATTER)}
+
+
+def _rises(line: LagLine, scatter: float) -> bool:
+    """Return whether a line rises too far for a linear fit, and its lags scatter less than a part of that."""
+    steep = abs(line.rise) > LEAST_RISE and abs(line.rate) < _STEEPEST
+    return steep and line.scatter < scatter * abs(line.rise)
+
+
+def drift_findings(lines: Mapping[str, LagLine]) -> list[Finding]:
+    """Return the drifts that lines show where the rig misfits, those that a sensor has alone in amber."""
+    return [_drift_of(n, line, lines) for n, line in lines.items() if _rises(line, _STRAIGHT)]
+
+
+def _drift_of(name: str, line: LagLine, lines: Mapping[str, LagLine]) -> Finding:
+    """Return the finding of one line; its doubt holds what the machine does to the other sensors."""
+    others = [other.rate for n, other in lines.items() if (n in JOINT) != (name in JOINT)]
+    duration = abs(line.rise / line.rate)
+    of_line = line.scatter / duration * math.sqrt(12.0 * BLOCK / duration)
+    doubt = float(np.hypot(of_line, max(map(abs, others), default=abs(line.rate))))
+    alone = abs(line.rate) > SURE * doubt
+    light: Light = "amber" if alone else "green"
+    beside = "seen beside a misfit of the rig" + ("" if alone else ", for which a cause may stand in for it")
+    return drift_finding(light, name, Number(line.rate, doubt), duration, beside)
+
+
+def at_rates(record: Record, rates: Mapping[str, float]) -> Record:
+    """Return the record with the stamps that some channels would have, did their clocks run as the command's.
+
+    rates: s/s by channel, since the first command.
+    """
+    start = float(record["command"].t[0])
+    moved = {n: Channel(c.t - rate * (c.t - start), c.y) for n, rate in rates.items() for c in [record[n]]}
+    return record.with_channels(**moved)
+
+
+def with_rates(linear: LinearisedFit, rates: Mapping[str, float]) -> LinearisedFit:
+    """Return the fit of a record at_rates as one of the record with its stamps."""
+    drift = {n: Number(d.value + rates.get(n, 0.0), d.sd) for n, d in linear.drift.items()}
+    return replace(linear, drift=drift)
+
+
+_COHERENT = 0.5
+_FEWEST, _MOST = 6, 0.4
+"""Coherent lines that a fit needs: so many, and that share of those below the filter's edge."""
+_MODEL_ERROR = 0.1
+"""Of Z: what friction leaves of a linear fit."""
+_SURE = 4.0
+"""Sigmas."""
+_INSIDE = 2.0
+"""Times the lowest frequency that was measured: the machine swings at more, or its K is not seen."""
+_FAR, _ELSEWHERE = 4.0, 4.0
+"""Factor of the rig's inertia that is another machine's, and spreads that go with it."""
+_STIFFER = 4.0
+"""Times the rig's stiffness that is another machine's; a pendulum's falls with its swing, so less is none."""
+_SHAPED = 0.35
+"""Largest median of what the fit leaves of Z, over Z."""
+
+
+@dataclass(frozen=True)
+class ImpedanceFit:
+    """K (N m/rad) and J (kg m^2) with one sigma each, and the median residual of the fit over Z."""
+
+    stiffness: float
+    stiffness_sd: float
+    inertia: float
+    inertia_sd: float
+    left: float
+    lowest: float
+
+    @property
+    def natural_frequency(self) -> float:
+        """Return the frequency at which the machine would swing by itself, Hz; 0 where it would not."""
+        return math.sqrt(max(self.stiffness / max(self.inertia, 1e-300), 0.0)) / (2.0 * math.pi)
+
+
+def impedance_findings(side: Side | None, rig: Rig) -> list[Finding]:
+    """Return the findings by which the machine differs from the rig: a spring or pendulum, another inertia.
+
+    side: of the torque.
+    """
+    measured = None if side is None else impedance_of(side, rig)
+    if measured is None or measured.left > _SHAPED or measured.inertia <= 0.0:
+        return []
+    m = mechanics(rig, linear_gravity=True)
+    stiffness, inertia = float(m.stiffness[0, 0]), float(m.mass[0, 0])
+    held = measured.stiffness - _SURE * measured.stiffness_sd > _STIFFER * stiffness
+    if held and measured.natural_frequency > _INSIDE * measured.lowest:
+        swing = f"a spring or pendulum holds the output: it swings at {measured.natural_frequency:.2g} Hz"
+        return [_another("stiffness", measured.stiffness, "N m/rad", stiffness, swing)]
+    factor = measured.inertia / inertia
+    sure = measured.inertia > 2.0 * _SURE * measured.inertia_sd
+    if sure and abs(math.log(factor)) > max(math.log(_FAR), _ELSEWHERE * inertia_spread(rig)):
+        return [_another("inertia", measured.inertia, "kg m^2", inertia, f"{factor:.2g} times the rig's")]
+    return []
+
+
+def _another(key: str, value: float, unit: str, expected: float, detail: str) -> Finding:
+    return Finding(
+        "red", "wrong_rig", f"spring_end.{key}", value, unit, expected=f"{expected:.3g}", detail=detail,
         remedy=RIGHT_RIG,
     )
+
+
+def impedance_of(side: Side, rig: Rig) -> ImpedanceFit | None:
+    """Return the impedance that a record shows; None where too few lines are coherent."""
+    q = quotient("motor_torque", side.t, side.p, side.y)
+    m = mechanics(rig, linear_gravity=True)
+    if q is None or m.order != 1:
+        return None
+    band = q.frequency < CUT_OFF
+    keep = band & (q.coherence > _COHERENT)
+    if np.count_nonzero(keep) < max(_FEWEST, _MOST * np.count_nonzero(band)):
+        return None
+    w = 2.0 * np.pi * q.frequency[keep]
+    nominal = m.stiffness[0, 0] - m.mass[0, 0] * w**2 + 1j * w * m.damping[0, 0]
+    return _fit(nominal / q.value[keep], w, q, q.sd[keep])
+
+
+def _fit(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> ImpedanceFit:
+    """Return K and J from the real part of Z, each line by its doubt."""
+    doubt = np.abs(z) * np.hypot(sd, _MODEL_ERROR)
+    rows = np.column_stack([np.ones(len(w)), -(w**2)])
+    size = np.linalg.norm(rows / doubt[:, None], axis=0)
+    inverse = np.linalg.pinv(rows / doubt[:, None] / size)
+    stiffness, inertia = (inverse @ (z.real / doubt)) / size
+    stiffness_sd, inertia_sd = np.linalg.norm(inverse, axis=1) / size
+    misfit = np.abs(z.real - rows @ [stiffness, inertia]) / np.abs(z)
+    return ImpedanceFit(
+        stiffness=float(stiffness), stiffness_sd=float(stiffness_sd), inertia=float(inertia),
+        inertia_sd=float(inertia_sd), left=float(np.median(misfit)), lowest=float(w[0]) / (2.0 * math.pi),
+    )
+
+
+_FALLS = 0.55
+"""Of what is left of the torque: with a spring or pendulum that is there, less is left."""
+_EDGE = 0.02
+"""Of the record at either end, where the filter settles."""
+_SHARP = 0.05
+"""Of the speed's RMS: the width of its sign's step."""
+
+
+def restoring_findings(record: Record, rig: Rig) -> list[Finding]:
+    """Return the finding of a torque that follows the position, for a rig that has neither K nor gravity."""
+    if rig["spring_end.stiffness"] or rig["spring_end.gravity"]:
+        return []
+    try:
+        motion = motion_from(record)
+    except (RseaError, ValueError):
+        return []
+    without, held = residual_shares(motion)
+    if not held < _FALLS * without:
+        return []
+    return [
+        Finding(
+            "red", "wrong_rig", "spring_end.stiffness", 100.0 * (1.0 - (held / without) ** 2), "%",
+            expected="0",
+            detail="of the torque that the rig leaves open follows the position: a spring or a pendulum",
+            remedy=RIGHT_RIG,
+        )
+    ]
+
+
+def residual_shares(motion: Motion) -> tuple[float, float]:
+    """Return the share of the torque's RMS that is left without and with the restoring terms."""
+    sign = np.tanh(motion.v / max(_SHARP * float(np.std(motion.v)), 1e-300))
+    holding = [motion.q, np.sin(motion.q), np.cos(motion.q)]
+    moving = [motion.a, motion.v, sign, np.ones_like(motion.v)]
+    known = motion.counts if motion.counts.any() else np.ones(len(motion.t), bool)
+    without, held = ([c[known] for c in columns] for columns in (moving, [*moving, *holding]))
+    return _rms_left(without, motion.torque[known]), _rms_left(held, motion.torque[known])
+
+
+def _rms_left(columns: list[FloatArray], torque: FloatArray) -> float:
+    edge = int(_EDGE * len(torque))
+    inside = slice(edge, len(torque) - edge)
+    rows = np.column_stack(columns)[inside]
+    rows = rows / np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    y = torque[inside]
+    return float(np.std(y - rows @ np.linalg.lstsq(rows, y, rcond=None)[0]) / max(float(np.std(y)), 1e-300))

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.identification.even_stamps import SCATTER
+from rsea_ros.identification.fit import SCATTER
 from rsea_ros.model.extent import AS_SECONDS, FAST, SKIPPED_START, SLOW, is_slow, is_too_fast
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
@@ -60,13 +60,7 @@ def fault_finding(fault: Fault) -> Finding:
     share = None if whole or not math.isfinite(fault.share) else 100.0 * fault.share
     value, unit = (fault.size, fault.unit) if fault.size is not None else (share, "%" if share else "")
     return Finding(
-        light,
-        fault.kind,
-        fault.channel,
-        value,
-        unit,
-        expected="none",
-        detail=fault.detail,
+        light, fault.kind, fault.channel, value, unit, expected="none", detail=fault.detail,
         remedy=_REMEDIES.get(fault.kind, ""),
     )
 
@@ -106,25 +100,13 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float, sl
         doubt = f"{AS_SECONDS} If so, " if slow else ""
         expected = f"> {_PER_CYCLE * natural:.3g} Hz, four samples to a cycle of the rig's {natural:.3g} Hz"
         return Finding(
-            "red",
-            "rate",
-            name,
-            rate,
-            "Hz",
-            expected=expected,
-            detail=longest,
+            "red", "rate", name, rate, "Hz", expected=expected, detail=longest,
             remedy=f"{doubt}record faster, or name the right rig with --rig",
         )
     if rate < _SLOW * command:
         return Finding(
-            "amber",
-            "rate",
-            name,
-            rate,
-            "Hz",
-            expected=f"{command:.4g} Hz as the commands",
-            detail="slower than the commands: what is faster folds",
-            remedy="record it faster",
+            "amber", "rate", name, rate, "Hz", expected=f"{command:.4g} Hz as the commands",
+            detail="slower than the commands: what is faster folds", remedy="record it faster",
         )
     return Finding("green", "rate", name, rate, "Hz", detail=longest)
 
@@ -146,14 +128,8 @@ def order(record: Record) -> list[Finding]:
         if back:
             findings.append(
                 Finding(
-                    "amber",
-                    "order",
-                    name,
-                    float(back),
-                    "1",
-                    expected="rising stamps",
-                    detail="stamps go back",
-                    remedy=_REMEDIES["out_of_order"],
+                    "amber", "order", name, float(back), "1", expected="rising stamps",
+                    detail="stamps go back", remedy=_REMEDIES["out_of_order"],
                 )
             )
     return findings

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rsea_ros.errors import OutputError
-from rsea_ros.outputs.new_files import Destination, check_free, unused_path
+from rsea_ros.outputs.files import unused_path
+from rsea_ros.outputs.new_files import Destination, check_free
 
 FOUND = 1
 """Exit status for a finding listed in --fail-on."""

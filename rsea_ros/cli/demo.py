@@ -31,7 +31,7 @@ from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
-from rsea_ros.outputs.new_files import unused_path
+from rsea_ros.outputs.files import unused_path
 from rsea_ros.report.remark_words import fault_lines
 
 HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and write a report"

@@ -31,7 +31,7 @@ NO_RUN = "no_run"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     from rsea_ros.documents.units import plain
-    from rsea_ros.experiment.run_limits import UNITS
+    from rsea_ros.experiment.run_shape import UNITS
 
     units = ", ".join(f"{name} ({plain(unit)})" for name, unit in UNITS.items())
     add = parser.add_argument
@@ -59,8 +59,8 @@ def run(args: argparse.Namespace) -> int:
     """Design the run and write it."""
     from rsea_ros.experiment.advice import advise
     from rsea_ros.experiment.proposal import DesignRequest
-    from rsea_ros.experiment.run_limits import limits_from
-    from rsea_ros.identification.workers import worker_pools
+    from rsea_ros.experiment.run_shape import limits_from
+    from rsea_ros.identification.solver import worker_pools
 
     place = results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
     shortest = args.shortest or min(0.5, args.longest)
@@ -126,7 +126,7 @@ def _possible(
 def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
     from rsea_ros.cli._provenance import provenance
-    from rsea_ros.experiment.run_limits import run_text
+    from rsea_ros.experiment.run_shape import run_text
     from rsea_ros.report.experiment.page import advice_page
     from rsea_ros.report.experiment.words import advice_json
     from rsea_ros.report.result_files import json_text

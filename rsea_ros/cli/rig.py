@@ -73,7 +73,7 @@ def _row(rig: Rig, name: str) -> tuple[str, ...]:
 def remarks(rig: Rig) -> list[str]:
     """Return a summary of the rig: moving ends, fitted values, sensors."""
     from rsea_ros.documents.wording import list_names
-    from rsea_ros.model.rig_fields import END_NAMES
+    from rsea_ros.model.rig import END_NAMES
 
     ends = [f"{end} {'moves' if rig.end_is_free(end) else 'is clamped'}" for end in END_NAMES]
     noisy = [f"{name} ({sensor.noise:g})" for name, sensor in rig.sensors.items() if sensor.noise > 0.0]

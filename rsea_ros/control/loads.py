@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from rsea_ros.control.sampled import check_controllable
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig
 
 LIGHTEST = "paper_moving_output"

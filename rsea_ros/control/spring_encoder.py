@@ -132,4 +132,4 @@ class SpringEncoder:
 def spread(rig: Rig, channel: str) -> float:
     """Return the standard deviation of a sensor's noise with its quantum; 0 where the rig has no sensor."""
     sensor = rig.sensors.get(channel)
-    return math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0)) if sensor else 0.0
+    return sensor.level if sensor else 0.0

@@ -13,7 +13,7 @@ from rsea_ros.design.requirement import Requirement
 from rsea_ros.design.spring_design import least_for_band, least_stiffness, spring_design
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.model.train import Train
-from rsea_ros.records.normal import Z90
+from rsea_ros.records.statistics import Z90
 
 _STEPS = 201
 

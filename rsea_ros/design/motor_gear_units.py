@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rsea_ros.documents import strict_yaml
-from rsea_ros.documents.fields import mapping, number, only_keys, text, unit
+from rsea_ros.documents.strict_yaml import mapping, number, only_keys, text, unit
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import FieldError, ParameterError

@@ -11,8 +11,7 @@ from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end, flat_band, pure_torque_bandwidth, undamped_stiffness
-from rsea_ros.model.rig import Quantity, Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Quantity, Rig
 
 DAMPING_RATIO = 0.025
 """Of spring and chassis, assumed: that of the prototype's rig. The paper states none."""

@@ -13,6 +13,7 @@ from rsea_ros.diagnosis.candidate import (
     effect_size,
     fit_candidate,
     is_within_clocks,
+    without_effect,
 )
 from rsea_ros.diagnosis.criteria import (
     costs_priors_less,
@@ -22,17 +23,16 @@ from rsea_ros.diagnosis.criteria import (
 )
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
-from rsea_ros.diagnosis.problem_variants import without_effect
 from rsea_ros.diagnosis.score import likelier_by
-from rsea_ros.diagnosis.screening import screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.step_fits import screen
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.solver import Pools
 from rsea_ros.identification.unknowns import apply
-from rsea_ros.identification.workers import Pools
-from rsea_ros.model.rig_fields import FIELDS
+from rsea_ros.model.rig import FIELDS
 from rsea_ros.records.record import FloatArray
 
 

@@ -136,18 +136,12 @@ def _piece(case: Case, drive: Drive, begin: float, end: float, run_up: float) ->
     compared = start + run_up
     inside = {n: (t >= start) & (t < drive.start + end) for n, t in case.t.items()}
     cut = replace(
-        drive,
-        start=start,
-        command=drive.command[first:last],
+        drive, start=start, command=drive.command[first:last],
         at={n: drive.at[n][keep] - first for n, keep in inside.items()},
         impulse={n: drive.impulse[n][keep] for n, keep in inside.items()},
-        reference=drive.reference[first:last],
-        angle=drive.angle[first:last],
-        initial=state_at(case, start),
-        origin=drive.origin + first * drive.step,
-        whole=drive.drift_time,
-        restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last),
-        spans=(),
+        reference=drive.reference[first:last], angle=drive.angle[first:last], initial=state_at(case, start),
+        origin=drive.origin + first * drive.step, whole=drive.drift_time,
+        restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last), spans=(),
     )
     return case.within({n: t >= compared for n, t in case.t.items()}).keep(inside, cut)
 

@@ -23,13 +23,12 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import torque_scale
-from rsea_ros.identification.even_stamps import with_even_clocks
-from rsea_ros.identification.fit import unknowns_of
+from rsea_ros.identification.fit import unknowns_of, with_even_clocks
+from rsea_ros.identification.identify import lost_behind
 from rsea_ros.identification.problem import Problem, case_from
-from rsea_ros.identification.record_checks import lost_behind
 from rsea_ros.identification.result import Remark
+from rsea_ros.identification.solver import Pools, worker_pools
 from rsea_ros.identification.start import joint_start, scale_of
-from rsea_ros.identification.workers import Pools, worker_pools
 from rsea_ros.model.extent import bound_values
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig

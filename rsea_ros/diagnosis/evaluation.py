@@ -11,13 +11,13 @@ from rsea_ros.diagnosis.candidate import Candidate, FitSetup, fit_candidate
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.score import Score, score, score_on
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, IntervalSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.diagnosis.stretches import spread_over
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import Case, Problem, case_from, simulate_cases
-from rsea_ros.identification.solver import Solution
+from rsea_ros.identification.settings import IntervalSettings
+from rsea_ros.identification.solver import Pools, Solution
 from rsea_ros.identification.unknowns import apply
-from rsea_ros.identification.workers import Pools
 from rsea_ros.model.prediction_errors import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import Fault, FloatArray, Record

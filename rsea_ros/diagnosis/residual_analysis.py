@@ -12,7 +12,7 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
-from rsea_ros.records.spectra import power_density
+from rsea_ros.records.statistics import power_density
 
 
 def edges_of(values: FloatArray, count: int, *, equal: bool) -> FloatArray:

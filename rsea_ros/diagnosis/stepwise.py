@@ -1,5 +1,8 @@
-"""Stepwise selection: from the re-fitted nominal model, cause after cause, until only noise is left or no
-effect helps.
+"""Stepwise selection: from the re-fitted nominal model, cause after cause, until no effect helps any more.
+
+All are screened and the promising fitted on short pieces of the data; the best of those are fitted to all
+training blocks. Where none is acceptable, effects that the pieces overlooked are tried, then effects on the
+measured rotor angle, then two at once. Two at once are also tried where the best fits only far from the rig.
 
 Models are fitted to the training blocks and chosen on the validation blocks; the test blocks are not touched.
 
@@ -11,8 +14,11 @@ fits better.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 from rsea_ros.diagnosis.candidate import (
     Candidate,
@@ -20,22 +26,183 @@ from rsea_ros.diagnosis.candidate import (
     effect_size,
     fit_candidate,
     leaves_only_noise,
+    prior_cost,
     refit,
     rescore,
     with_noise_reestimated,
+    without_effect,
 )
-from rsea_ros.diagnosis.criteria import is_acceptable, is_far_from_floor
+from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
-from rsea_ros.diagnosis.forward_step import NO_STEP, ForwardStep, StepResult
-from rsea_ros.diagnosis.problem_variants import without_effect
+from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.step_fits import ScreenedEffect, StepFits
 from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
+from rsea_ros.identification.confidence import is_off_rig
 from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.solver import Pools, Solution
 from rsea_ros.identification.unknowns import vector_of
-from rsea_ros.identification.workers import Pools
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
+
+
+class StepResult(NamedTuple):
+    """The model to accept, if any, all other trials, and the models that do as well as it."""
+
+    accepted: Candidate | None
+    trials: list[Trial]
+    equals: tuple[Candidate, ...]
+
+
+NO_STEP = StepResult(None, [], ())
+
+
+@dataclass(frozen=True)
+class ForwardStep:
+    """The input of a step: the current model, the effects to try, and the number of earlier steps."""
+
+    current: Candidate
+    effects: Sequence[Effect]
+    number: int
+    pools: Pools
+    tell: Progress
+    settings: DiagnosisSettings
+
+    def run(self) -> StepResult:
+        """Try every effect, and two at once where none helps alone."""
+        screened = self.fits.screen(self.fits.on_pieces)
+        close = self._fit_to_pieces(screened)
+        finalists = self._finalists(screened, close)
+        models = self.fits.fit_modes_again(self.fits.fit_all(finalists))
+        if not self._acceptable(models):
+            overlooked = self.fits.find_overlooked(_others(screened, finalists))
+            finalists += overlooked
+            models += self.fits.fit_all(overlooked)
+        if self.fits.is_far and all(
+            is_far_from_floor(m, self.settings) for m in self._acceptable(models)
+        ):
+            models += self.fits.on_measured_angle()
+        contenders = self._acceptable(models) or self._pairs(finalists)
+        chosen, equals = self._choose(contenders)
+        if chosen is not None and any(m is chosen for m in models):
+            undecided = self.fits.nearly_as_good(_others(close, finalists), chosen)
+            finalists += undecided
+            models += self.fits.fit_all(undecided)
+            contenders = self._acceptable(models)
+            chosen, equals = self._choose(contenders)
+        if chosen is not None and is_off_rig(chosen.solution):
+            contenders += self._pairs_nearer_the_rig(chosen, close)
+            chosen, equals = self._choose(contenders)
+        trials = [self._far_behind(s) for s in _others(screened, finalists)]
+        trials += [self._refusal(m, chosen) for m in models if m is not chosen]
+        return StepResult(chosen, trials, equals)
+
+    @cached_property
+    def fits(self) -> StepFits:
+        """The fits beside the current model."""
+        return StepFits(self.current, self.effects, self.pools, self.settings, self._say)
+
+    def _acceptable(self, models: Sequence[Candidate]) -> list[Candidate]:
+        return [m for m in models if is_acceptable(m, self.current, self.settings)]
+
+    def _choose(self, models: Sequence[Candidate]) -> tuple[Candidate | None, tuple[Candidate, ...]]:
+        """Return the model to accept and those that do as well."""
+        return break_tie(models, self.current.validation, self.settings)
+
+    def _fit_to_pieces(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
+        """Return the best of the screening fitted to the pieces, best first.
+
+        Also where no step helped: the guess may have been poor.
+        """
+        best = screened[: self.settings.forward.piece_fits]
+        return sorted(self.fits.fit_pieces(best), key=lambda s: s.cost)
+
+    def _finalists(
+        self, screened: Sequence[ScreenedEffect], close: Sequence[ScreenedEffect]
+    ) -> list[ScreenedEffect]:
+        """Return the best on the pieces, and the listed look-alikes of the very best."""
+        rule, cost = self.settings.forward, self.fits.on_pieces.cost
+        if not close:
+            return []
+        best, alike = close[0].cost, _look_alikes(close[0].effect, self.effects)
+        if self.fits.is_far:
+            close = [s for s in close if s.cost < rule.hope_one * cost] or close[:1]
+        first, following = close[: rule.full_fits], close[rule.full_fits : 2 * rule.full_fits]
+        near = [s for s in first if s.cost < rule.behind_first * best]
+        near += [s for s in following if s.cost < rule.behind_next * best]
+        fitted = {s.name: s for s in close}
+        rivals = {s.name: s for s in (*reversed(screened), *close) if s.name in alike}
+        rivals = {name: s for name, s in rivals.items() if name not in {n.name for n in near}}
+        late = [
+            fitted[name] if name in fitted else self.fits.fit_pieces([s])[0] for name, s in rivals.items()
+        ]
+        return [*near, *(s for s in late if s.cost < rule.behind_first * best)]
+
+    def _pairs(self, firsts: Sequence[ScreenedEffect]) -> list[Candidate]:
+        """Return acceptable models with two more effects, for where none helps alone and much is left."""
+        if not self.fits.is_far:
+            return []
+        return self._pairs_beside(firsts, self.fits.with_typical)
+
+    def _pairs_nearer_the_rig(self, chosen: Candidate, close: Sequence[ScreenedEffect]) -> list[Candidate]:
+        """Return acceptable models with two more effects, the first of which leaves the rig's values less.
+
+        Where two effects are missing, a third may fit as well alone, but only far from the rig.
+        """
+        rule, most = self.settings.forward, self.settings.forward.clear * self.fits.on_pieces.cost
+        away = {s.name: prior_cost(s.problem, s.theta) for s in close if s.cost < most}
+        nearer = [s for s in close if away.get(s.name, math.inf) < rule.nearer * chosen.prior_cost]
+        return self._pairs_beside(sorted(nearer, key=lambda s: away[s.name]), self.fits.with_fitted)
+
+    def _pairs_beside(
+        self, firsts: Sequence[ScreenedEffect], with_first: Callable[[ScreenedEffect], Solution]
+    ) -> list[Candidate]:
+        """Return acceptable models with an effect beside one of the first. with_first: on the pieces."""
+        rule, fits = self.settings.forward, self.fits
+        if len(self.current.causes) > rule.causes_beside_a_pair:
+            return []
+        pairs: list[ScreenedEffect] = []
+        for first in firsts[: rule.paired]:
+            pairs += fits.fit_pieces(fits.screen(with_first(first))[: rule.paired])
+        promising = sorted(
+            (p for p in pairs if p.cost < rule.hope_two * fits.on_pieces.cost), key=lambda p: p.cost
+        )
+        return self._acceptable(fits.fit_all(promising[: rule.paired_fits]))
+
+    def _far_behind(self, screened: ScreenedEffect) -> Trial:
+        problem, theta = self.fits.complete(screened)
+        return Trial(screened.name, self.current, problem, theta, is_full=False, reason="far_behind")
+
+    def _refusal(self, model: Candidate, chosen: Candidate | None) -> Trial:
+        """Return the trial of a model that was not accepted, with the reason."""
+        refused = refusal(model, self.current, self.settings)
+        if refused is not None or chosen is None:
+            return trial_of(model, model.newest, self.current, refused or "not_sure")
+        loss = float(chosen.validation.loss(chosen.validation).sum())
+        is_alike = loss_excess(model, chosen) < self.settings.forward.alike * loss
+        is_larger = model.parameters > chosen.parameters and is_alike
+        reason: Reason = "no_better_than_simpler" if is_larger else "explains_less"
+        if loss_excess(model, chosen) < 0.0 and model.prior_cost > chosen.prior_cost:
+            reason = "no_better_than_likelier"
+        return trial_of(model, model.newest, self.current, reason, chosen.newest)
+
+    def _say(self, what: str, within: float) -> None:
+        """Report the current trial; each step counts as half of the remaining work."""
+        share = 1.0 - 0.5**self.number * (1.0 - 0.5 * within)
+        self.tell(f"step {self.number + 1}: {what}", share)
+
+
+def _look_alikes(effect: Effect, effects: Sequence[Effect]) -> set[str]:
+    """Return the listed look-alikes of an effect, and those that list it and are no larger."""
+    confusable, size = effect.claims.confusable_with, effect_size(effect.name)
+    alike = look_alikes(effect.name, effects)
+    return {e.name for e in alike if e.name in confusable or effect_size(e.name) <= size}
+
+
+def _others(screened: Sequence[ScreenedEffect], chosen: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
+    names = {s.name for s in chosen}
+    return [s for s in screened if s.name not in names]
 
 
 def select_stepwise(

@@ -137,11 +137,9 @@ def on_slots(case: Case, slots: Sequence[int] | IntArray, settings: DiagnosisSet
     anew = [(first, _state(case, drive, first)) for first, _ in spans if first > 0]
     keep = {n: _inside(t - case.start, times) for n, t in case.t.items()}
     cut = replace(
-        drive,
-        at={n: at[keep[n]] for n, at in drive.at.items()},
+        drive, at={n: at[keep[n]] for n, at in drive.at.items()},
         impulse={n: i[keep[n]] for n, i in drive.impulse.items()},
-        restarts=tuple(sorted([*drive.restarts, *anew])),
-        spans=spans,
+        restarts=tuple(sorted([*drive.restarts, *anew])), spans=spans,
     )
     return case.keep(keep, cut)
 

@@ -1,4 +1,4 @@
-"""Strict YAML: one value for a key, numbers as people write them, errors with file, line and field.
+"""Strict YAML: one value for a key, numbers as people write them, fields checked with unit and range.
 
 Numbers are plain decimals (`1e-3` too). Text that YAML 1.1 but not a person reads as a number (`0x10`, `010`,
 `1:30`, `1_000`, a date) is refused with its line, as are anchors, aliases and tags.
@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 import re
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from rsea_ros.documents.wording import no_utf_8, quote
+from rsea_ros.documents.units import plain, same_unit
+from rsea_ros.documents.wording import did_you_mean, no_utf_8, quote
 from rsea_ros.errors import FieldError
 
 _DECIMAL = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
@@ -206,3 +207,90 @@ def _refusal(event: yaml.Event, reason: str) -> FieldError:
 
 def _line(event: yaml.Event) -> int:
     return event.start_mark.line + 1 if event.start_mark else 0
+
+
+def number(value: Any, name: str, unit: str) -> float:
+    """Return a YAML value as a float. Raises FieldError when it is not a number."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    try:
+        converted = float(value) if is_number else math.nan
+    except OverflowError:
+        converted = math.nan
+    if math.isnan(converted):
+        raise FieldError(f"{name} = {quote(value)}, expected a number ({plain(unit) or 1})", name)
+    return converted
+
+
+def interval(value: Any, name: str, unit: str) -> tuple[float, float]:
+    """Return [low, high] as two floats. Raises FieldError for anything else."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise FieldError(f"{name} = {quote(value)}, expected [low, high] in {plain(unit)}", name)
+    low, high = (number(v, name, unit) for v in value)
+    return low, high
+
+
+def switch(body: Mapping[str, Any], name: str) -> bool:
+    """Return true or false of a group. Raises FieldError when it is something else."""
+    value = body.get(name.split(".")[-1], False)
+    if not isinstance(value, bool):
+        raise FieldError(f"{name} = {quote(value)}, expected true or false", name)
+    return value
+
+
+def text(value: Any, name: str) -> str:
+    """Return a text. Raises FieldError for a value of another type."""
+    if not isinstance(value, str):
+        raise FieldError(f"{name} = {quote(value)}, expected text", name)
+    return value
+
+
+def mapping(value: Any, name: str, expected: str = "a mapping") -> Mapping[str, Any]:
+    """Return a mapping. Raises FieldError for a value of another type."""
+    if not isinstance(value, Mapping):
+        raise FieldError(f"{name} = {quote(value)}, expected {expected}", name)
+    return value
+
+
+def only_keys(body: Mapping[str, Any], allowed: set[str], where: str) -> None:
+    """Raise FieldError for a key that is not allowed."""
+    for key in body:
+        if key not in allowed:
+            expected = ", ".join(sorted(allowed)) + did_you_mean(str(key), allowed)
+            raise FieldError(
+                f"{where}: unknown key {quote(key)}, expected one of {expected}", f"{where}.{key}"
+            )
+
+
+def unit(value: Any, name: str, expected: str) -> None:
+    """Raise FieldError for another unit than the one expected, however that is written."""
+    if not same_unit(value, expected):
+        raise FieldError(f"{name} = {quote(value)}, expected {expected!r}", name)
+
+
+NEEDED = "required"
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a mapping: the expected value, the default, and the meaning."""
+
+    name: str
+    expects: str
+    default: str
+    meaning: str = ""
+
+
+def names(keys: Collection[Key]) -> set[str]:
+    """Return the names of keys."""
+    return {key.name for key in keys}
+
+
+def table(section: str, keys: Sequence[Key]) -> str:
+    """Return a table of keys in Markdown."""
+    head = [f"`{section}`:", "", "| key | expected | default | meaning |", "|---|---|---|---|"]
+    return "\n".join([*head, *map(_row, keys)]) + "\n"
+
+
+def _row(key: Key) -> str:
+    cells = (f"`{key.name}`", key.expects.replace("|", "\\|"), key.default, key.meaning)
+    return f"| {' | '.join(cells)} |"

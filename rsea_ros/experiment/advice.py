@@ -1,18 +1,189 @@
-"""The offline answer: the run to play, or the proof that none helps and the measurements to make instead."""
+"""The offline answer: the run to play, or the proof that none helps and the measurements to make instead.
+
+A run is a mixture in time of sines of the band, at several amplitudes and biases within the limits. If one
+set of the rival's values leaves, of every sine, at most a power p over the noise, no mixture of length T
+separates by more than S = p T, whatever its spectrum: the refit can only do better than these values. The
+values are chosen to make the largest p smallest (Lawson's weights: each sine weighted by its residual
+so far). For linear rigs every spectrum is such a mixture; for others the bound covers the sines tried.
+(Duality of the optimal design: Fedorov, Theory of Optimal Experiments, 1972.)
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.experiment.bound import Apart, Bound, bound, measurements_apart
-from rsea_ros.experiment.hypothesis import Hypothesis
+from rsea_ros.effects.signal_table import Port
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis, motion, run_case
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_design import propose
-from rsea_ros.experiment.shape_rater import noise_by_channel
-from rsea_ros.identification.solver import Map, serial
+from rsea_ros.experiment.run_shape import RunLimits, largest_share, of_command, of_response
+from rsea_ros.experiment.separation import noise_by_channel
+from rsea_ros.identification.excitation import ramp_ends
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Map, serial, solve
 from rsea_ros.progress import Progress
+from rsea_ros.records.record import FloatArray
+
+_LENGTH = 1.0
+"""s of a sine, of which the first is left to settle by its ramp; low frequencies get a period."""
+_LEVELS = ((1.0, 0.0), (0.3, 0.0), (0.4, 0.5))
+"""Amplitude and bias of the sines, as shares of what the limits allow."""
+_FREQUENCIES = 8
+_LAWSON = 3
+_ITERATIONS = 8
+HOPELESS = 6.0
+"""S of the longest run below which it would not make the odds twenty to one."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A bound for every run.
+
+    true, rival: names. most: S of a run of `duration` s, of any spectrum in the band.
+    frequency: Hz, rate: S a second at the worst level, shape (k,). values: the rival's, by name, SI, with
+    which it imitates the true one best.
+    """
+
+    true: str
+    rival: str
+    most: float
+    duration: float
+    frequency: FloatArray
+    rate: FloatArray
+    values: Mapping[str, float]
+
+    @property
+    def is_hopeless(self) -> bool:
+        """Whether no run of that length separates the two."""
+        return self.most < HOPELESS
+
+
+def bound(
+    true: Hypothesis,
+    rival: Hypothesis,
+    limits: RunLimits,
+    duration: float,
+    noise: Mapping[str, float],
+    rate: float = 280.0,
+    run: Map = serial,
+) -> Bound:
+    """Return the most that a run of `duration` s separates two hypotheses. noise: by channel. rate: Hz."""
+    frequencies = np.geomspace(0.5, 0.4 * rate, _FREQUENCIES)
+    sines = [(f, _sine(float(f), level, true, limits, rate)) for f in frequencies for level in _LEVELS]
+    problem = replace(true.problem, cases=tuple(run_case(u, rate, noise) for _, u in sines))
+    outputs = problem.outputs(true.if_there())
+    cases = tuple(replace(c, measured=dict(o)) for c, o in zip(problem.cases, outputs, strict=True))
+    theta, powers = _imitate(replace(rival.problem, cases=cases), rival.theta, duration, run)
+    at = np.array([f for f, _ in sines])
+    worst = np.array([powers[at == f].max() for f in frequencies])
+    values = {u.name: u.outer(float(v)) for u, v in zip(rival.problem.unknowns, theta, strict=True)}
+    return Bound(true.name, rival.name, float(worst.max()) * duration, duration, frequencies, worst, values)
+
+
+def _sine(
+    frequency: float, level: tuple[float, float], true: Hypothesis, limits: RunLimits, rate: float
+) -> FloatArray:
+    """Return a sine of a level within the limits at the likeliest values, N m."""
+    length = max(_LENGTH, 1.0 / frequency)
+    t = np.arange(round(length * rate)) / rate
+    amplitude, bias = level
+    command = limits.torque * ramp_ends(
+        bias + amplitude * np.sin(2.0 * np.pi * frequency * t), round(0.2 * rate)
+    )
+    rig = true.rig_at(true.if_there())
+    for _ in range(3):
+        peaks = of_command(command, rate) | of_response(command, motion(rig, command, rate))
+        share = largest_share(peaks, limits)
+        if share <= 1.0:
+            break
+        command = command * (0.98 / share if np.isfinite(share) else 0.3)
+    return command
+
+
+def _imitate(
+    problem: Problem, theta: FloatArray, duration: float, run: Map
+) -> tuple[FloatArray, FloatArray]:
+    """Return the values that imitate best, and the S a second that they leave, shape (cases,)."""
+    weights = np.full(len(problem.cases), 1.0)
+    best, least = theta, _powers(problem, theta)
+    for _ in range(_LAWSON):
+        heavy = replace(problem, cases=tuple(map(_with_weight, problem.cases, (weights * duration).tolist())))
+        theta = solve(heavy, best, iterations=_ITERATIONS, run=run).theta
+        powers = _powers(problem, theta)
+        if powers.max() < least.max():
+            best, least = theta, powers
+        weights = weights * np.sqrt(powers + 1e-12 * powers.max() + 1e-300)
+        weights = weights / weights.mean()
+    return best, least
+
+
+def _with_weight(case: Case, weight: float) -> Case:
+    return replace(case, noise={n: v / np.sqrt(max(weight, 1e-6)) for n, v in case.noise.items()})
+
+
+def _powers(problem: Problem, theta: FloatArray) -> FloatArray:
+    outputs = problem.outputs(theta)
+    return np.array([_power(problem, c, o) for c, o in zip(problem.cases, outputs, strict=True)])
+
+
+def _power(problem: Problem, case: Case, outputs: Mapping[str, FloatArray]) -> float:
+    """Return the squared residual of a case over the noise, summed, per second."""
+    parts: Sequence[float] = [
+        float(np.sum(((outputs[n] - case.measured[n]) / case.noise[n]) ** 2)) for n in problem.present(case)
+    ]
+    return sum(parts) / case.duration
+
+
+ACCURACY = 0.01
+"""Relative, one sigma: what a value measured apart with care is worth."""
+MOST = 2
+_OF_VALUES: Mapping[str, str] = {
+    "spring.stiffness": "the stiffness of the spring, by a known weight on a lever and the encoder",
+    "rotor.reflected_inertia": "the inertia of the rotor, from its drawing or by a pendulum",
+    "rotor.reflected_damping": "the drag of the motor, by its no-load current at a few speeds",
+    "spring.damping": "the damping of the spring, by a free swing",
+}
+_OF_PORTS: Mapping[Port, str] = {
+    Port.COMMAND: "the torque that the motor makes, by a torque sensor between motor and spring",
+    Port.MOTOR: "the torque that the motor makes, by a torque sensor or a known weight held at rest",
+    Port.GEAR: "the angle behind the gear, by a second encoder",
+    Port.SPRING: "the deflection of the spring, by a second encoder",
+    Port.SENSOR: "the F/T sensor, calibrated with a known weight",
+    Port.STRUCTURE: "the motion of what gives, by an accelerometer or a dial gauge",
+}
+
+
+@dataclass(frozen=True)
+class Apart:
+    """A measurement apart. separation: S that it brings, None where that was not computed."""
+
+    what: str
+    separation: float | None = None
+
+
+def measurements_apart(proved: Bound, true: Hypothesis, rival: Hypothesis) -> list[Apart]:
+    """Return separate measurements: the sensors that show the causes, then at most MOST values of the rig.
+
+    A value of the rig separates by how far the rival must have it from the true one to do what that does,
+    over ACCURACY; of those that separate, the easiest to measure come first.
+    """
+    ours = {u.name: u.outer(float(v)) for u, v in zip(true.problem.unknowns, true.if_there(), strict=True)}
+    values = []
+    for name, theirs in proved.values.items():
+        if name in true.problem.rig.quantities and ours[name] > 0.0 and theirs > 0.0:
+            away = np.log(theirs / ours[name]) / ACCURACY
+            values.append(Apart(_OF_VALUES.get(name, f"{name}, by itself"), float(away**2)))
+    easy = [*_OF_VALUES.values()]
+    values = [v for v in values if (v.separation or 0.0) > HOPELESS]
+    values.sort(key=lambda v: easy.index(v.what) if v.what in easy else len(easy))
+    effects = [effect_named(h.name) for h in (true, rival) if h.name != NOTHING]
+    sensors = dict.fromkeys(_OF_PORTS[e.port] for e in effects)
+    return [*(Apart(what) for what in sensors), *values[:MOST]]
+
 
 LONGEST_OF_ALL = 60.0
 """s of a run in whose length a pair must be hopeless to be called so."""

@@ -200,8 +200,7 @@ def noise_of(rig: Rig, channel: str, measured: Mapping[str, float] | None = None
     """Return the noise of a channel: as measured, else as the rig states it with q / sqrt(12)."""
     if measured and channel in measured:
         return measured[channel]
-    sensor = rig.sensors.get(channel, Sensor())
-    return float(max(np.hypot(sensor.noise, sensor.quantum / np.sqrt(12.0)), 1e-9))
+    return max(rig.sensors.get(channel, Sensor()).level, 1e-9)
 
 
 def run_case(command: FloatArray, rate: float, noise: Mapping[str, float], *, is_quick: bool = False) -> Case:

@@ -1,4 +1,12 @@
-"""Causes weighed jointly over all runs.
+"""Causes weighed jointly over all runs: each fitted from the prior of the runs before, by its evidence.
+
+The logarithm of the evidence is Laplace's, with priors on the rig's values and on the cause's size:
+
+    ln p(data | cause) = -C / (2 k) - (ln det(J'J / k + L) - ln det L) / 2
+
+C: cost of the fit, prior included; L: the prior's information; k: the variance that the best fit leaves, in
+units of the noise, not below 1. Of minima of about the same cost the one of the largest evidence counts: a
+narrow one that fits a little better is less likely than a wide one. (MacKay, Neural Computation 4, 1992.)
 
 A cause that the data cannot show weighs as much as no cause: it stays possible until a run could have shown
 it. All causes have the same prior probability.
@@ -6,6 +14,7 @@ it. All causes have the same prior probability.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,21 +25,178 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
+from rsea_ros.effects.effect import Parameter
+from rsea_ros.effects.guess import Guess
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.fits import (
-    fit_cause,
-    information_of,
-    log_evidence,
-    problem_of,
-    repeat_fits,
-    scale_of,
-)
-from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
-from rsea_ros.identification.problem import Case, case_from
-from rsea_ros.identification.solver import Map, Solution, power, serial
-from rsea_ros.model.rig import Rig
-from rsea_ros.progress import Progress
-from rsea_ros.records.record import BoolArray, FloatArray, Record
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis, may_contain, shared_parameters
+from rsea_ros.identification.fit import unknowns_of
+from rsea_ros.identification.problem import Case, Problem, case_from
+from rsea_ros.identification.solver import Map, Solution, power, serial, solve
+from rsea_ros.identification.unknowns import Unknown, idle, unknowns_of_effect
+from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.records.record import MEASURED, BoolArray, FloatArray, Record
+
+_SIZES = 1.0
+"""One sigma of the size of a cause around none at all, in what its catalogue calls typical."""
+_SPAN = 0.25
+"""One sigma of another parameter of a cause around its typical value, of the width of its bounds."""
+
+
+def problem_of(name: str, rig: Rig, cases: Sequence[Case]) -> Problem:
+    """Return the problem of a rig with one more cause, or none."""
+    nominal = unknowns_of(rig, cases)
+    stated = frozenset(e.name for e in rig.effects)
+    if name == NOTHING:
+        return Problem(tuple(cases), rig, nominal, MEASURED, stated=stated)
+    effect = effect_named(name)
+    with_it = rig.with_effects(*rig.effects, EffectSetting(name, effect.complete(effect.null)))
+    free = unknowns_of_effect(effect, effect.typical, rig.known | idle(effect, rig))
+    parameters = {f"{name}.{p.name}": p for p in effect.parameters}
+    doubted = tuple(_with_prior(u, parameters[u.name], u.name == f"{name}.{effect.main.name}") for u in free)
+    return Problem(tuple(cases), with_it, (*nominal, *doubted), MEASURED, stated=stated)
+
+
+def _with_prior(unknown: Unknown, parameter: Parameter, is_size: bool) -> Unknown:
+    """Return an unknown of a cause with a prior: its size around null, the rest around typical values."""
+    typical, null = unknown.inner(parameter.typical), unknown.start
+    if is_size and (parameter.null > 0.0 or not parameter.logarithmic) and math.isfinite(parameter.null):
+        null = unknown.inner(parameter.null)
+        return replace(unknown, start=parameter.null, doubt=_SIZES * abs(typical - null) or unknown.reach)
+    if math.isfinite(parameter.spread):
+        return unknown
+    return replace(unknown, doubt=_SPAN * _width(unknown, parameter))
+
+
+def _width(unknown: Unknown, parameter: Parameter) -> float:
+    """Return how far the parameter can reach in the fit's coordinate; 16 times where it has no bound."""
+    ends = (parameter.low, parameter.high)
+    if (unknown.logarithmic and parameter.low <= 0.0) or not all(map(math.isfinite, ends)):
+        return math.log(16.0) if unknown.logarithmic else 16.0 * abs(parameter.typical or 1.0)
+    width = unknown.inner(parameter.high) - unknown.inner(parameter.low)
+    return min(width, 16.0 * unknown.scale)
+
+
+def vector_at(problem: Problem, near: Mapping[str, float], start: Mapping[str, float]) -> FloatArray:
+    """Return coordinates of a problem: `start` where it says, else `near` (coordinates), else its prior."""
+    return np.array(
+        [
+            u.inner(min(max(start[u.name], u.low), u.high))
+            if u.name in start
+            else near.get(u.name, u.inner(u.start))
+            for u in problem.unknowns
+        ]
+    )
+
+
+def weights_of(problem: Problem) -> FloatArray:
+    """Return the information of the prior, shape (n,)."""
+    return np.array([1.0 / u.reach**2 for u in problem.unknowns])
+
+
+_SHARE = 0.15
+"""Of a cause's typical size, where fits begin too."""
+_LITTLE = 4.0
+"""Cost above the least, up to which a fit counts as no worse."""
+_CLOSE = 1.5
+"""Times the least cost, up to which a fit is begun once more."""
+_GAIN, _ITERATIONS = 1e-4, 12
+"""Relative fall of the cost below which a fit ends, and its most steps."""
+
+
+def fit_cause(
+    name: str, problem: Problem, before: FloatArray | None, near: Mapping[str, float], run: Map
+) -> Solution:
+    """Return a cause fitted from the best of its guesses, and from where it was or the rig's own fit."""
+    guesses = effect_named(name).default_guesses if name != NOTHING else [{}]
+    named = [{f"{name}.{k}": v for k, v in guess.items()} for guess in [*guesses, *_smaller(name, guesses)]]
+    rows = [vector_at(problem, {}, guess) for guess in named]
+    others = [before] if before is not None else [vector_at(problem, near, g) for g in named if near]
+    starts = [_best(problem, group, run) for group in (rows, others) if group]
+    fits = [solve(problem, theta, iterations=_ITERATIONS, gain=_GAIN, run=run) for theta in starts]
+    return min(fits, key=lambda s: s.cost)
+
+
+def _smaller(name: str, guesses: Sequence[Guess]) -> list[Guess]:
+    """Return guesses of a cause with a share of its typical size: a minimum may lie nearer to none at all."""
+    if name == NOTHING:
+        return []
+    main = effect_named(name).main
+    if not math.isfinite(main.null) or (main.logarithmic and main.null <= 0.0):
+        return []
+    return [{**g, main.name: main.null + _SHARE * (g[main.name] - main.null)} for g in guesses]
+
+
+def repeat_fits(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
+    """Return the fits, those that are close to the best also begun where others ended.
+
+    A fit that began far from the final values of the rig may stop in a local minimum: one that is worse than
+    the best begins once more from the rig's values of the best. A cause that contains another may miss it:
+    it begins once more from the other, where that fits no worse than the best.
+    """
+    best, scale = min(fits.values(), key=lambda s: s.cost), scale_of(fits)
+    good = {n: f for n, f in fits.items() if n != NOTHING and f.cost < best.cost + _LITTLE}
+    rig = {u.name: float(v) for u, v in zip(best.problem.unknowns, best.theta, strict=True)}
+    again = dict(fits)
+    for name, fit in fits.items():
+        if name == NOTHING or fit.cost >= _CLOSE * best.cost:
+            continue
+        starts = [x for n, f in good.items() for x in _as_simpler(name, fit.problem, n, f)]
+        if fit.cost > best.cost + _LITTLE:
+            pairs = zip(fit.problem.unknowns, fit.theta, strict=True)
+            starts.append(np.array([rig.get(u.name, float(v)) for u, v in pairs]))
+        others = [solve(fit.problem, x, iterations=_ITERATIONS, gain=_GAIN, run=run) for x in starts]
+        again[name] = _likeliest([fit, *others], scale)
+    return again
+
+
+def _likeliest(fits: Sequence[Solution], scale: float) -> Solution:
+    """Return the fit of the largest evidence, of those that are no worse than the best."""
+    least = min(s.cost for s in fits)
+    return max((s for s in fits if s.cost <= least + _LITTLE), key=lambda s: log_evidence(s, scale))
+
+
+def scale_of(fits: Mapping[str, Solution]) -> float:
+    """Return the variance that the best fit leaves, in units of the noise, not below 1."""
+    samples = max(len(next(iter(fits.values())).residual), 1)
+    return max(1.0, min(s.cost for s in fits.values()) / samples)
+
+
+def information_of(solution: Solution, scale: float) -> FloatArray:
+    """Return the information of prior and data together, shape (n, n)."""
+    matrix = solution.jacobian
+    result: FloatArray = matrix.T @ matrix / scale + np.diag(weights_of(solution.problem))
+    return result
+
+
+def log_evidence(solution: Solution, scale: float) -> float:
+    """Return the logarithm of the evidence of a fit; see the module docstring. scale: k."""
+    known = weights_of(solution.problem)
+    spread = np.linalg.slogdet(information_of(solution, scale) / np.sqrt(np.outer(known, known)))[1]
+    return -0.5 * solution.cost / scale - 0.5 * float(spread)
+
+
+def _as_simpler(name: str, problem: Problem, simpler: str, fit: Solution) -> list[FloatArray]:
+    """Return the start at which a cause does only what the fit of a simpler one does; none if it cannot."""
+    if not may_contain(name, simpler):
+        return []
+    values = {u.name: u.outer(float(v)) for u, v in zip(fit.problem.unknowns, fit.theta, strict=True)}
+    absent = {f"{name}.{p.name}": p.null for p in effect_named(name).parameters if math.isfinite(p.null)}
+    same = {f"{name}.{p}": values[f"{simpler}.{s}"] for p, s in shared_parameters(name, simpler).items()}
+    return [vector_at(problem, {}, values | absent | same)]
+
+
+def _best(problem: Problem, thetas: Sequence[FloatArray], run: Map) -> FloatArray:
+    """Return the start of the least cost; fits that begin far off may end in a local minimum."""
+    if len(thetas) == 1:
+        return thetas[0]
+    costs = run(lambda k: np.array([_cost(problem, thetas[k])]), range(len(thetas)))
+    return thetas[int(np.argmin([float(c[0]) for c in costs]))]
+
+
+def _cost(problem: Problem, theta: FloatArray) -> float:
+    away = theta - np.array([u.inner(u.start) for u in problem.unknowns])
+    return power(problem.residual(theta)) + float(weights_of(problem) @ away**2)
+
 
 HOPELESS = 1e-6
 """Probability below which a cause is not fitted again to further records."""
@@ -38,7 +204,7 @@ HOPELESS = 1e-6
 
 @dataclass(frozen=True)
 class WeighedCause:
-    """A cause fitted to all records. log_evidence: see fits.py; left: RMS over the noise."""
+    """A cause fitted to all records. log_evidence: see above; left: RMS over the noise."""
 
     name: str
     solution: Solution
@@ -154,14 +320,10 @@ def _where(before: RunWeighing | None, name: str) -> FloatArray | None:
 
 def _weigh(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> RunWeighing:
     scale = scale_of(solutions)
-    fits = {n: WeighedCause(n, s, log_evidence(s, scale), _rms_left(s)) for n, s in solutions.items()}
+    fits = {n: WeighedCause(n, s, log_evidence(s, scale), s.rms) for n, s in solutions.items()}
     logs = np.array([f.log_evidence for f in fits.values()])
     shares = np.exp(logs - logs.max())
     return RunWeighing(cases, fits, dict(zip(fits, (shares / shares.sum()).tolist(), strict=True)), scale)
-
-
-def _rms_left(solution: Solution) -> float:
-    return float(np.sqrt(np.mean(solution.residual**2)))
 
 
 SHORTEST = 4.2
@@ -169,11 +331,11 @@ SHORTEST = 4.2
 
 
 def diagnose_together(
-    records: Sequence[Record], rig: Rig, causes: Sequence[str], tell: Progress | None = None
+    records: Sequence[Record], rig: Rig, causes: Sequence[str]
 ) -> Diagnosis:
     """Return the diagnosis of all records together, which weighs causes by held-out data."""
     others = tuple(name for name in catalogue() if name not in causes)
-    return diagnose(list(records), rig, None, tell, DiagnosisSettings(without=others))
+    return diagnose(list(records), rig, settings=DiagnosisSettings(without=others))
 
 
 USUAL = (

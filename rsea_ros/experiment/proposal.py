@@ -19,8 +19,15 @@ from scipy.stats import norm
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.hypothesis import Hypothesis, motion
-from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
-from rsea_ros.experiment.run_shape import FEWEST, Kind, Shape
+from rsea_ros.experiment.run_shape import (
+    FEWEST,
+    Kind,
+    RunLimits,
+    Shape,
+    largest_share,
+    of_command,
+    of_response,
+)
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
 

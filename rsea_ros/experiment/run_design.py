@@ -3,8 +3,8 @@
 Shapes of every kind are tried, from the shortest run to the length that no chance of deciding could make
 worth its seconds; the best is refined by Nelder and Mead's method (scipy), which needs no smooth
 objective: gear friction and stops give none. Where full fits of the rivals leave it nothing to decide, the
-longest run is designed instead. trials.py rates shapes by simulation with the compiled step; separation.py
-has the measure. The final amplitude is the largest with which chance_constraint.py keeps all limits.
+longest run is designed instead. separation.py rates shapes by simulation and has the measure. The final
+amplitude is the largest with which proposal.py keeps all limits.
 """
 
 from __future__ import annotations
@@ -23,11 +23,14 @@ from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.proposal import DesignRequest, Group, Peaks, Proposal, ends_of, peaks, share_used
 from rsea_ros.experiment.run_shape import Shape
 from rsea_ros.experiment.separation import (
+    INSIDE,
+    ShapeRater,
     best_of,
     chances_decided,
     information_gain,
     least_share,
     likely_separations,
+    noise_by_channel,
     refit,
     separations,
     shapes_for,
@@ -35,7 +38,6 @@ from rsea_ros.experiment.separation import (
     trial_of,
     try_lengths,
 )
-from rsea_ros.experiment.shape_rater import INSIDE, ShapeRater, noise_by_channel
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress

@@ -1,4 +1,4 @@
-"""How far a run separates two hypotheses, and trials of many runs.
+"""How far a run separates two hypotheses: shapes within the limits, simulated, fitted and rated.
 
 S_ij = min_d ||y_j + J_j d - y_i||^2 + d' L_j d
 
@@ -10,19 +10,69 @@ Biometrika 62, 1975), averaged over which is true (Ponce de Leon, Atkinson, Biom
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
 
-from rsea_ros.experiment.hypothesis import Hypothesis, Response
+from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
 from rsea_ros.experiment.proposal import DesignRequest
-from rsea_ros.experiment.run_shape import FEWEST, Shape
-from rsea_ros.experiment.shape_rater import ShapeRater
+from rsea_ros.experiment.run_shape import FEWEST, Shape, command_of, largest_share, of_command, of_response
 from rsea_ros.identification.problem import Case
-from rsea_ros.identification.solver import Map, jacobian, power, serial
-from rsea_ros.records.record import BoolArray, FloatArray
+from rsea_ros.identification.solver import Map, descend, jacobian, power, serial
+from rsea_ros.records.record import MEASURED, BoolArray, FloatArray
+
+INSIDE = 0.9
+"""Share of the limits that shapes use during the search, where only the likeliest values are simulated."""
+
+
+@dataclass(frozen=True)
+class ShapeRater:
+    """Rates shapes for hypotheses. noise: by channel."""
+
+    hypotheses: Sequence[Hypothesis]
+    asked: DesignRequest
+    noise: Mapping[str, float]
+    run: Map
+
+    def within(self, shape: Shape, duration: float) -> FloatArray:
+        """Return the command of a shape in shares, as large as the limits allow at the likeliest values."""
+        limits, rate = self.asked.limits, self.asked.rate
+        whole = abs(shape.bias) + shape.amplitude
+        size = limits.torque * min(1.0, 1.0 / whole) * INSIDE
+        scaled = replace(shape, amplitude=shape.amplitude * size, bias=shape.bias * size)
+        command = command_of(scaled, duration, rate, limits.slew)
+        for _ in range(3):
+            share = max(self.share(h, command) for h in self.hypotheses)
+            if share <= INSIDE * 1.05:
+                break
+            command = command * (INSIDE / share if math.isfinite(share) else 0.5)
+        return command
+
+    def share(self, hypothesis: Hypothesis, command: FloatArray) -> float:
+        """Return the share of the limits that a command uses at the likeliest values."""
+        rate = self.asked.rate
+        rig = hypothesis.rig_at(hypothesis.if_there())
+        peaks = of_response(command, motion(rig, command, rate)) | of_command(command, rate)
+        return largest_share(peaks, self.asked.limits)
+
+    def responses(self, command: FloatArray, *, is_quick: bool = True) -> list[Response]:
+        """Return the prediction of each hypothesis for a command."""
+        case = self.case(command, is_quick=is_quick)
+        return [response(h, case, self.run) for h in self.hypotheses]
+
+    def case(self, command: FloatArray, *, is_quick: bool) -> Case:
+        """Return a run of a command, not yet made."""
+        return run_case(command, self.asked.rate, self.noise, is_quick=is_quick)
+
+
+def noise_by_channel(hypotheses: Sequence[Hypothesis], measured: Mapping[str, float]) -> dict[str, float]:
+    """Return the noise of every channel that the bench measures."""
+    rig = hypotheses[0].problem.rig
+    listed = [n for n in MEASURED if n in (measured or rig.sensors) and rig.measures(n)]
+    return {n: noise_of(rig, n, measured) for n in listed or ["ft", "position"]}
+
 
 SURE = float(np.log(19.0))
 """Logarithm of the odds that confirm a cause: 0.95 to 0.05."""
@@ -81,26 +131,13 @@ def refit(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial) ->
     predicted = replace(true.problem, cases=(case,)).outputs(true.if_there())[0]
     problem = replace(rival.problem, cases=(replace(case, measured=predicted),))
     low, high = rival.bounds()
-    theta, start, known = rival.theta, rival.theta, rival.information
-    residual = problem.residual(theta)
-    cost = power(residual)
-    for _ in range(_REFITS):
-        slope = jacobian(problem, theta, residual, run)
-        right = slope.T @ residual + known @ (theta - start)
-        step = -np.linalg.solve(slope.T @ slope + known, right)
-        for _ in range(4):
-            trial = np.clip(theta + step, low, high)
-            shifted = problem.residual(trial)
-            paid = power(shifted) + float((trial - start) @ known @ (trial - start))
-            if paid < cost:
-                break
-            step = 0.3 * step
-        else:
-            break
-        fallen, theta, residual, cost = cost - paid, trial, shifted, paid
-        if fallen < 0.01 * cost:
-            break
-    return Refit(cost, power(residual))
+    end = descend(
+        lambda theta: problem.residual(np.clip(theta, low, high)),
+        lambda theta, r: jacobian(problem, theta, r, run),
+        rival.theta, rival.information, rounds=_REFITS, enough=0.01,
+        parts=(1.0, 0.3, 0.09, 0.027),
+    )  # fmt: skip
+    return Refit(end.cost, power(end.residual))
 
 
 def decided_share(hypotheses: Sequence[Hypothesis], chances: FloatArray) -> float:

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.documents.fields import interval, mapping, number, text
+from rsea_ros.documents.strict_yaml import interval, mapping, number, text
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError, ParameterError
-from rsea_ros.experiment.fits import problem_of, vector_at, weights_of
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.joint_weighing import problem_of, vector_at, weights_of
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.rig import EffectSetting, Quantity, Rig
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import SENSED
+from rsea_ros.records.statistics import Z95
 
 SPREAD = 0.2
 """Relative, one sigma: the doubt of a cause's parameter whose file states no interval."""

@@ -17,9 +17,8 @@ from dataclasses import dataclass, field
 
 from rsea_ros.documents.units import STANDARD_GRAVITY, plain
 from rsea_ros.errors import RigError
-from rsea_ros.model.equations import rotor_inertia, train_ratio
+from rsea_ros.model.equations import rotor_inertia, train_ratio, with_structure
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.structure import with_structure
 
 WORLD = "world"
 

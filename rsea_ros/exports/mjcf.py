@@ -15,8 +15,8 @@ from rsea_ros.exports.mjcf_effects import EFFECTS, STRUCTURES
 from rsea_ros.exports.mjcf_loop import say_loop
 from rsea_ros.exports.others import finite_sizes, without_null_effects
 from rsea_ros.exports.represented import Export, Omitted, Represented, Unrepresentable, coverage_lines
+from rsea_ros.model.equations import with_structure
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.structure import with_structure
 
 
 def export_mjcf(rig: Rig) -> Export:

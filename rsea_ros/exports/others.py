@@ -9,8 +9,7 @@ from rsea_ros.documents.units import plain
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.represented import Omitted, Represented
 from rsea_ros.model.equations import rotor_inertia, train_ratio
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 
 
 def without_null_effects(rig: Rig) -> Rig:

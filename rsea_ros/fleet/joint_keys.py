@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from msg_adapters.topic_map import ROLES
-from rsea_ros.documents.fields import NEEDED, Key, table
+from rsea_ros.documents.strict_yaml import NEEDED, Key, table
 
 MAP = (
     Key("joints", "mapping", NEEDED, "a mapping for each joint; names have letters, digits, `_ - .`"),

@@ -13,7 +13,7 @@ from typing import Any, Literal, cast, get_args
 from msg_adapters.tables import ImportMap, load_map
 from msg_adapters.topic_map import TopicMap
 from rsea_ros.documents import strict_yaml
-from rsea_ros.documents.fields import mapping, names, only_keys, text
+from rsea_ros.documents.strict_yaml import mapping, names, only_keys, text
 from rsea_ros.documents.wording import quote
 from rsea_ros.errors import FieldError, RseaError
 from rsea_ros.fleet.dated_paths import names_a_day

@@ -21,7 +21,7 @@ from rsea_ros.fleet.row import Row, analysis_of, empty
 from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relist
 from rsea_ros.fleet.store import TaskOutcome
 from rsea_ros.fleet.time_limit import OutOfTime, limit_time
-from rsea_ros.identification.workers import on_cores
+from rsea_ros.identification.solver import on_cores
 
 _LONGEST = 500
 """Characters of a reason."""

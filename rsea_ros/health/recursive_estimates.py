@@ -28,8 +28,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.health.hypotheses import CHANNELS, ChangeHypothesis, LookEvidence
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import Z95
 
 MEMORY = 60.0
 """Looks that an estimate remembers."""

@@ -1,6 +1,15 @@
-"""Time offsets between channels and the command, fitted, and the doubt that they leave.
+"""Time offsets between channels and the command, fitted, their doubt, and lags that drift along a line.
 
-With c = d r / d clock, the other unknowns projected out of it, and r the weighted residual without the clock,
+The lag of a channel behind its simulation is followed along a record: a straight line is a clock's rate. In
+each block of a second the lag moves by Gauss-Newton steps from that of the block before, with p' = dp/dt,
+
+    lag -> lag - sum p' (y - p) / sum p'^2,   p read `lag` earlier,
+
+so a drift of many radians by the end stays within a fraction of one from block to block. The blocks' lags are
+weighted by what they show, sum p'^2.
+
+Whether the data ask for a clock: with c = d r / d clock, the other unknowns projected out of it, and r the
+weighted residual without the clock,
 
     z = c'r / sqrt(max(sum_b s_b^2, c'c)),   s_b = c_b' (r_b - c_b c'r / c'c) of blocks of one second
 
@@ -18,18 +27,101 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from rsea_ros.identification.confidence import Confidence, inverse_of, sample_blocks
-from rsea_ros.identification.lag_line import lag_line
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.result import Remark
 from rsea_ros.identification.settings import INTERVALS
 from rsea_ros.identification.solver import Map, Solution, clock_columns, serial, solve
-from rsea_ros.identification.unknowns import Unknown, clock_rates, clocks, start_vector
+from rsea_ros.identification.unknowns import FASTEST, Unknown, clock_rates, clocks, start_vector
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.records.record import FloatArray, IntArray, Record
+
+BLOCK = 1.0
+"""s. At 500 ppm the lag changes by half a millisecond in it."""
+_FEWEST = 8
+"""Blocks: a line through fewer says little."""
+_FEWEST_SAMPLES = 8
+"""In a block."""
+_STEPS, _FARTHEST = 4, 2e-3
+"""Steps in a block, and how far all of them together may lead, s for each block since the last."""
+_ALIKE = 0.7
+"""Of a block's power: what the simulation must explain at its best lag."""
+LEAST_RISE = 1e-3
+"""s over the record: less turns no phase far, and a linear fit sees it."""
+SCATTER = 0.25
+"""Of the rise of a line: lags that scatter more about it do not follow a clock."""
+
+
+class LagLine(NamedTuple):
+    """A line through lags: rate (s/s), lag (s) at the start of the record, scatter of the lags about it (s),
+    and how much the line rises over the record (s)."""
+
+    rate: float
+    at_start: float
+    scatter: float
+    rise: float
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the lags follow a clock's line: too far for a linear fit, no faster than clocks run."""
+        steep = abs(self.rise) > LEAST_RISE and abs(self.rate) < 1e-6 * FASTEST
+        return steep and self.scatter < SCATTER * abs(self.rise)
+
+
+def lag_line(t: FloatArray, y: FloatArray, p: FloatArray, start: float) -> LagLine | None:
+    """Return the line of a channel's lag; None where the blocks do not show one.
+
+    t: s, rising; y, p: measured and simulated, shape (n,), finite. start: of the record, s.
+    """
+    since, lag, weight = _lags(t, y, p, start)
+    if len(lag) < _FEWEST:
+        return None
+    rate, at_start = np.polyfit(since, lag, 1, w=np.sqrt(weight))
+    scatter = math.sqrt(float(np.average((lag - at_start - rate * since) ** 2, weights=weight)))
+    return LagLine(float(rate), float(at_start), scatter, float(rate) * float(np.ptp(t)))
+
+
+def _lags(
+    t: FloatArray, y: FloatArray, p: FloatArray, start: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return middle (s since start), lag (s) and weight of the blocks that show a lag."""
+    slope = np.gradient(p, t)
+    since, lags, weight = [], [], []
+    lag, last = 0.0, 0
+    edges = np.searchsorted(t, np.arange(t[0], t[-1] + BLOCK, BLOCK))
+    for k, (a, b) in enumerate(pairwise(edges.tolist())):
+        if b - a < _FEWEST_SAMPLES:
+            continue
+        at, share = _lag_of(t[a:b], y[a:b], (t, p, slope), lag, _FARTHEST * (k + 1 - last))
+        if share > _ALIKE:
+            lag, last = at, k + 1
+            since.append(float(np.mean(t[a:b])) - start)
+            lags.append(lag)
+            weight.append(float(np.sum(slope[a:b] ** 2)))
+    return np.array(since), np.array(lags), np.array(weight)
+
+
+def _lag_of(
+    t: FloatArray, y: FloatArray, simulated: tuple[FloatArray, FloatArray, FloatArray], lag: float, far: float
+) -> tuple[float, float]:
+    """Return the lag of one block, and the share of its power that the simulation explains at it."""
+    at, p, slope = simulated
+    begin = lag
+    for _ in range(_STEPS):
+        values, slopes = np.interp(t - lag, at, p), np.interp(t - lag, at, slope)
+        off = (y - values) - np.mean(y - values)
+        size = float(slopes @ slopes)
+        if size == 0.0:
+            return begin, 0.0
+        lag = float(np.clip(lag - float(slopes @ off) / size, begin - far, begin + far))
+    residual = y - np.interp(t - lag, at, p)
+    return lag, 1.0 - float(np.var(residual)) / max(float(np.var(y)), 1e-300)
+
 
 ASKED = 3.5
 """Standard deviations from which a clock is asked for: one of six in 360 records where all are right."""
@@ -88,14 +180,14 @@ def with_drifts(solution: Solution, run: Map = serial) -> Solution:
     behind the fit, and behind the rig as stated, which no drift has led astray. Offsets are left to the test.
     """
     problem = solution.problem
-    if is_inverse(problem.rig) or _rms(solution) <= MISFIT:
+    if is_inverse(problem.rig) or solution.rms <= MISFIT:
         return solution
     for theta in (solution.theta, start_vector(problem.unknowns)):
         rates = _drifts(problem, theta)
         added = clock_rates(sorted(rates))
         begin = np.concatenate([theta, [rates[u.name.split(".")[1]] for u in added]])
         free = replace(problem, unknowns=(*problem.unknowns, *added))
-        if added and _rms(drifting := solve(free, begin, run=run)) <= MISFIT:
+        if added and (drifting := solve(free, begin, run=run)).rms <= MISFIT:
             return drifting
     return solution
 
@@ -110,10 +202,6 @@ def _drifts(problem: Problem, theta: FloatArray) -> dict[str, float]:
             if line is not None and line.is_clear:
                 rates.setdefault(n, []).append(-1e6 * line.rate)
     return {n: float(np.median(values)) for n, values in rates.items()}
-
-
-def _rms(solution: Solution) -> float:
-    return float(np.sqrt(np.mean(solution.residual**2)))
 
 
 def free_clocks(solution: Solution, required: RequiredClocks) -> tuple[Problem, FloatArray]:

@@ -19,6 +19,7 @@ from numpy.fft import irfft, rfft
 from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.model.rig import Sensor
 from rsea_ros.records.record import BoolArray, Channel, ComplexArray, FloatArray, IntArray, Record
+from rsea_ros.records.statistics import hann, segment_spectra
 
 FEW = 0.2
 """Share of the samples: with more different values than that, a channel has no steps worth the name."""
@@ -45,18 +46,15 @@ TOP = 0.96
 """Of the Nyquist frequency: the highest line of all bands."""
 
 
-def segment_spectra(values: FloatArray, longest: int, fewest: int) -> ComplexArray:
+def unit_spectra(values: FloatArray, longest: int, fewest: int) -> ComplexArray:
     """Return the spectra of half-overlapping Hann segments without their means, shape (segments, lines).
 
     longest: samples in a segment, a power of two. fewest: number of segments that fit side by side.
     Scaled so that white noise has the square of its RMS in every line.
     """
     length = min(longest, 2 ** math.floor(math.log2(max(len(values), 8 * fewest) / fewest)))
-    segments = np.lib.stride_tricks.sliding_window_view(values, length)[:: length // 2]
-    window = np.hanning(length + 1)[:-1]
-    centred = (segments - segments.mean(axis=1, keepdims=True)) * window
-    spectra: ComplexArray = rfft(centred, axis=1) / math.sqrt(float(window @ window))
-    return spectra
+    window = hann(length)
+    return np.asarray(segment_spectra(values, length) / math.sqrt(float(window @ window)))
 
 
 @dataclass(frozen=True)
@@ -122,7 +120,7 @@ def noise_floor(record: Record, name: str, sensor: Sensor, rule: NoiseSettings =
     """
     t, y = _finite(record[name])
     least = least_noise(y, sensor, rule)
-    stated = math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0))
+    stated = sensor.level
     if len(y) < _FEWEST:
         return max(float(np.std(np.diff(y, 2))) / math.sqrt(6.0) if len(y) > 3 else 0.0, stated, least)
     if stated > 0.0 and record[name].rate < rule.slower * record["command"].rate:
@@ -151,7 +149,7 @@ def top_of_band(
 
     seams: samples before which values are missing. A jump there would pass for noise.
     """
-    spectra = segment_spectra(values, _LONGEST, _SEGMENTS)
+    spectra = unit_spectra(values, _LONGEST, _SEGMENTS)
     power = np.mean(np.abs(spectra[_seamless(spectra, seams)]) ** 2, axis=0)
     return math.sqrt(float(np.median(power[_top(power, rule)]))), _is_flat(power, rule)
 
@@ -167,8 +165,8 @@ def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray) -> BoolArr
 def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
     """Return the power of a channel that does not follow the command linearly, by frequency."""
     period = float(np.median(np.diff(t)))
-    u = segment_spectra(_held_before(command, t - 0.25 * period), _LONGEST, _SEGMENTS)
-    v = segment_spectra(y, _LONGEST, _SEGMENTS)
+    u = unit_spectra(_held_before(command, t - 0.25 * period), _LONGEST, _SEGMENTS)
+    v = unit_spectra(y, _LONGEST, _SEGMENTS)
     power = np.mean(np.abs(v) ** 2, axis=0)
     shared = np.abs(np.mean(v * u.conj(), axis=0)) ** 2 / (np.mean(np.abs(u) ** 2, axis=0) + _TINY)
     return np.asarray(np.maximum(power - shared, 0.0) / (1.0 - 1.8 / max(2.0, len(v))))

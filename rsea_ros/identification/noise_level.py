@@ -1,13 +1,13 @@
 """Noise level of the residuals: white or coloured, from channels that witness each other.
 
 A floor is never above the residual's white part, which no law of the bench can make; and where all of a
-residual passes for noise of the sensor (coloured.py) it equals that residual. That noise is called coloured
+residual passes for noise of the sensor it equals that residual. That noise is called coloured
 only where it exceeds its white part by more than the doubt of that part, which is large in short records.
 
 Sensor noise is stationary; its spectrum falls with frequency and is flat below what a block of a second
 resolves; whitened, it is nearly Gaussian; and it is independent of the command, of the motion, and of
 other sensors. A residual that passes all of these tests is noise, however large; one that fails in any point
-is a misfit. The limits (noise_settings.py) were set between noise of first order with a memory of up to
+is a misfit. The limits (settings.py) were set between noise of first order with a memory of up to
 0.25 s and mild effects, inside and outside the catalogue, of the second bench in test/independent.
 
 The command; laws of friction, play, springs, ripple and drift over the simulated motion; and the
@@ -26,9 +26,9 @@ from rsea_ros.identification.noise import (
     OVERLAP,
     TOP,
     SpectralShape,
-    segment_spectra,
     shape_of,
     top_of_band,
+    unit_spectra,
 )
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.settings import NOISE, NoiseSettings
@@ -69,8 +69,7 @@ def _motion(case: Case, outputs: Mapping[str, FloatArray], t: FloatArray) -> tup
     drive = case.drive
     if not isinstance(drive, Drive):
         return tuple(np.interp(t, drive.t, y) for y in (drive.torque, drive.q, drive.v, drive.torque))
-    steps = ((t - drive.start) / drive.step).astype(np.int64)
-    command = drive.command[np.clip(steps, 0, len(drive.command) - 1)]
+    command = drive.command_at(t)
     at = {n: np.interp(t, case.t[n], outputs[n]) for n in case.t.keys() & outputs.keys()}
     load = at.get("ft", command)
     q = at.get("position", load)
@@ -102,14 +101,14 @@ def is_noise(
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
     if _lasting_share(residual) > rule.lasting or _slow(residual, rate) > rule.slow:
         return False
-    spectra = segment_spectra(residual, _LONG, 8)
+    spectra = unit_spectra(residual, _LONG, 8)
     shape = shape_of(spectra)
     if shape.off > rule.shape or _unsteady(spectra, shape, rate) > rule.unsteady:
         return False
     if _kurtosis(shape, residual) > rule.spiky:
         return False
-    short_spectra = segment_spectra(residual, _SHORT, 16)
-    others = (segment_spectra(w, _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
+    short_spectra = unit_spectra(residual, _SHORT, 16)
+    others = (unit_spectra(w, _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
     return all(_coherent_share(short_spectra, other, rate) < rule.shared for other in others)
 
 
@@ -127,7 +126,7 @@ def _lasting_share(values: FloatArray) -> float:
 
 def _slow(values: FloatArray, rate: float) -> float:
     """Return the power density below 0.25 Hz over that from 0.3 to 1 Hz; 0 where the record is too short."""
-    spectra = segment_spectra(values, 2**30, 2)
+    spectra = unit_spectra(values, 2**30, 2)
     frequency, power = _lines(spectra, rate), np.mean(np.abs(spectra) ** 2, axis=0)
     low = (frequency > 0.0) & (frequency < 0.25)
     above = (frequency >= 0.3) & (frequency < 1.0)

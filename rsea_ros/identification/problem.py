@@ -13,11 +13,10 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
 from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
-from rsea_ros.model.drive import Drive
+from rsea_ros.model.drive import Drive, outside_gaps, zero_unknown
 from rsea_ros.model.extent import SKIPPED_START
 from rsea_ros.model.inverse import CUT_OFF, Motion, acting_torque, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.position_loop import with_command
-from rsea_ros.model.restarts import outside_gaps, zero_unknown
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
@@ -53,9 +52,7 @@ class Case:
     def keep(self, samples: Mapping[str, slice | BoolArray], drive: Drive) -> Case:
         """Return the case on another drive, with some samples of each channel."""
         return replace(
-            self,
-            drive=drive,
-            t={n: t[samples[n]] for n, t in self.t.items()},
+            self, drive=drive, t={n: t[samples[n]] for n, t in self.t.items()},
             measured={n: y[samples[n]] for n, y in self.measured.items()},
             mask={n: m[samples[n]] for n, m in self.mask.items()},
         )
@@ -64,11 +61,8 @@ class Case:
         """Return the case with the channels of another noise only, weighted by it."""
         channels = [n for n in self.t if n in noise]
         return replace(
-            self,
-            t={n: self.t[n] for n in channels},
-            measured={n: self.measured[n] for n in channels},
-            noise={n: noise[n] for n in channels},
-            mask={n: self.mask[n] for n in channels},
+            self, t={n: self.t[n] for n in channels}, measured={n: self.measured[n] for n in channels},
+            noise={n: noise[n] for n in channels}, mask={n: self.mask[n] for n in channels},
         )
 
     @property
@@ -162,12 +156,9 @@ def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
     stated = 0.0 if is_flat else rig.sensors.get("motor_torque", Sensor()).noise
     noise = max(level, stated) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
     return Case(
-        drive=motion,
-        t={"motor_torque": motion.t},
-        measured={"motor_torque": motion.torque},
+        drive=motion, t={"motor_torque": motion.t}, measured={"motor_torque": motion.torque},
         noise={"motor_torque": max(noise, 1e-6 * float(np.std(torque.y)), 1e-300)},
-        mask={"motor_torque": motion.counts},
-        source=record.source,
+        mask={"motor_torque": motion.counts}, source=record.source,
     )
 
 

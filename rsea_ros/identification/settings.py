@@ -1,15 +1,32 @@
-"""Settings of noise and intervals: each number with unit, meaning and reason."""
+"""Numbers that steer a result, each with meaning, unit and reason: here those of noise and intervals."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeVar
 
-from rsea_ros.documents.setting import number
+T = TypeVar("T")
+
+
+class Setting(NamedTuple):
+    """One setting as a report shows it. name: `group.field`."""
+
+    name: str
+    value: Any
+    unit: str
+    meaning: str
+    reason: str
+
+
+def number(value: T, unit: str, meaning: str, reason: str) -> T:
+    """Declare a field of a group of settings, a frozen dataclass, with its meaning, unit and reason."""
+    described = {"unit": unit, "meaning": meaning, "reason": reason}
+    return field(default=value, metadata=described)
 
 
 @dataclass(frozen=True)
 class NoiseSettings:
-    """The noise that a record shows (noise.py), that of a residual (noise_level.py), colour (coloured.py).
+    """The noise that a record shows (noise.py), that of a residual (noise_level.py), and its colour.
 
     A residual is noise, however large, if it stays below every one of the last six.
     """

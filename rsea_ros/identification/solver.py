@@ -1,4 +1,6 @@
-"""Gauss-Newton with Marquardt's damping on output errors and priors.
+"""Gauss-Newton with Marquardt's damping on output errors and priors, and the threads that it works in.
+
+Two pools, because a fit waits for its derivatives: a single pool full of fits would wait for itself.
 
 The cost is ||r(theta)||^2 + sum ((theta - theta_0) / doubt)^2: residuals over their noise, priors over
 their doubt. Derivatives by forward differences of the simulation; those of the clocks by central ones, of
@@ -7,12 +9,15 @@ all sensors at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.blas import dger
+from threadpoolctl import threadpool_limits
 
 from rsea_ros.identification.problem import Problem, simulate_cases
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector
@@ -44,6 +49,11 @@ class Solution:
     def values(self) -> dict[str, float]:
         """Return every unknown in SI."""
         return {u.name: u.outer(float(t)) for u, t in zip(self.problem.unknowns, self.theta, strict=True)}
+
+    @property
+    def rms(self) -> float:
+        """Return the RMS of the residual over the noise."""
+        return float(np.sqrt(np.mean(self.residual**2)))
 
 
 Map = Callable[[Callable[[int], FloatArray], Sequence[int]], Sequence[FloatArray]]
@@ -190,6 +200,56 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
     return Solution(problem, theta, residual, matrix, cost)
 
 
+@dataclass(frozen=True)
+class Descent:
+    """Where a descent ended: the residual without its prior, shape (m,), and the cost with it."""
+
+    theta: FloatArray
+    residual: FloatArray
+    cost: float
+
+
+def descend(
+    residual: Callable[[FloatArray], FloatArray],
+    slope: Callable[[FloatArray, FloatArray], FloatArray],
+    theta: FloatArray,
+    information: FloatArray,
+    *,
+    centre: FloatArray | None = None,
+    is_robust: bool = False,
+    rounds: int = 15,
+    enough: float = 1e-3,
+    parts: Sequence[float] = (1.0, 0.5, 0.25, 0.1, 0.03),
+) -> Descent:
+    """Minimise a residual beside a prior by Gauss-Newton, every step cut until it helps.
+
+    slope: derivatives (m, n) at theta and its residual. information: of the prior, (n, n), about `centre`, or
+    the start. is_robust: rows that do not fit count less (Cauchy). enough: relative fall of the cost that is
+    too small to go on. parts: of a step, tried until the cost falls.
+    """
+    start = theta if centre is None else centre
+
+    def at(place: FloatArray) -> Descent:
+        r, off = residual(place), place - start
+        size = float(np.sum(np.log1p(r**2))) if is_robust else power(r)
+        return Descent(place, r, size + float(off @ information @ off))
+
+    best = at(theta)
+    for _ in range(rounds):
+        matrix = slope(best.theta, best.residual)
+        weighted = matrix / (1.0 + best.residual**2)[:, None] if is_robust else matrix
+        right = weighted.T @ best.residual + information @ (best.theta - start)
+        step = -np.linalg.lstsq(weighted.T @ matrix + information, right, rcond=None)[0]
+        trials = (at(best.theta + part * step) for part in parts)
+        better = next((t for t in trials if t.cost < best.cost), None)
+        if better is None:
+            break
+        fall, best = best.cost - better.cost, better
+        if fall < enough * (best.cost + fall):
+            break
+    return best
+
+
 def broyden_update(matrix: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
     """Return the derivatives nearest to `matrix`, each in its own scale, that give the change of a step.
 
@@ -225,3 +285,43 @@ def _lowest(unknown: Unknown) -> float:
 
 def _highest(unknown: Unknown) -> float:
     return unknown.high
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Keep BLAS from starting threads inside a with statement; else a fit takes four times as long."""
+    with threadpool_limits(1, user_api="blas"):
+        yield
+
+
+_CORES: ContextVar[int] = ContextVar("cores", default=2)
+
+
+def cores() -> int:
+    """Return how many cores a fit may use."""
+    return _CORES.get()
+
+
+@contextmanager
+def on_cores(count: int) -> Iterator[None]:
+    """Set the number of cores for fits within a with statement: 1 where a program runs several at once."""
+    token = _CORES.set(count)
+    try:
+        yield
+    finally:
+        _CORES.reset(token)
+
+
+@dataclass(frozen=True)
+class Pools:
+    """Where fits run, and how one makes its derivatives."""
+
+    fits: Executor
+    run: Map
+
+
+@contextmanager
+def worker_pools() -> Iterator[Pools]:
+    """Hold both pools within a with statement; linear algebra keeps to one thread meanwhile."""
+    with one_blas_thread(), ThreadPoolExecutor(cores()) as fits, ThreadPoolExecutor(cores()) as derivatives:
+        yield Pools(fits, in_pool(derivatives))

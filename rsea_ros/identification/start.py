@@ -15,7 +15,7 @@ inverse model; Gautier, Janot et al.). Gravity's angle has two minima in an outp
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.identification.frequency_response import model_response
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.result import FrequencyResponse
+from rsea_ros.identification.solver import descend
 from rsea_ros.identification.unknowns import apply, start_vector, unknowns_of_rig
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import FEWEST, smooth
@@ -36,7 +37,6 @@ _LINES = 60
 _COHERENT = 0.5
 _MODEL_ERROR = 0.05
 _DIFFERENCE = 1e-4
-_ITERATIONS = 15
 
 
 def start_from(responses: Sequence[FrequencyResponse], rig: Rig) -> Rig:
@@ -44,14 +44,17 @@ def start_from(responses: Sequence[FrequencyResponse], rig: Rig) -> Rig:
     unknowns, chosen = unknowns_of_rig(rig), [r for r in map(_choose_lines, responses) if len(r.frequency)]
     if not (unknowns and chosen):
         return rig
-    begin = start_vector(unknowns)
-    doubt = np.array([u.reach for u in unknowns])
+    prior = np.diag([u.reach**-2.0 for u in unknowns])
 
     def residual(theta: FloatArray) -> FloatArray:
         moved, _ = apply(rig, unknowns, theta)
-        return np.concatenate([*(_misfit(r, moved) for r in chosen), (theta - begin) / doubt])
+        return np.concatenate([_misfit(r, moved) for r in chosen])
 
-    return apply(rig, unknowns, _least_squares(residual, begin))[0]
+    def slope(theta: FloatArray, at: FloatArray) -> FloatArray:
+        steps = _DIFFERENCE * np.eye(len(theta))
+        return np.column_stack([(residual(theta + s) - at) / _DIFFERENCE for s in steps])
+
+    return apply(rig, unknowns, descend(residual, slope, start_vector(unknowns), prior).theta)[0]
 
 
 def _choose_lines(response: FrequencyResponse) -> FrequencyResponse:
@@ -63,12 +66,8 @@ def _choose_lines(response: FrequencyResponse) -> FrequencyResponse:
         wanted = np.geomspace(response.frequency[good[0]], response.frequency[good[-1]], _LINES)
         good = good[np.unique(np.searchsorted(response.frequency[good], wanted).clip(0, len(good) - 1))]
     return FrequencyResponse(
-        input=response.input,
-        output=response.output,
-        frequency=response.frequency[good],
-        response=response.response[good],
-        coherence=response.coherence[good],
-        sd=response.sd[good],
+        input=response.input, output=response.output, frequency=response.frequency[good],
+        response=response.response[good], coherence=response.coherence[good], sd=response.sd[good],
         method=response.method,
     )
 
@@ -77,24 +76,6 @@ def _misfit(measured: FrequencyResponse, rig: Rig) -> FloatArray:
     quotient = np.log(model_response(rig, measured.output, measured.frequency) / measured.response)
     weight = np.hypot(measured.sd / np.abs(measured.response), _MODEL_ERROR)
     return np.concatenate([quotient.real / weight, quotient.imag / weight])
-
-
-def _least_squares(residual: Callable[[FloatArray], FloatArray], theta: FloatArray) -> FloatArray:
-    """Return theta at the least sum of squares: Gauss-Newton, the step halved until it helps."""
-    misfit = residual(theta)
-    for _ in range(_ITERATIONS):
-        steps = _DIFFERENCE * np.eye(len(theta))
-        slope = np.column_stack([(residual(theta + s) - misfit) / _DIFFERENCE for s in steps])
-        step = -np.linalg.lstsq(slope, misfit, rcond=None)[0]
-        trials = ((theta + f * step, residual(theta + f * step)) for f in (1.0, 0.5, 0.25, 0.1, 0.03))
-        better = next((t for t in trials if t[1] @ t[1] < misfit @ misfit), None)
-        if better is None:
-            break
-        done = misfit @ misfit - better[1] @ better[1] < 1e-3 * (misfit @ misfit)
-        theta, misfit = better
-        if done:
-            break
-    return theta
 
 
 _SLOW = 0.05
@@ -190,9 +171,8 @@ def _torque_of_errors(case: Case, rig: Rig) -> float:
     """Return the largest torque of a position loop by its errors, N m; 0 without a position."""
     if "position" not in case.measured or not isinstance(case.drive, Drive):
         return 0.0
-    keep, drive = case.mask["position"], case.drive
-    steps = ((case.t["position"][keep] - drive.start) / drive.step).astype(np.int64)
-    error = drive.command[np.clip(steps, 0, len(drive.command) - 1)] - case.measured["position"][keep]
+    keep = case.mask["position"]
+    error = case.drive.command_at(case.t["position"][keep]) - case.measured["position"][keep]
     _, position, _, velocity, *_ = loop_parameters(rig)
     gain = position if rig.loop == "pd" else position * velocity
     return gain * _quantile(error)

@@ -10,8 +10,7 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect, Parameter
-from rsea_ros.model.rig import EffectSetting, Rig
-from rsea_ros.model.rig_fields import FIELDS, LEAST_SIZE
+from rsea_ros.model.rig import FIELDS, LEAST_SIZE, EffectSetting, Rig
 from rsea_ros.records.record import FloatArray
 
 CLOCK, CLOCK_RATE = "clock", "clock_rate"

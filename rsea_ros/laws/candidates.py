@@ -11,8 +11,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.signal import periodogram, welch
 
-from rsea_ros.diagnosis.residual_peaks import interpolate_peak, peaks
-from rsea_ros.laws.columns import CaseModel, ResidualRows
+from rsea_ros.diagnosis.initial_guess import interpolate_peak, peaks
 from rsea_ros.laws.terms import (
     COMMAND_TERMS,
     CREEP,
@@ -29,7 +28,7 @@ from rsea_ros.laws.terms import (
     stiffness_waves,
     wave_terms,
 )
-from rsea_ros.laws.variables import Variables
+from rsea_ros.laws.variables import CaseModel, ResidualRows, Variables
 from rsea_ros.records.record import FloatArray
 
 _MOST = 400.0

@@ -12,17 +12,25 @@ from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, part
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.identification.even_stamps import with_even_clocks
-from rsea_ros.identification.fit import fit
-from rsea_ros.identification.noise_level import reestimate_noise
+from rsea_ros.identification.fit import fit, with_even_clocks, with_noise_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.start import joint_start
 from rsea_ros.laws.candidates import TermCandidate, candidates_of, columns_of
-from rsea_ros.laws.columns import CaseModel, case_model, rows_of
-from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
-from rsea_ros.laws.result import Tried
-from rsea_ros.laws.sparse_regression import MOST_TERMS, Dependence, SparseLaw, paths, simplest, standard_error
+from rsea_ros.laws.law import Tried
+from rsea_ros.laws.sparse_regression import (
+    HELD_BACK,
+    MOST_TERMS,
+    SELECTION,
+    Dependence,
+    Gram,
+    SparseLaw,
+    gram_of,
+    paths,
+    simplest,
+    standard_error,
+)
+from rsea_ros.laws.variables import CaseModel, case_model, rows_of
 from rsea_ros.model.extent import bound_values
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
@@ -62,13 +70,7 @@ def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
     solution = fit(parts, rig, start=start)[0]
     whole = replace(solution.problem, cases=problem.cases)
     outputs = whole.outputs(solution.theta)
-    return Base(solution, _with_noise(whole, outputs), outputs)
-
-
-def _with_noise(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
-    """Return the cases with the noise that the base's residual shows, as a diagnosis estimates it."""
-    ratio = problem.rig["gear.ratio"]
-    return tuple(reestimate_noise(c, out, ratio) for c, out in zip(problem.cases, outputs, strict=True))
+    return Base(solution, with_noise_of(whole, outputs), outputs)
 
 
 def levels_of(

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rsea_ros.diagnosis.candidate import on_blocks
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
-from rsea_ros.diagnosis.problem_variants import on_blocks
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lend
@@ -20,10 +20,9 @@ from rsea_ros.identification.confidence import confidence_of, interval
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, solve
 from rsea_ros.identification.unknowns import apply, start_vector, unknowns_of_effect
-from rsea_ros.laws.columns import case_model
 from rsea_ros.laws.effect_source import LawProvenance, source_of
-from rsea_ros.laws.law import Law, letters_of
-from rsea_ros.laws.result import FigurePoints, WrittenLaw
+from rsea_ros.laws.law import FigurePoints, Law, WrittenLaw, letters_of
+from rsea_ros.laws.variables import case_model
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.simulation import simulate_drive

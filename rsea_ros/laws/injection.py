@@ -33,8 +33,7 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.laws.terms import PORTS, Place
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.sampling import sample
-from rsea_ros.model.simulation import Machine, build, run
+from rsea_ros.model.simulation import Machine, build, run, sample
 from rsea_ros.model.step import OUTPUTS, Calls
 from rsea_ros.records.record import FloatArray
 
@@ -133,12 +132,9 @@ def with_injection(machine: Machine, torque: FloatArray, port: Port, kind: float
     first[port + 1 :] += 1
     series = np.concatenate([[kind], torque, torque[-1:]])
     changed = Calls(
-        first=first,
-        address=np.insert(calls.address, at, _inject.address),
-        p_at=np.insert(calls.p_at, at, len(calls.p)),
-        x_at=np.insert(calls.x_at, at, 0),
-        p=np.concatenate([calls.p, series]),
-        nonlinear=calls.nonlinear or port in (Port.GEAR, Port.SPRING),
+        first=first, address=np.insert(calls.address, at, _inject.address),
+        p_at=np.insert(calls.p_at, at, len(calls.p)), x_at=np.insert(calls.x_at, at, 0),
+        p=np.concatenate([calls.p, series]), nonlinear=calls.nonlinear or port in (Port.GEAR, Port.SPRING),
     )
     return replace(machine, calls=changed)
 

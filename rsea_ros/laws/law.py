@@ -1,15 +1,19 @@
-"""A law: its terms with coefficients, how it reads, and where its variables lie in the step."""
+"""A law: its terms with coefficients, how it reads, where its variables lie; and the result of a search."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rsea_ros.effects.effect import Claims, Effect
+from rsea_ros.laws.sparse_regression import Dependence
 from rsea_ros.laws.terms import CREEP, Place, Term
 from rsea_ros.laws.variables import Variables
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.records.record import FloatArray
 
 
@@ -95,10 +99,7 @@ class Law:
         """Return the law with fitted parameters and their intervals, by name."""
         parts = tuple(
             replace(
-                part,
-                coefficient=values[c],
-                shape=values[s] if s else 0.0,
-                ci95=ci95.get(c),
+                part, coefficient=values[c], shape=values[s] if s else 0.0, ci95=ci95.get(c),
                 shape_ci95=ci95.get(s),
             )
             for part, (c, s) in zip(self.parts, self.names, strict=True)
@@ -189,3 +190,68 @@ def letters_of(law: Law) -> set[str]:
 def ranges_of(law: Law, letters: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Return the largest size of each variable that a law reads."""
     return {n: float(np.max(np.abs(letters[n]))) for n in READS if n in letters_of(law)}
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A compared model: its terms, and its held-out residual over that of the base."""
+
+    place: str
+    terms: tuple[str, ...]
+    left: float
+    chosen: bool = False
+
+
+@dataclass(frozen=True)
+class FigurePoints:
+    """The missing torque beside a law, point by point, for the page.
+
+    t: s. values, law: N m, rad at the encoder. over: the letter of the variable that the law
+    depends on most. sd: of a value.
+    """
+
+    t: FloatArray
+    x: FloatArray
+    values: FloatArray
+    law: FloatArray
+    over: str
+    sd: float
+
+
+@dataclass(frozen=True)
+class WrittenLaw:
+    """A law, its effect, the text of its file, and the points for its figure."""
+
+    law: Law
+    effect: Effect
+    source: str
+    claims: Claims
+    shown: FigurePoints
+
+
+@dataclass(frozen=True)
+class LawResult:
+    """laws: most important first; empty where no law explains the residual.
+
+    gain: 1 - RMS(with the laws) / RMS(without) on test blocks that were not used before, with its 95 %
+    interval, each channel in units of the base's residual. share: of the power above the noise.
+    left, noise: RMS of each channel before and after, and of its noise, on those blocks.
+    rig_choice: how the user chose the rig and the data.
+    """
+
+    rig_name: str
+    sources: tuple[str, ...]
+    duration: float
+    base_rig: Rig
+    rig: Rig
+    dependences: tuple[Dependence, ...]
+    tried: tuple[Tried, ...]
+    laws: tuple[WrittenLaw, ...]
+    gain: float
+    gain_ci95: tuple[float, float]
+    share: float
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    noise: Mapping[str, float]
+    at_floor: bool
+    rig_choice: RigChoice = field(default_factory=RigChoice)

@@ -12,8 +12,7 @@ from numpy.polynomial import polynomial
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.outputs import Sees
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.train import spin_inertia
 from rsea_ros.model.transfer import Fraction, distal_over_proximal, distal_per_proximal
 from rsea_ros.records.record import FloatArray

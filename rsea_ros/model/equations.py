@@ -1,4 +1,4 @@
-"""Equations of motion of the unlumped actuator, for any rig.
+"""Equations of motion of the unlumped actuator, for any rig; effects that change its structure.
 
 Coordinates (absolute angles, rad): h housing, g gear output before the gear's own compliance,
 c spring chassis, d distal output, p load on the housing's end. The rotor turns at
@@ -22,10 +22,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.train import rotor_turns
 from rsea_ros.records.record import FloatArray
+
+
+def with_structure(rig: Rig) -> Rig:
+    """Return the rig with the changes of structure by its effects (a compliant gear or base).
+
+    Raises ParameterError for wrong parameters, and for an effect that this rig cannot have.
+    """
+    for setting in rig.effects:
+        effect = effect_named(setting.name)
+        effect.vector(setting.parameters)
+        if effect.structure is not None:
+            rig = effect.structure(rig, effect.complete(setting.parameters))
+    return rig
+
 
 H, G, C, D, P = range(5)
 COORDINATES = 5
@@ -97,10 +112,7 @@ def mechanics(rig: Rig, *, linear_gravity: bool = True) -> Mechanics:
             f"rig {rig.name}: the mass matrix is singular, expected an inertia on every part that can move"
         )
     return Mechanics(
-        mass=mass,
-        damping=damping,
-        stiffness=stiffness,
-        ports=PORT_DIRECTIONS @ placement,
+        mass=mass, damping=damping, stiffness=stiffness, ports=PORT_DIRECTIONS @ placement,
         placement=placement,
     )
 

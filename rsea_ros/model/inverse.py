@@ -21,13 +21,12 @@ import numpy as np
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.equations import mechanics
+from rsea_ros.model.drive import gaps
+from rsea_ros.model.equations import mechanics, with_structure
 from rsea_ros.model.extent import SKIPPED_START, check_extent, check_slow
-from rsea_ros.model.restarts import gaps
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
-from rsea_ros.model.structure import with_structure
 from rsea_ros.records.holds import AT_EDGE
 from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
 

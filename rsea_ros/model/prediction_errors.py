@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
+from rsea_ros.model.drive import outside_gaps
 from rsea_ros.model.extent import SKIPPED_START, bound_values, check_command, check_pace
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
 from rsea_ros.model.position_loop import with_command
-from rsea_ros.model.restarts import outside_gaps
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate

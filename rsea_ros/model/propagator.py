@@ -10,8 +10,7 @@ from scipy.linalg import expm
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.model.equations import Mechanics, mechanics, train_ratio
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.step import Linear
 from rsea_ros.records.record import FloatArray
 
@@ -89,15 +88,12 @@ def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
     rows = np.array(sorted(reads - {st.LOAD}), dtype=np.int64)
     matrix = np.array([read_row(rig, system.mechanics, int(r)) for r in rows]).reshape(len(rows), n)
     return Linear(
-        phi=np.ascontiguousarray(exponential[:n, :n]),
-        g=np.ascontiguousarray(exponential[:n, n:]),
-        rows=rows,
-        matrix=np.ascontiguousarray(matrix),
+        phi=np.ascontiguousarray(exponential[:n, :n]), g=np.ascontiguousarray(exponential[:n, n:]),
+        rows=rows, matrix=np.ascontiguousarray(matrix),
         spans=np.array([read_row(rig, system.mechanics, s) for s in (st.GEAR_VELOCITY, st.DEFLECTION)]),
         outputs=_outputs(rig, system.mechanics),
         gravity=np.array([rig[f"{end}.{key}"] for key in ("gravity", "gravity_angle") for end in END_NAMES]),
-        reads_load=reads_load,
-        rest=(0.0,) * n,
+        reads_load=reads_load, rest=(0.0,) * n,
     )
 
 

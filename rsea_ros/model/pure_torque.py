@@ -17,6 +17,7 @@ from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end, flat_band
+from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import ErrorModel, TorqueEstimate
 from rsea_ros.model.pure_torque_filter import (
     CORNER,
@@ -37,7 +38,6 @@ from rsea_ros.model.pure_torque_filter import (
     update_flag,
 )
 from rsea_ros.model.rig import Rig, check_two_torques
-from rsea_ros.model.structure import with_structure
 from rsea_ros.records.record import FloatArray
 
 

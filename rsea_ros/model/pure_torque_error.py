@@ -25,12 +25,12 @@ from numpy.polynomial import polynomial
 from rsea_ros.compiler import njit
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end, inner_inertia
+from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.rig import Rig, check_two_torques
-from rsea_ros.model.structure import with_structure
 from rsea_ros.model.transfer import Fraction
-from rsea_ros.records.normal import Z90
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import Z90
 
 LENGTH = 8192
 """Samples that a window can hold: 0.8 s at 10 kHz."""

@@ -15,10 +15,8 @@ from typing import Any
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import FieldError, OutputError, RigError
-from rsea_ros.model.rig import CLOCK_DOUBT, Quantity, Rig, Sensor
+from rsea_ros.model.rig import CLOCK_DOUBT, FIELDS, Quantity, Rig, Sensor
 from rsea_ros.model.rig_document import rig_from_document
-from rsea_ros.model.rig_fields import FIELDS
-from rsea_ros.outputs.new_files import write_text
 from rsea_ros.records.record import UNITS
 
 
@@ -156,6 +154,8 @@ def save_rig(rig: Rig, path: str | Path, *, force: bool = False) -> None:
 
     Raises RigError, and leaves nothing behind, when it cannot be written.
     """
+    from rsea_ros.outputs.new_files import write_text  # a rig that is only read needs no writer
+
     try:
         write_text(path, rig_text(rig), force=force)
     except OutputError as error:

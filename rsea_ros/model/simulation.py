@@ -13,22 +13,75 @@ from typing import Any
 
 import numpy as np
 
+from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
-from rsea_ros.model.drive import Drive, drive_from
-from rsea_ros.model.equations import train_ratio
+from rsea_ros.model.drive import Drive, drive_from, zero_unknown
+from rsea_ros.model.equations import train_ratio, with_structure
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
 from rsea_ros.model.propagator import propagator, start_map
-from rsea_ros.model.restarts import zero_unknown
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
-from rsea_ros.model.sampling import sample
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
-from rsea_ros.model.structure import with_structure
 from rsea_ros.records.record import Channel, FloatArray, Record
+
+
+@njit(cache=True, nogil=True)
+def _sample_smooth(values, at, command):  # type: ignore[no-untyped-def]
+    """Interpolate values at steps 0, 1, 2, … at fractional steps, by cubics through four points.
+
+    Where the command jumps a velocity has a kink: the points are taken from one side of it, and are fewer
+    where a jump is not on the grid.
+    """
+    out, last = np.empty(len(at)), len(values) - 1
+    for i in range(len(at)):
+        u = min(max(at[i], 0.0), float(last))
+        k = int(u)
+        if u == k:
+            out[i] = values[k]
+            continue
+        left, right = k, k + 1
+        if left > 0 and command[left - 1] == command[k]:
+            left -= 1
+        while right < last and right - left < 3 and command[right] == command[k]:
+            right += 1
+        while left > 0 and right - left < 3 and command[left - 1] == command[k]:
+            left -= 1
+        out[i] = _newton(values, left, right, u - left)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _newton(v, left, right, u):  # type: ignore[no-untyped-def]
+    """Return Newton's polynomial through the two to four values from left to right, u steps after left."""
+    value = v[left] + u * (v[left + 1] - v[left])
+    if right - left > 1:
+        value += u * (u - 1) / 2 * (v[left + 2] - 2 * v[left + 1] + v[left])
+    if right - left > 2:
+        value += u * (u - 1) * (u - 2) / 6 * (v[left + 3] - 3 * (v[left + 2] - v[left + 1]) - v[left])
+    return value
+
+
+@njit(cache=True, nogil=True)
+def _sample_held(values, at):  # type: ignore[no-untyped-def]
+    """Return the value of the step that ends nearest to each instant (a hold that just ended)."""
+    out = np.empty(len(at))
+    for i in range(len(at)):
+        out[i] = values[min(max(int(np.rint(at[i])), 1), len(values) - 1)]
+    return out
+
+
+def sample(name: str, values: FloatArray, at: FloatArray, command: FloatArray) -> FloatArray:
+    """Return a simulated channel at instants in steps since the start.
+
+    values: at the ends of the steps, the initial one first, shape (steps + 1,). command: of each step.
+    """
+    smooth = name != "motor_torque"
+    result: FloatArray = _sample_smooth(values, at, command) if smooth else _sample_held(values, at)
+    return result
+
 
 _AFTER_DELAY = 1
 """Order of a position loop at its port: its targets come late, and what it asks is limited and lags."""
@@ -69,12 +122,10 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
 def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
     """Return the drive of a rig from a record. Raises ChannelError where its commands are missing."""
     return drive_from(
-        with_command(record, rig),
-        refine=refine,
+        with_command(record, rig), refine=refine,
         closed_loop=rig.loop is None and rig.controller is not None and "reference" in record,
         from_rest="position" in record and zero_unknown(record, rig, "position"),
-        targeted=rig.loop is not None,
-        hold=rig.hold,
+        targeted=rig.loop is not None, hold=rig.hold,
     )
 
 

@@ -57,9 +57,9 @@ def distal_per_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> TransferF
 
 def distal_over_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> Fraction:
     """Return the same as a fraction."""
-    distal, _ = _expand(rig, outputs.distal(rig, sees), "gear")
-    proximal, _ = _expand(rig, outputs.proximal(rig), "gear")
-    return _reduce(distal, proximal)
+    above, _ = _expand(rig, outputs.distal(rig, sees), "gear")
+    below, _ = _expand(rig, outputs.proximal(rig), "gear")
+    return _reduce(above, below)
 
 
 def position_per_motor(rig: Rig) -> TransferFunction:

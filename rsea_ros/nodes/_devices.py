@@ -20,8 +20,7 @@ from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.spring_sensor import Spring
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig
 
 Values = Mapping[str, Any]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from msg_adapters import BagWriter
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.outputs.new_files import unused_path
+from rsea_ros.outputs.files import unused_path
 
 
 class Message(NamedTuple):

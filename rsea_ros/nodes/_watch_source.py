@@ -15,8 +15,7 @@ from rclpy.node import Node
 
 from msg_adapters.ros import Bool, DiagnosticArray
 from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.nodes._anchor import SECOND
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import LATCHED, MEASUREMENT

@@ -10,7 +10,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from rsea_ros.experiment.run_limits import read_run
+from rsea_ros.experiment.run_shape import read_run
 from rsea_ros.identification.excitation import KINDS, ExcitationSettings, check_limits, excitation
 from rsea_ros.nodes._bench_status import BenchStatus
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth

@@ -21,7 +21,7 @@ from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.experiment.campaign import Budget, Campaign, CampaignOutcome, Round
 from rsea_ros.experiment.joint_weighing import USUAL, causes_from, diagnose_together
 from rsea_ros.experiment.proposal import LONGEST, RATES, DesignRequest, Proposal
-from rsea_ros.experiment.run_limits import limits_from
+from rsea_ros.experiment.run_shape import limits_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
@@ -29,7 +29,8 @@ from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._trial import Ears, LiveRun
-from rsea_ros.outputs.new_files import Destination, unused_path
+from rsea_ros.outputs.files import unused_path
+from rsea_ros.outputs.new_files import Destination
 from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.files import write_diagnosis
 from rsea_ros.report.diagnosis.words import diagnosis_sentence

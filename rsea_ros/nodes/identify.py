@@ -27,7 +27,8 @@ from rsea_ros.nodes._parameters import AXIS, NodeParameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
-from rsea_ros.outputs.new_files import check_free, unused_path
+from rsea_ros.outputs.files import unused_path
+from rsea_ros.outputs.new_files import check_free
 from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.words import diagnosis_sentence
 from rsea_ros.report.identification.words import verdict_sentence

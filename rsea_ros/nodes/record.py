@@ -18,7 +18,7 @@ from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
-from rsea_ros.outputs.new_files import unused_path
+from rsea_ros.outputs.files import unused_path
 
 TOPICS = {
     "torque_command": JOINT_STATE,

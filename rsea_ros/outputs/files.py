@@ -1,28 +1,41 @@
 """Files on the disk: written new, synchronised, and named together or not at all.
 
 A file gets its name by a hard link, which fails where the name is taken: two runs at once cannot take the
-same name, no file is replaced unless requested, and no symbolic link is followed.
+same name, no file is replaced unless requested, and no symbolic link is followed. What lasts only while a
+result is written lies in locked folders beside it: a stage with what is new, one of kind `old` with what that
+replaces. The system releases a lock when its process ends, in any way; so the next writer recognises the
+folders of a killed one, gives what it put aside its names back, and removes its stage.
 """
 
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
+import secrets
 import shutil
+import time
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from itertools import chain
+from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 
 from rsea_ros.errors import OutputError
-from rsea_ros.outputs.replaced import Replaced, putting_aside
 from rsea_ros.processes import hold_signals
 
+PREFIX, STAGE, OLD = ".rsea-", "stage", "old"
+"""Of names that last only while something is written, and the kinds of folders that have them."""
+LEFT_AFTER = 60.0
+"""s, after which a folder without a lock is one that was left; a new one has its lock within milliseconds."""
+_HOST = f"{zlib.crc32(os.uname().nodename.encode()):08x}"
+"""Another machine's lock cannot be seen on every network mount: its folders are its own to remove."""
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS}
 """What a file system without hard links says (FAT, some network mounts)."""
 NO_SYNC = {errno.EINVAL, errno.ENOTSUP}
 """What a file system says that has no fsync for folders."""
-Undo = list[Callable[[], object]]
 
 
 def make_folder(folder: Path) -> list[Path]:
@@ -82,20 +95,31 @@ def give_names(pairs: Sequence[tuple[Path, Path]], *, force: bool = False) -> No
     for source, _ in pairs:
         for path in chain(source.iterdir() if source.is_dir() else (), [source]):
             sync(path)
-    undo: Undo = []
-    with hold_signals(), putting_aside() as replaced:
+    undo: list[Callable[[], object]] = []
+    aside: dict[Path, LockedFolder] = {}
+    with hold_signals():
         try:
             for source, target in pairs:
                 with name_errors(target):
-                    _take(source, target, replaced if force else None, undo)
+                    if force and os.path.lexists(target):
+                        _exchange(source, target, aside, undo)
+                    else:
+                        _take(source, target, undo)
             for folder in {target.parent for _, target in pairs}:
                 sync(folder)
-            given_up = replaced.give_up()
+            given_up = [new_name(parent, STAGE) for parent in aside]
+            for old, path in zip(aside.values(), given_up, strict=True):
+                os.rename(old.path, path)
         except BaseException:
             for step in reversed(undo):
                 with suppress(OSError):
                     step()
             raise
+        finally:
+            for old in aside.values():
+                with suppress(OSError):
+                    old.path.rmdir()
+                old.release()
         for path in given_up:
             remove(path)
 
@@ -119,55 +143,46 @@ def remove(path: Path) -> None:
         path.unlink()
 
 
-def _take(source: Path, target: Path, replaced: Replaced | None, undo: Undo) -> None:
-    """Give one file or folder its name.
-
-    replaced: where the present holder of the name is put; None: it stays.
-    """
-    if replaced is not None and os.path.lexists(target):
-        check_replaceable(target)
-        if source.is_dir() != target.is_dir():
-            kind = "folder" if source.is_dir() else "file"
-            raise OutputError(f"{target}: is no {kind}, expected a new name")
-        _exchange(source, target, replaced.place(target), undo)
-        return
+def _take(source: Path, target: Path, undo: list[Callable[[], object]]) -> None:
+    """Give a file or folder its name. Raises OutputError where it is taken."""
     try:
-        _take_free(source, target, undo)
+        if source.is_dir():
+            target.mkdir()  # takes the name, or fails; a rename may replace this empty folder
+            undo.append(target.rmdir)
+            os.rename(source, target)
+            undo[-1] = lambda: os.rename(target, source)
+            return
+        linked = _link(source, target)
+        if not linked:
+            os.close(create(target))  # takes the name, or fails
+        undo.append(target.unlink)
+        if not linked:
+            os.rename(source, target)
     except FileExistsError:
         raise taken_error(target) from None
 
 
-def _take_free(source: Path, target: Path, undo: Undo) -> None:
-    """Give a file or folder its name, or raise FileExistsError."""
-    if source.is_dir():
-        target.mkdir()  # takes the name, or fails; a rename may replace this empty folder
-        undo.append(target.rmdir)
-        os.rename(source, target)
-        undo[-1] = lambda: os.rename(target, source)
-    elif _link(source, target):
-        undo.append(target.unlink)
-    else:
-        os.close(create(target))  # takes the name, or fails
-        undo.append(target.unlink)
-        os.rename(source, target)
-
-
-def _exchange(source: Path, target: Path, aside: Path, undo: Undo) -> None:
-    """Put a file or folder in the place of another, which goes aside."""
-    if source.is_dir():
+def _exchange(
+    source: Path, target: Path, folders: dict[Path, LockedFolder], undo: list[Callable[[], object]]
+) -> None:
+    """Put a file or folder in the place of another, which goes aside into the folder of its parent."""
+    check_replaceable(target)
+    if source.is_dir() != target.is_dir():
+        raise OutputError(f"{target}: is no {'folder' if source.is_dir() else 'file'}, expected a new name")
+    if target.parent not in folders:
+        folders[target.parent] = make_locked(target.parent, OLD)
+    aside = folders[target.parent].path / target.name
+    if source.is_dir() or not _link(target, aside):
         os.rename(target, aside)
         undo.append(lambda: os.rename(aside, target))
-        os.rename(source, target)
-        undo.append(lambda: os.rename(target, source))
-        return
-    if _link(target, aside):
+    else:
         undo.append(aside.unlink)
-    else:
-        os.rename(target, aside)
-        undo.append(lambda: os.rename(aside, target))
     sync(aside.parent)
     os.rename(source, target)
-    undo[-1] = lambda: os.rename(aside, target)
+    if aside.is_dir():
+        undo.append(lambda: os.rename(target, source))
+    else:
+        undo[-1] = lambda: os.rename(aside, target)
 
 
 def _link(source: Path, target: Path) -> bool:
@@ -190,3 +205,121 @@ def name_errors(path: Path) -> Iterator[None]:
         if error.errno is not None:  # else it is an error of ours, with its whole message
             error.filename = str(path)
         raise
+
+
+@dataclass(frozen=True)
+class LockedFolder:
+    """A folder for this process alone, with its lock."""
+
+    path: Path
+    lock: int
+
+    def release(self) -> None:
+        """Release the lock."""
+        os.close(self.lock)
+
+    def remove(self) -> None:
+        """Remove the folder, if it can be removed."""
+        remove(self.path)
+        self.release()
+
+
+def name_of(kind: str) -> str:
+    """Return the prefix of the names of this machine's folders of a kind."""
+    return f"{PREFIX}{kind}-{_HOST}-"
+
+
+def new_name(parent: Path, kind: str) -> Path:
+    """Return a name in a folder that nobody has."""
+    return parent / f"{name_of(kind)}{secrets.token_hex(8)}"
+
+
+def make_stage(parent: Path, mode: int = 0o700) -> LockedFolder:
+    """Make a stage in a folder, after what killed writers left there is cleared up. Raises OSError."""
+    put_back(parent)
+    remove_left(parent)
+    return make_locked(parent, STAGE, mode)
+
+
+def make_locked(parent: Path, kind: str, mode: int = 0o700) -> LockedFolder:
+    """Make a folder of a kind in a folder. Raises OSError."""
+    path = new_name(parent, kind)
+    path.mkdir(mode)
+    try:
+        lock = os.open(path, _FOLDER)
+    except OSError:
+        path.rmdir()
+        raise
+    with suppress(OSError):  # a file system without locks: its folders never count as left
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    return LockedFolder(path, lock)
+
+
+def abandoned_folders(parent: Path, kind: str) -> Iterator[tuple[Path, float]]:
+    """Yield folders of a kind and of this user whose process is gone, and when a name in each last changed.
+
+    Safe for two processes at once, and beside running writers: each is locked meanwhile. Time in s since the
+    epoch.
+    """
+    entries: list[str] = []
+    with suppress(OSError):
+        entries = [entry.path for entry in os.scandir(parent) if entry.name.startswith(name_of(kind))]
+    for entry in entries:
+        with suppress(OSError):  # another process has the lock, or it is no folder
+            lock = os.open(entry, _FOLDER)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if os.fstat(lock).st_uid == os.geteuid():
+                    yield Path(entry), os.fstat(lock).st_mtime
+            finally:
+                os.close(lock)
+
+
+def _is_old(changed: float) -> bool:
+    """Return whether a folder is too old for one that is only about to get its lock."""
+    return time.time() - changed > LEFT_AFTER
+
+
+def remove_left(parent: Path) -> None:
+    """Remove stages of this user in a folder whose process is gone, and that are older than LEFT_AFTER."""
+    for path, changed in abandoned_folders(parent, STAGE):
+        if _is_old(changed):
+            remove(path)
+
+
+def put_back(parent: Path) -> None:
+    """Restore the files that killed writers of this user put aside in a folder.
+
+    A file that has taken the name since is replaced only where it is the killed writer's; else the old one
+    gets the first free of NAME.old, NAME.old-2, …
+    """
+    for path, changed in abandoned_folders(parent, OLD):
+        with suppress(OSError):  # a file that cannot be put back stays, and stops nothing
+            names = os.listdir(path)
+            for name in names:
+                _put_back(path / name, parent / name, changed)
+            if names or _is_old(changed):
+                path.rmdir()
+
+
+def _put_back(old: Path, target: Path, changed: float) -> None:
+    """Give one file or folder its name back. Raises OSError."""
+    if os.path.lexists(target) and (
+        old.is_dir() or not target.is_file() or target.stat().st_mtime > changed
+    ):
+        target = unused_path(target.with_name(f"{target.name}.old"))
+    if os.path.lexists(target) and old.samefile(target):
+        old.unlink()
+    else:
+        os.rename(old, target)
+
+
+def siblings(path: Path) -> Iterator[Path]:
+    """Yield NAME, NAME-2, NAME-3, …"""
+    yield path
+    yield from (path.with_name(f"{path.name}-{number}") for number in count(2))
+
+
+def unused_path(path: Path) -> Path:
+    """Return the first of NAME, NAME-2, NAME-3, … that does not exist."""
+    return next(one for one in siblings(path) if not os.path.lexists(one))

@@ -7,52 +7,26 @@ when all are complete and on the disk. An earlier error or signal changes nothin
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 from types import TracebackType
 
 from rsea_ros.errors import OutputError, RseaError
 from rsea_ros.outputs.files import (
+    LockedFolder,
     check_replaceable,
     give_names,
     make_folder,
+    make_stage,
     name_errors,
-    remove,
+    put_back,
+    siblings,
     taken_error,
     write_new,
 )
-from rsea_ros.outputs.replaced import LockedFolder, abandoned_folders, make_locked, put_back
 from rsea_ros.processes import hold_signals
-
-KIND = "stage"
-
-
-@dataclass(frozen=True)
-class Stage(LockedFolder):
-    """A folder in which files are written before they get their names."""
-
-    def remove(self) -> None:
-        """Remove the folder, if it can be removed."""
-        remove(self.path)
-        self.release()
-
-
-def make_stage(parent: Path, mode: int = 0o700) -> Stage:
-    """Make a stage in a folder, and remove stages of killed writers in it. Raises OSError."""
-    put_back(parent)
-    remove_left(parent)
-    folder = make_locked(parent, KIND, mode)
-    return Stage(folder.path, folder.lock)
-
-
-def remove_left(parent: Path) -> None:
-    """Remove stages of this user in a folder whose process is gone, and that are older than LEFT_AFTER."""
-    for folder in abandoned_folders(parent, KIND):
-        if folder.is_old:
-            remove(folder.path)
 
 
 @dataclass(frozen=True)
@@ -79,7 +53,7 @@ class NewFiles:
         self.folder = self._place.folder
         self._names: list[str] = []
         self._made: list[Path] = []
-        self._stage: Stage | None = None
+        self._stage: LockedFolder | None = None
 
     def __enter__(self) -> NewFiles:
         try:
@@ -156,17 +130,6 @@ def write_file(path: str | Path, content: str | bytes, *, force: bool = False) -
 def write_text(path: str | Path, text: str, *, force: bool = False) -> Path:
     """Write one file of text as `write_file` does."""
     return write_file(path, text, force=force)
-
-
-def siblings(path: Path) -> Iterator[Path]:
-    """Yield NAME, NAME-2, NAME-3, …"""
-    yield path
-    yield from (path.with_name(f"{path.name}-{number}") for number in count(2))
-
-
-def unused_path(path: Path) -> Path:
-    """Return the first of NAME, NAME-2, NAME-3, … that does not exist."""
-    return next(one for one in siblings(path) if not os.path.lexists(one))
 
 
 def check_free(

@@ -17,8 +17,7 @@ import numpy as np
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import rotor_inertia, train_ratio
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.train import TRAINS, Train
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import formulas

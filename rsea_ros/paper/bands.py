@@ -18,8 +18,7 @@ from rsea_ros.model.bandwidth import (
     pure_torque_bandwidth,
     undamped_band,
 )
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper.formulas import eq_6_distal_per_proximal
 

@@ -12,8 +12,7 @@ from rsea_ros.design.mechanism import spring_radius
 from rsea_ros.documents.units import STANDARD_GRAVITY
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import inner_inertia, pure_torque_bandwidth, undamped_band
-from rsea_ros.model.rig import Quantity
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Quantity
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import claims, formulas

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.result import Code, Remark
 from rsea_ros.model.rig import CLOCK_DOUBT
-from rsea_ros.records.fault_kinds import MASKED
-from rsea_ros.records.record import Fault
+from rsea_ros.records.record import MASKED, Fault
 from rsea_ros.report import words
 
 

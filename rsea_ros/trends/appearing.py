@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 from scipy.special import ndtri, stdtr
 from scipy.stats import t
 
-from rsea_ros.records.normal import MAD_TO_SD, Z95
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import MAD_TO_SD, Z95
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Growth, Interval, Trend
 from rsea_ros.trends.settings import DAY, TrendSettings

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-from rsea_ros.records.normal import MAD_TO_SD
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import MAD_TO_SD
 from rsea_ros.trends.series import BoolArray, Series
 from rsea_ros.trends.settings import DAY, TrendSettings
 

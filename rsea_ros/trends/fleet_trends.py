@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.records.normal import MAD_TO_SD, Z95
+from rsea_ros.records.statistics import MAD_TO_SD, Z95
 from rsea_ros.trends.appearing import adjust, appearances, two_sided_p, with_course
 from rsea_ros.trends.cause_series import namings, size_series, temperatures
 from rsea_ros.trends.course_search import Tested, change_test, describe

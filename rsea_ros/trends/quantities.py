@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import Z95
 from rsea_ros.trends.course import Course, Regression, StepOrRamp, date_range, term
 from rsea_ros.trends.result import Interval
 from rsea_ros.trends.settings import DAY

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import Z95
 
 Table = Mapping[str, npt.NDArray[Any]]
 """Columns of equal length by name."""

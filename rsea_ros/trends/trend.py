@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.records.normal import Z95
+from rsea_ros.records.statistics import Z95
 from rsea_ros.trends.appearing import scan_threshold
 from rsea_ros.trends.course import Course, term
 from rsea_ros.trends.course_search import Tested

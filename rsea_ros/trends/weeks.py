@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import Z95
 from rsea_ros.trends.result import Trend
 from rsea_ros.trends.series import BoolArray
 from rsea_ros.trends.settings import DAY

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.outputs.new_files import unused_path
+from rsea_ros.outputs.files import unused_path
 from rsea_ros.processes import start, stop
 
 VERBS = ("identify", "diagnose")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.checks.check import check_record
-from rsea_ros.checks.encoder_findings import jump_findings
-from rsea_ros.checks.signal_findings import standstill_findings
+from rsea_ros.checks.signal_findings import jump_findings, standstill_findings
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize

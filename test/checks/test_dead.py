@@ -15,8 +15,7 @@ from scipy.signal import lfilter
 from rsea_ros.checks.carried import check_diagnosable, with_check_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.expected import Side
-from rsea_ros.checks.faults import clipping
-from rsea_ros.checks.frozen import dead_channels
+from rsea_ros.checks.faults import clipping, dead_channels
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Fault

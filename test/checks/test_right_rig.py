@@ -10,8 +10,8 @@ from independent.bench import drawn_bench, record_run
 
 import rsea_ros as rsea
 from rsea_ros.checks.check import check_record
-from rsea_ros.checks.gain_findings import RIGHT_RIG
-from rsea_ros.checks.machine_impedance import restoring_findings
+from rsea_ros.checks.gains import RIGHT_RIG
+from rsea_ros.checks.rig_findings import restoring_findings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.checks.encoder_findings import _average
+from rsea_ros.checks.signal_findings import _average
 
 PERIOD = 1.0 / 280.0
 

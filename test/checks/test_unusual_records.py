@@ -14,7 +14,7 @@ from rsea_ros.checks.check import check_record
 from rsea_ros.checks.expected import is_still
 from rsea_ros.checks.linearised_rig import linear_of
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.statics import statics_of
+from rsea_ros.identification.result import statics_of
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 

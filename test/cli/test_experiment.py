@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main
-from rsea_ros.experiment.run_limits import read_run
+from rsea_ros.experiment.run_shape import read_run
 from rsea_ros.experiment.stored_models import models_of
 from rsea_ros.model.rig_file import load_rig, save_rig
 

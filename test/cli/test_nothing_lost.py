@@ -12,7 +12,6 @@ import pytest
 from writing_verbs import OLD, WRITERS, contents, prepare
 
 import rsea_ros.outputs.files as files
-import rsea_ros.outputs.replaced as replaced
 from rsea_ros.cli.main import main
 
 STEPS = ("open", "pwrite", "fsync", "link", "rename")
@@ -59,7 +58,6 @@ def misfires(monkeypatch, words: list[str], misfire: Callable[[str], None]) -> I
         disk = Disk(n, misfire)
         with monkeypatch.context() as patch:
             patch.setattr(files, "os", disk)
-            patch.setattr(replaced, "os", disk)
             status = main(words)
         yield status
         if disk.left > 0:

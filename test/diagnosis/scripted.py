@@ -16,9 +16,8 @@ from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Solution, serial
+from rsea_ros.identification.solver import Pools, Solution, serial
 from rsea_ros.identification.unknowns import Unknown
-from rsea_ros.identification.workers import Pools
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 

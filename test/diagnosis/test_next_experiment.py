@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.next_experiment import EXCITATIONS, _as_excited, _series, _settings, amplitude_series
-from rsea_ros.identification.allowed_run import DriverLimits, allowed_run
+from rsea_ros.diagnosis.next_experiment import (
+    EXCITATIONS,
+    DriverLimits,
+    _as_excited,
+    _series,
+    _settings,
+    allowed_run,
+    amplitude_series,
+)
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import Solution

@@ -5,14 +5,19 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.next_experiment import EXCITATIONS, _as_excited, _series, _settings, amplitude_series
-from rsea_ros.identification.allowed_run import allowed_run
+from rsea_ros.diagnosis.next_experiment import (
+    EXCITATIONS,
+    _as_excited,
+    _series,
+    _settings,
+    allowed_run,
+    amplitude_series,
+)
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import Solution
 from rsea_ros.model.drive import Drive
-from rsea_ros.model.rig import EffectSetting
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, EffectSetting
 from rsea_ros.model.rig_file import load_rig, rig_names
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel

@@ -10,14 +10,13 @@ import pytest
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate, refit
 from rsea_ros.diagnosis.diagnose import nominal_problem
-from rsea_ros.diagnosis.screening import ScreenedEffect
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.diagnosis.step_fits import StepFits
+from rsea_ros.diagnosis.step_fits import ScreenedEffect, StepFits
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.excitation import ExcitationSettings, chirp
+from rsea_ros.identification.fit import add_effect
+from rsea_ros.identification.solver import worker_pools
 from rsea_ros.identification.unknowns import with_effect
-from rsea_ros.identification.workers import worker_pools
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel

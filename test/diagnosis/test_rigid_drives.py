@@ -9,7 +9,7 @@ import pytest
 
 from rsea_ros import simulate
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.residual_peaks import missing_torque, ripples
+from rsea_ros.diagnosis.initial_guess import missing_torque, ripples
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.excitation import ExcitationSettings, excitation

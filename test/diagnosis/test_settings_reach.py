@@ -11,13 +11,13 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis import candidate
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate, with_noise_reestimated
 from rsea_ros.diagnosis.diagnose import nominal_problem
-from rsea_ros.diagnosis.naming.contribution import rows_of
-from rsea_ros.diagnosis.naming.flexible import flexible
+from rsea_ros.diagnosis.naming.flexible import flexible, rows_of
 from rsea_ros.diagnosis.score import gain_of
-from rsea_ros.diagnosis.settings import DEFAULT, IntervalSettings, NoiseSettings
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.confidence import confidence_of
+from rsea_ros.identification.fit import add_effect
+from rsea_ros.identification.settings import IntervalSettings, NoiseSettings
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rsea_ros.diagnosis.candidate import with_doubled_step
 from rsea_ros.diagnosis.data_split import short_pieces_of
-from rsea_ros.diagnosis.problem_variants import with_doubled_step
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.rig_file import load_rig

@@ -19,8 +19,8 @@ from similar_machine import factor, record_with, similar
 
 from rsea_ros.diagnosis.diagnose import searched_effects
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
-from rsea_ros.diagnosis.screening import screen
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.diagnosis.step_fits import screen
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Problem, case_from

@@ -12,9 +12,8 @@ from scripted import POOLS, RIG, script, settings
 
 from rsea_ros.diagnosis import stepwise
 from rsea_ros.diagnosis.evaluation import trial_of
-from rsea_ros.diagnosis.forward_step import NO_STEP, StepResult
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.diagnosis.stepwise import replacement_step, select_stepwise
+from rsea_ros.diagnosis.stepwise import NO_STEP, StepResult, replacement_step, select_stepwise
 from rsea_ros.effects.catalogue import effect_named
 
 FRICTION, STRIBECK, LUGRE, HYSTERESIS = (

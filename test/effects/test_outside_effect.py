@@ -16,9 +16,9 @@ from rsea_ros.cli.main import main
 from rsea_ros.control.compensation import compensation
 from rsea_ros.control.lags import lag_responses
 from rsea_ros.control.sampled import responses, sample_rig
+from rsea_ros.diagnosis.candidate import with_common_clock_in_delay
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.naming.cause_facts import undetermined_play
-from rsea_ros.diagnosis.problem_variants import with_common_clock_in_delay
+from rsea_ros.diagnosis.naming.conclusion import undetermined_play
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.exports.bam import export_bam

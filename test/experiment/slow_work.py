@@ -4,7 +4,7 @@ from independent.bench import Bench
 from independent.hidden import hide
 
 from rsea_ros.experiment.proposal import DesignRequest
-from rsea_ros.experiment.run_limits import RunLimits
+from rsea_ros.experiment.run_shape import RunLimits
 from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")

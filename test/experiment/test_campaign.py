@@ -15,7 +15,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.experiment.campaign import Budget, Campaign
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.normal import Z95
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report.experiment.page import probability_figure, write_campaign
 from rsea_ros.report.experiment.words import run_count
 

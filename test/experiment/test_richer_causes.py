@@ -9,13 +9,13 @@ from independent.bench import Bench, record_command
 from independent.hidden import hide
 from slow_work import ASKED, CAUSES, RIG
 
-from rsea_ros.experiment import campaign, shared_name
-from rsea_ros.experiment.campaign import Campaign
+from rsea_ros.experiment import campaign
+from rsea_ros.experiment import campaign as shared_name
+from rsea_ros.experiment.campaign import Campaign, SharedName
 from rsea_ros.experiment.joint_weighing import weigh
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_design import propose
-from rsea_ros.experiment.run_limits import RunLimits
-from rsea_ros.experiment.shared_name import SharedName
+from rsea_ros.experiment.run_shape import RunLimits
 from rsea_ros.report.experiment.words import end_sentence, shared_words
 
 FRICTION = ("coulomb_friction", "stribeck_friction")

@@ -8,15 +8,20 @@ from independent.bench import Bench, record_command
 from independent.hidden import hide
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.advice import advise, proofs_of
-from rsea_ros.experiment.bound import bound
-from rsea_ros.experiment.fits import problem_of, weights_of
+from rsea_ros.experiment.advice import advise, bound, proofs_of
 from rsea_ros.experiment.hypothesis import Hypothesis, motion, run_case
-from rsea_ros.experiment.joint_weighing import cases_of
+from rsea_ros.experiment.joint_weighing import cases_of, problem_of, weights_of
 from rsea_ros.experiment.proposal import DesignRequest, at_ends, ends_of, peaks
 from rsea_ros.experiment.run_design import propose
-from rsea_ros.experiment.run_limits import RunLimits, largest_share, of_command, of_response
-from rsea_ros.experiment.run_shape import Shape, at_rest_around, command_of
+from rsea_ros.experiment.run_shape import (
+    RunLimits,
+    Shape,
+    at_rest_around,
+    command_of,
+    largest_share,
+    of_command,
+    of_response,
+)
 from rsea_ros.experiment.separation import SURE, Refit, chances_decided, refit
 from rsea_ros.experiment.stored_models import hypotheses_from, model_of
 from rsea_ros.identification.excitation import ExcitationSettings, chirp

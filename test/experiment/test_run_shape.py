@@ -4,15 +4,18 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.run_limits import (
+from rsea_ros.experiment.run_shape import (
+    KINDS,
+    LEAD,
     RunLimits,
+    Shape,
+    command_of,
     largest_share,
     limits_from,
     of_command,
     read_run,
     run_text,
 )
-from rsea_ros.experiment.run_shape import KINDS, LEAD, Shape, command_of
 
 RATE = 280.0
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from rsea_ros.health.hypotheses import Bank, hypotheses_of
-from rsea_ros.health.look import Cutter, events_of
+from rsea_ros.health.hypotheses import Bank, Cutter, events_of, hypotheses_of
 from rsea_ros.health.recursive_estimates import Estimates
 from rsea_ros.model.observer import Observer, noise_of
 from rsea_ros.model.observer.log import BatchObserver

@@ -3,9 +3,8 @@
 import numpy as np
 from independent.bench import Bench, record_command
 
-from rsea_ros.health.hypotheses import hypotheses_of
-from rsea_ros.health.look import Cutter, events_of
-from rsea_ros.health.single_cause import FINALISTS, Fitter
+from rsea_ros.health.changes import FINALISTS, Fitter
+from rsea_ros.health.hypotheses import Cutter, events_of, hypotheses_of
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.observer.log import BatchObserver
 from rsea_ros.model.rig_file import load_rig

@@ -10,7 +10,7 @@ from coloured_cases import RATE, white
 from scipy.signal import lfilter
 
 from rsea_ros.identification import noise_level as coloured
-from rsea_ros.identification.noise import SpectralShape, segment_spectra, shape_of
+from rsea_ros.identification.noise import SpectralShape, shape_of, unit_spectra
 
 ALTERNATING = np.resize([1.0, -1.0], 10_000)
 
@@ -77,14 +77,14 @@ def test_slow_lines_are_compared_with_those_up_to_a_hertz(monkeypatch, line, rat
     """Lines of a sixteenth of a hertz, one of which has a power of 100."""
     spectra = np.ones((2, 129), complex)
     spectra[:, line] = 10.0
-    monkeypatch.setattr(coloured, "segment_spectra", lambda *rest: spectra)
+    monkeypatch.setattr(coloured, "unit_spectra", lambda *rest: spectra)
     assert coloured._slow(np.zeros(9), 16.0) == pytest.approx(ratio)
 
 
 @pytest.mark.parametrize(("lines", "ratio"), [(101, 1.0), (81, 0.0)])
 def test_at_least_two_slow_lines_are_needed(monkeypatch, lines, ratio):
     """At 20 Hz: lines of 0.1 Hz, and of 0.125."""
-    monkeypatch.setattr(coloured, "segment_spectra", lambda *rest: np.ones((2, lines), complex))
+    monkeypatch.setattr(coloured, "unit_spectra", lambda *rest: np.ones((2, lines), complex))
     assert coloured._slow(np.zeros(9), 20.0) == ratio
 
 
@@ -121,14 +121,14 @@ def test_the_excess_kurtosis_of_known_distributions_is_right(values, excess):
 def test_kurtosis_is_that_of_the_whitened_residual():
     """Smoothing makes anything Gaussian; what was smoothed is not."""
     y = lfilter([1.0], [1.0, -0.97], np.random.default_rng(2).laplace(size=2**16))
-    shape = shape_of(segment_spectra(y, 1024, 8))
+    shape = shape_of(unit_spectra(y, 1024, 8))
     flat = SpectralShape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
     assert coloured._kurtosis(flat, y) < 0.3
     assert coloured._kurtosis(shape, y) > 0.7
 
 
 def unsteady(y, shape=None):
-    spectra = segment_spectra(y, 1024, 8)
+    spectra = unit_spectra(y, 1024, 8)
     return coloured._unsteady(spectra, shape or shape_of(spectra), RATE)
 
 
@@ -162,7 +162,7 @@ def test_the_worst_band_decides_whether_noise_is_steady():
 
 
 def share(a, b):
-    return coloured._coherent_share(segment_spectra(a, 512, 16), segment_spectra(b, 512, 16), RATE)
+    return coloured._coherent_share(unit_spectra(a, 512, 16), unit_spectra(b, 512, 16), RATE)
 
 
 @pytest.mark.parametrize(

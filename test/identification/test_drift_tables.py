@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification import clocks
-from rsea_ros.identification.clocks import with_drifts
-from rsea_ros.identification.lag_line import LagLine
+from rsea_ros.identification.clocks import LagLine, with_drifts
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown
 

@@ -8,7 +8,7 @@ import pytest
 from rsea_ros.errors import ChannelError, IdentificationError
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response, responses_of
-from rsea_ros.identification.resample import AtRestError
+from rsea_ros.identification.local_polynomial import AtRestError
 from rsea_ros.identification.result import ComplexArray, FrequencyResponse
 from rsea_ros.model import outputs
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -121,17 +121,6 @@ def test_a_sensor_faster_than_the_command_leaves_no_bias() -> None:
     gain, phase = errors(rig, estimate_response(sampled_at(rig, command, stamps), "velocity"), low=2.0)
     assert gain < 0.01
     assert phase < 1.0
-
-
-def test_torque_over_position_is_that_of_spring_and_damper() -> None:
-    rig = load_rig("paper_high_impedance")
-    response = estimate_response(
-        synthesize(rig, command_of("chirp", 160.0), noise=False), "ft", input="position"
-    )
-    wanted = rig["spring.stiffness"] + 2j * np.pi * response.frequency * rig["spring.damping"]
-    inside = (response.frequency > 1.0) & (response.frequency < 100.0)
-    assert response.input == "position"
-    assert float(np.max(np.abs(response.response / wanted - 1.0)[inside])) < 0.01
 
 
 def test_motor_torque_follows_the_command() -> None:

@@ -9,7 +9,7 @@ import pytest
 from benches import RATE, bench, record_bench
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.even_stamps import even_clock
+from rsea_ros.identification.fit import even_clock
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.model.rig_file import load_rig

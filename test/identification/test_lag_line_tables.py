@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.identification.lag_line import LagLine, _lag_of, _lags, lag_line
+from rsea_ros.identification.clocks import LagLine, _lag_of, _lags, lag_line
 
 START, RATE = 5.0, 200.0
 

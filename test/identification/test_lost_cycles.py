@@ -11,8 +11,7 @@ from benches import bench, record_bench
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.identification.identify import identify
-from rsea_ros.identification.record_checks import explained_by_lost_cycles
+from rsea_ros.identification.identify import explained_by_lost_cycles, identify
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel, Fault, Record

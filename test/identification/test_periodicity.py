@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.identification.multisine import find_periods
+from rsea_ros.identification.frequency_response import find_periods
 
 T = np.arange(1246) / 50.0
 

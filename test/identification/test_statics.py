@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from benches import bench, record_bench
 
-from rsea_ros.identification.statics import statics_of
+from rsea_ros.identification.result import statics_of
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.identification.welch import sampled_integrators
+from rsea_ros.identification.frequency_response import sampled_integrators
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.3, -0.4, -1.7])

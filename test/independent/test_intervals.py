@@ -8,9 +8,8 @@ from independent.hidden import hide
 from independent.severities import drawn_parameters
 
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.alternatives import add_effect
 from rsea_ros.identification.confidence import confidence_of
-from rsea_ros.identification.fit import unknowns_of
+from rsea_ros.identification.fit import add_effect, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rsea_ros.laws.law import LawResult
 from rsea_ros.laws.learn import learn
-from rsea_ros.laws.result import LawResult
 from rsea_ros.model.rig_file import load_rig
 
 sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parents[1] / "effects")]

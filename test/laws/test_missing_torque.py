@@ -10,9 +10,8 @@ from effect_bench import RIG, command
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.identification.unknowns import vector_of
-from rsea_ros.laws.columns import case_model, rows_of
-from rsea_ros.laws.gram import SELECTION, gram_of
-from rsea_ros.laws.sparse_regression import fold_sums
+from rsea_ros.laws.sparse_regression import SELECTION, fold_sums, gram_of
+from rsea_ros.laws.variables import case_model, rows_of
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
 

@@ -6,8 +6,7 @@ import math
 
 from hypothesis import strategies as st
 
-from rsea_ros.model.rig import Quantity, Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Quantity, Rig
 from rsea_ros.model.train import TRAINS
 
 RIG_NAMES = ("paper_high_impedance", "paper_moving_output", "prototype_knee", "bare_drive", "pendulum")

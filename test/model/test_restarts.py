@@ -7,7 +7,7 @@ import pytest
 
 import rsea_ros as rsea
 from rsea_ros.checks.faults import check
-from rsea_ros.model.restarts import gaps
+from rsea_ros.model.drive import gaps
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 

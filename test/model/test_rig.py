@@ -9,8 +9,7 @@ import pytest
 from random_rigs import RIG_NAMES
 
 from rsea_ros.errors import RigError
-from rsea_ros.model.rig import Quantity, Rig
-from rsea_ros.model.rig_fields import FIELDS, check_value, unit_of
+from rsea_ros.model.rig import FIELDS, Quantity, Rig, check_value, unit_of
 from rsea_ros.model.rig_file import load_rig
 
 PAPER = load_rig("paper_high_impedance")

@@ -12,6 +12,7 @@ from random_rigs import RIG_NAMES, rigs
 
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig import EffectSetting, PositionLoop, Quantity
+from rsea_ros.model.rig_document import tables
 from rsea_ros.model.rig_file import (
     load_rig,
     rig_folders,
@@ -20,7 +21,6 @@ from rsea_ros.model.rig_file import (
     rig_to_document,
     save_rig,
 )
-from rsea_ros.model.rig_keys import tables
 
 
 @pytest.mark.parametrize("name", RIG_NAMES)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.model.sampling import sample
+from rsea_ros.model.simulation import sample
 
 STEPS = 40
 ENDS = np.arange(STEPS + 1.0)

@@ -11,7 +11,7 @@ from rolling import rotor_speed
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, flat_band, inner_inertia, resonance_peak, undamped_band
 from rsea_ros.model.equations import mechanics, rotor_inertia, train_ratio
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS, rotor_turns, spin_inertia
 from rsea_ros.model.transfer import frequency_response

@@ -8,8 +8,7 @@ import pytest
 
 from msg_adapters import write_record
 from msg_adapters.ros import DiagnosticArray, JointState
-from rsea_ros.experiment.run_limits import run_text
-from rsea_ros.experiment.run_shape import Shape, command_of
+from rsea_ros.experiment.run_shape import Shape, command_of, run_text
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.nodes._qos import COMMAND

@@ -1,5 +1,14 @@
 """Weighing: the evidence for every accepted cause and its rivals, and for one more that surely helps.
 
+Rivals of a cause are the effects that were tried beside the same model and its known look-alikes
+that do as well in its place. Each has a weight by its residual on the test blocks: pseudo-BMA with the
+Bayesian bootstrap,
+
+    w_k = mean over bootstraps of softmax_k(-1/2 (sum_b v_b loss_kb + price_k))
+
+v: Dirichlet weights of the blocks times their number. A rival that is ahead by a few blocks' luck does not
+get all the weight, as it would from the sum alone (Yao, Vehtari, Simpson, Gelman, Bayesian Anal. 13, 2018).
+
 A step of the search requires that the residual of some channel falls by `acceptance.fall`, and by more far
 from the floor. Where several small effects overlap, none may gain that much. An effect that nevertheless
 surely helps on unused blocks is promoted to a cause to be weighed.
@@ -7,18 +16,163 @@ surely helps on unused blocks is promoted to a cause to be weighed.
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
+import numpy as np
+
+from rsea_ros.diagnosis.candidate import (
+    Candidate,
+    FitSetup,
+    effect_size,
+    fit_candidate,
+    prior_cost,
+    refit,
+)
 from rsea_ros.diagnosis.criteria import is_at_floor, preference
+from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, Selection, Trial, evaluate, held_out_data
 from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for
-from rsea_ros.diagnosis.naming.rivals import beside, contests
-from rsea_ros.diagnosis.score import Score
-from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.identification.workers import Pools
+from rsea_ros.diagnosis.score import Score, tempered_loss
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.identification.confidence import is_off_rig
+from rsea_ros.identification.solver import Pools
+from rsea_ros.records.record import FloatArray
+
+
+@dataclass(frozen=True)
+class Contest:
+    """A cause that was accepted and its rivals, the likeliest first."""
+
+    cause: Claim
+    rivals: tuple[Claim, ...]
+
+
+def contests(
+    selection: Selection, stages: Sequence[Evaluated], held_out: HeldOut, pools: Pools
+) -> list[Contest]:
+    """Return the contest for the place of each accepted cause, in the order of the stages."""
+    result = []
+    for without, with_it in itertools.pairwise(stages):
+        name = with_it.added
+        last = stages[-1].solution
+        claim = Claim(name, last.problem, last.theta, with_it.test, without.test, 1.0)
+        rounds = [t for t in selection.trials if t.name == name and t.reason == "replaced"]
+        tried = beside(selection, rounds[-1].beside) if rounds else []
+        result.append(weigh_rivals(selection, claim, tried, held_out, pools))
+    return result
+
+
+def beside(selection: Selection, model: Candidate) -> list[Trial]:
+    """Return the trials beside a model that were fitted to all training blocks, the last of each effect."""
+    full = {t.name: t for t in selection.trials if t.is_full and t.beside.causes == model.causes}
+    return list(full.values())
+
+
+def weigh_rivals(
+    selection: Selection, claim: Claim, tried: Sequence[Trial], held_out: HeldOut, pools: Pools
+) -> Contest:
+    """Return a contest of a claim with the effects tried beside the same model, or as good in its place.
+
+    Another cause that was accepted too is no rival, whichever of the two came first. Where the accepted model
+    itself is far from the rig, the rig is doubtful: its values decide between no two causes.
+    """
+    accepted, settings = selection.last.causes, selection.last.settings
+    rule = settings.evidence
+    tried = [t for t in tried if t.name == claim.name or t.name not in accepted]
+    trust = 0.0 if is_off_rig(selection.last.solution) else 1.0
+    scores, weights = _race(tried, held_out, pools, settings, trust)
+    if sum(w >= rule.close_weight for w in weights) > 1:
+        tried = _with_close_ones_fitted(tried, weights, selection, pools)
+        scores, weights = _race(tried, held_out, pools, settings, trust)
+    weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
+    rivals = [
+        Claim(t.name, t.problem, t.theta, s, held_out.score_of(t.beside), weight_of[t.name])
+        for t, s in zip(tried, scores, strict=True)
+        if t.name != claim.name
+    ]
+    swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(accepted)]
+    models = [selection.last, *swapped]
+    tested = [held_out.score_of(m) for m in models]
+    priors, lengths = [trust * m.prior_cost for m in models], [m.size for m in models]
+    among_swapped = _stack(tested, priors, lengths, settings)
+    among_tried = weight_of.get(claim.name, 1.0)
+    for model, with_it, weight in zip(swapped, tested[1:], among_swapped[1:], strict=True):
+        theta = model.solution.theta
+        rivals.append(Claim(model.newest, model.problem, theta, with_it, claim.without, weight))
+    heavy = sorted((r for r in rivals if r.weight >= rule.least_weight), key=lambda r: -r.weight)
+    once = {r.name: r for r in reversed(heavy)}
+    kept = sorted(once.values(), key=lambda r: -r.weight)[: rule.most_rivals]
+    return Contest(replace(claim, weight=min(among_tried, among_swapped[0])), tuple(kept))
+
+
+def _race(
+    tried: Sequence[Trial], held_out: HeldOut, pools: Pools, settings: DiagnosisSettings, trust: float
+) -> tuple[list[Score], list[float]]:
+    """Return the scores of trials and their weights. trust: share of the priors' cost that counts."""
+    scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), tried))
+    priors = [trust * prior_cost(t.problem, t.theta) for t in tried]
+    return scores, _stack(scores, priors, [effect_size(t.name) for t in tried], settings)
+
+
+def _with_close_ones_fitted(
+    tried: Sequence[Trial], weights: Sequence[float], selection: Selection, pools: Pools
+) -> list[Trial]:
+    """Return trials, those of some weight fitted to the end."""
+    least = selection.last.settings.evidence.close_weight
+    fitted = [t for t, w in zip(tried, weights, strict=True) if w >= least]
+    ends = {t.name: t for t in pools.fits.map(lambda t: _fit_to_the_end(t, selection, pools), fitted)}
+    return [ends.get(t.name, t) for t in tried]
+
+
+def _fit_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Trial:
+    """Return a trial fitted as the models that are tested: the steps of the search stop far earlier.
+
+    Nearly equal laws need long fits: the values of one compensate for the other.
+    """
+    settings = selection.last.settings
+    blocks, gain = (*TRAIN, *VALIDATION), settings.fits.final_gain
+    setup = FitSetup(selection.cases, settings, pools.run, blocks=blocks, gain=gain)
+    initial = fit_candidate(replace(setup, iterations=0), trial.problem, trial.theta)
+    model = refit(initial, setup)
+    return replace(trial, problem=model.problem, theta=model.solution.theta)
+
+
+def _stack(
+    scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[int], settings: DiagnosisSettings
+) -> list[float]:
+    """Return weights; each parameter of an effect costs the logarithm of the number of blocks.
+
+    A law that holds another as a special case does as well wherever the other is right (Schwarz, Annals of
+    Statistics 6, 1978).
+    """
+    if not scores:
+        return []
+    best = min(scores, key=lambda s: float(s.loss(s).sum()))
+    losses = [tempered_loss(s, best, settings.floor.far) for s in scores]
+    prices = [p + math.log(len(losses[0])) * size for p, size in zip(priors, sizes, strict=True)]
+    return [float(w) for w in stacking_weights(losses, prices, settings.acceptance.resamples)]
+
+
+def stacking_weights(
+    losses: Sequence[FloatArray],
+    prices: Sequence[float],
+    resamples: int = DEFAULT.acceptance.resamples,
+) -> FloatArray:
+    """Return a weight for each model, shape (k,), summing to 1.
+
+    losses: twice the negative log likelihood of every block, shape (b,) each. prices: of the priors, alike.
+    """
+    loss = np.array(losses)
+    blocks = loss.shape[1]
+    draws = np.random.default_rng(0).dirichlet(np.ones(blocks), resamples) * blocks
+    evidence = -0.5 * (draws @ loss.T + np.asarray(prices))
+    evidence -= evidence.max(axis=1, keepdims=True)
+    likely = np.exp(evidence)
+    return np.asarray((likely / likely.sum(axis=1, keepdims=True)).mean(axis=0))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pathlib import Path
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
 from rsea_ros.hardware.peer.peer_motor import KEPT, LENGTH, UNKNOWN, EmulatedMotor
 from rsea_ros.hardware.peer.protocol2 import Request, RequestParser, checksum, status
-from rsea_ros.outputs.replaced import PREFIX
+from rsea_ros.outputs.files import PREFIX
 
 EVERYONE = 254
 PING, READ, WRITE, REBOOT = 0x01, 0x02, 0x03, 0x08

@@ -17,7 +17,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model import outputs
 from rsea_ros.model.drive import LONGEST_STEP
-from rsea_ros.model.equations import PORTS
+from rsea_ros.model.equations import PORTS, with_structure
 from rsea_ros.model.observer.filter import CLOCK, SIGMA, FilterModel, FilterState, disturbance
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.outputs import Output
@@ -25,7 +25,6 @@ from rsea_ros.model.propagator import StateSpace, state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls
-from rsea_ros.model.structure import with_structure
 from rsea_ros.records.record import FloatArray
 
 _GEAR_PLACE = PORTS.index("gear")

@@ -30,8 +30,7 @@ from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 from rsea_ros.documents.units import plain
 from rsea_ros.errors import RigError
 from rsea_ros.model.propagator import state_space
-from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_fields import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.records.record import UNITS, FloatArray
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
@@ -84,7 +83,7 @@ def _sigma(rig: Rig, channel: str, noise_rms: Mapping[str, float]) -> float:
     if channel not in rig.sensors:
         return math.inf
     sensor = rig.sensors[channel]
-    sigma = noise_rms.get(channel, math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0)))
+    sigma = noise_rms.get(channel, sensor.level)
     if not sigma > 0.0:
         raise RigError(
             f"rig {rig.name}: sensors.{channel}.noise = {sigma:g} {plain(UNITS[channel])}, "

@@ -9,8 +9,8 @@ import numpy as np
 from rsea_ros.diagnosis.result import Cause, CauseParameter, Diagnosis
 from rsea_ros.documents.units import in_motion
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import UNITS
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 
 _END = 0.99

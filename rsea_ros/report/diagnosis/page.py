@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from html import escape
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Rejected
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, Setting
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.documents.wording import list_names
+from rsea_ros.identification.settings import Setting
 from rsea_ros.records.record import UNITS
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num

@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.experiment.advice import Advice, Proof
 from rsea_ros.experiment.campaign import Campaign, CampaignOutcome
 from rsea_ros.experiment.proposal import Proposal
-from rsea_ros.experiment.run_limits import RunLimits, run_text
+from rsea_ros.experiment.run_shape import RunLimits, run_text
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import NewFiles, check_free
 from rsea_ros.records.record import FloatArray

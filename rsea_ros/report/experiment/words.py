@@ -14,9 +14,9 @@ from rsea_ros.experiment.campaign import Campaign, CampaignOutcome
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.joint_weighing import RunWeighing
 from rsea_ros.experiment.proposal import LEVEL, Proposal
-from rsea_ros.experiment.run_limits import UNITS
+from rsea_ros.experiment.run_shape import UNITS
 from rsea_ros.model.rig import CLOCK_DOUBT
-from rsea_ros.records.normal import Z95
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.result_files import pick, strict
 

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import UNITS, ComplexArray, FloatArray
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import (
     Figure,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rsea_ros.records.normal import Z95
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.fleet.figures import determined_by
 from rsea_ros.report.fleet.links import Links

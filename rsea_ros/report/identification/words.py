@@ -9,9 +9,8 @@ from typing import Any
 from rich.table import Table
 
 from rsea_ros.documents.wording import list_names
-from rsea_ros.identification.record_checks import explained_by_lost_cycles
-from rsea_ros.identification.result import CLOCKS, Identification, ParameterEstimate
-from rsea_ros.identification.statics import Statics
+from rsea_ros.identification.identify import explained_by_lost_cycles
+from rsea_ros.identification.result import CLOCKS, Identification, ParameterEstimate, Statics
 from rsea_ros.report import words
 from rsea_ros.report.remark_words import coloured_noise, remark_sentences
 from rsea_ros.report.result_files import fault_json, pick, strict

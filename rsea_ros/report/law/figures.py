@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rsea_ros.laws.result import WrittenLaw
-from rsea_ros.records.normal import Z95
+from rsea_ros.laws.law import WrittenLaw
 from rsea_ros.records.record import FloatArray, IntArray
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import (
     Figure,

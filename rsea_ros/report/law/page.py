@@ -7,12 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from rsea_ros.effects.catalogue import lend
-from rsea_ros.laws.law import about_of, equation_of
-from rsea_ros.laws.result import LawResult, WrittenLaw
+from rsea_ros.laws.law import LawResult, WrittenLaw, about_of, equation_of
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import UNITS
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, QUIET, faint
 from rsea_ros.report.law.figures import over_figure, time_figure

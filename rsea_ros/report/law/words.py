@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rsea_ros.laws.law import Law, equation_of
-from rsea_ros.laws.result import LawResult
+from rsea_ros.laws.law import Law, LawResult, equation_of
 from rsea_ros.report import words
 from rsea_ros.report.result_files import pick
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.naming.contribution import rows_of
+from rsea_ros.diagnosis.naming.flexible import rows_of
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.alternatives import add_effect
-from rsea_ros.identification.fit import unknowns_of
+from rsea_ros.identification.fit import add_effect, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig

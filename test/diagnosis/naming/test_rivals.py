@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.naming.rivals import stacking_weights
+from rsea_ros.diagnosis.naming.weighing import stacking_weights
 
 RNG = np.random.default_rng(3)
 LOSS = RNG.chisquare(50, size=30)

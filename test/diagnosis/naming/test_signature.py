@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.naming.contribution import ContributionRows, project_out
-from rsea_ros.diagnosis.naming.signature import signature
+from rsea_ros.diagnosis.naming.evidence import signature
+from rsea_ros.diagnosis.naming.flexible import ContributionRows, project_out
 
 BLOCKS, LENGTH = 48, 100
 RNG = np.random.default_rng(5)

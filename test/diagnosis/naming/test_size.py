@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rsea_ros.diagnosis.naming import conclusion as outcome
-from rsea_ros.diagnosis.naming.cause_facts import is_known, sizes
+from rsea_ros.diagnosis.naming.conclusion import is_known, sizes
 from rsea_ros.diagnosis.naming.status import Named
 from rsea_ros.diagnosis.result import CauseParameter
 from rsea_ros.diagnosis.settings import DEFAULT

@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsea_ros.diagnosis.criteria import takes_most, verdict_of
-from rsea_ros.diagnosis.naming.evidence import Evidence
+from rsea_ros.diagnosis.naming.evidence import Evidence, Signature
 from rsea_ros.diagnosis.naming.flexible import Flexible
-from rsea_ros.diagnosis.naming.signature import Signature
 from rsea_ros.diagnosis.naming.status import (
     COEFFICIENTS,
     features,

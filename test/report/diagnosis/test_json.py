@@ -12,8 +12,8 @@ import pytest
 from rsea_ros.diagnosis.result import CauseParameter, Experiment
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.normal import Z95
 from rsea_ros.records.record import Fault
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report.diagnosis.files import diagnosis_json
 from rsea_ros.report.result_files import DIAGNOSIS
 

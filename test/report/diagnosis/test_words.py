@@ -12,8 +12,9 @@ import pytest
 from rich.console import Console
 
 from rsea_ros.diagnosis.result import CauseParameter, Misfit, Reason, Rejected
-from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings, NoiseSettings
+from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
 from rsea_ros.identification.result import Overlay
+from rsea_ros.identification.settings import NoiseSettings
 from rsea_ros.records.record import Fault
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num

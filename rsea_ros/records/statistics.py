@@ -1,9 +1,8 @@
-"""Spectra by Welch's method (half-overlapping Hann segments without their means), and fast lengths for them.
+"""Quantiles of the normal distribution, spectra by Welch's method, and fast lengths for them.
 
 Source: Welch, IEEE Trans. Audio Electroacoust. 15, 1967. The same as scipy.signal.welch and csd, whose import
-takes longer than a diagnosis that finds nothing wrong.
-
-scipy.fft has the same function, but imports for 0.15 s at every start; numpy.fft transforms alike.
+takes longer than a diagnosis that finds nothing wrong. scipy.fft has the lengths, but imports for 0.15 s at
+every start; numpy.fft transforms alike.
 """
 
 from __future__ import annotations
@@ -12,11 +11,18 @@ import numpy as np
 
 from rsea_ros.records.record import ComplexArray, FloatArray
 
+Z95 = 1.959964
+"""Standard deviations from the middle of a 95 % interval to its end."""
+Z90 = 1.6449
+"""The same of a 90 % interval."""
+MAD_TO_SD = 1.4826
+"""Standard deviation of normal values over their median absolute deviation."""
+
 
 def segment_spectra(values: FloatArray, length: int) -> ComplexArray:
     """Return the spectrum of each segment of `length` samples, shape (segments, length // 2 + 1)."""
     parts = np.lib.stride_tricks.sliding_window_view(values, length)[:: length - length // 2]
-    return np.asarray(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * _hann(length), axis=1))
+    return np.asarray(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * hann(length), axis=1))
 
 
 def power_density(values: FloatArray, rate: float, length: int) -> tuple[FloatArray, FloatArray]:
@@ -37,11 +43,12 @@ def cross_density(
     one_sided[0] = 1.0
     if length % 2 == 0:
         one_sided[-1] = 1.0
-    density = one_sided * product.mean(axis=0) / (rate * np.sum(_hann(length) ** 2))
+    density = one_sided * product.mean(axis=0) / (rate * np.sum(hann(length) ** 2))
     return np.asarray(np.fft.rfftfreq(length, 1.0 / rate), np.float64), density
 
 
-def _hann(length: int) -> FloatArray:
+def hann(length: int) -> FloatArray:
+    """Return the periodic Hann window, shape (length,)."""
     return np.hanning(length + 1)[:-1]
 
 

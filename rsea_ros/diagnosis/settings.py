@@ -1,16 +1,29 @@
-"""The groups of settings of a diagnosis: each number with unit, meaning and reason."""
+"""Every number that steers a verdict: its meaning, its unit, and why it has this value.
+
+`identify` estimates noise and intervals by the same rules; their settings lie in identification/settings.py.
+
+No setting: what happens to a record before any model (checks/, identification/fit.py), where fits
+begin (initial_guess.py, identification/start.py), the steps of derivatives, and what
+is only shown (residual_analysis.py, score.lost_above). Those numbers stand with their reasons where they
+are used (docs/decisions/0180-which-numbers-are-settings.md).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
 from typing import TypeVar
 
-from rsea_ros.documents import setting
+from rsea_ros.errors import ParameterError
+from rsea_ros.identification import settings as setting
 from rsea_ros.identification.result import AT_NOISE
+from rsea_ros.identification.settings import IntervalSettings, NoiseSettings, Setting
 
 T = TypeVar("T")
 CHOSEN = "chosen on the benchmark; bench/settings_curve.py shows the outcomes over it"
-CALIBRATED = "fixed when coefficients.py was fitted: after a change, `bench/calibration.py fit`"
+CALIBRATED = (
+    "fixed when the coefficients of naming/status.py were fitted: after a change, `bench/calibration.py fit`"
+)
 
 
 def flat(low: str, high: str) -> str:
@@ -135,7 +148,7 @@ class FitSettings:
 
 @dataclass(frozen=True)
 class BlockSettings:
-    """The blocks of a record, and the coherence over them that shows a missed response (coherence.py)."""
+    """The blocks of a record, and the coherence over them that shows a missed response (score.py)."""
 
     longest: float = number(
         1.0, "s", "length of a block", "longer than a bench's memory: blocks are independent"
@@ -286,7 +299,7 @@ class NamingSettings:
     rival: float = number(0.05, "1", "probability from which a rival is an alternative", "one in twenty")
     carried: float = number(
         2.6, "1", "standard deviations by which a cause's misfit lasts from block to block, above which it "
-        "is not confirmed although only noise is left (naming/signature.py)",
+        "is not confirmed although only noise is left (naming/evidence.py)",
         "chance exceeds it for one right cause in 200; in simulated records 0 of 88 right causes did, "
         "and 6 of 8 drifts that were named for a wandering sensor",
     )  # fmt: skip
@@ -339,3 +352,48 @@ class NextRunSettings:
         0.8, "1", "part of the wanted amplitude that the limits must leave",
         "with less the two amplitudes are too alike to compare",
     )  # fmt: skip
+
+
+MOST_CAUSES = 4
+
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """The effects that a diagnosis tries, and every number that steers its verdict.
+
+    max_causes: the most causes, 1 or more; the search ends earlier where only noise is left. Four causes
+    leave too little of the benchmark's records unexplained for a fifth.
+    without: effects of the catalogue that are not tried.
+    Raises ParameterError for a number below 1.
+    """
+
+    max_causes: int = MOST_CAUSES
+    without: tuple[str, ...] = ()
+    blocks: BlockSettings = field(default_factory=BlockSettings)
+    floor: FloorSettings = field(default_factory=FloorSettings)
+    acceptance: AcceptanceSettings = field(default_factory=AcceptanceSettings)
+    fits: FitSettings = field(default_factory=FitSettings)
+    stretches: StretchSettings = field(default_factory=StretchSettings)
+    pieces: PieceSettings = field(default_factory=PieceSettings)
+    forward: ForwardSettings = field(default_factory=ForwardSettings)
+    evidence: EvidenceSettings = field(default_factory=EvidenceSettings)
+    naming: NamingSettings = field(default_factory=NamingSettings)
+    sizes: SizeSettings = field(default_factory=SizeSettings)
+    next_run: NextRunSettings = field(default_factory=NextRunSettings)
+    noise: NoiseSettings = field(default_factory=NoiseSettings)
+    intervals: IntervalSettings = field(default_factory=IntervalSettings)
+
+    def __post_init__(self) -> None:
+        if self.max_causes < 1:
+            raise ParameterError(f"max_causes = {self.max_causes}, expected 1 or more")
+        object.__setattr__(self, "without", tuple(self.without))
+
+    def numbers(self) -> Iterator[Setting]:
+        """Yield every number of the groups with its meaning, unit and reason."""
+        for group in (f.name for f in fields(self) if f.name not in ("max_causes", "without")):
+            values = getattr(self, group)
+            for f in fields(values):
+                yield Setting(f"{group}.{f.name}", getattr(values, f.name), **f.metadata)
+
+
+DEFAULT = DiagnosisSettings()
