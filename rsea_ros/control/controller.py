@@ -28,16 +28,21 @@ from rsea_ros.control.law import FeedbackLaw, FeedbackState, Gains, feedback, ho
 from rsea_ros.control.learning import Learning
 from rsea_ros.control.link import LinkMotion, LinkShare
 from rsea_ros.control.loads import lightest, load_range, lock
-from rsea_ros.control.prediction import Prediction
+from rsea_ros.control.prediction import AHEAD, Prediction
 from rsea_ros.control.reference import Reference
 from rsea_ros.control.sampled import sample_rig
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import design
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import FloatArray
+from rsea_ros.records.record import HUGE, NONSENSE, FloatArray, is_measured
 
 FOLLOWED = 0.25
 """Of the largest torque: the most that the link's motion may take."""
+STALE = 0.05
+"""s without a usable reading after which there is no torque; the next one starts anew."""
+SMALL = 0.01
+"""Of the largest torque: an error at a start that is let in without teaching loads. For twice the ramp a
+larger one would: 24 N m at the motor for 10 N m with a fifth of the samples lost."""
 
 
 @dataclass(frozen=True)
@@ -98,14 +103,20 @@ class TorqueController:
         self._reference = Reference(sample_rig(lock(rig), rate), self._law, self.learned)
         self._compensation: Compensation = compensation(rig, settings.compensate)
         self._prediction, self._acted = Prediction(settings.corner, 1.0 / rate), Acted(1.0 / rate)
+        self._most = NONSENSE * max(limits.torque, 1.0)
         self._preview, self._learn, self._limits = settings.preview, settings.learn, limits
         self._link = LinkMotion(self._law, link, FOLLOWED * limits.torque)
         self.start(Measurement(0.0, 0.0, 0.0))
 
     def start(self, reading: Measurement, desired: float = 0.0) -> None:
         """Restart without a jump, from the present state of the bench and its motor torque."""
-        torque = reading.motor_torque if math.isfinite(reading.motor_torque) else 0.0
-        self._reference.start(reading.ft, reading.velocity, desired)
+        desired = desired if is_measured(desired, self._most) else 0.0
+        torque = reading.motor_torque if is_measured(reading.motor_torque, self._most) else 0.0
+        if not self._is_usable(reading):
+            reading = Measurement(0.0, 0.0, 0.0)
+        softly = reading.ft if self._limits.ramp > 0.0 else desired
+        self._skipped = 0
+        self._reference.start(reading.ft, reading.velocity, softly)
         self.learned.start(reading.ft, reading.velocity)
         self._prediction.start(desired)
         self._link.start(reading.link)
@@ -113,7 +124,7 @@ class TorqueController:
         self._acted.start(torque)
         self._begin = self._sent = self._sent_before = torque
         self._known = self._learned = (0.0, 0.0)
-        self._age, self._crossed = 0, 0.0
+        self._age, self._crossed, self._jump = 0, 0.0, softly - desired
         self.share = Share()
 
     def step(
@@ -131,10 +142,22 @@ class TorqueController:
 
         desired: N m, at this sample's place in the grid, or two samples later with preview. missed: samples
         lost before it. offset: samples by which the reading was taken after its place in the grid.
+        A reading with a value that is not measured, or beyond NONSENSE times the largest torque, is a lost
+        sample; for such a desired torque the one that was expected counts.
         desired_offset: samples by which desired is for later than that place; with preview it does not count.
         late: the torque will act later than the margins allow; then it is feed-forward alone.
         trust: part of the feedback that counts, as lateness.py has it.
         """
+        if not is_measured(desired, self._most):
+            desired = self._prediction.expected(missed + 1)
+        if not self._is_usable(reading):
+            return self._bridge(missed)
+        if self._skipped * self._law.period > STALE:
+            self.start(reading, desired)
+            missed = 0
+        missed, self._skipped = missed + self._skipped, 0
+        if not is_measured(reading.motor_torque, self._most):
+            reading = replace(reading, motor_torque=math.nan)
         for wanted in self._prediction.between(desired, missed) if missed else ():
             self._coast(wanted, desired_offset)
         ahead, model = self._ahead(desired, desired_offset), self._reference
@@ -160,11 +183,21 @@ class TorqueController:
         model.advance(forward, float(ahead[0]))
         return torque
 
+    def _is_usable(self, r: Measurement) -> bool:
+        return is_measured(r.ft, self._most) and all(is_measured(v, HUGE) for v in (r.velocity, r.position))
+
+    def _bridge(self, missed: int) -> float:
+        """Return the torque, N m, for a sample that says nothing: the last one, zero once it is stale."""
+        self._skipped += missed + 1
+        if self._skipped * self._law.period > STALE:
+            self._sent = 0.0
+        return self._sent
+
     def _ahead(self, desired: float, off: float) -> FloatArray:
         samples = self._reference.samples
         if self._preview:
-            return np.full(samples, desired)
-        return self._prediction.ahead(desired, samples, off)
+            return self._soften(np.full(samples, desired))
+        return self._soften(self._prediction.ahead(desired, samples, off))
 
     def _coast(self, desired: float, off: float) -> None:
         """Bridge a missing sample: the last torque goes on acting."""
@@ -202,10 +235,12 @@ class TorqueController:
         share, timely = missed / (missed + 1), in_time and not missed
         acted = self._acted.over_sample(reading.motor_torque, self._sent_before, self._sent, sure=timely)
         acted = acted - self._known[0] if math.isfinite(acted) else s.applied
+        still = abs(self._jump) < SMALL * self._limits.torque or self._grown(-self._age // 2) >= 1.0
         for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist() if missed else (1.0,):
             ft, velocity = s.ft + part * (reading.ft - s.ft), s.velocity + part * turned
             torques = s.applied + self._learned[0], acted + self._learned[0]
-            self.learned.hear(ft, velocity, *torques, gap=self._crossed, sure=self._learn and in_time)
+            sure = self._learn and in_time and still
+            self.learned.hear(ft, velocity, *torques, gap=self._crossed, sure=sure)
         self._state = s._replace(
             error=s.error + share * (error - s.error),
             slowness=s.slowness + share * (slowness - s.slowness),
@@ -233,8 +268,22 @@ class TorqueController:
         self._crossed = start
         return self._law.inertia * (stop - start) / h + 0.5 * self._law.damping * (start + stop)
 
+    def _grown(self, ahead: int = 0) -> float:
+        """Return the part of the limits that is open at this sample or later ones: it grows after a start."""
+        ramp = self._limits.ramp
+        return min(1.0, (self._age + 1 + ahead) * self._law.period / ramp) if ramp > 0.0 else 1.0
+
+    def _soften(self, ahead: FloatArray) -> FloatArray:
+        """Return desired torques, N m, without the error of the start, which is let in over the ramp.
+
+        A limit on the torque alone lets the whole error in at once, which takes several times its size.
+        """
+        if self._grown(AHEAD) >= 1.0:
+            return ahead
+        left = 1.0 - np.array([self._grown(AHEAD + k) for k in range(len(ahead))])
+        softened: FloatArray = ahead + self._jump * left * left * (3.0 - 2.0 * left)
+        return softened
+
     def _largest(self) -> float:
-        """Return the largest torque that the limits let through now, N m; it grows after a start."""
-        limits, h = self._limits, self._law.period
-        grown = min(1.0, (self._age + 1) * h / limits.ramp) if limits.ramp > 0.0 else 1.0
-        return min(limits.torque, max(abs(self._begin), limits.torque * grown))
+        """Return the largest torque that the limits let through now, N m."""
+        return min(self._limits.torque, max(abs(self._begin), self._limits.torque * self._grown()))

@@ -47,6 +47,11 @@ class Prediction:
         self._smooth = [torque, torque]
         self._last, self._surprise, self._change, self.trust = torque, 0.0, 0.0, 1.0
 
+    def expected(self, samples: int) -> float:
+        """Return the torque, N m, that is expected a number of samples after the last one."""
+        along = self._state[1] * samples + 0.5 * self._state[2] * samples * samples
+        return float(self._state[0] + self.trust * along)
+
     def between(self, desired: float, missed: int) -> FloatArray:
         """Return the torques (N m) of samples that were missed before one of `desired`: shape (missed,).
 

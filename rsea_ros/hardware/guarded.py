@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
-from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, complaint, unmeasured_quantities, without
+from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, unmeasured_quantities, without
 from rsea_ros.hardware.losses import Losses
 from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring
@@ -244,7 +244,7 @@ class GuardedDevice:
     def _check(self) -> None:
         """Raise DeviceError where a reading has a fault, which is latched."""
         state = self._patiently()
-        fault = self._step(self.state, state) or complaint(self.guard.limits, state)
+        fault = self._step(self.state, state) or self.guard.complaint(state)
         if fault is not None:
             self.guard.trip(fault)
             raise DeviceError(f"{fault} is still there, expected it to be over")

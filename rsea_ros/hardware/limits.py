@@ -11,6 +11,7 @@ from rsea_ros.documents.units import plain
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.interlock import Interlock
+from rsea_ros.records.record import NONSENSE, is_measured
 
 COMMAND_TIMEOUT = "command_timeout"
 HEARD_LATE = 3
@@ -57,7 +58,7 @@ def unmeasured_quantities(limits: Limits, state: State) -> list[str]:
     """Return the quantities of NO_LIMIT that are limited and that a reading does not have."""
     return [
         name for name, none in NO_LIMIT.items()
-        if getattr(limits, name) != none and math.isnan(getattr(state, name))
+        if getattr(limits, name) != none and not is_measured(getattr(state, name))
     ]  # fmt: skip
 
 
@@ -82,8 +83,16 @@ class DeviceFault:
         return f"{self.cause}:" + ("" if math.isnan(self.value) else measured) + f" {self.detail}".rstrip()
 
 
-def complaint(limits: Limits, state: State) -> DeviceFault | None:
-    """Return the first fault in a reading."""
+def ft_torque(limits: Limits, state: State) -> float:
+    """Return the torque about the actuator's axis, N m; nan where the sensor measures none."""
+    return math.nan if state.wrench is None else state.wrench[limits.ft_axis]
+
+
+def complaint(limits: Limits, state: State, *, deflects: bool = False) -> DeviceFault | None:
+    """Return the first fault in a reading. What is not measured (signals.is_measured) is beyond no limit.
+
+    deflects: whether the spring's deflection was measured before: then the drive's angle is none instead.
+    """
     if not math.isfinite(state.position + state.velocity + state.motor_torque):
         reading = f"{state.position} rad, {state.velocity} rad/s, {state.motor_torque} N·m"
         return DeviceFault("reading", detail=f"{reading}, expected finite values")
@@ -94,20 +103,19 @@ def complaint(limits: Limits, state: State) -> DeviceFault | None:
     ):
         if words:
             return DeviceFault(cause, detail=words)
-    ft = abs(state.wrench[limits.ft_axis]) if state.wrench is not None else math.nan
-    deflection = state.position if math.isnan(state.deflection) else state.deflection
+    deflection = state.deflection if deflects or is_measured(state.deflection) else state.position
     for cause, value, limit, unit in (
         ("deflection", abs(deflection), limits.deflection, "rad"),
         ("temperature", state.temperature, limits.temperature, "°C"),
         ("current", abs(state.current), limits.current, "A"),
         ("velocity", abs(state.velocity), limits.velocity, "rad/s"),
         ("position", abs(state.position), limits.position, "rad"),
-        ("ft_torque", ft, limits.ft, "N m"),
+        ("ft_torque", abs(ft_torque(limits, state)), limits.ft, "N m"),
         ("power", abs(state.motor_torque * state.velocity), limits.power, "W"),
     ):
-        if value > limit:
+        if is_measured(value) and value > limit:
             return DeviceFault(cause, value, limit, unit)
-    if state.voltage < limits.voltage:
+    if is_measured(state.voltage) and state.voltage < limits.voltage:
         return DeviceFault("voltage", state.voltage, limits.voltage, "V", "too low")
     return None
 
@@ -121,7 +129,7 @@ class Guard:
     def __init__(self, limits: Limits, period: float) -> None:
         self.limits, self._period = limits, period
         self.interlock = Interlock()
-        self.limited = 0
+        self.limited = self.refused = 0
         self.torque = 0.0
         self._ramp = self._ramp_from = self._room = 0.0
         self._written: deque[float] = deque(maxlen=HEARD_LATE)
@@ -155,27 +163,38 @@ class Guard:
 
     def look(self, state: State) -> None:
         """Latch the fault in a reading."""
-        fault = (
-            complaint(self.limits, state) or self._blind(state) or self._missing_torque(state.motor_torque)
-        )
+        fault = self.complaint(state) or self._blind(state) or self._missing_torque(state.motor_torque)
         if fault is not None:
             self.trip(fault)
+
+    def complaint(self, state: State) -> DeviceFault | None:
+        """Return the first fault in a reading; a deflection that was measured once is expected from then on."""
+        return complaint(self.limits, state, deflects="deflection" in self._measured)
 
     def _blind(self, state: State) -> DeviceFault | None:
         """Return a fault while a limit cannot be applied for too long, also once it was cleared.
 
         A limit of NO_LIMIT counts if its quantity was measured before: `GuardedDevice.open` refuses others.
         """
-        before, self._complete = self._complete, state.wrench is not None and math.isfinite(
-            state.temperature + state.current + state.voltage
+        felt = is_measured(ft_torque(self.limits, state))
+        if is_measured(state.deflection):
+            self._measured.add("deflection")
+        before, self._complete = (
+            self._complete,
+            felt
+            and math.isfinite(state.temperature + state.current + state.voltage)
+            and ("deflection" not in self._measured or is_measured(state.deflection)),
         )
         if before and self._complete:
             return None
         lacking = unmeasured_quantities(self.limits, state)
         self._measured |= NO_LIMIT.keys() - set(lacking)
         lacking = [name for name in lacking if name in self._measured]
-        if state.wrench is None and not math.isinf(self.limits.ft):
+        if not felt and not math.isinf(self.limits.ft):
             lacking.insert(0, "ft")
+        limited = "deflection" in self._measured and not math.isinf(self.limits.deflection)
+        if limited and not is_measured(state.deflection):
+            lacking.append("deflection")
         for name in lacking:
             self._unfelt[name] += 1
             if self._unfelt[name] * self._period > UNFELT:
@@ -195,7 +214,9 @@ class Guard:
             self.torque = 0.0
         elif self.fault is None:
             self._open(age)
-            self.torque = self._within(0.0 if age is None else wanted)
+            is_command = age is not None and is_measured(wanted, NONSENSE * self.limits.torque)
+            self.torque = self._within(wanted if is_command else 0.0)
+            self.refused += age is not None and not is_command
         elif self.fault.cause == COMMAND_TIMEOUT:
             self.torque = math.copysign(self._ramp_limit(age), self.torque)
         else:

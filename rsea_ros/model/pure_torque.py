@@ -38,7 +38,7 @@ from rsea_ros.model.pure_torque_filter import (
     update_flag,
 )
 from rsea_ros.model.rig import Rig, check_two_torques
-from rsea_ros.records.record import FloatArray
+from rsea_ros.records.record import HUGE, FloatArray, is_measured
 
 
 def split(a: FloatArray, b: FloatArray, c: FloatArray, r: FloatArray, corner: float, dt: float) -> FloatArray:
@@ -177,7 +177,9 @@ class PureTorque:
             self._memory[:] = 0.0
             self._memory[[HEARD, SINCE, LAST, FELL]] = -math.inf
             self._pair = empty_pair()
-        update_flag(self._pair, self._limits, self._memory, t, estimate.distal, estimate.sigma_distal)
+        distal = estimate.distal if is_measured(estimate.distal, HUGE) else math.nan
+        if math.isfinite(t):
+            update_flag(self._pair, self._limits, self._memory, t, distal, estimate.sigma_distal)
         return self.verdict
 
     def reading(self) -> PureTorqueVerdict:

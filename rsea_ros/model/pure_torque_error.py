@@ -29,7 +29,7 @@ from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.rig import Rig, check_two_torques
 from rsea_ros.model.transfer import Fraction
-from rsea_ros.records.record import FloatArray
+from rsea_ros.records.record import HUGE, FloatArray, is_measured
 from rsea_ros.records.statistics import Z90
 
 LENGTH = 8192
@@ -185,6 +185,10 @@ class ErrorFlag:
         """
         distal, proximal, _, sigma_distal, sigma_proximal, _ = estimate
         sigma = sigma_distal + sigma_proximal
+        if not is_measured(distal, HUGE) or not is_measured(proximal, HUGE):
+            distal = proximal = math.nan
+        if math.isnan(t):
+            return int(self._state[VERDICT])
         verdict: int = judge_error(self._state, self._ring, t, distal, proximal, sigma, heard)
         return verdict
 

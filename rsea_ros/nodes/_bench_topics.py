@@ -54,7 +54,7 @@ class BenchTopics:
         self, node: Node, names: Mapping[str, Any], *, strict: bool = False, every_record: bool = False,
         part: str = "", deflects: bool = False,
     ) -> None:  # fmt: skip
-        """names: values of NAMES, and of SPRING_FRAME where it may be.
+        """names: values of NAMES, and of SPRING_FRAME and torque_limit where they may be.
 
         strict: see CommandQueue; then one publisher is obeyed at a time.
 
@@ -66,7 +66,8 @@ class BenchTopics:
         """
         within = f"{part}/" if part else ""
         self._node, self._every_record, self._strict = node, every_record, strict
-        self.commands, self._obeyed = CommandQueue(strict=strict), Obeyed()
+        limit = names.get("torque_limit", math.inf)
+        self.commands, self._obeyed = CommandQueue(strict=strict, limit=limit), Obeyed()
         self._reported: Mapping[str, int] = {}
         self._polled = 0
         self._states = _publisher(node, JointState, f"{within}joint_states")

@@ -7,6 +7,7 @@ import threading
 from typing import NamedTuple
 
 from rsea_ros.nodes._anchor import SECOND
+from rsea_ros.records.record import NONSENSE, is_measured
 
 MILLISECOND = SECOND // 1000
 HORIZON = 300 * MILLISECOND
@@ -27,15 +28,17 @@ class CommandQueue:
     Instants are ns on a clock that never jumps and has the system clock's time (Anchor).
     A command takes effect at its stamp. One whose stamp is past takes effect at once (`late` counts them);
     one without a stamp, or further than 0.3 s from now, when it arrives (`unstamped`, of these `off` by
-    their stamp). A command that takes effect at once overtakes earlier waiting ones. Not-a-number is
-    dropped (`refused`). 50 ms after the last command the torque is zero (`expired` counts how often).
+    their stamp). A command that takes effect at once overtakes earlier waiting ones. One that is not finite,
+    or beyond NONSENSE times the limit, is dropped (`refused`). 50 ms after the last command the torque is
+    zero (`expired` counts how often).
     first: the first one (N m) since the last `clear`, whether it ever took effect or not.
     strict, as in front of a real machine: a stamp further than 0.3 s from now is `refused` too, unless there
     is none, and the last torque stays in force: the machine's limits end it.
     """
 
-    def __init__(self, *, strict: bool = False) -> None:
-        self._strict = strict
+    def __init__(self, *, strict: bool = False, limit: float = math.inf) -> None:
+        """limit: the largest torque, N m; NONSENSE times that is no command but an error of its sender."""
+        self._strict, self._most = strict, NONSENSE * limit
         self._lock = threading.Lock()
         self._waiting: list[PendingCommand] = []
         self._taken_until = self._from = 0
@@ -53,7 +56,7 @@ class CommandQueue:
             strange = stamp != 0 and abs(stamp - now) > HORIZON
             if strange:
                 self.off, self.furthest = self.off + 1, (stamp - now) / SECOND
-            if not math.isfinite(torque) or (self._strict and strange):
+            if not is_measured(torque, self._most) or (self._strict and strange):
                 self.refuse()
                 return
             if abs(stamp - now) > HORIZON:

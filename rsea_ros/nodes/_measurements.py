@@ -15,6 +15,7 @@ from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import CommandQueue
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from rsea_ros.records.record import NONSENSE, is_measured
 
 WAITING = 500
 """Measurements that wait for their other half."""
@@ -30,17 +31,19 @@ class Measurements:
     """Pairs of joint_states and ft, with the link's angle. period: ns. desired: messages of desired_torque.
 
     encoder: checks `deflection`; None: that topic is not heard.
-    unusable: readings that were not finite, and messages of several joints.
+    limit: the largest torque, N m.
+    unusable: readings that were not finite, or of NONSENSE times the limit, and messages of several joints.
     """
 
     def __init__(
-        self, node: Node, axis: str, period: float, joint: str = "", *, encoder: SpringEncoder | None = None
-    ) -> None:
+        self, node: Node, axis: str, period: float, joint: str = "", *,
+        encoder: SpringEncoder | None = None, limit: float = math.inf,
+    ) -> None:  # fmt: skip
         self._period = period
         self._sign, along = sign_and_index(axis)
         self._waiting_states: deque[tuple[int, Sequence[float]]] = deque(maxlen=WAITING)
         self._waiting_fts: deque[tuple[int, float]] = deque(maxlen=WAITING)
-        self.desired = CommandQueue()
+        self.desired, self._most = CommandQueue(limit=limit), NONSENSE * limit
         self.unusable = self._heard = 0
         state = (("position", 0), ("velocity", 0), ("effort", 0))
         states = MessageFields(JOINT_STATE, state, joint)
@@ -73,7 +76,7 @@ class Measurements:
                 self._waiting_fts.popleft()
                 continue
             self._waiting_states.popleft()
-            if math.isfinite(torque + velocity + position):
+            if is_measured(torque, self._most) and is_measured(velocity) and is_measured(position):
                 ft_age = (stamp - at) / self._period
                 link = self._link(stamp, torque, position, ft_age) if self._encoder else math.nan
                 yield stamp, Measurement(torque, velocity, position, effort, ft_age, link)

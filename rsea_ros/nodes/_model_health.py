@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
-from rsea_ros.model.observer.signal_noise import Consistency
+from rsea_ros.model.observer.signal_noise import Consistency, consistency
 from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
@@ -17,6 +17,8 @@ from rsea_ros.nodes._model_inputs import ModelInputs
 EVERY = 64
 """Estimates between two looks at their noise."""
 
+COMPARED = 32
+"""Estimates between two comparisons of the sensors: a flag that is up for a second too long is wrong."""
 CHANGED = 0.1
 """Part by which period or doubt of the estimates must have changed before their noise is worked out again."""
 
@@ -41,6 +43,7 @@ class ModelHealth:
         self._calibrated = (math.nan, math.nan)
         self._errors = {"ft": noise.ft, "position": noise.position * rig["spring.stiffness"]}
         self.contradictions: list[str] = []
+        self._scores = observer.scores()
         self.estimate: TorqueEstimate | None = None
         self.count = 0
 
@@ -50,6 +53,10 @@ class ModelHealth:
         self.count += 1
         if self.count % EVERY == 0:
             self._calibrate()
+        if self.count % COMPARED == 0:
+            now = self._observer.scores()
+            change, self._scores = now - self._scores, now
+            self.contradictions = self._contradictions(consistency(change))
 
     def report(self) -> NodeHealth:
         """Return the report."""
@@ -58,7 +65,6 @@ class ModelHealth:
                 WARN, "no measurement yet, expected joint_states and ft", {"bandwidth_hz": self._edge()}
             )
         tests = self._observer.consistency()
-        self.contradictions = self._contradictions(tests)
         sensors = self._inputs.stopped
         stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in sensors.frozen]
         if sensors.unmoved and not stopped:

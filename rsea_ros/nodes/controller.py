@@ -16,6 +16,8 @@ from msg_adapters.ros import JointState, Trigger, torque_command_message
 from msg_adapters.topic_map import TYPES
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.grid import Grid
+from rsea_ros.control.polarity import Polarity
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._control import TABLE, controller_of, design_of, summary
 from rsea_ros.nodes._controller_limits import ControllerLimits
@@ -47,13 +49,16 @@ class ControllerNode:
         self._controller = controller_of(values, self._design, self._link.share)
         self._period = SECOND / values["rate"]
         self._inputs = Measurements(
-            node, values["axis"], self._period, values["joint"], encoder=self._link.encoder
-        )
+            node, values["axis"], self._period, values["joint"],
+            encoder=self._link.encoder, limit=values["torque_limit"],
+        )  # fmt: skip
         self._desired = self._inputs.desired
         self._anchor, self._grid = Anchor(), Grid(self._period)
         self._limits = ControllerLimits(values)
+        self._polarity = Polarity(load_rig(values["rig"]), values["rate"], values["torque_limit"])
         self._last, self._heard, self._watched, self._until, self._torque = 0, 0, 0, 0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
+        self._wished = False
         self._steps = self._missed = self._limited = self._late = self._late_reported = self._restarts = 0
         self._told_losses = 0
         self._squares: list[float] = []
@@ -104,18 +109,12 @@ class ControllerNode:
         self._inputs.hear_desired(self._anchor)
         off = self._take_desired()
         if not self._last or self._limits.idle(self._torque, reading.motor_torque):
-            self._controller.start(reading, self._desired.torque)
+            self._polarity.start()
         late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
         trust = self._limits.lateness.take(max(late, missed), max(together, int(missed > 0)))
-        torque = self._controller.step(
-            reading,
-            self._desired.torque,
-            missed,
-            trust=trust,
-            offset=self._grid.offset,
-            desired_offset=off,
-        )
-        if fault := self._limits.fault(reading.ft, self._desired.torque):
+        torque = self._next_torque(reading, missed, trust, off)
+        desired = self._desired.torque if self._polarity.proven else reading.ft
+        if fault := self._polarity.contradiction or self._limits.fault(reading.ft, desired):
             return self._latch(fault)
         self._torque = torque
         self._publish(self._grid.next)
@@ -125,6 +124,28 @@ class ControllerNode:
         self._late += late > self._limits.lateness.tolerance.late
         self._squares.append((reading.ft - self._desired.torque) ** 2)
 
+    def _next_torque(self, reading: Measurement, missed: int, trust: float, off: float) -> float:
+        """Return the torque that acts next: none before a desired torque, then pulses, then control."""
+        desired = self._desired.torque if self._wished else None
+        if not self._polarity.proven:
+            torque = self._polarity.probe(reading, desired, missed)
+            if torque is not None:
+                return torque
+            self._controller.start(reading, self._desired.torque)
+            missed = 0
+        elif self._polarity.watch(reading, missed):
+            return 0.0
+        torque = self._controller.step(
+            reading,
+            self._desired.torque,
+            missed,
+            trust=trust,
+            offset=self._grid.offset,
+            desired_offset=off,
+        )
+        self._polarity.sent(torque)
+        return torque
+
     def _take_desired(self) -> float:
         """Take the desired torque nearest to this sample; return by how many samples it is for later.
 
@@ -133,6 +154,7 @@ class ControllerNode:
         place = self._grid.at + (round(2.0 * self._period) if self._values["preview"] else 0)
         before, self._until = self._until, round(place + 0.5 * self._period)
         taken = self._desired.take(self._until)
+        self._wished = self._wished or bool(taken)
         if not taken or taken[-1][0] <= before:
             return 0.0
         return float(max((taken[-1][0] - place) / self._period, -0.5))
@@ -159,7 +181,7 @@ class ControllerNode:
     def _clear(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Restart at zero torque with the next measurement."""
         with self._lock:
-            self._fault, self._last, self._torque = "", 0, 0.0
+            self._fault, self._last, self._torque, self._wished = "", 0, 0.0, False
             self._grid.forget()
             self._limits.clear()
             self._desired.clear(self._anchor.now())
@@ -216,12 +238,20 @@ class ControllerNode:
             return NodeHealth(ERROR, self._fault, values)
         if not self._last:
             return NodeHealth(WARN, "waiting for joint_states and ft", values)
+        if not self._polarity.proven:
+            return NodeHealth(*self._unproven(), values)
         new, self._late_reported = self._late - self._late_reported, self._late
         if new:
             return NodeHealth(WARN, f"{new} commands more than a sample late, with less feedback", values)
         if words := self._new_loss():
             return NodeHealth(WARN, words, values)
         return NodeHealth(OK, "running", values)
+
+    def _unproven(self) -> tuple[bytes, str]:
+        """Return level and words of a controller whose signs are not proven."""
+        if not self._wished:
+            return OK, "waiting for desired_torque"
+        return WARN, "pulses of torque without feedback: signs of ft, joint_states and motor torque are open"
 
     def _new_loss(self) -> str:
         """Return in words that the encoder on the link has ceased to count; empty where it has not."""

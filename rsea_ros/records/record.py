@@ -19,6 +19,17 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 ComplexArray = npt.NDArray[np.complex128]
 
+NONSENSE = 10.0
+"""Times its limit from which on a torque is no large one but an error: N mm for N m is 1000 times it."""
+HUGE = 1e6
+"""N m, rad, rad/s, of no actuator: what is beyond was not measured, where no limit is known."""
+
+
+def is_measured(value: float | None, most: float = math.inf) -> bool:
+    """Return whether there is a value: None, not-a-number, infinity and what is beyond `most` are none."""
+    return value is not None and math.isfinite(value) and abs(value) <= most
+
+
 UNITS: Mapping[str, str] = MappingProxyType(
     {
         "command": "N m",

@@ -1,6 +1,7 @@
 """The controller on the simulated bench: following, compensations, limits, lost and late samples."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.feedforward import inverse, inverse_poles
 from rsea_ros.control.following import follow
 from rsea_ros.control.harness import closed_loop
+from rsea_ros.control.lateness import Lateness
 from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import load_range
 from rsea_ros.control.prediction import AHEAD, Prediction, prediction_response
@@ -219,3 +221,51 @@ def test_commands_that_come_far_too_late_are_feed_forward_alone_and_stay_stable(
 
 def _reading(sample):
     return Measurement(sample.ft, sample.velocity, sample.position, sample.motor_torque)
+
+
+@pytest.mark.parametrize("lost", [0.05, 0.2, 0.4])
+def test_a_restart_under_a_desired_torque_lets_the_error_in_slowly(lost):
+    """10 N m at once took 47 N m of the motor; with lost samples a load was learned that was not there."""
+    for seed in range(4):
+        plant, controller = Plant(RIG, RATE, seed=seed), TorqueController(RIG, RATE, GAINS)
+        dice, acting, pending, missed, torques = np.random.default_rng(seed), 0.0, 0.0, 0, []
+        lateness, sample = Lateness(RATE), plant.step(0.0)
+        controller.start(_reading(sample), 10.0)
+        for _ in range(350):
+            if dice.random() < lost:
+                missed += 1
+            else:
+                trust = lateness.take(float(missed), max(1, missed + 1))
+                pending, missed = controller.step(_reading(sample), 10.0, missed, trust=trust), 0
+            sample, acting = plant.step(acting), pending
+            torques.append(abs(acting))
+        assert max(torques) < 13.0
+        assert sample.ft == pytest.approx(10.0, abs=1.5)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, 1e300, -1e4])
+@pytest.mark.parametrize("name", ["ft", "velocity", "position", "motor_torque", "desired"])
+def test_one_value_that_is_no_measurement_is_a_lost_sample(name, bad):
+    """One ft of 1e300 was full torque for 20 samples, one NaN a torque of NaN for ever."""
+    if abs(bad) < 1e6 and name in ("velocity", "position"):
+        return  # finite, and of some actuator
+    plant, controller, torque, torques = Plant(RIG, RATE), TorqueController(RIG, RATE, GAINS), 0.0, []
+    for k in range(400):
+        reading, desired = _reading(plant.step(torque)), 10.0 * math.sin(2.0 * math.pi * k / RATE)
+        if k == 250 and name == "desired":
+            desired = bad
+        elif k == 250:
+            reading = replace(reading, **{name: bad})
+        torque = controller.step(reading, desired)
+        torques.append(torque)
+    assert np.isfinite(torques).all() and np.abs(torques).max() < 16.0
+
+
+def test_readings_that_stay_unusable_end_the_torque_and_the_next_begins_anew():
+    plant, controller, torque = Plant(RIG, RATE), TorqueController(RIG, RATE, GAINS), 0.0
+    for k in range(300):
+        reading = _reading(plant.step(torque))
+        torque = controller.step(replace(reading, ft=math.nan) if 100 <= k < 130 else reading, 10.0)
+        if 115 <= k < 130:
+            assert torque == 0.0
+    assert torque == pytest.approx(10.0, abs=1.0)

@@ -207,3 +207,32 @@ def test_the_default_slew_limit_is_that_of_the_driver():
     driver = yaml.safe_load((ROOT / "config" / "nodes" / "driver.yaml").read_text(encoding="utf-8"))
     (parameters,) = (node["ros__parameters"] for node in driver.values())
     assert Limits(1.0).slew == parameters["slew_limit"]
+
+
+@pytest.mark.parametrize("wanted", [math.nan, math.inf, -1e6])
+def test_a_command_that_is_none_leads_to_zero_within_the_slew_limit(wanted):
+    """NaN was returned, and dropped the slew limit; -1e6 N m was obeyed as -68."""
+    limited = guard(slew=300.0)
+    for _ in range(5):
+        limited.allowed_torque(10.0, 0.0)
+    assert [limited.allowed_torque(wanted, 0.0) for _ in range(4)] == [7.0, 4.0, 1.0, 0.0]
+    assert limited.refused == 4 and limited.allowed_torque(10.0, 0.0) == 3.0
+
+
+@pytest.mark.parametrize("nothing", [None, (0.0, 0.0, 0.0, 0.0, 0.0, math.nan), (0.0,) * 5 + (math.inf,)])
+def test_a_wrench_without_the_torque_is_none_for_its_limit(nothing):
+    """None was a fault after a second; NaN switched the limit off in silence."""
+    blind = guard(ft=50.0)
+    for _ in range(102):
+        blind.look(State(0, 0.0, 0.0, 0.0, wrench=nothing))
+    assert str(blind.fault) == "ft: no torque measured for 1 s, expected one for ft_limit"
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf])
+def test_a_deflection_that_ceases_is_a_fault_and_not_the_drives_angle(nothing):
+    felt = guard()
+    felt.look(State(0, 9.0, 0.0, 0.0, deflection=0.01))
+    for k in range(101):
+        assert felt.fault is None, k
+        felt.look(State(0, 9.0, 0.0, 0.0, deflection=nothing))
+    assert "no deflection measured for 1 s" in str(felt.fault)

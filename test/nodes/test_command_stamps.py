@@ -26,6 +26,9 @@ def program(listener, monkeypatch):
     values = {parameter.name: parameter.default for parameter in controller.TABLE} | {"rate": 1000.0}
     made = controller.ControllerNode(listener.node, values | {"ft_limit": 1e3, "error_limit": 1e3})
     made.sent = []
+    made._polarity = SimpleNamespace(
+        proven=True, contradiction="", start=lambda: None, watch=lambda *now: "", sent=lambda torque: None
+    )
     made._writer = SimpleNamespace(write=lambda stamp, torques: (stamp, *torques))
     made._commands = SimpleNamespace(publish=made.sent.append)
     return made

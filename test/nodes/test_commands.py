@@ -118,3 +118,13 @@ def test_an_age_counts_from_the_arrival_of_a_late_command():
     queue.add(NOW - 100 * MILLISECOND, 1.0, NOW + MILLISECOND)
     queue.take(NOW + 2 * MILLISECOND)
     assert queue.age(NOW + 2 * MILLISECOND) == 0.001
+
+
+def test_a_command_beyond_ten_times_the_limit_is_refused_as_nan_is():
+    """-1e6 N m, a unit error, was obeyed as the full torque; 1e300 ended the controller node."""
+    queue = CommandQueue(limit=68.0)
+    for k, torque in enumerate((1e300, -1e6, 681.0, math.nan)):
+        queue.add(0, torque, k + 1)
+    assert queue.refused == 4 and queue.take(10) == []
+    queue.add(0, 600.0, 11)
+    assert queue.take(20)[-1][1] == 600.0

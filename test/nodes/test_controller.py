@@ -1,13 +1,22 @@
 """The controller over topics: the torque follows, stays within its limits, and ends when measurements do."""
 
 import signal
+import time
 
 import numpy as np
 import pytest
 
-from msg_adapters.ros import effort_of, stamp_of, wrench_of
+from msg_adapters.ros import (
+    DiagnosticArray,
+    JointState,
+    effort_of,
+    stamp_of,
+    torque_command_message,
+    wrench_of,
+)
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig, save_rig
+from rsea_ros.nodes._qos import COMMAND
 from test.nodes.torque_loop import PERIOD, RATE, Loop
 
 HZ, AMPLITUDE = 5.0, 10.0
@@ -67,6 +76,26 @@ def test_without_measurements_the_torque_ends_until_the_fault_is_cleared(loop, s
     assert all(effort_of(m)[1] == 0.0 for m in loop.commands[-20:])
     listener.call("/rsea/controller/clear_fault")
     loop.hold(20.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 20.0) < 0.5)
+
+
+def test_a_reversed_axis_is_a_fault_before_there_is_torque(start, listener):
+    """It was 68 N m at the motor, before any desired torque was sent."""
+    spaces = {"__ns": "/turned"}
+    start("plant", remaps=spaces, rate=RATE)
+    start("controller", remaps=spaces, axis="-torque.z")
+    commands = listener.hear(JointState, "/turned/torque_command", COMMAND)
+    health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+    desired = listener.node.create_publisher(JointState, "/turned/desired_torque", COMMAND)
+    told = lambda: [m.status[0].message for m in health if m.status[0].name == "/turned/controller"]  # noqa: E731
+    listener.until(lambda: len(commands) > 100)
+    assert not any(effort_of(m)[1] for m in commands)
+
+    def contradicted():
+        desired.publish(torque_command_message(time.time_ns(), 10.0))
+        return any("ft is reversed" in words for words in told())
+
+    listener.until(contradicted)
+    assert 0.0 < max(abs(effort_of(m)[1]) for m in commands) < 5.0
 
 
 def test_at_its_end_the_controller_commands_zero(loop, listener):

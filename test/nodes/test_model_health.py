@@ -28,21 +28,28 @@ class Node:
         )
         self.health = ModelHealth(RIG, NOISE, self._observer, PureTorque(RIG), self._error, self.inputs)
         self._amplitude, self._sensed, self._k = amplitude, sensed, 0
+        self.freezes = False
         self._rng = np.random.default_rng(3)
 
     def run(self, seconds):
-        """Play a slow sine, at which the spring has the torque of the motor; return the report."""
+        """Play and return the report."""
+        self.play(seconds)
+        return self.health.report()
+
+    def play(self, seconds):
+        """Play a slow sine, at which the spring has the torque of the motor."""
         for _ in range(round(seconds * RATE)):
             t = self._k / RATE
             torque = self._amplitude * math.sin(2.0 * math.pi * 0.5 * t)
-            position = torque / RIG["spring.stiffness"] + NOISE.position * self._rng.normal()
+            if not self.freezes:
+                self._stood = torque
+            position = self._stood / RIG["spring.stiffness"] + NOISE.position * self._rng.normal()
             self._observer.command(t, torque)
             self._observer.state(t, position, torque)
             estimate = self._observer.ft(t, self._sensed(t, torque) + NOISE.ft * self._rng.normal())
             self._error.take(t, estimate, heard=True)
             self.health.tell(estimate)
             self._k += 1
-        return self.health.report()
 
 
 def test_a_sound_sensor_contradicts_nobody():
@@ -64,6 +71,20 @@ def test_a_sensor_that_keeps_an_old_value_under_its_own_noise_contradicts(wrong)
     report = node.run(1.0)
     assert report.level == WARN and "ft differs from model and other sensors by" in report.summary
     assert node.health.contradictions
+
+
+def test_joint_states_that_stand_still_beside_a_live_ft_contradict_within_two_windows():
+    """They outvoted it for 0.98 s, with the flag up and an estimate that was wrong by 6.9 N m."""
+    node = Node(8.0, lambda t, torque: torque)
+    node.run(3.1)
+    assert node.health.contradictions == []
+    node.freezes = True
+    late = 0.0
+    while not node.health.contradictions:
+        node.play(1.0 / RATE)
+        late += 1.0 / RATE
+        assert late < 2.0 * 0.25
+    assert "differs from model and other sensors" in node.health.contradictions[0]
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 0.01])

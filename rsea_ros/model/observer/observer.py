@@ -24,7 +24,7 @@ from rsea_ros.model.observer.signal_noise import Consistency, Noise, consistency
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.step import Calls, Linear
-from rsea_ros.records.record import FloatArray, Record
+from rsea_ros.records.record import HUGE, FloatArray, Record, is_measured
 
 ADDRESS, ROWS, COLUMNS = range(3)
 
@@ -187,10 +187,15 @@ class Observer:
 
     def consistency(self) -> dict[str, Consistency]:
         """Return for each channel the innovations since the last call over their expected size."""
-        now = self._state.score.reshape(3, 3).copy()
+        now = self.scores()
         change = now - self._score
         self._score = now
         return consistency(change)
+
+    def scores(self) -> FloatArray:
+        """Return the sums since the start of which `consistency` takes differences, shape (3, 3)."""
+        scores: FloatArray = self._state.score.reshape(3, 3).copy()
+        return scores
 
     def error_model(self, dt: float) -> ErrorModel:
         """Return the error dynamics at a period of dt s, with the present gain K = P h' / r."""
@@ -211,6 +216,10 @@ class Observer:
         self.restarts += 1
 
     def _take(self, t: float, kind: int, a: float, b: float) -> TorqueEstimate | None:
+        """Process an event. Values that are not measured (signals.is_measured) are left out, not believed."""
+        if not math.isfinite(t) or (kind == COMMAND and not is_measured(a, HUGE)):
+            return None
+        a, b = (value if is_measured(value, HUGE) else math.nan for value in (a, b))
         if abs(t - self._newest) > GAP:
             self._begin()
         if kind == COMMAND:

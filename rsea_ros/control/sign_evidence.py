@@ -1,0 +1,208 @@
+"""What readings say of the signs and sizes of ft, joint_states and motor torque: fits of two balances.
+
+    m = s_T T + s_w (J w' + b w) + c sgn w + o            momentum of the gear, whatever the load does
+    int m s_w dq > 0,   int (T - T_0) s_T s_w dq > 0      from rest: motor and passive load take power
+
+m: motor torque, T: ft, q, w: angle and speed of the gear, c: friction, o: a bias, s: 1 where a sign is right.
+A motor that somebody else moves makes the second line false; then the first alone counts.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+
+from rsea_ros.control.controller import Measurement
+from rsea_ros.control.spring_encoder import spread
+from rsea_ros.model.rig import Rig
+from rsea_ros.records.record import HUGE, FloatArray, is_measured
+
+Signs = tuple[float, float]
+SIGNS: tuple[Signs, ...] = tuple((s_t, s_w) for s_t, s_w in product((1.0, -1.0), repeat=2))
+RIGHT = SIGNS[0]
+MOVED = 0.1
+"""Of a pulse: what torque or spring must move by to say anything."""
+MEMORY = 0.5
+"""s over which samples are fitted."""
+ALIKE = 4.0
+"""Samples that make one independent one: ripple, play and friction are no noise."""
+SPREADS = (0.25, 0.25, 0.5, 5.0, 2.0)
+"""Standard deviations of the factors of T, J w' and b w from 1 (1), of c and o from 0 (pulses)."""
+POWER = 12.0
+"""Half the difference of two sums of squares that a power of the wrong sign counts for."""
+CLEAR, SIGMAS = 0.3, 3.0
+"""Part of the motor's power that must go one way; standard deviations by which the load's must be known."""
+DOUBT = 0.5
+"""Part of J w' + b w that nobody knows."""
+GAIN = 2.5
+"""Factor, up and down, by which ft may differ from what the rest of the bench says."""
+CREEP = 2e-3
+"""rad/s below which the sign of a speed is not known."""
+SWAY, SETTLED, CALM = 0.3, 0.02, 0.1
+"""s: of the mean from which the bench's unrest is measured, so that a load that swings at 0.5 Hz is none; of
+that from which a pulse begins; of the unrest."""
+
+
+class SignEvidence:
+    """Takes readings in; pulses of torque begin and end between them. made: the last two motor torques, N m.
+
+    unrest: RMS of what moves, N m. way, most: by how much the spring (by the gear's angle) and ft have moved
+    in the pulse, N m. heard: s.
+    """
+
+    def __init__(self, rig: Rig, rate: float, pulse: float) -> None:
+        """rate: Hz. pulse: N m, the size of a pulse of torque."""
+        self._h, self._pulse = 1.0 / rate, pulse
+        self._inertia, self._damping = rig["rotor.reflected_inertia"], rig["rotor.reflected_damping"]
+        self._stiffness = rig["spring.stiffness"]
+        noise = math.hypot(self._inertia * spread(rig, "velocity") * math.sqrt(2.0) * rate, spread(rig, "ft"))
+        self.ft_noise = max(spread(rig, "ft"), 1e-3 * pulse)
+        self.noise = math.hypot(noise, spread(rig, "motor_torque"))
+        self._floor = max(MOVED * pulse, self.noise)
+        self._creep = max(CREEP, 4.0 * spread(rig, "velocity"))
+        self._precision = 1.0 / (np.array([1.0, 1.0, 1.0, pulse, pulse]) * SPREADS) ** 2
+        self.start()
+
+    def start(self) -> None:
+        """Forget everything."""
+        self._before: Measurement | None = None
+        self._moments = np.zeros((6, 6))
+        self._mean = self._fast = math.nan
+        self._square, self.heard = math.inf, 0.0
+        self._past = dict.fromkeys(SIGNS, 0.0)
+        self.made = (0.0, 0.0)
+        self._pulsing = False
+
+    @property
+    def unrest(self) -> float:
+        """RMS of what moves, N m."""
+        return math.sqrt(self._square)
+
+    def begin_pulse(self) -> None:
+        """Count power and ways from here on."""
+        assert self._before is not None
+        self._pulsing, self._restless = True, self.unrest
+        self._work, self.most, self.way = np.zeros(5), 0.0, 0.0
+        self._ft, self._from = self._fast, self._before.position
+
+    def end_pulse(self) -> None:
+        """Keep half of what the powers said for the next pulse."""
+        self._past = {signs: 0.5 * power for signs, power in self.powers().items()}
+        self._pulsing = False
+
+    def hear(
+        self, r: Measurement, sent: float, missed: int, *, keep: bool = True
+    ) -> tuple[float, float] | None:
+        """Take a reading; return T and J w' + b w, N m, means over the sample, None where they are not known.
+
+        sent: N m, the motor torque where it is not measured. missed: samples that were lost before. keep:
+        whether it joins the fit.
+        """
+        if not all(is_measured(value, HUGE) for value in (r.ft, r.velocity, r.position)):
+            return None
+        before, self._before = self._before, r
+        made = r.motor_torque if is_measured(r.motor_torque, HUGE) else sent
+        self.made = (made if before is None else self.made[1], made)
+        if before is None:
+            return None
+        ft, turn = 0.5 * (r.ft + before.ft), r.position - before.position
+        speed = 0.5 * (r.velocity + before.velocity)
+        if self._pulsing:
+            taken = (ft - self._ft) * turn
+            self._work += np.array([made * turn, abs(made * turn), taken, turn * turn, abs(turn)])
+            self.most = max(self.most, abs(ft - self._ft))
+            self.way = max(self.way, self._stiffness * abs(r.position - self._from))
+        self._settle(ft, speed)
+        if missed:
+            return None
+        rise = self._inertia * (r.velocity - before.velocity) / self._h
+        if keep and abs(speed) > self._creep:
+            row = (ft, rise, self._damping * speed, math.copysign(1.0, speed), 1.0, made)
+            self._moments += np.outer(row, row)
+        return ft, rise + self._damping * speed
+
+    def _settle(self, ft: float, speed: float) -> None:
+        """Follow the unrest."""
+        if math.isnan(self._mean):
+            self._mean = self._fast = ft
+        self._mean += self._h / SWAY * (ft - self._mean)
+        self._fast += self._h / SETTLED * (ft - self._fast)
+        square = (ft - self._mean) ** 2 + (self._damping * speed) ** 2
+        before = square if math.isinf(self._square) else self._square
+        self._square = before + self._h / CALM * (square - before)
+        self.heard += self._h
+        self._moments *= 1.0 - self._h / MEMORY
+
+    def powers(self) -> dict[Signs, float]:
+        """Return what the powers of this pulse and the last ones say against each pair of signs."""
+        return {signs: self._past[signs] + self._wrong_power(*signs) for signs in SIGNS}
+
+    def wrong_size(self) -> str:
+        """Return in words which quantity is of the wrong size; empty where none is known to be.
+
+        A light load hides the size of ft: that is no fault.
+        """
+        if self.most > GAIN * self.way + MOVED * self._pulse + 2.0 * SIGMAS * self._restless:
+            return f"joint_states moved by {self.way:.3g} N·m of spring, ft by {self.most:.3g} N·m"
+        ft, doubt = self._size()
+        if ft - doubt > GAIN or 0.0 < ft - doubt < ft + doubt < 1.0 / GAIN:
+            return f"ft is {1.0 / ft:.2g} times the torque by motor torque and motion"
+        return ""
+
+    def size_is_known(self) -> bool:
+        """Return whether ft is known to be of the right size."""
+        ft, doubt = self._size()
+        return ft - doubt > 1.0 / GAIN and ft + doubt < GAIN
+
+    def _size(self) -> tuple[float, float]:
+        """Return the factor a in m - (J w' + b w) = a T + c sgn w + o, and its doubt: noise, and that of J
+        and b."""
+        m = self._moments
+        count = max(m[4, 4], 1.0)
+        m = m - m[:, 3:5] @ np.linalg.pinv(m[3:5, 3:5], rcond=1e-3) @ m[3:5, :]
+        t, t_motion, t_made = m[0, 0], m[0, 1] + m[0, 2], m[0, 5]
+        motion = m[1, 1] + 2.0 * m[1, 2] + m[2, 2]
+        if t <= 0.0:
+            return 1.0, math.inf
+        factor = float((t_made - t_motion) / t)
+        left = max(m[5, 5] - 2.0 * (m[1, 5] + m[2, 5]) + motion - factor * (t_made - t_motion), 0.0)
+        noise = 3.0 * math.sqrt(ALIKE * max(left / count, self.noise**2))
+        return factor, (noise + DOUBT * math.sqrt(max(motion, 0.0))) / math.sqrt(t)
+
+    def _information(self) -> FloatArray:
+        """Return the moments over the variance of what the best fit leaves, for ALIKE samples each."""
+        m, count = self._moments, max(self._moments[4, 4], 1.0)
+        best = np.linalg.lstsq(m[:5, :5], m[:5, 5], rcond=1e-9)[0]
+        left = float(m[5, 5] - best @ m[:5, 5]) / count
+        information: FloatArray = m / (ALIKE * max(self._floor**2, left))
+        return information
+
+    def _fit(self, m: FloatArray, s_t: float, s_w: float) -> tuple[FloatArray, float]:
+        """Return the factors of the momentum's parts with signs, and half of the squares that they leave."""
+        x = np.array([s_t, s_w, s_w, 0.0, 0.0])
+        best = np.linalg.solve(m[:5, :5] + np.diag(self._precision), m[:5, 5] + self._precision * x)
+        left = m[5, 5] - 2.0 * best @ m[:5, 5] + best @ m[:5, :5] @ best
+        return best, 0.5 * float(left + self._precision @ (best - x) ** 2)
+
+    def misfits(self) -> dict[Signs, float]:
+        """Return half of what is left of the momentum with each pair of signs, over its variance."""
+        m = self._information()
+        return {signs: self._fit(m, *signs)[1] for signs in SIGNS}
+
+    def friction(self) -> float:
+        """Return the friction and bias of the fit, N m."""
+        best, _ = self._fit(self._information(), *RIGHT)
+        return float(abs(best[3]) + abs(best[4]))
+
+    def _wrong_power(self, s_t: float, s_w: float) -> float:
+        """Return POWER for each power from rest that is of the wrong sign."""
+        made, whole, taken, square, way = self._work.tolist()
+        cost, stored = 0.0, 0.5 * self._ft**2 / self._stiffness
+        pushed = max(CLEAR * whole, stored, SIGMAS * self._restless * way)
+        if self.way > MOVED * self._pulse and abs(made) > pushed:
+            cost += POWER * (s_w * made < 0.0)
+        if abs(taken) > SIGMAS * (self.ft_noise * math.sqrt(square) + self._restless * way):
+            cost += POWER * (s_t * s_w * taken < 0.0)
+        return cost

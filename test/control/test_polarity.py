@@ -1,0 +1,102 @@
+"""Signs of ft, joint_states and motor torque are proven by small pulses before feedback acts."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from rsea_ros.control.controller import Measurement, TorqueController
+from rsea_ros.control.law import Gains
+from rsea_ros.control.polarity import Polarity
+from rsea_ros.model.plant import Plant
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+
+RATE, LIMIT = 280.0, 68.0
+"""Of config/nodes/controller.yaml: Hz, N m."""
+RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
+GAINS = Gains(0.2575, 0.003029, 1.195, 6.99, 42.9)
+RUB = EffectSetting("coulomb_friction", {"torque": 3.0})
+RIPPLE = EffectSetting("torque_ripple", {"amplitude": 3.0, "cycles_per_revolution": 4.0, "phase": 0.7})
+BENCHES = {
+    "clamped": RIG,
+    "clamped, 3 N m of friction": RIG.with_effects(RUB),
+    "clamped, 3 N m of ripple": RIG.with_effects(RIPPLE),
+    "pendulum": FREE,
+    "pendulum, friction": FREE.with_effects(RUB),
+}
+WRONG = {
+    "ft is reversed": {"ft": -1.0},
+    "joint_states are reversed": {"position": -1.0, "velocity": -1.0},
+    "motor torque is reversed": {"motor_torque": -1.0},
+    "motor and axis": {"position": -1.0, "velocity": -1.0, "motor_torque": -1.0},
+}
+
+
+def measured(sample, factors):
+    reading = Measurement(sample.ft, sample.velocity, sample.position, sample.motor_torque)
+    return replace(reading, **{name: by * getattr(reading, name) for name, by in factors.items()})
+
+
+def probe(rig, factors, *, desired=0.0, seconds=4.0, command=1.0, seed=0):
+    """Return the polarity once it has decided, and the largest torque that was commanded, N m."""
+    plant, polarity, torque, largest = Plant(rig, RATE, seed=seed), Polarity(RIG, RATE, LIMIT), 0.0, 0.0
+    for _ in range(round(seconds * RATE)):
+        after = polarity.probe(measured(plant.step(command * torque), factors), desired)
+        if after is None or polarity.contradiction:
+            break
+        torque, largest = after, max(largest, abs(after))
+    return polarity, largest
+
+
+@pytest.mark.parametrize("name", BENCHES)
+def test_right_signs_are_proven_by_small_pulses(name):
+    for seed in range(3):
+        polarity, largest = probe(BENCHES[name], {}, seed=seed)
+        assert polarity.proven and not polarity.contradiction
+        assert largest < 9.0
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize("name", BENCHES)
+def test_a_wrong_sign_is_a_fault_before_feedback_acts(name, wrong):
+    """It was 68 N m at the motor before anybody had wished for a torque."""
+    polarity, largest = probe(BENCHES[name], WRONG[wrong])
+    assert polarity.contradiction and not polarity.proven
+    assert largest < 6.0
+    assert wrong not in ("ft is reversed", "joint_states are reversed") or wrong in polarity.contradiction
+
+
+@pytest.mark.parametrize(("factors", "command"), [({"ft": 0.1}, 1.0), ({"ft": 10.0}, 1.0), ({}, 10.0)])
+def test_a_torque_that_is_ten_times_off_is_a_fault(factors, command):
+    """An F/T gain far too low makes the motor ten times the desired torque, and no error shows it."""
+    polarity, _ = probe(RIG, factors, command=command)
+    assert "expected ft positive" in polarity.contradiction or "N·m at a command" in polarity.contradiction
+
+
+def test_without_a_desired_torque_there_is_none():
+    assert probe(RIG, {}, desired=None, seconds=1.0)[1] == 0.0
+
+
+def test_a_drive_that_is_off_is_neither_right_nor_wrong_and_gets_no_more():
+    polarity, largest = probe(RIG, {"motor_torque": 0.0}, command=0.0, desired=50.0)
+    assert not polarity.proven and not polarity.contradiction and largest < 4.2
+
+
+@pytest.mark.parametrize("name", ["ft", "velocity"])
+def test_a_sign_that_changes_under_torque_is_a_fault_soon(name):
+    """It was left to error_limit: half a second at the limit of the torque."""
+    plant, polarity, torque = Plant(RIG, RATE), Polarity(RIG, RATE, LIMIT), 0.0
+    controller, factors = TorqueController(RIG, RATE, GAINS), {}
+    polarity.proven = True
+    for k in range(1000):
+        reading = measured(plant.step(torque), factors)
+        if polarity.watch(reading):
+            break
+        wanted = 20.0 * math.sin(2.0 * math.pi * 4.0 * k / RATE)
+        if k == 292:
+            factors = {name: -1.0}
+        torque = controller.step(reading, wanted)
+        polarity.sent(torque)
+    assert f"{'ft' if name == 'ft' else 'joint_states'} has changed its sign" in polarity.contradiction
+    assert 292 < k < 320
