@@ -15,7 +15,7 @@ from typing import Any
 from bench.driver_loop import Loop
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply
-from rsea_ros.hardware.limits import DeviceFault
+from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._devices import limits_of
 from rsea_ros.nodes.driver import TABLE

@@ -11,7 +11,8 @@ from dataclasses import replace
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
-from rsea_ros.hardware.limits import DeviceFault, Guard, Limits, unmeasured_quantities, without
+from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.hardware.limits import Guard, Limits, unmeasured_quantities, without
 from rsea_ros.hardware.losses import Losses
 from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring

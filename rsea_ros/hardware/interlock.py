@@ -6,15 +6,30 @@ events have a number, from one count: a request ends only what came before it.
 
 from __future__ import annotations
 
+import math
 import threading
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
+from rsea_ros.documents.units import plain
 from rsea_ros.errors import DeviceError
 
-if TYPE_CHECKING:
-    from rsea_ros.hardware.limits import DeviceFault
-
 MEANWHILE = "stopped: ~/stop was called meanwhile, expected a clear_fault after it"
+
+
+@dataclass(frozen=True)
+class DeviceFault:
+    """Why there is no torque: cause, value, limit, unit; detail: in words."""
+
+    cause: str
+    value: float = math.nan
+    limit: float = math.nan
+    unit: str = ""
+    detail: str = ""
+
+    def __str__(self) -> str:
+        unit = plain(self.unit)
+        measured = f" {self.value:.4g} {unit}, limit {self.limit:.4g} {unit}"
+        return f"{self.cause}:" + ("" if math.isnan(self.value) else measured) + f" {self.detail}".rstrip()
 
 
 class Interlock:

@@ -7,10 +7,9 @@ from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rsea_ros.documents.units import plain
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.interlock import Interlock
+from rsea_ros.hardware.interlock import DeviceFault, Interlock
 from rsea_ros.records.record import NONSENSE, is_measured
 
 COMMAND_TIMEOUT = "command_timeout"
@@ -65,22 +64,6 @@ def unmeasured_quantities(limits: Limits, state: State) -> list[str]:
 def without(limits: Limits, names: Sequence[str]) -> Limits:
     """Return limits that do not limit some quantities of NO_LIMIT."""
     return Limits(**{**vars(limits), **{name: NO_LIMIT[name] for name in names}})
-
-
-@dataclass(frozen=True)
-class DeviceFault:
-    """Why there is no torque: cause, value, limit, unit; detail: in words."""
-
-    cause: str
-    value: float = math.nan
-    limit: float = math.nan
-    unit: str = ""
-    detail: str = ""
-
-    def __str__(self) -> str:
-        unit = plain(self.unit)
-        measured = f" {self.value:.4g} {unit}, limit {self.limit:.4g} {unit}"
-        return f"{self.cause}:" + ("" if math.isnan(self.value) else measured) + f" {self.detail}".rstrip()
 
 
 def ft_torque(limits: Limits, state: State) -> float:
@@ -168,7 +151,7 @@ class Guard:
             self.trip(fault)
 
     def complaint(self, state: State) -> DeviceFault | None:
-        """Return the first fault in a reading; a deflection that was measured once is expected from then on."""
+        """Return the first fault in a reading; once measured, a deflection is expected."""
         return complaint(self.limits, state, deflects="deflection" in self._measured)
 
     def _blind(self, state: State) -> DeviceFault | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from rsea_ros.hardware.limits import DeviceFault
+from rsea_ros.hardware.interlock import DeviceFault
 
 WINDOW, SHARE = 10, 0.5
 """Answers that are looked at, as a multiple of those that are a fault in a row, and the part of them."""

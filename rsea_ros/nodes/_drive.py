@@ -9,7 +9,7 @@ from typing import Protocol
 
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.guarded import GuardedDevice
-from rsea_ros.hardware.limits import DeviceFault
+from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.together import Shared, cycle
 from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue

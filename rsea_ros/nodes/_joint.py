@@ -11,7 +11,7 @@ from msg_adapters.ros import Trigger
 from rsea_ros.errors import RseaError
 from rsea_ros.hardware.device import Device, State
 from rsea_ros.hardware.guarded import GuardedDevice
-from rsea_ros.hardware.limits import DeviceFault
+from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import BenchTopics
 from rsea_ros.nodes._cycle import Cycle

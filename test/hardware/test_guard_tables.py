@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.limits import DeviceFault, Guard, Limits
+from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.hardware.limits import Guard, Limits
 
 PERIOD = 1.0 / 64.0
 """s; a power of two, so that sums of it are exact."""

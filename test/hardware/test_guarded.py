@@ -8,7 +8,8 @@ import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.guarded import GuardedDevice
-from rsea_ros.hardware.limits import DeviceFault, Limits
+from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring
 from test.hardware.logged_device import LOST, Device, guard

@@ -9,7 +9,8 @@ import pytest
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.guarded import GuardedDevice
-from rsea_ros.hardware.limits import DeviceFault, Limits
+from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.hardware.limits import Limits
 from test.hardware.logged_device import LOST, Device, guard
 
 

@@ -9,7 +9,8 @@ import yaml
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, Refused, State
 from rsea_ros.hardware.guarded import GuardedDevice
-from rsea_ros.hardware.limits import DeviceFault, Guard, Limits
+from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.hardware.limits import Guard, Limits
 from rsea_ros.hardware.protection import NONE, Protection
 
 PERIOD = 0.01

@@ -14,8 +14,7 @@ import pytest
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply
-from rsea_ros.hardware.interlock import Interlock
-from rsea_ros.hardware.limits import DeviceFault
+from rsea_ros.hardware.interlock import DeviceFault, Interlock
 from test.nodes.monitor import World
 
 FAULT = DeviceFault("ft", detail="silent")
