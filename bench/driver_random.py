@@ -2,10 +2,11 @@
 
 No torque unless active, commanded in the last 100 ms, without fault, and without a stop that no clear which
 began later has ended. Services run in a thread of their own, as those of the node, and all else goes on
-meanwhile. A motor in another mode is seen within a second; only then is its torque judged. The seed of a
-violation repeats the faults; it does not repeat stalls of the machine. A torque that the bench has kept while
-it stood still itself, by its own account, is counted apart: a motor does not stand still, and no driver could
-have reached it.
+meanwhile. A motor in another mode is seen within a second in which it is heard; only then is its torque
+judged: one that is in another mode and does not answer is beyond any driver. The seed of a violation repeats
+the faults; it does not repeat stalls of the machine. A torque that the bench has kept while it stood still
+itself, by its own account, is counted apart: a motor does not stand still, and no driver could have reached
+it.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Watched:
         self.seen = self.faults = self.stops = 0
         self.stopped, self.cleared = -1, -1
         self.service: threading.Thread | None = None
-        self.mode_changed = -MODE_SEEN
+        self.mode_changed, self.unheard = -MODE_SEEN, False
         self.looked = self.begun = time.monotonic_ns()
 
     def cycle(self) -> None:
@@ -79,7 +80,7 @@ class Watched:
         now = time.monotonic_ns()
         held_up, self.looked = now - self.looked, now
         served = self.service is not None and self.service.is_alive()
-        if served and now - self.mode_changed < MODE_SEEN:
+        if (served or self.unheard) and now - self.mode_changed < MODE_SEEN:
             self.mode_changed = now
         if not goal or not on or now - self.mode_changed < MODE_SEEN:
             return
@@ -128,6 +129,7 @@ class Watched:
 
     def _misbehave(self, **how: object) -> None:
         self.bench.ask("misbehave", **{**CALM, **how})
+        self.unheard = any(value for name, value in how.items() if not name.startswith("ft"))
 
     def _quiet(self) -> None:
         self.silent = self.dice.randrange(100)
@@ -141,7 +143,7 @@ class Watched:
         self.stopped, self.stops = time.monotonic_ns(), self.stops + 1
 
     def _recover(self) -> None:
-        self.bench.ask("misbehave", **CALM)
+        self._misbehave()
         self.bench.ask("set", temperature=30, voltage=240, torque_limit=620, homing_offset=0)
         self._call("clear", "reboot", "clear", "enable")
 

@@ -29,7 +29,7 @@ from numba.core import runtime as numba_runtime
 
 SHARED = (
     "effects/_*.py", "effects/effect.py", "effects/signal_table.py", "effects/spring_hysteresis.py",
-    "model/compiled_call.py", "model/drive.py", "model/step.py",
+    "model/drive.py", "model/step.py",
     "model/observer/filter.py", "model/observer/log.py", "model/observer/transition.py",
 )  # fmt: skip
 """Files whose functions and constants are compiled into those of other files."""

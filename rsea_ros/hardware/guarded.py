@@ -25,6 +25,8 @@ UNOBEYED = {
     "current",
 }  # fmt: skip
 """Causes after which the motor is switched off: a goal of zero stops one in another mode not at all."""
+PATIENCE = 10
+"""Times the lost answers of a fault that a reading at configure or in clear_fault may lose."""
 STEP = 2.0
 """Times the velocity limit: a position that changes faster has jumped, the fault `velocity` comes before."""
 
@@ -273,8 +275,8 @@ class GuardedDevice:
         return state
 
     def _patiently(self) -> State:
-        """Return a reading, of which as many answers may be lost as are no fault."""
-        for _ in range(self.guard.limits.lost_cycles - 1):
+        """Return a reading outside of the cycles, of which more answers may be lost than within them."""
+        for _ in range(PATIENCE * self.guard.limits.lost_cycles - 1):
             with suppress(NoReply):
                 return self._read()
         return self._read()

@@ -63,7 +63,10 @@ class Line:
                 if not self._replies:
                     time.sleep(left)
                 elif select.select((self._descriptor,), (), (), left)[0]:
-                    heard += os.read(self._descriptor, 4096)
+                    data = os.read(self._descriptor, 4096)
+                    if not data:
+                        raise OSError("the port is gone")
+                    heard += data
                     if any(reply in heard for reply in self._replies):
                         return True
         except OSError:

@@ -101,7 +101,7 @@ def test_a_simulation_says_which_limits_do_not_apply_to_it():
 
 
 def test_a_device_that_does_not_answer_is_not_opened(device):
-    device.broken = {"read": [LOST] * 3}
+    device.broken = {"read": [LOST] * 30}
     with pytest.raises(DeviceError):
         GuardedDevice(device, Limits(64.0), 64.0).open()
     assert device.log[-1] == "close"
@@ -126,7 +126,7 @@ def test_a_deflection_is_measured_where_a_reading_has_one(joint, device, value):
     assert joint.measures_deflection() is math.isfinite(value)
     device.broken = {"read": [LOST]}
     assert joint.measures_deflection() is math.isfinite(value), "one lost reply took the topic away"
-    device.broken = {"read": [LOST] * 3}
+    device.broken = {"read": [LOST] * 30}
     assert joint.measures_deflection() is False
     device.broken = {"read": [DeviceError("not open")]}
     assert joint.measures_deflection() is False

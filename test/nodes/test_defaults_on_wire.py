@@ -25,7 +25,7 @@ class Commanded(Driven):
     """A driver that a thread commands at 280 Hz. torque: N m; None: nothing."""
 
     def __init__(self, bench, listener, name, begin):
-        super().__init__(bench, listener, name, begin, {"autostart": True, "resume": True})
+        super().__init__(bench, listener, name, begin, {"autostart": True})
         self.torque, self.children, self._over = 10.0, (), threading.Event()
         self._thread = threading.Thread(target=self._command, daemon=True)
         self._thread.start()
@@ -100,11 +100,11 @@ FAULTS = {
     "every reply 20 ms late": (ask("misbehave", delay=1.0, late=0.02), CALM, "no_reply", 5),
     "hot": (ask("set", temperature=71), HEALTHY, "temperature", 2),
     "supply too low": (ask("set", voltage=190), HEALTHY, "voltage", 2),
-    "torque switched off": (ask("set", torque_enable=0), HEALTHY, ("effort", "motor_state"), 1),
+    "torque switched off": (ask("set", torque_enable=0), HEALTHY, ("effort", "motor_state"), 3),
     "mode changed": (ask("set", mode=3), HEALTHY, ("effort", "motor_state"), SECOND),
     "mode changed, turning": (ask("set", mode=1, goal_velocity=3000), HEALTHY, MOVED, SECOND),
     "position jumps": (ask("set", homing_offset=40_000), HEALTHY, "position_step", 2),
-    "alert": (ask("alert", bits=32), HEALTHY, "hardware_error", 1),
+    "alert": (ask("alert", bits=32), HEALTHY, "hardware_error", 3),
     "F/T saturated": (ask("ft_status"), ask("ft_status", bits=0), "ft", 3),
     "F/T silent": (ask("misbehave", ft_silent=True), CALM, "ft", 8),
     "F/T stands still": (ask("misbehave", ft_stuck=True), CALM, "ft: all six values", MOST_STUCK),
@@ -114,6 +114,13 @@ FAULTS = {
     "supervisor stands still": (supervisor(signal.SIGSTOP), CALM, "supervisorlost", SECOND),
 }
 """How it is provoked and ended, the cause that is latched, the most writes of a torque until then."""
+
+
+def test_a_driver_that_starts_under_a_stream_of_commands_makes_no_torque_by_itself(wire, listener):
+    """One that was killed and started again did."""
+    fault = listener.until(wire.latched)
+    assert fault.startswith("restarted: the first command since autostart is 10 N·m") or is_stall(fault)
+    assert not any(goal and on for _, goal, on in wire.bench.log()["torque"])
 
 
 @pytest.mark.parametrize("name", FAULTS)
