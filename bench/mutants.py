@@ -3,6 +3,7 @@
     python bench/mutants.py                                  every module of mutants_targets.py
     python bench/mutants.py hardware/limits --list           its mutants
     python bench/mutants.py --sample 60 --seed 1             so many of each module
+    python bench/mutants.py --random 200 --seed 4            of all modules of rsea_ros, as they come
     python bench/mutants.py --log run.jsonl --resume run.jsonl    go on after a break
 
 Prints killed, survived and timed-out mutants of each module, and every survivor with the reason why it is no
@@ -30,6 +31,7 @@ import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting th
 
 # isort: split
 import hypothesis  # noqa: F401  what every test needs, once
+import mutants_random
 import numpy  # noqa: F401
 import pytest  # noqa: F401
 import scipy  # noqa: F401
@@ -70,6 +72,8 @@ class Played:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the mutants and print the table; status 1 where one got through without a reason."""
     args = _arguments(argv)
+    if args.random:
+        return mutants_random.play(args.random, args.seed)
     known = _resume(args.resume)
     log = args.log.open("a") if args.log else None
     explained = yaml.safe_load(EXPLAINED.read_text()) or {}
@@ -159,6 +163,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("modules", nargs="*", metavar="MODULE", help=f"of {', '.join(TARGETS)}")
     parser.add_argument("--sample", type=int, metavar="N", help=f"so many of each module, {FEWEST} or more")
+    parser.add_argument("--random", type=int, metavar="N", help="so many faults of all modules")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the sample")
     parser.add_argument("--log", type=Path, metavar="F", help="append each outcome to a file")
     parser.add_argument("--resume", type=Path, metavar="F", help="take outcomes of a log of the same tree")

@@ -16,9 +16,9 @@ def warm(target: str, tests: Iterable[Path]) -> None:
     """Import what some tests import, directly or not, as far as it does not import the target."""
     names = set()
     for test in tests:
-        names |= set(_imports(test))
-    for name in sorted(names | set().union(*(_reachable(n) for n in names))):
-        if target not in {name, *_reachable(name)} and not name.startswith("test"):
+        names |= set(imported(test))
+    for name in sorted(names | set().union(*(reachable(n) for n in names))):
+        if target not in {name, *reachable(name)} and not name.startswith("test"):
             try:
                 import_module(name)
             except ImportError:  # a helper beside the tests
@@ -26,20 +26,20 @@ def warm(target: str, tests: Iterable[Path]) -> None:
 
 
 @cache
-def _reachable(name: str) -> frozenset[str]:
+def reachable(name: str) -> frozenset[str]:
     """Return the modules of this repository that a module imports, directly or not."""
     reached: set[str] = set()
     waiting = [name]
     while waiting:
         path = _path(waiting.pop())
-        fresh = {n for n in _imports(path) if n not in reached} if path else set()
+        fresh = {n for n in imported(path) if n not in reached} if path else set()
         reached |= fresh
         waiting += fresh
     return frozenset(reached)
 
 
 @cache
-def _imports(path: Path) -> frozenset[str]:
+def imported(path: Path) -> frozenset[str]:
     return frozenset(_names(ast.parse(path.read_text())))
 
 

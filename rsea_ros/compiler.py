@@ -11,10 +11,12 @@ Code in the folder is executed, so it is used only where nobody but this user (o
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import logging
 import os
 import stat
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache, lru_cache
@@ -94,6 +96,9 @@ def _strangers(parent: os.stat_result) -> bool:
     return parent.st_uid not in (0, os.geteuid()) or bool(parent.st_mode & 0o002 and not sticky)
 
 
+PATIENCE = 30.0
+"""s. The longest compilation of one function takes 3."""
+
 _log = logging.getLogger(__name__)
 _caching: Any = numba_caching
 _cfunc: Any = ccallback.CFunc
@@ -142,8 +147,12 @@ class _Kept(_caching.FunctionCache):  # type: ignore[misc]
             with suppress(OSError):
                 self.flush()
             code = None
+        if code is None and _turn.take(os.path.dirname(self.cache_path)):
+            return self.load_overload(sig, target_context)  # another process may have compiled it meanwhile
         if code is None:
             tell_once()
+        else:
+            _turn.give_back()
         return code
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -151,6 +160,45 @@ class _Kept(_caching.FunctionCache):  # type: ignore[misc]
             super().save_overload(sig, data)
         except OSError as error:
             warn_once(error.strerror or str(error))
+        _turn.give_back()
+
+
+class _Turn:
+    """One process compiles at a time: the others load what it has stored, and no index loses an entry.
+
+    A process takes its turn with the first function that is not stored, and gives it back when that is. numba
+    compiles in one thread at a time. Whoever compiles for longer than PATIENCE is not waited for.
+    """
+
+    def __init__(self) -> None:
+        self._lock: int | None = None
+
+    def take(self, folder: str) -> bool:
+        """Wait for the turn; return whether this process did not have it before."""
+        if self._lock is not None:
+            return False
+        with suppress(OSError):
+            lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+            begun = time.monotonic()
+            while time.monotonic() - begun < PATIENCE:
+                try:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    time.sleep(0.02)
+                else:
+                    self._lock = lock
+                    return True
+            os.close(lock)
+        return False
+
+    def give_back(self) -> None:
+        """Let another process compile."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+
+_turn = _Turn()
 
 
 def _cache_of(function: Callable[..., Any]) -> Any:

@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """Return the syntax tree of a module, read once."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def found_in_modules(offences: Callable[[Path, ast.Module], Iterable[object]]) -> list[str]:
+    """Return the offences of all modules, each with the path of its module."""
+    found = ((path, each) for path in MODULES for each in offences(path, tree_of(path)))
+    return [f"{path.relative_to(ROOT)}: {each}" for path, each in found]
 
 
 def name_of(path: Path) -> str:
@@ -16,9 +29,9 @@ def name_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def imports(path: Path, source: str) -> Iterator[tuple[str, int]]:
+def imports(path: Path, source: str | ast.Module) -> Iterator[tuple[str, int]]:
     """Yield every module that a source imports, at any depth, by its absolute name, with its line."""
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(ast.parse(source) if isinstance(source, str) else source):
         if isinstance(node, ast.Import):
             yield from ((alias.name, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -290,3 +290,15 @@ def test_kept_code_runs_without_the_compiler() -> None:
             [sys.executable, "-c", START], cwd=ROOT, capture_output=True, text=True, check=True
         )
     assert done.stdout.strip() == "[]"
+
+
+def test_one_process_compiles_at_a_time_and_nobody_waits_for_one_that_hangs(tmp_path, monkeypatch):
+    """Two workers compiled the same functions at once."""
+    monkeypatch.setattr(compiler, "PATIENCE", 0.05)
+    mine, others = compiler._Turn(), compiler._Turn()
+    assert mine.take(str(tmp_path)) and not mine.take(str(tmp_path))
+    assert not others.take(str(tmp_path))
+    mine.give_back()
+    assert others.take(str(tmp_path)) and not mine.take(str(tmp_path))
+    others.give_back()
+    assert not mine.take(str(tmp_path / "nowhere"))

@@ -71,7 +71,6 @@ RESULTS = {
     "a clock that was set": ("identify", {"stamps": "hour forward"}),
     "a clock that was set by a year": ("predict", {"stamps": "year forward"}),
     "a drive without a spring, its clock set": ("identify", {"rig": "bare_drive", "stamps": "hour forward"}),
-    "one sample a second": ("diagnose", {"rate": 1.0, "duration": 80.0, "sensors": "zero"}),
     "velocity alone": ("diagnose", {"channels": ("velocity",)}),
     "a sample of 1e308": ("predict", {"dead": "1e308"}),
     "a sample of 1e308 to a fit, which leaves it out": ("identify", {"dead": "1e308"}),

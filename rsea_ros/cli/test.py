@@ -1,4 +1,4 @@
-"""rsea test: the whole suite of the repository."""
+"""rsea test: the suite of the repository, whole or a group of it."""
 
 from __future__ import annotations
 
@@ -12,28 +12,52 @@ from pathlib import Path
 from rsea_ros.errors import RseaError
 from rsea_ros.processes import Stopped
 
-HELP = "run the tests; further arguments go to pytest (paths are relative to the repository)"
-EXAMPLE = "rsea test test/cli -x"
+HELP = "run the tests: all, science, safety or contract; further arguments go to pytest"
+EXAMPLE = "rsea test safety -x"
+
+MOST = 8
+"""Workers that compute: collecting the tests costs each some seconds."""
+
+GROUPS = {
+    "science": (
+        "test/checks", "test/control", "test/design", "test/diagnosis", "test/effects", "test/experiment",
+        "test/health", "test/identification", "test/independent", "test/laws", "test/model", "test/paper",
+        "test/trends",
+    ),
+    "safety": (
+        "test/hardware", "test/nodes", "test/cli/test_run_launch_topics.py", "test/test_torque_edge.py",
+        "test/test_held_commands.py", "test/cli/test_ctrl_c.py",
+    ),
+    "contract": ("test/golden", "test/cli", "test/library", "test/msg_adapters", "test/test_imports.py"),
+    "all": (),
+}  # fmt: skip
+"""What each group runs: physics and statistics; what keeps torque off; what other programs rely on."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Take no arguments; all go to pytest."""
+    """Take a group; all other arguments go to pytest."""
+    parser.add_argument("--renew", action="store_true", help="write the stored outputs of test/golden anew")
     parser.set_defaults(pass_on=[])
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run pytest on the tree with two workers and return its exit status.
+    """Run pytest on a group or some paths with a worker more than cores and return its exit status.
 
-    The first worker waits for nodes most of its time; the other one computes at a lower priority.
+    The first worker waits for nodes most of its time; the others compute at a lower priority.
 
     Raises Stopped, once pytest has ended, when a signal asks this process to stop.
     """
     root = Path(__file__).resolve().parents[2]
     if not (root / "test" / "conftest.py").is_file():
         raise RseaError(f"{root}: no tests here, expected the repository: run ./rsea test in a clone")
-    workers = ["-n", "2", "--dist", "loadfile"] if (os.cpu_count() or 1) > 1 else []
+    cores = min(os.cpu_count() or 1, MOST)
+    workers = ["-n", str(cores + 1), "--dist", "loadfile"] if cores > 1 else []
+    chosen = [path for word in args.pass_on for path in GROUPS.get(word, (word,))]
     environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-    command = [sys.executable, "-m", "pytest", "-q", *workers, *args.pass_on]
+    if args.renew:
+        environment["RSEA_RENEW"] = "1"
+        chosen.append("test/golden")
+    command = [sys.executable, "-m", "pytest", "-q", *workers, *chosen]
     pytest = subprocess.Popen(command, cwd=root, env=environment)
     stopped: KeyboardInterrupt | None = None
     while True:

@@ -2,32 +2,15 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
 from rsea_ros.cli.main import main
-from rsea_ros.version import version
 
 
 @pytest.fixture
 def directory(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def test_design_without_arguments_computes_the_papers_example(directory, capsys):
-    assert main(["design", "--json"]) == 0
-    result = json.loads(capsys.readouterr().out)
-    assert result["asked"]["bandwidth_eq_7_hz"] == pytest.approx(55.83, abs=5e-3)
-    assert result["asked"]["largest_torque"] == 130.0
-    assert result["asked"]["deflection"] is None
-    assert not result["asked"]["feasible"]
-    assert result["least"]["feasible"]
-    page = (directory / "out/design/report.html").read_text(encoding="utf-8")
-    assert f"rsea_ros {version()}, 20" in page and ": rsea design" in page, "the footer has no provenance"
-    for said in ("55.8 Hz by Eq. (7)", "130 N·m at 45°", "33°", "1728", "2759", "n = −160"):
-        assert said in page
 
 
 def test_fail_on_makes_the_result_of_a_design_an_exit_status(directory):

@@ -32,46 +32,6 @@ def test_an_empty_name_is_no_folder(words, capsys):
     assert end.value.code == 2 and "'', expected a name" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "suggestion"),
-    [
-        (["idntify"], "identify"),
-        (["diagnose", "x", "--holdut", "y"], "--holdout"),
-        (["identify", "x", "--rig", "paper_hih_impedance"], "paper_high_impedance"),
-        (["import", "x", "--map", "pendulm", "--out", "y"], "pendulum"),
-        (["effects", "backlsh"], "backlash"),
-        (["simulate", "pendulum", "--effect", "colomb_friction:torque=1", "--out", "x"], "coulomb_friction"),
-        (["run", "plnt"], "plant"),
-        (["launch", "simulaton"], "simulation"),
-        (["launch", "replay", "bagg:=x"], "bag"),
-        (["topics", "eco"], "echo"),
-        (["rig", "nwe", "x"], "new"),
-        (["export", "--mjcff", "x"], "--mjcf"),
-        (["idenfity"], "identify"),
-        (["excite"], "run excite"),
-        (["--verson"], "--version"),
-        (["control", "paper_hi"], "paper_high_impedance"),
-        (["design", "--unit", "rd85"], "rd85x13-hd_cpl-25a-160"),
-        (["identify", "run", "--axis", "torqe.z"], "torque.z"),
-        (["identify", "run", "--topic", "joint_state=/x"], "joint_states"),
-        (["simulate", "pendulum", "--efect", "backlash:gap=0.004", "--out", "x"], "--effect"),
-        (["simulate", "pendulum", "--effect", "backlsh:gap=0.004", "--out", "x"], "backlash"),
-        (["import", "a.csv", "--map", "so11", "--out", "x"], "so101"),
-    ],
-)
-def test_a_name_that_is_nearly_right_is_answered_with_the_right_one(
-    arguments, suggestion, tmp_path, capsys, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    try:
-        status = cli.main(arguments)
-    except SystemExit as left:
-        status = left.code
-    assert status == 2
-    assert f", did you mean {suggestion}?" in capsys.readouterr().err
-
-
 def test_a_rig_file_with_a_mistyped_key_is_answered_too(tmp_path, capsys):
     (tmp_path / "mine.yaml").write_text("name: mine\nsprng: {rigid: true}\n")
     assert cli.main(["rig", "check", str(tmp_path / "mine.yaml")]) == 2

@@ -142,6 +142,18 @@ def test_a_stopped_suite_waits_for_pytest_and_has_the_status_of_the_signal(
     assert capsys.readouterr().err == f"rsea test: {line}\n"
 
 
+def test_groups_name_folders_that_exist_and_other_words_go_to_pytest(monkeypatch):
+    module = importlib.import_module("rsea_ros.cli.test")
+    assert [p for paths in module.GROUPS.values() for p in paths if not (ROOT / p).exists()] == []
+    asked = []
+    done = types.SimpleNamespace(wait=int)
+    pytest_of = types.SimpleNamespace(Popen=lambda words, cwd: asked.append(words) or done)
+    monkeypatch.setattr(module, "subprocess", pytest_of)
+    assert cli.main(["test", "safety", "-x"]) == cli.main(["test", "all"]) == 0
+    assert asked[0][-1] == "-x" and set(module.GROUPS["safety"]) < set(asked[0])
+    assert not [word for word in asked[1] if word.startswith("test")]
+
+
 def test_a_stop_that_a_destructor_swallows_is_asked_for_again(verb, capsys):
     class Deaf:
         def __del__(self):
