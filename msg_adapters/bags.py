@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from msg_adapters import mcap_file, metadata, sqlite_file
+from msg_adapters import mcap_file, metadata, ros1_file, sqlite_file
 from msg_adapters.compression import ERRORS, ZSTD_MAGIC, Allowance, unpack_file, unpack_message
 from msg_adapters.contents import AND, Contents, Messages
 from rsea_ros.documents.wording import brief
@@ -21,6 +21,7 @@ from rsea_ros.records.record import Fault, FloatArray, IntArray
 SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
     ".mcap": mcap_file.scan,
     ".db3": lambda path, contents, allowance: sqlite_file.scan(path, contents),
+    ".bag": ros1_file.scan,
 }
 PACKED = ".zstd"
 TABLES = (".csv", ".tsv", ".txt", ".dat", ".mat", ".npz", ".npy", ".json", ".parquet", ".pq", ".zarr", ".tar")
@@ -85,7 +86,7 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
     known = metadata.metadata_of(path, contents)
     files = known.files or sorted(file for file in path.iterdir() if _suffix(file) in SCANNERS)
     if not files:
-        raise BagError(f"{path}: no bag, expected a directory with .mcap or .db3 files")
+        raise BagError(f"{path}: no bag, expected a directory with .mcap, .db3 or .bag files")
     _tell_unnamed(path, files, contents)
     parts = _scan_all(files, contents)
     contents.notes.extend(known.remarks.notes)
@@ -130,7 +131,7 @@ def _scan(file: Path, contents: Contents) -> Contents:
     """Return the contents of a file; its notes and faults are added to those of the bag."""
     if _suffix(file) not in SCANNERS:
         table = f"; a table becomes a bag by rsea import {file} --map MAP" if _suffix(file) in TABLES else ""
-        raise BagError(f"{file}: no bag, expected a directory, or a .mcap or .db3 file{table}")
+        raise BagError(f"{file}: no bag, expected a directory, or a .mcap, .db3 or .bag file{table}")
     if file.stat().st_size == 0:
         raise BagError(f"{file}: empty file")
     part = Contents(contents.wanted)

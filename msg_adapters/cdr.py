@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from msg_adapters.topic_map import WRENCH
+from msg_adapters.topic_map import DYNAMIC, FLOAT, FLOATS, WRENCH
 from rsea_ros.errors import BagError
 from rsea_ros.records.record import FloatArray, IntArray
 
@@ -23,6 +23,8 @@ ByteMatrix = npt.NDArray[np.uint8]
 
 HEADER = 4
 STAMP = 4
+VALUES = "data"
+"""The field of a message of numbers without names."""
 _MANY = 32
 """Layouts of one length; a topic has one or two of them."""
 
@@ -34,7 +36,7 @@ class MessageLayout:
     names: joints. fields: name -> (first byte, count of doubles). order: '<' or '>'.
     structure: first and end of the runs of bytes that make the layout: lengths and names. Not the frame,
     which may be any text, and not the padding, which may hold anything.
-    end: the first byte behind the message.
+    end: the first byte behind the message. stamped: whether it begins with a header.
     """
 
     names: tuple[str, ...]
@@ -42,6 +44,7 @@ class MessageLayout:
     order: str
     structure: tuple[tuple[int, int], ...]
     end: int
+    stamped: bool = True
 
 
 @dataclass(frozen=True)
@@ -53,12 +56,16 @@ class Block:
     layout: MessageLayout
 
     def stamps(self) -> IntArray:
-        """Return the header stamps, ns, shape (n,)."""
+        """Return the header stamps, ns, shape (n,); zero for messages without a header."""
+        if not self.layout.stamped:
+            return np.zeros(len(self.rows), np.int64)
         seconds = self._cut(STAMP, 4, "i4")[:, 0].astype(np.int64)
         return seconds * 1_000_000_000 + self.nanoseconds()
 
     def nanoseconds(self) -> IntArray:
         """Return the part of the header stamps below a second, ns, shape (n,)."""
+        if not self.layout.stamped:
+            return np.zeros(len(self.rows), np.int64)
         return self._cut(STAMP + 4, 4, "u4")[:, 0].astype(np.int64)
 
     def field(self, name: str) -> FloatArray:
@@ -126,16 +133,37 @@ class Walk:
 
 
 def layout_of(raw: bytes, msgtype: str) -> MessageLayout:
-    """Walk one serialised JointState or WrenchStamped. Raises ValueError for a damaged message."""
+    """Walk one serialised message of topic_map.READ. Raises ValueError for a damaged message.
+
+    The fields of a DynamicJointState are called `JOINT/INTERFACE`, the one of numbers without names VALUES.
+    """
     walk = Walk(raw)
-    walk.stamp_and_frame()
+    stamped = msgtype not in (FLOAT, FLOATS)
+    if stamped:
+        walk.stamp_and_frame()
     names: tuple[str, ...] = ()
     if msgtype == WRENCH:
         fields = {"wrench": walk.doubles(6)}
+    elif msgtype == FLOAT:
+        fields = {VALUES: walk.doubles(1)}
+    elif msgtype == FLOATS:
+        for _ in range(walk.count()):
+            walk.name()
+            walk.count(), walk.count()
+        walk.count()
+        fields = {VALUES: walk.doubles(walk.count())}
+    elif msgtype == DYNAMIC:
+        names = tuple([walk.name() for _ in range(walk.count())])
+        fields = {}
+        for at in range(walk.count()):
+            interfaces = [walk.name() for _ in range(walk.count())]
+            first, _ = walk.doubles(walk.count())
+            joint = names[at] if at < len(names) else ""
+            fields |= {f"{joint}/{name}": (first + 8 * k, 1) for k, name in enumerate(interfaces)}
     else:
         names = tuple([walk.name() for _ in range(walk.count())])
         fields = {name: walk.doubles(walk.count()) for name in ("position", "velocity", "effort")}
-    return MessageLayout(names, fields, walk.order, tuple(walk.structure), walk.at)
+    return MessageLayout(names, fields, walk.order, tuple(walk.structure), walk.at, stamped)
 
 
 def blocks(

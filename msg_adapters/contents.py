@@ -82,7 +82,7 @@ class Contents:
 
 NAME = "rsea"
 NOTES, FAULTS = "rsea_notes", "rsea_faults"
-KEPT = frozenset({"rows_left_out", "missing_values", "coarse_stamps"})
+KEPT = frozenset({"rows_left_out", "missing_values", "coarse_stamps", "raw_codes"})
 """Faults that no reader of the bag could find again."""
 _LONGEST, _MOST = 500, 50
 

@@ -1,10 +1,12 @@
-"""Messages decoded to values; topics inferred; faults that /diagnostics reports.
+"""Messages decoded to values; topics inferred; faults that /diagnostics reports; a run's temperature.
 
 The counters count from a node's start; counts from before the recording do not belong to the run.
 """
 
 from __future__ import annotations
 
+import math
+import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -12,7 +14,7 @@ import numpy as np
 
 from msg_adapters.cdr import Block, Walk, blocks
 from msg_adapters.contents import Contents, Messages
-from msg_adapters.topic_map import TopicMap
+from msg_adapters.topic_map import FLOAT, FLOATS, TopicMap
 from rsea_ros.documents.wording import brief
 from rsea_ros.records.record import BoolArray, FloatArray, IntArray
 
@@ -24,12 +26,13 @@ _PADDING = 4
 class Decoded:
     """Stamps (ns) and values by field, each (n,), with which messages fill the field.
 
-    sound: messages that could be decoded.
+    sound: messages that could be decoded. is_unstamped: whether they have no header.
     """
 
     def __init__(self, messages: Messages, msgtype: str, fields: tuple[str, ...]) -> None:
         count = len(messages.raw)
         self._messages, self._msgtype, self.fields = messages, msgtype, fields
+        self.is_unstamped = msgtype in (FLOAT, FLOATS)
         self.stamps: IntArray = np.zeros(count, np.int64)
         self.sound: BoolArray = np.zeros(count, bool)
         self.values: dict[str, FloatArray] = {name: np.full(count, np.nan) for name in fields}
@@ -210,3 +213,26 @@ def _values(raw: bytes) -> Iterator[tuple[str, str, str]]:
         walk.text()
         for _ in range(walk.count()):
             yield node, walk.read_text(), walk.read_text()
+
+
+TEMPERATURE = "sensor_msgs/msg/Temperature"
+
+
+def mean_temperature(contents: Contents, topic: str) -> float | None:
+    """Return the mean of a topic's temperatures, °C; None where none of its messages holds a finite one."""
+    messages = contents.topics.get(topic)
+    if messages is None or messages.msgtype != TEMPERATURE:
+        return None
+    values = [value for raw in messages.raw if (value := _temperature(raw)) is not None]
+    return sum(values) / len(values) if values else None
+
+
+def _temperature(raw: bytes) -> float | None:
+    try:
+        walk = Walk(raw)
+        walk.stamp_and_frame()
+        first, _ = walk.doubles(1)
+    except ValueError:
+        return None
+    value = float(struct.unpack_from(f"{walk.order}d", raw, first)[0])
+    return value if math.isfinite(value) else None

@@ -15,13 +15,13 @@ from msg_adapters.bags import (
     on_the_clock_of_the_command,
     read_contents,
 )
-from msg_adapters.cdr import Block
+from msg_adapters.cdr import VALUES, Block
 from msg_adapters.contents import Contents, Messages
 from msg_adapters.decoding import DIAGNOSTICS, Decoded, is_inferred, tell_health
-from msg_adapters.topic_map import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
-from rsea_ros.documents.wording import brief, did_you_mean
+from msg_adapters.topic_map import FIELDS, READ, ROLES, TYPES, TopicMap, sign_and_index
+from rsea_ros.documents.wording import brief, did_you_mean, list_names
 from rsea_ros.errors import BagError
-from rsea_ros.records.record import Channel, FloatArray, IntArray, Record
+from rsea_ros.records.record import IMPORTED, Channel, FloatArray, IntArray, Record
 from rsea_ros.records.stamp_order import far_apart, in_order, stray_fault
 from rsea_ros.records.stamps import repair_stamps
 
@@ -107,9 +107,10 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
     filled = set()
     for role in ROLES:
         messages = contents.topics.get(topics.topic(role), Messages(TYPES[role]))
-        if messages.msgtype != TYPES[role]:
+        if messages.msgtype not in READ[role]:
+            expected = list_names(READ[role], "or")
             raise BagError(
-                f"{source}: {topics.topic(role)} is {brief(messages.msgtype)}, expected {TYPES[role]}"
+                f"{source}: {topics.topic(role)} is {brief(messages.msgtype)}, expected {expected}"
             )
         if messages.raw:
             filled.add(role)
@@ -124,8 +125,17 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
             wanted = " or ".join(topics.topic(role) for role in roles)
             raise BagError(
                 f"{source}: no message on {wanted}; the bag holds {_topics_text(contents)}"
-                f"{contents.remarks()}; record one, or name its topic with --topic or --namespace"
+                f"{contents.remarks()}; {_remedy(contents, roles)}"
             )
+
+
+def _remedy(contents: Contents, roles: Sequence[str]) -> str:
+    """Return what may be done about a topic without messages, in the words of the bag's origin."""
+    if not any(note.startswith(IMPORTED) for note in contents.notes):
+        return "record one, or name its topic with --topic or --namespace"
+    if "torque_command" in roles:
+        return "map the commanded torque or current as `command`; the measured one will do where no other is"
+    return "name a measurement's column in the import map"
 
 
 def _topics_text(contents: Contents) -> str:
@@ -151,11 +161,14 @@ def _series(
     """Decode one topic: channel -> series. A field that no message fills is left out."""
     topic = topics.topic(role)
     where = f"{source}: {topic}"
-    decoded = Decoded(messages, TYPES[role], tuple(FIELDS[role].values()))
+    decoded = Decoded(messages, messages.msgtype, tuple(FIELDS[role].values()))
     decoded_blocks = decoded.blocks(topic, where, report)
     _one_joint(where, decoded_blocks, topics.joint)
+    element = 0
+    if not any(block.layout.names for block in decoded_blocks):
+        element = _element(where, decoded_blocks, role, topics, report)
     for block in decoded_blocks:
-        decoded.take(block, {field: _column(block, field, topics) for field in decoded.fields})
+        decoded.take(block, {f: _column(block, f, topics, element) for f in decoded.fields})
     decoded.tell_empty(topic, report)
     stamps = _with_log_times(topic, where, decoded, messages.log_times, report)
     series = {}
@@ -182,19 +195,50 @@ def _one_joint(where: str, decoded_blocks: Sequence[Block], joint: str | None) -
     listed = ", ".join(map(brief, names[:_MOST_NAMED])) or "without names"
     if joint is not None and names and joint not in names:
         raise BagError(f"{where}: no joint {joint!r}, the messages hold {listed}")
-    if joint is None and count > 1:
+    if joint is None and count > 1 and names:
         raise BagError(f"{where}: {count} joints ({listed}), expected one; name it with --joint")
 
 
-def _column(block: Block, field: str, topics: TopicMap) -> FloatArray | None:
-    """Return the field's value of each message, None where these messages do not hold it."""
+def _element(where: str, blocks: Sequence[Block], role: str, topics: TopicMap, report: Contents) -> int:
+    """Return which of several numbers without names counts: that of the map, or the only one ever used.
+
+    Raises BagError where several are, or where there are fewer.
+    """
+    layouts = [block.layout for block in blocks if "wrench" not in block.layout.fields]
+    count = max([n for layout in layouts for _, n in layout.fields.values()], default=1)
+    chosen = topics.element(role)
+    if chosen is None and count > 1:
+        parts = [block.field(name) for block in blocks for name in block.layout.fields]
+        used = sorted({at for part in parts for at in np.flatnonzero((part != 0.0).any(axis=0)).tolist()})
+        if len(used) != 1:
+            topic = f"{role}={topics.topic(role)}"
+            raise BagError(
+                f"{where}: {count} numbers without names, expected which: --topic {topic}[0] to [{count - 1}]"
+            )
+        chosen = used[0]
+        report.notes.append(f"{where}: [{chosen}] taken, the only one of {count} that is ever not zero")
+    if chosen is not None and chosen >= count:
+        raise BagError(f"{where}: {count} numbers without names, expected more than {chosen}")
+    return chosen or 0
+
+
+def _column(block: Block, field: str, topics: TopicMap, element: int) -> FloatArray | None:
+    """Return the field's value of each message, None where these messages do not hold it.
+
+    element: which number counts where they have no names.
+    """
     if field == "wrench":
         sign, index = sign_and_index(topics.axis)
         return sign * block.field(field)[:, index]
     names = block.layout.names
     if topics.joint is not None and names and topics.joint not in names:
         return None
-    index = names.index(topics.joint) if topics.joint in names else 0
+    if block.layout.fields.keys() == {VALUES}:
+        field = VALUES
+    elif field not in block.layout.fields:  # of a DynamicJointState
+        field = f"{topics.joint or names[0]}/{field}" if names else field
+        return block.field(field)[:, 0] if field in block.layout.fields else None
+    index = names.index(topics.joint) if topics.joint in names else 0 if names else element
     return block.field(field)[:, index] if index < block.layout.fields[field][1] else None
 
 
@@ -205,9 +249,11 @@ def _with_log_times(
     stamps: IntArray = decoded.stamps.copy()
     zero = np.flatnonzero((stamps == 0) & decoded.sound)
     unset = [row for row in zero.tolist() if log_times[row]]
-    if unset:
+    if unset and decoded.is_unstamped:
+        report.notes.append(f"{where}: its messages have no stamps, log time taken")
+    elif unset:
         detail = f"{len(unset)} of {len(stamps)} header stamps are zero, log time taken"
         report.notes.append(f"{where}: {detail}")
         report.tell("zero_stamps", topic, detail, len(unset), "messages", len(unset) / len(stamps))
-        stamps[unset] = [min(log_times[row], LATEST) for row in unset]
+    stamps[unset] = [min(log_times[row], LATEST) for row in unset]
     return stamps

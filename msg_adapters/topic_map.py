@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
+DYNAMIC = "control_msgs/msg/DynamicJointState"
+FLOAT, FLOATS = "std_msgs/msg/Float64", "std_msgs/msg/Float64MultiArray"
 
 AXES = tuple(f"{part}.{axis}" for part in ("force", "torque") for axis in "xyz")
 ROLES = ("torque_command", "joint_states", "ft", "deflection", "desired_position")
@@ -33,6 +35,14 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
 """By role: the channels of the record, and the field of the message that each comes from."""
 
 TYPES: Mapping[str, str] = {role: WRENCH if role == "ft" else JOINT_STATE for role in ROLES}
+"""By role: the type that is written."""
+READ: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(ROLES, (JOINT_STATE, DYNAMIC, FLOAT, FLOATS)),
+    "joint_states": (JOINT_STATE, DYNAMIC),
+    "ft": (WRENCH,),
+}
+"""By role: the types that are read. Numbers without names and stamps are what ros2_control's forward
+controllers take; their stamps are the log times."""
 
 
 def sign_and_index(axis: str) -> tuple[float, int]:
@@ -40,6 +50,7 @@ def sign_and_index(axis: str) -> tuple[float, int]:
     return (-1.0 if axis.startswith("-") else 1.0), AXES.index(axis.removeprefix("-"))
 
 
+_ELEMENT = re.compile(r"\[([0-9]{1,4})\]$")
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _LONGEST = 247
 """Characters of a topic: ROS 2 puts eight more in front, and DDS takes 255."""
@@ -62,6 +73,9 @@ class TopicMap:
     neither quantity nor unit, and in ROS often means a reference frame.
 
     deflection is a JointState whose position is the angle of the spring by its own encoder.
+
+    A number in brackets behind a name, `/effort_controller/commands[2]`, says which of several numbers
+    without names counts, from 0.
 
     joint: which joint, where the messages hold several.
     axis: actuator axis of the wrench, one of AXES, with a leading minus where the sensor faces back.
@@ -92,8 +106,13 @@ class TopicMap:
 
     def topic(self, role: str) -> str:
         """Return the absolute topic of a role of ROLES."""
-        name: str = getattr(self, role)
+        name: str = _ELEMENT.sub("", getattr(self, role))
         return name if name.startswith("/") else f"/{self.namespace.strip('/')}/{name}".replace("//", "/")
+
+    def element(self, role: str) -> int | None:
+        """Return which number of a role's messages counts, None where the name does not say."""
+        match = _ELEMENT.search(getattr(self, role))
+        return int(match[1]) if match else None
 
     def with_topics(self, assignments: Sequence[str]) -> TopicMap:
         """Return the map with `role=topic` assignments applied, as the command line gives them.

@@ -6,28 +6,48 @@ import csv
 import gzip
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from msg_adapters.tables import json_file
-from msg_adapters.tables.column_table import Table
-from msg_adapters.tables.foreign_files import refuse_foreign
+from msg_adapters.tables.child import Reader
+from msg_adapters.tables.column_table import LARGEST, Table, Wanted
 from msg_adapters.tables.json_file import read_json
-from msg_adapters.tables.mat_file import read_mat
+from msg_adapters.tables.mat_file import HDF5, read_mat
 from msg_adapters.tables.npz_file import read_npy, read_npz
-from msg_adapters.tables.parquet_file import read_parquet
 from msg_adapters.tables.text_file import read_text
 from msg_adapters.tables.zarr_file import read_zarr
 from msg_adapters.tables.zarr_store import is_group
 from rsea_ros.errors import ImportMapError
 
-READERS: Mapping[str, Callable[[Path, Sequence[str]], Table]] = {
+PARQUET, TIME = Path(__file__).with_name("_parquet_reader.py"), 90.0
+"""The reader, and s that it may take. Three columns of ten million rows take 2 s."""
+
+
+def read_parquet(path: Path, wanted: Wanted) -> Table:
+    """Return the requested columns, read by `_parquet_reader.py` in another process, a row group at a time.
+
+    Raises OSError and ValueError with column, type and expectation.
+    """
+    with path.open("rb") as file:
+        if file.read(4) != b"PAR1":
+            raise ValueError("no Parquet file (it does not begin with PAR1), expected one")
+    if find_spec("pyarrow") is None:
+        raise ValueError(
+            "Parquet needs the package pyarrow, which is not installed: pip install 'rsea_ros[fleet]'"
+        )
+    return Reader("Parquet", PARQUET, TIME, LARGEST).read(path, wanted.columns)
+
+
+READERS: Mapping[str, Callable[[Path, Wanted], Table]] = {
     ".mat": read_mat,
     ".npz": read_npz,
     ".npy": read_npy,
     ".parquet": read_parquet,
     ".pq": read_parquet,
-    ".zarr": read_zarr,
-    ".tar": read_zarr,
+    ".zarr": lambda path, wanted: read_zarr(path, wanted.columns),
+    ".tar": lambda path, wanted: read_zarr(path, wanted.columns),
     ".json": read_json,
     **dict.fromkeys(json_file.LINES, read_json),
 }
@@ -35,25 +55,20 @@ READERS: Mapping[str, Callable[[Path, Sequence[str]], Table]] = {
 with a .zgroup is a zarr group whatever its name."""
 
 
-def read_columns(
-    path: Path,
-    columns: Sequence[str],
-    delimiter: str | None = None,
-    header: bool | None = None,
-    decimal: str = ".",
-) -> Table:
-    """Return the requested columns.
+def read_columns(path: Path, columns: Sequence[str], **options: Any) -> Table:
+    """Return the requested columns. options: those of Wanted.
 
-    Text files name their columns in the first row, below a preamble at most; without names they are called
-    1, 2, …. decimal: their decimal sign.
+    Text files name their columns in the first row, below a preamble at most, or in a comment above the
+    numbers; without names they are called 1, 2, ….
     Raises ImportMapError with file, line, column, value and expectation.
     """
-    reader = read_zarr if is_group(path) else READERS.get(path.suffix.lower())
+    wanted = Wanted(tuple(columns), **options)
+    reader = READERS.get(".zarr" if is_group(path) else path.suffix.lower())
     try:
         if reader:
-            return reader(path, columns)
+            return reader(path, wanted)
         refuse_foreign(path)
-        return read_text(path, columns, delimiter, header, decimal)
+        return read_text(path, wanted)
     except IsADirectoryError:
         raise ImportMapError(
             f"{path}: is a directory, expected a file; only a map with `file:` reads a directory"
@@ -64,3 +79,36 @@ def read_columns(
         raise ImportMapError(f"{path}: {error.strerror or error}") from None
     except (ValueError, csv.Error) as error:
         raise ImportMapError(f"{path}: {' '.join(str(error).split())}") from None
+
+
+_AS_NPZ = "write its columns to NPZ with numpy.savez (docs/import.md)"
+_KINDS: tuple[tuple[bytes, str, str], ...] = (
+    (HDF5, "an HDF5 file", _AS_NPZ),
+    (b"PK\x03\x04", "a spreadsheet or another zip archive", "save the sheet as CSV, or unpack it"),
+    (b"\xd0\xcf\x11\xe0", "an Excel workbook", "save the sheet as CSV"),
+    (b"ARROW1", "an Arrow (Feather) file", "write it as Parquet with pyarrow.parquet.write_table"),
+    (b"PAR1", "a Parquet file", "call it .parquet"),
+    (b"#ROSBAG V2.0", "a bag of ROS 1", "it needs no import: name it in place of a bag"),
+    (b"\x89MCAP", "a bag", "it needs no import: name it in place of a bag"),
+    (b"SQLite format 3", "a database", "a bag (.db3) needs no import; export a table as CSV"),
+    (b"\x93NUMPY", "an NPY file", "call it .npy"),
+    (b"MATLAB 5.0", "a MAT file", "call it .mat"),
+    (b"\x80\x04", "a pickle, which may run any program", _AS_NPZ),
+    (b"\x80\x05", "a pickle, which may run any program", _AS_NPZ),
+    (b"\x80\x02", "a pickle, which may run any program", _AS_NPZ),
+    (b"CDF\x01", "a netCDF file", _AS_NPZ),
+    (b"CDF\x02", "a netCDF file", _AS_NPZ),
+)
+"""First bytes, kind, and what a person can do."""
+_LONGEST = max(len(start) for start, _, _ in _KINDS)
+
+
+def refuse_foreign(path: Path) -> None:
+    """Raise ValueError with kind and remedy for a file whose first bytes say that it is not a text."""
+    if not path.is_file():
+        return
+    with path.open("rb") as file:
+        head = file.read(_LONGEST)
+    for start, kind, remedy in _KINDS:
+        if head.startswith(start):
+            raise ValueError(f"is {kind}, expected a table: {remedy}")

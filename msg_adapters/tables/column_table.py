@@ -1,16 +1,36 @@
-"""Columns of numbers from a file, and their missing values."""
+"""Columns of a file: what a map asks for, and the numbers and labels that there are."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
 
 from rsea_ros.documents.wording import did_you_mean, quote
-from rsea_ros.records.record import FloatArray
+from rsea_ros.records.record import BoolArray, FloatArray
 
+Labels = npt.NDArray[np.str_]
 LARGEST = 100_000_000
 """Numbers in all columns that are asked for: 0.8 GB."""
 _LONGEST_LIST = 40
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a map asks of a file.
+
+    columns: each once. labels: those that choose rows, which may hold texts. stamps: those that may hold
+    date-times. delimiter, header, decimal: of a text file, None where its lines tell.
+    """
+
+    columns: tuple[str, ...]
+    labels: frozenset[str] = frozenset()
+    stamps: frozenset[str] = frozenset()
+    delimiter: str | None = None
+    header: bool | None = None
+    decimal: str = "."
 
 
 @dataclass(frozen=True)
@@ -19,6 +39,8 @@ class Table:
 
     rows: of the file, those that were left out included. left_out: how many of them had too few or too
     many fields. first: place of the first of these, for people. notes: lines of the file that are no rows.
+    labels: columns of texts, empty where a cell was. dated: columns of date-times, in s. trials: name of the
+    list of trials that the rows come from, and the number of each row's.
     """
 
     columns: Mapping[str, FloatArray]
@@ -26,9 +48,22 @@ class Table:
     left_out: int = 0
     first: str = ""
     notes: tuple[str, ...] = ()
+    labels: Mapping[str, Labels] = field(default_factory=dict)
+    dated: frozenset[str] = frozenset()
+    trials: tuple[str, FloatArray] | None = None
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]
+
+    def values(self, name: str) -> FloatArray | Labels:
+        """Return a column of numbers or of texts."""
+        return self.labels[name] if name in self.labels else self.columns[name]
+
+    def given(self, name: str) -> BoolArray:
+        """Return which rows have a value in a column."""
+        if name in self.labels:
+            return np.asarray(self.labels[name] != "")
+        return ~np.isnan(self.columns[name])
 
 
 def index_of(column: str, names: Sequence[str]) -> int:

@@ -46,6 +46,17 @@ PLAIN: Mapping[str, tuple[Callable[..., Any], int, str]] = {
     "unwrap": (np.unwrap, 1, "angle in rad without jumps of 2 pi"),
     "mean": (np.nanmean, 1, "mean over the record"),
     "first": (lambda x: x[0] if np.ndim(x) else x, 1, "first sample"),
+    "int8": (lambda x: _wrapped(x, 8), 1, "signed 8 bit number that was read as unsigned: 255 is -1"),
+    "int16": (lambda x: _wrapped(x, 16), 1, "signed 16 bit number that was read as unsigned: 65535 is -1"),
+    "int32": (lambda x: _wrapped(x, 32), 1, "signed 32 bit number that was read as unsigned"),
+    "uint8": (lambda x: np.mod(x, 2**8), 1, "unsigned 8 bit number: -1 is 255"),
+    "uint16": (lambda x: np.mod(x, 2**16), 1, "unsigned 16 bit number: -1 is 65535"),
+    "uint32": (lambda x: np.mod(x, 2**32), 1, "unsigned 32 bit number"),
+    "sign_magnitude": (
+        lambda x, y: np.where(np.mod(x, 2.0 ** (y + 1)) < 2.0**y, 1.0, -1.0) * np.mod(x, 2.0**y),
+        2,
+        "number whose bit y, from 0, is its sign: (1030, 10) is -6",
+    ),
 }
 """By name: function, how many arguments, meaning."""
 TIMED: Mapping[str, tuple[Callable[[Any, FloatArray], Any], int, str]] = {
@@ -53,6 +64,8 @@ TIMED: Mapping[str, tuple[Callable[[Any, FloatArray], Any], int, str]] = {
     "integral": (lambda x, t: _integral(x, t), 1, "integral over time since the first sample, trapezoids"),
 }
 FUNCTIONS = {**PLAIN, **TIMED}
+DECODING = frozenset(name for name in PLAIN if "int" in name) | {"sign_magnitude", "unwrap"}
+"""What makes numbers of raw codes."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +74,12 @@ class Expression:
 
     text: str
     columns: tuple[str, ...]
+
+    @property
+    def decodes(self) -> bool:
+        """Whether it makes numbers of raw codes."""
+        nodes = ast.walk(ast.parse(self.text.strip(), mode="eval"))
+        return any(isinstance(node, ast.Name) and node.id in DECODING for node in nodes)
 
     def values(self, columns: Mapping[str, FloatArray], t: FloatArray) -> FloatArray:
         """Return its value at every sample. columns: by name, shape (n,). t: stamps, s, shape (n,).
@@ -176,6 +195,10 @@ def _real(result: Any, arguments: Sequence[Any]) -> Any:
     if np.any(made):
         raise ValueError(f"no real number at sample {int(np.argmax(made)) + 1}")
     return result
+
+
+def _wrapped(x: Any, bits: int) -> Any:
+    return np.mod(np.asarray(x) + 2.0 ** (bits - 1), 2.0**bits) - 2.0 ** (bits - 1)
 
 
 def _integral(x: Any, t: FloatArray) -> Any:

@@ -1,8 +1,8 @@
 """Import maps: which column of a foreign file is which channel, and in which unit.
 
 about: one line that goes into the bag's notes
-time: {column: t, unit: s}                    # or {rate: 1000} (Hz) where the file has no time
-where: {column: test_nr, below: 100}          # optional: only these rows; also from:, equals:
+time: {column: t, unit: s}                    # or {rate: 1000} (Hz) without stamps, or set_points at rest
+where: {column: test_nr, below: 100}          # optional: only these rows; also from:, equals: (a text, too)
 runs: {column: episode_index}                 # optional: a file of several runs, one for each value
 delimiter: ";"                                # optional: text files only, else seen from the first line
 header: false                                 # optional: text files only, else seen from the first line
@@ -18,6 +18,7 @@ channels:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,7 +26,7 @@ from pathlib import Path
 from msg_adapters.tables.column_units import CHANNELS, LINEAR, unit
 from msg_adapters.tables.elements import choose_element, is_open
 from msg_adapters.tables.layout import DELIMITERS
-from msg_adapters.tables.map_keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
+from msg_adapters.tables.map_keys import CHANNEL, MAP, RATES, RUNS, SET_POINTS, TIME, WHERE
 from msg_adapters.tables.map_terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import list_names, quote
@@ -39,7 +40,7 @@ class RowFilter:
     column: str
     start: float | None = None
     stop: float | None = None
-    equals: float | None = None
+    equals: float | str | None = None
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ class ImportMap:
     runs: str | None = None
     header: bool | None = None
     decimal: str = "."
+    set_points: bool = False
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -90,12 +92,15 @@ class ImportMap:
         held = {name: terms for name, terms in self.channels.items() if terms[0].file == file}
         return replace(self, channels=held)
 
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The columns that choose rows."""
+        return (*([self.where.column] if self.where else ()), *([self.runs] if self.runs else ()))
+
     def columns(self) -> list[str]:
         """Return every needed column, each once."""
         terms = [column for terms in self.channels.values() for term in terms for column in term.columns]
-        where = [self.where.column] if self.where is not None else []
-        runs = [self.runs] if self.runs is not None else []
-        return list(dict.fromkeys([*(self.time.columns if self.time else ()), *where, *runs, *terms]))
+        return list(dict.fromkeys([*(self.time.columns if self.time else ()), *self.labels, *terms]))
 
 
 def load_map(path: str | Path) -> ImportMap:
@@ -113,11 +118,22 @@ def load_map(path: str | Path) -> ImportMap:
 
 
 def _map(path: Path, document: object) -> ImportMap:
+    if isinstance(document, Mapping) and "channels" in document and "time" not in document:
+        expected = f"a column with its unit, `{{rate: 1000}}` Hz, or `{SET_POINTS}` for readings at rest"
+        raise FieldError(f"map: no 'time', expected {expected}", "map")
     body = checked_keys(document, "map", MAP)
-    time = checked_keys(body["time"], "time", TIME)
+    set_points = body["time"] == SET_POINTS
+    time = checked_keys({"rate": 1.0} if set_points else body["time"], "time", TIME)
     if ("rate" in time) == ("column" in time or "expression" in time):
         raise FieldError("time: expected either a column with its unit, or a rate in Hz", "time")
     rate = _rate(time["rate"]) if "rate" in time else None
+    for name in body["channels"] if isinstance(body["channels"], Mapping) else ():
+        if name not in CHANNELS and re.search(r"curr|amp|^i_?q|effort|torque", str(name), re.IGNORECASE):
+            raise FieldError(
+                f"channels: no {quote(name)}: map it as `command` if it was commanded, as `motor_torque` if"
+                " measured; a current with `scale:`, N m for each A",
+                f"channels.{name}",
+            )
     channels = checked_keys(body["channels"], "channels", CHANNEL)
     return ImportMap(
         path=path,
@@ -129,6 +145,7 @@ def _map(path: Path, document: object) -> ImportMap:
         runs=_runs(body["runs"]) if "runs" in body else None,
         header=_header(body.get("header")),
         decimal=_decimal(body.get("decimal", ".")),
+        set_points=set_points,
         about=" ".join(str(body.get("about", "")).split()),
     )
 
@@ -175,11 +192,14 @@ def _one_kind(channels: dict[str, tuple[ChannelTerm, ...]]) -> dict[str, tuple[C
 
 def _rows(value: object) -> RowFilter:
     body = checked_keys(value, "where", WHERE)
-    limits = {key: number(body[key], f"where.{key}") for key in ("from", "below", "equals") if key in body}
-    if not limits:
+    limits = {key: number(body[key], f"where.{key}") for key in ("from", "below") if key in body}
+    equals = body.get("equals")
+    if not limits and equals is None:
         raise FieldError("where: expected one of from, below, equals", "where")
+    if equals is not None and not isinstance(equals, str):
+        equals = number(equals, "where.equals")
     column = column_name(body["column"], "where.column")
-    return RowFilter(column, limits.get("from"), limits.get("below"), limits.get("equals"))
+    return RowFilter(column, limits.get("from"), limits.get("below"), equals)
 
 
 def _delimiter(value: object) -> str | None:

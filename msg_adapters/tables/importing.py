@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,12 +13,16 @@ import numpy as np
 from msg_adapters.tables.clock import spread_repeats
 from msg_adapters.tables.column_files import read_columns
 from msg_adapters.tables.column_table import Table
-from msg_adapters.tables.column_units import LINEAR, canonical, unit
+from msg_adapters.tables.column_units import CHANNELS, LINEAR, canonical, unit
 from msg_adapters.tables.import_map import ImportMap, RowFilter
 from msg_adapters.tables.map_terms import ChannelTerm
+from msg_adapters.tables.raw_codes import raw_code
+from msg_adapters.tables.set_points import SET_POINTS, static_lines
+from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.units import in_motion, plain
+from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import ImportMapError
-from rsea_ros.records.record import UNITS, BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.records.record import IMPORTED, UNITS, BoolArray, Channel, Fault, FloatArray, Record
 
 UNDATED = 1e8
 """Stamps below this (s, three years after 1970) have no date: the file's clock starts near zero."""
@@ -25,6 +30,7 @@ START_NS = 1_000_000_000
 """Where an undated record starts: a stamp of zero would mean `not set`."""
 MOST_RUNS = 10_000
 """Of a file: a bag each."""
+_MOST_NAMED = 20
 LATEST = 2.0**31
 """s. The seconds of a message's stamp are a signed integer of 32 bits."""
 
@@ -36,12 +42,14 @@ class Imported:
     record: Record
     mapping: ImportMap
     index: int | None = None
-    run: float | None = None
+    run: float | str | None = None
 
     @property
     def name(self) -> str:
-        """Its suffix among the others of the same file: `-joint2-run7`."""
+        """Its suffix among the others of the same file: `-joint2-run7`, `-joint2-chirp`."""
         joint = "" if self.index is None else f"-joint{self.index}"
+        if isinstance(self.run, str):
+            return f"{joint}-{re.sub('[^-.0-9A-Za-z]+', '_', self.run)}"
         return joint + ("" if self.run is None else f"-run{self.run:.15g}")
 
 
@@ -88,9 +96,9 @@ def import_records(
 
 
 @contextmanager
-def _name_errors(path: str | Path, mapping: ImportMap, run: float | None) -> Iterator[None]:
+def _name_errors(path: str | Path, mapping: ImportMap, run: float | str | None) -> Iterator[None]:
     """Let an error name file and run. Raises ImportMapError."""
-    where = f"{path}" if run is None else f"{path}: {mapping.runs} = {run:g}"
+    where = f"{path}" if run is None else f"{path}: {mapping.runs} = {_text(run)}"
     try:
         yield
     except ValueError as error:
@@ -107,26 +115,55 @@ def _file(path: Path, name: str, mapping: ImportMap) -> Path:
 def _table(path: Path, name: str, maps: Sequence[ImportMap]) -> Table:
     """Read the columns that all joints need from a file."""
     columns = dict.fromkeys(column for mapping in maps for column in mapping.of_file(name).columns())
-    return read_columns(path, list(columns), maps[0].delimiter, maps[0].header, maps[0].decimal)
+    labels = frozenset(label for mapping in maps for label in mapping.labels)
+    one = maps[0]
+    stamps = frozenset(one.time.columns if one.time else ())
+    text = {"delimiter": one.delimiter, "header": one.header, "decimal": one.decimal}
+    return read_columns(path, list(columns), labels=labels, stamps=stamps, **text)
 
 
-def _runs(path: str | Path, tables: Mapping[str, Table], mapping: ImportMap) -> list[float | None]:
+def _text(run: float | str) -> str:
+    return run if isinstance(run, str) else f"{run:.15g}"
+
+
+def _runs(
+    path: str | Path, tables: Mapping[str, Table], mapping: ImportMap
+) -> Sequence[float | str | None]:
     """Return the runs in order, None where the map knows of no runs."""
     if mapping.runs is None:
         return [None]
-    values = next(iter(tables.values()))[mapping.runs]
-    runs = np.unique(values[~np.isnan(values)])
+    table = next(iter(tables.values()))
+    runs = np.unique(table.values(mapping.runs)[table.given(mapping.runs)])
     if not 0 < len(runs) <= MOST_RUNS:
         raise ImportMapError(f"{path}: {len(runs)} values in {mapping.runs}, expected 1 to {MOST_RUNS} runs")
-    return [float(run) for run in runs]
+    return [str(run) if runs.dtype.kind == "U" else float(run) for run in runs]
 
 
-def _part(path: Path, table: Table, mapping: ImportMap, run: float | None) -> _Part:
+def _part(path: Path, table: Table, mapping: ImportMap, run: float | str | None) -> _Part:
     with _name_errors(path, mapping, run):
         keep, undated = _rows_kept(table, mapping, run)
         stamps, repeats = _stamps(path, table, mapping, keep)
-        values = {name: _values(table, terms, keep, stamps) for name, terms in mapping.channels.items()}
-    return _Part(stamps, values, table.notes, (*_rows_left_out(path, table, undated), *repeats))
+        codes = [f for name, terms in mapping.channels.items() for f in _codes(name, table, terms, keep)]
+        raw = {fault.channel for fault in codes}
+        if raw == mapping.channels.keys():
+            raise ImportMapError(f"no channel is left: {codes[0].channel}: {codes[0].detail}")
+        kept = {name: terms for name, terms in mapping.channels.items() if name not in raw}
+        values = {name: _values(table, terms, keep, stamps) for name, terms in kept.items()}
+    return _Part(stamps, values, table.notes, (*_rows_left_out(path, table, undated), *repeats, *codes))
+
+
+def _codes(name: str, table: Table, terms: Sequence[ChannelTerm], keep: BoolArray) -> Iterator[Fault]:
+    """Yield the fault of a channel that takes a device's codes for numbers."""
+    for term in terms:
+        is_angle = CHANNELS[name] == "angle" and unit(term.unit)[0] not in LINEAR
+        is_read = term.expression is not None and term.expression.decodes
+        for column in () if is_read else term.columns:
+            values = table[column][keep]
+            code = raw_code(column, values, term.gain if is_angle and term.expression is None else None)
+            if code is not None:
+                held = f"{column} holds {code[0]}, {np.nanmin(values):.0f} to {np.nanmax(values):.0f}"
+                yield Fault("raw_codes", name, 1.0, f"left out: {held}; in the map: {code[1]}")
+                return
 
 
 def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Record:
@@ -141,8 +178,11 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
             channels[name] = _arrivals(name, channels[name])
         faults += lost
     lines = [f"{fault.channel}: {fault.detail}" for fault in faults]
+    if mapping.set_points:
+        lines += [SET_POINTS, *static_lines(Record(channels))]
+        channels = {name: held for name, held in channels.items() if name not in ("command", "reference")}
     notes = (
-        f"imported from {Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
+        f"{IMPORTED}{Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
         *(note for part in parts for note in part.notes),
         *lines,
     )
@@ -157,6 +197,11 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
         low, high = channel.y.min(), channel.y.max()
         si = plain(in_motion(UNITS[name], linear=_is_linear(mapping)))
         lines.append(f"{name}: {len(channel)} samples of {columns}, {low:.6g} to {high:.6g} {si}")
+    if record.driving is None and not mapping.set_points:
+        lines.append(
+            "no command: `check` compares the channels; for `identify` and `diagnose` map the commanded"
+            " torque or current as `command`, or the measured one where no other was logged"
+        )
     return lines
 
 
@@ -171,33 +216,57 @@ def _is_linear(mapping: ImportMap) -> bool:
     return any(unit(term.unit)[0] in LINEAR for term in terms)
 
 
-def _rows_kept(table: Table, mapping: ImportMap, run: float | None) -> tuple[BoolArray, int]:
+def _rows_kept(table: Table, mapping: ImportMap, run: float | str | None) -> tuple[BoolArray, int]:
     """Return which rows count, and how many are left out without a stamp or by `where`."""
     keep = np.ones(len(next(iter(table.columns.values()))), np.bool_)
     where = mapping.where
     for column in (*(mapping.time.columns if mapping.time else ()), *([where.column] if where else [])):
-        keep &= ~np.isnan(table[column])
+        keep &= table.given(column)
     undated = int(np.count_nonzero(~keep))
     if mapping.runs is not None:
-        keep &= table[mapping.runs] == run
+        keep &= table.values(mapping.runs) == run
     if where is not None:
-        values = table[where.column]
-        keep &= values >= where.start if where.start is not None else True
-        keep &= values < where.stop if where.stop is not None else True
-        keep &= values == where.equals if where.equals is not None else True
+        keep &= _chosen(table, where)
     if np.count_nonzero(keep) < 2:
         raise ImportMapError(f"fewer than two rows{_spread(table, where)}, expected a record")
+    if table.trials is not None and (count := len(np.unique(table.trials[1][keep]))) > 1:
+        name = table.trials[0]
+        raise ImportMapError(
+            f"rows of {count} trials, expected one: `runs: {{column: {name}}}` in the map makes a bag each,"
+            f" `where: {{column: {name}, equals: 1}}` takes the first"
+        )
     return keep, undated
 
 
-def _spread(table: Table, where: RowFilter | None) -> str:
-    if where is None:
-        return ""
+def _chosen(table: Table, where: RowFilter) -> BoolArray:
+    """Return the rows that a condition keeps. Raises ImportMapError for a limit of texts."""
+    if where.column in table.labels:
+        if where.start is not None or where.stop is not None:
+            raise ImportMapError(f"where: {where.column} holds texts{_held(table, where)}, expected equals")
+        assert where.equals is not None
+        return np.asarray(table.labels[where.column] == _text(where.equals))
     values = table[where.column]
-    if np.isnan(values).all():
-        return f" left by where ({where.column} is empty)"
-    low, high = np.nanmin(values), np.nanmax(values)
-    return f" left by where ({where.column} goes from {low:g} to {high:g})"
+    keep = np.ones(len(values), np.bool_)
+    keep &= values >= where.start if where.start is not None else True
+    keep &= values < where.stop if where.stop is not None else True
+    if isinstance(where.equals, str) and not is_decimal(where.equals):
+        raise ImportMapError(f"where.equals is {where.equals!r}, expected a number{_held(table, where)}")
+    return keep & (values == float(where.equals)) if where.equals is not None else keep
+
+
+def _spread(table: Table, where: RowFilter | None) -> str:
+    return "" if where is None else f" left by where{_held(table, where)}"
+
+
+def _held(table: Table, where: RowFilter) -> str:
+    """Return what is in the column of a condition, for people."""
+    values = table.values(where.column)[table.given(where.column)]
+    if not values.size:
+        return f" ({where.column} is empty)"
+    if values.dtype.kind == "U":
+        texts = [quote(str(text)) for text in np.unique(values)[:_MOST_NAMED]]
+        return f" ({where.column} is {list_names(texts, 'or')})"
+    return f" ({where.column} goes from {values.min():g} to {values.max():g})"
 
 
 def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fault]:
@@ -248,8 +317,14 @@ def _stamps(
         start = int(np.argmax(keep)) if mapping.runs is not None else 0
         return (np.flatnonzero(keep) - start) / float(mapping.rate or 1.0), []
     whole = ~np.isnan(_column_of(table, mapping.time.columns))
-    if mapping.runs is not None:
-        whole &= table[mapping.runs] == table[mapping.runs][np.argmax(keep)]
+    for labels in [mapping.runs] if mapping.runs is not None else []:
+        whole &= table.values(labels) == table.values(labels)[np.argmax(keep)]
+    if table.trials is not None:
+        whole &= table.trials[1] == table.trials[1][np.argmax(keep)]
+    if mapping.time.column in table.dated and canonical(mapping.time.unit) != "s":
+        raise ImportMapError(
+            f"time.unit is {mapping.time.unit!r}, and {mapping.time.column} holds date-times, expected s"
+        )
     dated = np.flatnonzero(whole)
     t = _values(table, (mapping.time,), whole, dated.astype(np.float64))
     back = np.flatnonzero(np.diff(t) < 0)

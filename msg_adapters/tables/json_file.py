@@ -1,40 +1,58 @@
 """Columns out of JSON: records, `[{"t": 0, "q": [1, 2]}, …]`, or columns, `{"t": [0, …], "q": [[1, 2], …]}`.
 
-A column is named by its way, `log.motor.current`, through mappings and, once, through a list of records.
-JSON lines (`.jsonl`, `.ndjson`) are a list of records.
+A column is named by its way, `log.motor.current`, through mappings and lists of records. JSON lines
+(`.jsonl`, `.ndjson`) are a list of records. A record whose values are long lists is a trial, whose other
+values hold for all its samples; the way to the list of trials (`.`: the document) numbers them, from 1.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from msg_adapters.tables.child import finite_table
-from msg_adapters.tables.column_table import Table, check_size, index_of
+from msg_adapters.tables.column_table import Table, Wanted, check_size, checked_lengths, index_of
 from msg_adapters.tables.elements import ElementAddress, place_of
+from msg_adapters.tables.numerals import seconds_of
 from rsea_ros.documents.wording import brief, no_utf_8, quote
 from rsea_ros.records.record import FloatArray
 
 LARGEST_FILE = 200_000_000
 """Bytes: read as a whole, they take about eight times as much memory."""
 LINES = (".jsonl", ".ndjson")
+_SHORTEST_TRIAL = 20
+"""Samples. Shorter lists are taken for the numbers of one sample."""
 _DEEPEST = 4
 """Levels of names that a message lists."""
 
 
-def read_json(path: Path, columns: Sequence[str]) -> Table:
+def read_json(path: Path, wanted: Wanted) -> Table:
     """Return the requested columns. Raises OSError and ValueError with column, sample and expectation."""
     if path.stat().st_size > LARGEST_FILE:
         raise ValueError(f"{path.stat().st_size} bytes of JSON, expected fewer than {LARGEST_FILE}")
     document = _document(path)
-    vectors = {column: _vector(column, document) for column in columns}
-    check_size(len(next(iter(vectors.values()))), len(columns))
-    return finite_table(vectors)
+    places = {column: place_of(column) for column in wanted.columns}
+    cells = {column: _cells_of(column, place, document) for column, place in places.items()}
+    lengths = _trial_lengths({column: c for column, c in cells.items() if places[column].index is None})
+    if lengths and all(isinstance(cells[column][0], list) for column in wanted.stamps):
+        cells = {column: _spread(column, c, lengths) for column, c in cells.items()}
+    else:
+        lengths = []
+    texts = [column for column in wanted.labels if any(isinstance(cell, str) for cell in cells[column])]
+    labels = {c: np.array(["" if v is None else str(v) for v in cells[c]]) for c in texts}
+    dated = frozenset(c for c in wanted.stamps if isinstance(cells[c][0], str))
+    vectors = {c: _vector(c, places[c], cells[c], c in dated) for c in cells if c not in labels}
+    check_size(len(next(iter(cells.values()))), len(cells))
+    checked_lengths({column: len(c) for column, c in cells.items()})
+    numbers = np.repeat(np.arange(1.0, len(lengths) + 1), lengths)
+    trials = (_list_of(document, next(iter(places.values())).base), numbers) if lengths else None
+    return replace(finite_table(vectors), labels=labels, dated=dated, trials=trials)
 
 
 def _document(path: Path) -> Any:
@@ -68,10 +86,10 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return mapping
 
 
-def _vector(column: str, document: Any) -> FloatArray:
-    place = place_of(column)
+def _cells_of(column: str, place: ElementAddress, document: Any) -> list[Any]:
+    """Return the cells of a column, of the column that is a list of trials their numbers."""
     try:
-        cells = _cells(document, place.base)
+        cells = _cells(document, "" if place.base == "." else place.base)
     except KeyError:
         index_of(column, list(dict.fromkeys(_names(document))))
         raise ValueError(f"column {column!r} is not a list of numbers, expected one") from None
@@ -79,6 +97,41 @@ def _vector(column: str, document: Any) -> FloatArray:
         cells = _element(cells, place, column, 0)
     if not isinstance(cells, list) or len(cells) < 2:
         raise ValueError(f"column {column!r} is {quote(cells)}, expected a list of numbers")
+    return list(range(1, len(cells) + 1)) if all(isinstance(cell, dict) for cell in cells) else cells
+
+
+def _trial_lengths(cells: Mapping[str, list[Any]]) -> list[int]:
+    """Return how many samples each trial has; empty for samples that are no lists. Raises ValueError."""
+    held = {column: c for column, c in cells.items() if all(isinstance(cell, list) for cell in c)}
+    lengths = {column: [len(cell) for cell in c] for column, c in held.items()}
+    for column, one in lengths.items():
+        for at, (count, other) in enumerate(zip(one, next(iter(lengths.values())), strict=False), 1):
+            if count != other:
+                raise ValueError(f"trial {at}: {column} has {count} values, {next(iter(lengths))} {other}")
+    found = next(iter(lengths.values()), [])
+    return found if found and min(found) >= _SHORTEST_TRIAL else []
+
+
+def _spread(column: str, cells: list[Any], lengths: Sequence[int]) -> list[Any]:
+    """Return a cell for each sample: those of a trial's list, or the one value of the trial."""
+    if len(cells) != len(lengths):
+        raise ValueError(f"column {column!r} has {len(cells)} values, expected one for {len(lengths)} trials")
+    each = zip(cells, lengths, strict=True)
+    return [one for c, n in each for one in (c if isinstance(c, list) and len(c) == n else [c] * n)]
+
+
+def _list_of(value: Any, way: str) -> str:
+    """Return the way to the list of records that a way goes through, `.` for the document."""
+    before = ""
+    while not isinstance(value, list):
+        name = max((n for n in value if way == n or way.startswith(f"{n}.")), key=len)
+        value, way, before = value[name], way[len(name) + 1 :], f"{before}.{name}"
+    return before.removeprefix(".") or "."
+
+
+def _vector(column: str, place: ElementAddress, cells: list[Any], is_dated: bool) -> FloatArray:
+    if is_dated:
+        cells = [seconds_of(cell) if isinstance(cell, str) else cell for cell in cells]
     return np.array([_number(cell, place, column, at) for at, cell in enumerate(cells)], np.float64)
 
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from msg_adapters.tables.column_table import index_of
+from msg_adapters.tables.column_table import Wanted, index_of
 from msg_adapters.tables.elements import base_and_index
-from msg_adapters.tables.numerals import is_numeral
+from msg_adapters.tables.numerals import is_datum
 
-COMMENT = "#"
+COMMENTS = ("#", "%")
 BLANKS = " "
 """As delimiter: one or several blanks or tabs."""
 DELIMITERS = {",": ",", ";": ";", "\t": "\t", "|": "|", " ": BLANKS, "tab": "\t", "blanks": BLANKS}
@@ -42,7 +42,7 @@ class TextLayout:
 def counts(line: str) -> bool:
     """Return whether a line is neither empty nor a comment."""
     text = line.strip()
-    return bool(text) and not text.startswith(COMMENT)
+    return bool(text) and not text.startswith(COMMENTS)
 
 
 def split(line: str, delimiter: str) -> list[str]:
@@ -60,29 +60,39 @@ def index_in(column: str, names: Sequence[str]) -> int:
 
 
 def layout_of(
-    lines: Sequence[str], columns: Sequence[str], path: Path, delimiter: str | None,
-    header: bool | None = None, decimal: str = ".",
-) -> tuple[int, TextLayout]:  # fmt: skip
+    lines: Sequence[str], comments: Sequence[str], wanted: Wanted, path: Path
+) -> tuple[int, TextLayout]:
     """Return which of the first lines that count begins the table, and the layout by it.
 
-    header: whether that line names the columns; None: if no delimiter makes numbers of all of it. It is the
-    first line, or below a preamble the first that names all requested columns. Without a delimiter it is the
-    first of several with which the line has the requested columns; otherwise the one that yields most of
-    them, and of these the one that makes most cells. A comma between cells of decimal commas, which are
-    quoted then, comes last.
+    wanted.header: whether that line names the columns; None: if no delimiter makes numbers of all of it. It
+    is the first line, or below a preamble the first that names all requested columns; a comment above may
+    name the columns of numbers. Without a delimiter it is the first of several with which the line has the
+    requested columns; otherwise the one that yields most of them, and of these the one that makes most cells.
+    A comma between cells of decimal commas, which are quoted then, comes last.
     """
+    columns, header = wanted.columns, wanted.header
     usual = "\t" if ".tsv" in path.suffixes else ","
-    known = sorted(dict.fromkeys((usual, "\t", ";", ",", "|", BLANKS)), key=lambda one: one == decimal)
-    tried = [delimiter] if delimiter else known
-    layouts = [_layout(lines[0], one, header) for one in tried]
+    known = sorted(dict.fromkeys((usual, "\t", ";", ",", "|", BLANKS)), key=lambda one: one == wanted.decimal)
+    tried = [wanted.delimiter] if wanted.delimiter else known
+    layouts = [_layout(lines, one, wanted) for one in tried]
     for layout in sorted(layouts, key=lambda layout: layout.headed):
         if all(_has(layout, column) for column in columns):
             return 0, layout
-    for at, line in enumerate(lines[1:] if header is not False else (), 1):
-        for layout in (_layout(line, one, header) for one in tried):
+    for layout in (one for one in layouts if not one.headed):
+        for named in (TextLayout(layout.delimiter, n, False) for n in _commented(comments, known)):
+            if len(named.names) == len(layout.names) and all(_names(named, column) for column in columns):
+                return 0, named
+    for at in range(1, len(lines) if header is not False else 0):
+        for layout in (_layout(lines[at:], one, wanted) for one in tried):
             if layout.headed and all(_names(layout, column) for column in columns):
                 return at, layout
     return 0, max(layouts, key=lambda one: (sum(_names(one, column) for column in columns), len(one.names)))
+
+
+def _commented(comments: Sequence[str], delimiters: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    """Yield what may be the names of columns in comments, as numpy.savetxt(header=…) writes them."""
+    for line in reversed(comments):
+        yield from (tuple(split(line.lstrip(" \t#%"), one)) for one in delimiters)
 
 
 def _names(layout: TextLayout, column: str) -> bool:
@@ -94,10 +104,19 @@ def _has(layout: TextLayout, column: str) -> bool:
     return base in layout.names or (base.isdecimal() and 1 <= int(base[:6]) <= len(layout.names))
 
 
-def _layout(first: str, delimiter: str, header: bool | None) -> TextLayout:
-    cells = split(first, delimiter)
-    while cells[1:] and not cells[-1]:
-        cells.pop()
-    if all(map(is_numeral, cells)) if header is None else not header:
+def _layout(lines: Sequence[str], delimiter: str, wanted: Wanted) -> TextLayout:
+    """Return the layout by the first of some lines; unnamed columns at its end are those that hold values."""
+    cells, header = split(lines[0], delimiter), wanted.header
+    is_numbered = all(column.isdecimal() for column in wanted.columns)
+    if is_numbered or not cells[-1:] or not cells[-1]:
+        width = max((_width(split(line, delimiter)) for line in lines[1:]), default=0)
+        cells = cells[: max(width, _width(cells), 1)]
+        cells += [""] * (width - len(cells)) if is_numbered else []
+    if all(is_datum(cell) for cell in cells if cell) if header is None else not header:
         return TextLayout(delimiter, tuple(str(number + 1) for number in range(len(cells))), headed=False)
     return TextLayout(delimiter, tuple(cells), headed=True)
+
+
+def _width(cells: Sequence[str]) -> int:
+    """Return how many cells there are up to the last that is not empty."""
+    return max((at for at, cell in enumerate(cells, 1) if cell), default=0)

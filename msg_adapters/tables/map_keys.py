@@ -11,9 +11,12 @@ from rsea_ros.documents.strict_yaml import NEEDED, Key, table
 RATES = (1e-3, 1e6)
 """Hz, of a file without stamps."""
 
+SET_POINTS = "set_points"
+"""In place of a time: a table of readings at rest."""
+
 MAP = (
     Key("about", "text", "empty", "one line for the notes of the bag"),
-    Key("time", "mapping", NEEDED, "source of the stamps: a column with its unit, or a rate"),
+    Key("time", f"mapping, `{SET_POINTS}`", NEEDED, "source of the stamps: a column and its unit, or a rate"),
     Key("where", "mapping", "all rows", "condition on the rows that are used"),
     Key("runs", "mapping", "one run", "splits a file into runs by the values of a column, one bag for each"),
     Key("header", "`true`, `false`", "detected", "whether a text file begins with column names"),
@@ -33,13 +36,13 @@ TIME = (
     Key("rate", f"{RATES[0]:g} to {RATES[1]:g} Hz", "a column", "sample rate of a file without stamps"),
 )
 RUNS = (
-    Key("column", "name or number of a column", NEEDED, "the column that numbers the runs"),
+    Key("column", "name or number of a column", NEEDED, "the column that numbers or names the runs"),
 )
 WHERE = (
     Key("column", "name or number of a column", NEEDED, "the column to compare"),
     Key("from", "number, as in the file", "no limit", "keeps rows with this value or more"),
     Key("below", "number, as in the file", "no limit", "keeps rows with less than this value"),
-    Key("equals", "number, as in the file", "no limit", "keeps rows with exactly this value"),
+    Key("equals", "number or text", "no limit", "keeps rows with exactly this value"),
 )
 TERM = (
     Key("column", "name or number of a column", "an expression", "values; `q[2]`: one of several in a cell"),

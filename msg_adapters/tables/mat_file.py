@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 from msg_adapters.tables.child import Reader
-from msg_adapters.tables.column_table import LARGEST, Table
-from msg_adapters.tables.foreign_files import HDF5
+from msg_adapters.tables.column_table import LARGEST, Table, Wanted
 
+HDF5 = b"\x89HDF\r\n\x1a\n"
 CHILD = Path(__file__).with_name("_mat_reader.py")
 TIME = 90.0
 """s. The largest file that is read takes 3 s."""
@@ -17,11 +16,11 @@ _HEADER = 128
 """Bytes before the first variable."""
 
 
-def read_mat(path: Path, columns: Sequence[str]) -> Table:
+def read_mat(path: Path, wanted: Wanted) -> Table:
     """Return the requested variables. Raises OSError and ValueError with variable, shape and expectation."""
     _refuse_version_7_3(path)
     _refuse_cut_off(path)
-    return Reader("MAT", CHILD, TIME, LARGEST).read(path, columns)
+    return Reader("MAT", CHILD, TIME, LARGEST).read(path, wanted.columns)
 
 
 def _refuse_version_7_3(path: Path) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from msg_adapters.tables.child import finite_table
-from msg_adapters.tables.column_table import LARGEST, Table, index_of
+from msg_adapters.tables.column_table import LARGEST, Table, Wanted, index_of
 from msg_adapters.tables.elements import ElementAddress, place_of
 from rsea_ros.documents.wording import brief
 from rsea_ros.records.record import FloatArray
@@ -22,12 +22,12 @@ _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0
 _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, KeyError, SyntaxError)
 
 
-def read_npz(path: Path, columns: Sequence[str]) -> Table:
+def read_npz(path: Path, wanted: Wanted) -> Table:
     """Return the requested arrays. Raises OSError and ValueError with array, shape and expectation."""
     try:
         with zipfile.ZipFile(path) as archive:
             sizes = {n.removesuffix(".npy"): archive.getinfo(n).file_size for n in archive.namelist()}
-            places = {column: _check_address(place_of(column), list(sizes)) for column in columns}
+            places = {column: _check_address(place_of(column), list(sizes)) for column in wanted.columns}
             arrays: dict[str, Any] = {}
             for place in places.values():
                 name = _root(place.base, sizes)
@@ -39,7 +39,7 @@ def read_npz(path: Path, columns: Sequence[str]) -> Table:
         raise ValueError(f"no NPZ file that can be read ({brief(str(error))}), expected one") from None
 
 
-def read_npy(path: Path, columns: Sequence[str]) -> Table:
+def read_npy(path: Path, wanted: Wanted) -> Table:
     """Return columns of the one array, by number from 1 or by the name of a field."""
     with path.open("rb") as file:
         array = _array(file, path.name, path.stat().st_size)
@@ -47,7 +47,7 @@ def read_npy(path: Path, columns: Sequence[str]) -> Table:
     if array.ndim > 2:
         raise ValueError(f"array of shape {array.shape}, expected a vector or a matrix")
     vectors = {}
-    for column in columns:
+    for column in wanted.columns:
         at = index_of(column, names)
         values = array[names[at]] if array.dtype.names else array if array.ndim == 1 else array[:, at]
         vectors[column] = _vector(column, values)
@@ -116,6 +116,8 @@ def _numbers(column: str, place: ElementAddress, arrays: Any, names: Any) -> Flo
 
 def _vector(column: str, values: Any) -> FloatArray:
     is_vector = values.size >= 2 and values.size == max(values.shape)
+    if values.dtype.kind in "Mm" and is_vector:
+        return np.asarray(values.ravel().astype(f"{values.dtype.kind}8[ns]").astype(np.float64) * 1e-9)
     if values.dtype.kind not in "iufb" or not is_vector:
         more = f" or a column of the matrix, {column}[0]" if values.ndim == 2 and not is_vector else ""
         raise ValueError(

@@ -1,13 +1,18 @@
-"""Numbers in the cells of text tables: plain decimals, Fortran's D exponents, decimal commas."""
+"""Numbers in the cells of tables: plain decimals, Fortran's D exponents, decimal commas, ISO date-times."""
 
 from __future__ import annotations
 
 import re
+from datetime import datetime, timedelta, timezone
 
 from rsea_ros.documents.strict_yaml import is_decimal
 
 _FORTRAN = re.compile(r"([-+]?[0-9.]+)[dD]([-+]?[0-9]+)")
 _COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eEdD][-+]?[0-9]+)?")
+_DATE_TIME = re.compile(
+    r"([0-9]{4})[-/]([0-9]{2})[-/]([0-9]{2})[T ]+([0-9]{2}):([0-9]{2}):([0-9]{2})(?:[.,]([0-9]+))?"
+    r" ?(?:(?:Z|UTC|GMT)|([+-][0-9]{2}):?([0-9]{2})?)?"
+)
 
 
 def numeral(cell: str, decimal: str = ".") -> str:
@@ -22,6 +27,29 @@ def is_numeral(cell: str) -> bool:
     return is_decimal(numeral(cell, ","))
 
 
+def is_datum(cell: str) -> bool:
+    """Return whether a cell is a number or a date-time."""
+    return is_numeral(cell) or _DATE_TIME.fullmatch(cell) is not None
+
+
 def has_decimal_comma(cell: str) -> bool:
     """Return whether a cell is a number with a decimal comma."""
     return bool(_COMMA.fullmatch(cell))
+
+
+def seconds_of(cell: str) -> float | None:
+    """Return an ISO 8601 date-time as s since 1970, None for anything else; without a zone it is UTC.
+
+    Raises ValueError for a date or a time that there is not.
+    """
+    match = _DATE_TIME.fullmatch(cell)
+    if match is None:
+        return None
+    *fields, fraction, hours, minutes = match.groups()
+    zone = timezone(timedelta(hours=int(hours or 0), minutes=int(f"{(hours or '+')[0]}{minutes or 0}")))
+    try:
+        year, month, day, hour, minute, second = map(int, fields)
+        whole = datetime(year, month, day, hour, minute, second, tzinfo=zone).timestamp()
+    except ValueError as error:
+        raise ValueError(f"{error}, expected a date-time") from None
+    return whole + float(f"0.{fraction or 0}")

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from msg_adapters.tables.column_table import Table, check_size
+from msg_adapters.tables.column_table import Labels, Table, Wanted, check_size
 from msg_adapters.tables.elements import base_and_index, number_in
 from msg_adapters.tables.layout import BLANKS, TextLayout, counts, index_in, layout_of
-from msg_adapters.tables.numerals import has_decimal_comma, numeral
+from msg_adapters.tables.numerals import has_decimal_comma, is_numeral, numeral, seconds_of
 from msg_adapters.tables.text_lines import blocks_of_lines
 from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.wording import brief, quote
@@ -29,29 +30,23 @@ _PREAMBLE = 100
 """Lines that count among which the names of the columns are sought."""
 
 
-def read_text(
-    path: Path,
-    columns: Sequence[str],
-    delimiter: str | None,
-    header: bool | None = None,
-    decimal: str = ".",
-) -> Table:
+def read_text(path: Path, wanted: Wanted) -> Table:
     """Return the requested columns. Raises ValueError with line, column, value and expectation.
 
     Lines above the names of the columns, and one of units below them, are left out with a note.
     """
-    head = list(islice(chain.from_iterable(_numbered_blocks(path)), _PREAMBLE))
+    comments, head = _head(path)
     if not head:
         raise ValueError("empty file, expected a row of column names and rows of numbers")
-    at, layout = layout_of([line for _, line in head], columns, path, delimiter, header, decimal)
+    at, layout = layout_of([line for _, line in head], comments, wanted, path)
     first, notes = head[at][0] + layout.headed, _preamble(head[:at])
-    places = {column: base_and_index(column, layout.names) for column in columns}
+    places = {column: base_and_index(column, layout.names) for column in wanted.columns}
     indices = {column: index_in(base, layout.names) for column, (base, _) in places.items()}
     if layout.headed and head[at + 1 :] and is_row_of_texts(layout.cells(head[at + 1][1])):
         number, line = head[at + 1]
         first, notes = number + 1, (*notes, f"line {number} is taken for the units: {brief(line, _LONGEST)}")
     elements = {column: element for column, (_, element) in places.items()}
-    reader = _Reader(layout, indices, elements, decimal)
+    reader = _Reader(layout, indices, elements, wanted)
     for block in _numbered_blocks(path):
         reader.add([row for row in block if row[0] >= first])
     return replace(reader.table(), notes=notes)
@@ -70,6 +65,20 @@ def is_row_of_texts(cells: Sequence[str]) -> bool:
     return bool(filled) and not any(cell[0] in _FIRST_OF_NUMBERS or "," in cell for cell in filled)
 
 
+def _head(path: Path) -> tuple[list[str], list[tuple[int, str]]]:
+    """Return the comments above the first line that counts, and the first that do, with their numbers."""
+    comments: deque[str] = deque(maxlen=_PREAMBLE)
+    head: list[tuple[int, str]] = []
+    for number, line in enumerate(chain.from_iterable(blocks_of_lines(path)), 1):
+        if counts(line):
+            head.append((number, line))
+        elif not head:
+            comments.append(line)
+        if len(head) == _PREAMBLE:
+            break
+    return list(comments), head
+
+
 def _numbered_blocks(path: Path) -> Iterator[list[tuple[int, str]]]:
     """Yield lines that count, with their numbers."""
     number = 1
@@ -82,15 +91,16 @@ class _Reader:
     """Collects columns block by block."""
 
     def __init__(
-        self, layout: TextLayout, indices: dict[str, int], elements: dict[str, int | None], decimal: str
+        self, layout: TextLayout, indices: dict[str, int], elements: dict[str, int | None], wanted: Wanted
     ) -> None:
         """elements: by column, which number of a list in its cells, None for cells of one number."""
         self._layout = layout
-        self._decimal = decimal
+        self._decimal, self._labels, self._stamps = wanted.decimal, wanted.labels, wanted.stamps
+        self._dated: set[str] = set()
         self._indices = indices
         self._elements = elements
         self._has_lists = any(element is not None for element in elements.values())
-        self._parts: dict[str, list[FloatArray]] = {column: [] for column in indices}
+        self._parts: dict[str, list[FloatArray | Labels]] = {column: [] for column in indices}
         self._rows = 0
         self._left_out = 0
         self._first = ""
@@ -102,10 +112,9 @@ class _Reader:
         self._rows += len(rows)
         check_size(self._rows, len(self._indices))
         values = None if self._has_lists else self._fast([line for _, line in rows])
-        if values is None:
-            values = self._careful(rows)
-        for at, parts in enumerate(self._parts.values()):
-            parts.append(np.ascontiguousarray(values[:, at]))
+        cells = self._careful(rows) if values is None else values.T
+        for parts, part in zip(self._parts.values(), cells, strict=True):
+            parts.append(np.ascontiguousarray(part))
 
     def table(self) -> Table:
         """Return the collected table. Raises ValueError where it is not a table."""
@@ -113,13 +122,20 @@ class _Reader:
             raise ValueError("no rows, expected numbers below the column names")
         if self._left_out > MOST_LEFT_OUT * self._rows:
             both = self._layout.delimiter == self._decimal
-            quotes = ": cells of numbers with decimal commas need quotes between commas" if both else ""
-            raise ValueError(f"{self._first}, as in {self._left_out} of {self._rows} rows{quotes}")
-        columns = {}
+            unnamed = ": if a column has no name, number all columns" if self._left_out == self._rows else ""
+            hint = ": cells of numbers with decimal commas need quotes between commas" if both else unnamed
+            raise ValueError(f"{self._first}, as in {self._left_out} of {self._rows} rows{hint}")
+        columns: dict[str, FloatArray] = {}
+        labels: dict[str, Labels] = {}
         for column, parts in self._parts.items():
-            columns[column] = np.concatenate(parts)
+            texts = [cell for part in parts if part.dtype.kind == "U" for cell in part]
+            if all(is_numeral(cell) or not cell for cell in texts):
+                columns[column] = np.concatenate([_as_numbers(part) for part in parts])
+            else:
+                labels[column] = np.concatenate([_as_texts(part) for part in parts])
             parts.clear()
-        return Table(columns, self._rows, self._left_out, self._first)
+        dated = frozenset(self._dated)
+        return Table(columns, self._rows, self._left_out, self._first, labels=labels, dated=dated)
 
     def _fast(self, lines: list[str]) -> FloatArray | None:
         """Return the values of a block of plain numbers only, otherwise None."""
@@ -136,9 +152,9 @@ class _Reader:
             return None
         return table if len(table) == len(lines) and np.isfinite(table).all() else None
 
-    def _careful(self, rows: list[tuple[int, str]]) -> FloatArray:
-        """Return the values of a block, NaN for missing ones, without rows that have too few cells."""
-        kept = []
+    def _careful(self, rows: list[tuple[int, str]]) -> list[FloatArray | Labels]:
+        """Return the columns of a block, NaN for missing values, without rows that have too few cells."""
+        kept: list[list[float | str]] = []
         for number, line in rows:
             cells = self._layout.cells(line)
             if len(cells) == len(self._layout.names):
@@ -147,10 +163,19 @@ class _Reader:
             self._left_out += 1
             expected = len(self._layout.names)
             self._first = self._first or f"line {number} has {len(cells)} fields, expected {expected}"
-        return np.array(kept, np.float64).reshape(len(kept), len(self._indices))
+        columns = zip(*kept, strict=True) if kept else [()] * len(self._indices)
+        return [
+            np.array(column, np.str_ if name in self._labels else np.float64)
+            for name, column in zip(self._indices, columns, strict=True)
+        ]
 
-    def _value(self, line: int, column: str, cell: str) -> float:
+    def _value(self, line: int, column: str, cell: str) -> float | str:
         element = self._elements[column]
+        if column in self._labels:
+            return "" if cell.lower() in MISSING else cell
+        if column in self._stamps and (seconds := _seconds(line, column, cell)) is not None:
+            self._dated.add(column)
+            return seconds
         if element is None:
             return _value(line, column, cell, self._decimal)
         try:
@@ -168,3 +193,20 @@ def _value(line: int, column: str, cell: str, decimal: str) -> float:
         return float("nan")
     hint = ', with a decimal point (or `decimal: ","` in the map)' if has_decimal_comma(cell) else ""
     raise ValueError(f"line {line}, column {column!r} is {quote(cell)}, expected a finite number{hint}")
+
+
+def _seconds(line: int, column: str, cell: str) -> float | None:
+    try:
+        return seconds_of(cell)
+    except ValueError as error:
+        raise ValueError(f"line {line}, column {column!r} is {quote(cell)}: {error}") from None
+
+
+def _as_numbers(part: FloatArray | Labels) -> FloatArray:
+    if part.dtype.kind == "U":
+        part = np.where(part == "", "nan", part)
+    return np.asarray(part, np.float64)
+
+
+def _as_texts(part: FloatArray | Labels) -> Labels:
+    return np.array([cell if isinstance(cell, str) else f"{cell:.15g}" for cell in part], np.str_)

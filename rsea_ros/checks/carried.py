@@ -8,7 +8,7 @@ import numpy as np
 
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.expected import is_still
-from rsea_ros.checks.finding import Findings, unused_sentence
+from rsea_ros.checks.finding import Findings, missing_command, unused_sentence
 from rsea_ros.checks.rig_findings import at_rates
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import list_names
@@ -30,7 +30,8 @@ def check_diagnosable(record: Record) -> None:
     if driving is None:
         have = ", ".join(record.channels) or "nothing"
         raise IdentificationError(
-            f"{record.source}: no command, expected the torques that drove the run beside {have}"
+            f"{record.source}: no command, expected the torques that drove the run beside {have}: "
+            f"{missing_command(record)}"
         )
     for name, channel in record.channels.items():
         if len(channel) < 2 or _rises_rarely(channel):

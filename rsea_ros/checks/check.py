@@ -20,7 +20,7 @@ from rsea_ros.checks.expected import (
     sides,
 )
 from rsea_ros.checks.faults import Checked, check
-from rsea_ros.checks.finding import Finding, Findings, unused_sentence
+from rsea_ros.checks.finding import Finding, Findings, in_words_of, missing_command, unused_sentence
 from rsea_ros.checks.gains import Readings, gain_findings, readings_of, strangers
 from rsea_ros.checks.linearised_rig import LinearisedFit, linear_of
 from rsea_ros.checks.response_shape import Quotient, quotient
@@ -93,6 +93,7 @@ def check_record(
             if is_commanded(checked.record) and not is_too_fast(checked.record):
                 every += _against_rig(checked, rig, axis, values)
         every += _other_axes(checked, rig, axis, wrench)
+    every = [in_words_of(record, finding) for finding in every]
     idle = (replace(f, kind="no_excitation") for f in every if (f.kind, f.light) == ("excitation", "red"))
     doubts = (*(f for f in every if f.kind in FAULTY and f.light != "green"), *idle)
     faults = (*checked.faults, *map(_fault, doubts))
@@ -124,7 +125,7 @@ def _topics(record: Record, rig: Rig) -> list[Finding]:
     return [
         Finding(
             "red", "topics", "command", expected="the torques that drove the run", detail=f"only {have}",
-            remedy="record the commands, or name their topic with --topic",
+            remedy=missing_command(record),
         )
     ]
 

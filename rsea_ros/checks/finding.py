@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from rsea_ros.model.inverse import is_inverse
@@ -78,3 +79,30 @@ def unused_sentence(record: Record, rig: Rig) -> str:
 def _takes(rig: Rig, channel: str) -> bool:
     """Return whether a fit of the rig uses a channel; a drive without a spring is judged by its torque."""
     return rig.measures(channel) and not (is_inverse(rig) and channel == "velocity")
+
+
+_IN_A_MAP = (
+    (r"name (its|their) topic with --topic( [a-z_]+=…)?", r"name \1 column in the import map"),
+    (r"axis \(--axis\)", "column"),
+    (r"--axis \S+", "`sign: -1` for ft in the import map"),
+    (r"another joint with --joint", "another column in the import map"),
+)
+"""What an option for the topics of a bag is for a table that was imported."""
+
+
+def in_words_of(record: Record, finding: Finding) -> Finding:
+    """Return a finding whose remedy names what its user has: options for a bag, the map for a table."""
+    remedy = finding.remedy
+    for option, key in _IN_A_MAP if record.is_table else ():
+        remedy = re.sub(option, key, remedy)
+    return replace(finding, remedy=remedy)
+
+
+def missing_command(record: Record) -> str:
+    """Return the remedy for a record without commands."""
+    if not record.is_table:
+        return "record the commands, or name their topic with --topic torque_command=…"
+    if any(note.startswith("static readings") for note in record.notes):
+        return "record a motion: these are static readings"
+    own = ", or the column of motor_torque where no other was logged" if "motor_torque" in record else ""
+    return f"map the commanded torque or current as `command`{own}"

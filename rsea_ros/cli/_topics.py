@@ -25,7 +25,7 @@ def add_topic_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="ROLE=TOPIC",
-        help=f"another topic name; ROLE: {', '.join(ROLES)}",
+        help=f"another topic name; ROLE: {', '.join(ROLES)}; TOPIC[2]: the third of numbers without names",
     )
     group.add_argument("--joint", help="name of the joint, if the messages hold several")
     axes = ", ".join(AXES)

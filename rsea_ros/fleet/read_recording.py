@@ -8,10 +8,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from msg_adapters.bags import read_contents
-from msg_adapters.decoding import DIAGNOSTICS
+from msg_adapters.decoding import DIAGNOSTICS, mean_temperature
 from msg_adapters.reading import record_from
 from msg_adapters.tables import import_record
-from msg_adapters.temperature import mean_temperature
 from msg_adapters.topic_map import ROLES
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.dated_paths import date_in

@@ -123,7 +123,7 @@ def channels_that_tell(record: Record, rig: Rig) -> list[str]:
     if not set(channels) - {"motor_torque"}:
         raise IdentificationError(
             f"{record.source}: no ft, deflection, position or velocity channel for rig {rig.name}, "
-            "expected one: record it, or name its topic with --topic"
+            f"expected one: record it, or {record.naming}"
         )
     start = float(record["command"].t[0]) + SKIPPED_START
     counts = {n: int(np.sum((record[n].t >= start) & np.isfinite(record[n].y))) for n in channels}

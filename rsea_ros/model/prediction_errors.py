@@ -129,7 +129,7 @@ def predict(rig: Rig | str, record: Record) -> Mapping[str, Comparison]:
 def _why(record: Record) -> str:
     """Return which channels the reading left out, and why."""
     reasons = "; ".join(f"{f.channel}: {f.detail}" for f in record.faults if f.share == 1.0 and f.detail)
-    expected = f"expected one channel of {', '.join(OUTPUTS)}: record it, or name its topic with --topic"
+    expected = f"expected one channel of {', '.join(OUTPUTS)}: record it, or {record.naming}"
     return f" ({reasons}), {expected}" if reasons else f", {expected}"
 
 

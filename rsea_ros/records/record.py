@@ -128,6 +128,10 @@ class Fault:
     unit: str = ""
 
 
+IMPORTED = "imported from "
+"""How the note begins that an import leaves with the record of a table."""
+
+
 @dataclass(frozen=True)
 class Record:
     """One run: channels by name (see UNITS), and their origin.
@@ -206,6 +210,16 @@ class Record:
     def stop(self) -> float:
         """Last stamp of any channel, s."""
         return max(float(c.t[-1]) for c in self.channels.values() if len(c))
+
+    @property
+    def is_table(self) -> bool:
+        """Whether an import made it of a table, whose map then says what a bag's options would."""
+        return any(note.startswith(IMPORTED) for note in self.notes)
+
+    @property
+    def naming(self) -> str:
+        """How to say which of the recorded quantities a channel is, for a remedy."""
+        return "name its column in the import map" if self.is_table else "name its topic with --topic"
 
     def between(self, start: float, stop: float) -> Record:
         """Return the record restricted to start <= t < stop (s); stamps keep their origin."""
@@ -348,6 +362,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "zero_stamps": "header stamps that are zero; the log time replaces them",
         "missing_values": "cells of a table that are empty or not a number, left out",
         "rows_left_out": "rows of a table with another number of cells, left out",
+        "raw_codes": "a column of a table holds codes of a device, not numbers; its channel is left out",
         "coarse_stamps": "stamps of a clock coarser than the samples, which are dated evenly between them",
         "rounded_stamps": "stamps rounded to a step of which the sample period is no multiple",
         "clock_jump": "the clock of the stamps jumped; the jump is removed",

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -47,7 +48,14 @@ def wrench(stamp: int, values: Sequence[float], frame: str = "ft") -> Any:
     return make(WRENCH, header=header(stamp, frame), wrench=whole)
 
 
+def numbers(*values: float) -> Any:
+    """Make the message of a forward controller's commands."""
+    layout = make("std_msgs/msg/MultiArrayLayout", dim=[], data_offset=0)
+    return make("std_msgs/msg/Float64MultiArray", layout=layout, data=np.array(values, float))
+
+
 Row = tuple[str, int, Any]
+Packing = Ros1Writer.CompressionFormat
 
 
 def write_foreign(
@@ -66,6 +74,23 @@ def write_foreign(
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
             writer.write(connections[topic], log_time, STORE.serialize_cdr(message, kind))
+    return path
+
+
+def write_ros1(path: Path, rows: Sequence[Row], compression: Packing | None = None) -> Path:
+    """Write the rows as a bag of ROS 1, in chunks of 20 kB; return the path."""
+    noetic, connections = get_typestore(Stores.ROS1_NOETIC), dict[str, Any]()
+    writer = Ros1Writer(path)
+    writer.chunk_threshold = 20_000
+    if compression is not None:
+        writer.set_compression(compression)
+    with writer:
+        for topic, log_time, message in rows:
+            kind = message.__msgtype__
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=noetic)
+            raw = STORE.cdr_to_ros1(STORE.serialize_cdr(message, kind), kind)
+            writer.write(connections[topic], log_time, raw)
     return path
 
 

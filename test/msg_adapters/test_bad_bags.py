@@ -119,7 +119,7 @@ def test_a_missing_joint_is_named_with_those_in_the_bag(tmp_path):
         ),
         ("a.db3", b"nothing of the kind", "no sqlite3 file"),
         ("a.db3", b"SQLite format 3\x00" + bytes(200), "no rosbag2 database"),
-        ("a.csv", b"1,2", "no bag, expected a directory, or a .mcap or .db3 file"),
+        ("a.csv", b"1,2", "no bag, expected a directory, or a .mcap, .db3 or .bag file"),
         ("a.mcap.zstd", b"nothing of the kind", "Unable to decompress|Unknown frame|decompress"),
     ],
 )

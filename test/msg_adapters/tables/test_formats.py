@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import zipfile
 
 import numpy as np
@@ -11,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.io import savemat
 
-from msg_adapters.tables import json_file, npz_file, parquet_file
+from msg_adapters.tables import column_files, json_file, npz_file
 from msg_adapters.tables.column_files import read_columns
 from rsea_ros.errors import ImportMapError
 
@@ -192,7 +193,7 @@ def test_stamps_holes_and_fields_of_parquet_are_read(tmp_path):
 
 
 def test_a_missing_reader_of_parquet_is_one_line(write, monkeypatch):
-    monkeypatch.setattr(parquet_file, "find_spec", lambda name: None)
+    monkeypatch.setattr(column_files, "find_spec", lambda name: None)
     missing = r"needs the package pyarrow, which is not installed: pip install"
     assert_refused(write(".parquet"), "q[0]", missing)
 
@@ -225,3 +226,27 @@ def test_a_first_line_with_a_hole_is_data_where_the_map_says_so(tmp_path, header
 def test_the_second_of_two_columns_with_one_name_can_be_read(tmp_path):
     (tmp_path / "run.csv").write_text("t,q,q\n0,1,2\n1,3,4\n")
     assert read_columns(tmp_path / "run.csv", ["t", "3"])["3"].tolist() == [2.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "words"),
+    [
+        ("log.h5", b"\x89HDF\r\n\x1a\n", r"is an HDF5 file, expected a table: .*numpy\.savez"),
+        ("log.xlsx", b"PK\x03\x04", "is a spreadsheet .* save the sheet as CSV"),
+        ("log.xls", b"\xd0\xcf\x11\xe0\xa1\xb1", "is an Excel workbook, .* save the sheet as CSV"),
+        ("log.feather", b"ARROW1\0\0", r"is an Arrow .* pyarrow\.parquet\.write_table"),
+        ("log.dat", b"PAR1", r"is a Parquet file, .* call it \.parquet"),
+        ("run.mcap", b"\x89MCAP0\r\n", "is a bag, .* needs no import"),
+        ("log.pkl", pickle.dumps(np.arange(3), 4), "is a pickle, which may run any program"),
+    ],
+)
+def test_a_foreign_file_is_named_with_its_remedy(tmp_path, name, head, words):
+    """They were "not a text", or columns with names of noise."""
+    (tmp_path / name).write_bytes(head + bytes(range(256)) * 3)
+    with pytest.raises(ImportMapError, match=f"{name}: {words}"):
+        read_columns(tmp_path / name, ["t"])
+
+
+def test_a_directory_for_a_file_is_one_line(tmp_path):
+    with pytest.raises(ImportMapError, match="is a directory, expected a file; only a map with `file:`"):
+        read_columns(tmp_path, ["t"])

@@ -16,7 +16,8 @@ MAPS = Path(__file__).resolve().parents[3] / "config" / "imports"
 BAD_MAPS = {
     "{": "not YAML",
     "channels: 3\ntime: {rate: 1}": "channels is 3, expected a mapping",
-    "channels: {}": "map: no 'time', expected channels, time",
+    "time: {rate: 1}\nchannels: {current: {column: i, unit: A}}": "no 'current': map it as `command`",
+    "channels: {}": "map: no 'time', expected a column with its unit",
     "[]": r"map is \[\], expected a mapping with",
     MAP.replace("deg", "degrees"): "unit 'degrees' unknown, expected one of s, ms",
     MAP.replace("sign: -1", "sign: 2"): r"channels.position.sign is 2.0, expected 1 or -1",

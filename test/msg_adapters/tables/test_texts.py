@@ -28,6 +28,14 @@ TEXTS = {
         't,u\n"0,0","1,5"\n"0,1","-2,5"\n"0,2","1500"\n',
         'decimal: ","\ndelimiter: ","\n',
     ),
+    "date-times": (
+        "t,u\n2025-11-12T10:03:29Z,1.5\n2025-11-12T10:03:29.100000Z,-2.5\n2025-11-12 11:03:29.2+01:00,1500\n",
+        "",
+    ),
+    "names in a comment": ("% bench 3\n# t u\n 0.0 1.5\n 0.1 -2.5\n 0.2 1500\n", ""),
+    "names in a comment with other separators": ("# t, u\n0.0;1.5\n0.1;-2.5\n0.2;1500\n", ""),
+    "a last column without a name": ("t,u,\n0,1.5,7\n0.1,-2.5,8\n0.2,1500,9\n", ""),
+    "a delimiter at the end of each line": ("t,u,\n0,1.5,\n0.1,-2.5,\n0.2,1500,\n", ""),
     "D exponents": ("t u\n 0.0D+00 1.5D0\n 1.0D-01 -2.5d+00\n 2.0D-1 0.15D+04\n", ""),
 }
 
@@ -41,7 +49,7 @@ def import_file(folder, text, more=""):
 @pytest.mark.parametrize("name", TEXTS)
 def test_it_is_read(name, tmp_path):
     command = import_file(tmp_path, *TEXTS[name])["command"]
-    np.testing.assert_allclose(command.t, STAMPS, atol=1e-12)
+    np.testing.assert_allclose(command.t, STAMPS, atol=1e-12 if "date" not in name else 3e-7)
     np.testing.assert_allclose(command.y, VALUES)
 
 
@@ -80,3 +88,31 @@ def test_decimal_commas_between_commas_are_refused_with_what_is_missing(tmp_path
 def test_another_decimal_sign_is_refused(tmp_path):
     with pytest.raises(ImportMapError, match=r"decimal is ';', expected '\.' or ','"):
         import_file(tmp_path, "t,u\n0,1\n1,2\n", 'decimal: ";"\n')
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "message"),
+    [
+        ("t,u\n2025-13-12T10:03:29Z,1.5\n2025-13-12T10:03:30Z,2\n", "", "line 2, column 't' .*month must be"),
+        ("t,u\n0,1.5,7\n0.1,-2.5,8\n", "", "has 3 fields, expected 2.*if a column has no name, number"),
+    ],
+)
+def test_what_cannot_be_read_is_one_line(text, more, message, tmp_path):
+    with pytest.raises(ImportMapError, match=message):
+        import_file(tmp_path, text, more)
+
+
+def test_date_times_have_no_other_unit_than_seconds(tmp_path):
+    (tmp_path / "run.csv").write_text("t,u\n2025-11-12T10:03:29Z,1.5\n2025-11-12T10:03:30Z,-2.5\n")
+    (tmp_path / "map.yaml").write_text(MAP.replace("unit: s", "unit: ms"))
+    with pytest.raises(ImportMapError, match=r"time.unit is 'ms', and t holds date-times, expected s"):
+        import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
+
+
+def test_unnamed_columns_have_numbers(tmp_path):
+    """A logger that names every other column: the last one was taken for the end of a line."""
+    (tmp_path / "run.csv").write_text("a,,b,\nX,Y,X,Y\n0,1.5,0,3\n0.1,-2.5,0.1,4\n0.2,1500,0.2,5\n")
+    numbered = MAP.replace("column: t", "column: 3").replace("column: u", "column: 4")
+    (tmp_path / "map.yaml").write_text(numbered)
+    record = import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
+    assert record["command"].y.tolist() == [3.0, 4.0, 5.0]
