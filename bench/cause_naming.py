@@ -26,7 +26,7 @@ from independent.hidden import hide_off_catalogue as hide_outside
 from independent.severities import SEVERITIES, drawn_parameters
 
 from rsea_ros.benchmark.dataset import MANIFEST, VERSION, manifest_text, table_text, truth_path
-from rsea_ros.benchmark.truth import RecordTruth, truth_hash, truth_text
+from rsea_ros.benchmark.scoring import RecordTruth, truth_hash, truth_text
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_text

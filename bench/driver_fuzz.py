@@ -10,7 +10,7 @@ import random
 import struct
 from pathlib import Path
 
-from rsea_ros.hardware.dynamixel.frame_stream import StatusFrameParser
+from rsea_ros.hardware.dynamixel.frames import StatusFrameParser
 from rsea_ros.hardware.netft.rdt import Sequence, decode
 from rsea_ros.hardware.peer import protocol2
 

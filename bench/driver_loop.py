@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 
 from rsea_ros.hardware.device import State
+from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.settings import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits

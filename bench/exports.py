@@ -24,14 +24,12 @@ import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting thread
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RseaError
 from rsea_ros.exports.bam import export_bam
-from rsea_ros.exports.difference import RATE, differences, ours
 from rsea_ros.exports.fmu import export_fmu
-from rsea_ros.exports.fmu_play import play_fmu
 from rsea_ros.exports.isaac import export_isaac
 from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.mujoco_play import play_mujoco
-from rsea_ros.exports.sdf import export_sdf
-from rsea_ros.exports.urdf import export_urdf
+from rsea_ros.exports.mujoco_play import RATE, differences, ours, play_mujoco
+from rsea_ros.exports.urdf import export_sdf, export_urdf
+from rsea_ros.exports.verification import play_fmu
 from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, rig_names

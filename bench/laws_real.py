@@ -21,7 +21,7 @@ from bench.public_fit import DATA, RIGS
 from bench.public_fit import record_of as benchmark_record
 from bench.public_silverbox import ANGLE, RATE, TORQUE
 from msg_adapters.tables import import_record, load_map
-from rsea_ros.cli._maps import map_path
+from rsea_ros.cli.maps import map_path
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.laws.learn import learn
 from rsea_ros.model.rig import Rig

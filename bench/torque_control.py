@@ -30,18 +30,16 @@ from bench.torque_control_stiffest import stiffest as limited
 from rsea_ros.cli.control import motors
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.harness import Arrivals, irregular
-from rsea_ros.control.human import measure_impedance
+from rsea_ros.control.human import Virtual, measure_impedance, passive_to, stiffest
 from rsea_ros.control.impedance import distal_responses
-from rsea_ros.control.large_signal import largest
 from rsea_ros.control.link import LinkShare, link_share, linked_set
 from rsea_ros.control.loads import LOCKED, load_range, lock
-from rsea_ros.control.robustness import robustness
+from rsea_ros.control.robustness import largest, robustness
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
 from rsea_ros.control.trials import LEARNED, sine, tracking_error
 from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, corners
-from rsea_ros.control.virtual import Virtual, passive_to, stiffest
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.control import tables

@@ -97,8 +97,7 @@ async def watch_run(
 
 def missed_rate(seconds: float) -> float:
     """Return the plant's missed cycles a second, as its diagnostics say; NaN without any."""
-    from rsea_ros.nodes._listener import Listener
-    from rsea_ros.nodes._visitor import visit
+    from rsea_ros.nodes._visitor import Listener, visit
 
     values = []
     with visit("bench_watch") as node:

@@ -18,8 +18,7 @@ from rsea_ros.effects.effect import Claims
 from rsea_ros.exports.fmu import export_fmu
 from rsea_ros.exports.isaac import export_isaac
 from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.sdf import export_sdf
-from rsea_ros.exports.urdf import export_urdf
+from rsea_ros.exports.urdf import export_sdf, export_urdf
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import FittedTerm, Law
 from rsea_ros.laws.terms import GEAR_TERMS

@@ -23,8 +23,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from msg_adapters.tables.column_units import CHANNELS, LINEAR, unit
-from msg_adapters.tables.elements import choose_element, is_open
+from msg_adapters.tables.child import choose_element, is_open
+from msg_adapters.tables.column_table import CHANNELS, LINEAR, unit
 from msg_adapters.tables.layout import DELIMITERS
 from msg_adapters.tables.map_keys import CHANNEL, MAP, RATES, RUNS, SET_POINTS, TIME, WHERE
 from msg_adapters.tables.map_terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of

@@ -12,8 +12,7 @@ import numpy as np
 
 from msg_adapters.tables.clock import spread_repeats
 from msg_adapters.tables.column_files import read_columns
-from msg_adapters.tables.column_table import Table
-from msg_adapters.tables.column_units import CHANNELS, LINEAR, canonical, unit
+from msg_adapters.tables.column_table import CHANNELS, LINEAR, Table, canonical, unit
 from msg_adapters.tables.import_map import ImportMap, RowFilter
 from msg_adapters.tables.map_terms import ChannelTerm
 from msg_adapters.tables.raw_codes import raw_code

@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from msg_adapters.tables.child import finite_table
+from msg_adapters.tables.child import ElementAddress, finite_table, place_of
 from msg_adapters.tables.column_table import Table, Wanted, check_size, checked_lengths, index_of
-from msg_adapters.tables.elements import ElementAddress, place_of
-from msg_adapters.tables.numerals import seconds_of
+from msg_adapters.tables.layout import seconds_of
 from rsea_ros.documents.wording import brief, no_utf_8, quote
 from rsea_ros.records.record import FloatArray
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from msg_adapters.tables.column_units import CHANNELS, FACTORS
+from msg_adapters.tables.column_table import CHANNELS, FACTORS
 from msg_adapters.tables.expression import FUNCTIONS
 from rsea_ros.documents.strict_yaml import NEEDED, Key, table
 

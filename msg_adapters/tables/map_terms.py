@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from msg_adapters.tables.column_units import CHANNELS, FACTORS, LINEAR, unit
-from msg_adapters.tables.elements import choose_element
+from msg_adapters.tables.child import choose_element
+from msg_adapters.tables.column_table import CHANNELS, FACTORS, LINEAR, unit
 from msg_adapters.tables.expression import Expression, parse
 from msg_adapters.tables.map_keys import TERM
 from rsea_ros.documents.strict_yaml import NEEDED, Key

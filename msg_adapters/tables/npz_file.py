@@ -12,9 +12,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.lib import format as npy
 
-from msg_adapters.tables.child import finite_table
+from msg_adapters.tables.child import ElementAddress, finite_table, place_of
 from msg_adapters.tables.column_table import LARGEST, Table, Wanted, index_of
-from msg_adapters.tables.elements import ElementAddress, place_of
 from rsea_ros.documents.wording import brief
 from rsea_ros.records.record import FloatArray
 

@@ -1,23 +1,84 @@
-"""Columns of numbers from text, block by block: memory grows with the requested columns, not the file."""
+"""A text table read line by line."""
 
 from __future__ import annotations
 
+import codecs
+import gzip
+import io
+import stat
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from typing import IO, cast
 
 import numpy as np
 
+from msg_adapters.tables.child import base_and_index, number_in
 from msg_adapters.tables.column_table import Labels, Table, Wanted, check_size
-from msg_adapters.tables.elements import base_and_index, number_in
-from msg_adapters.tables.layout import BLANKS, TextLayout, counts, index_in, layout_of
-from msg_adapters.tables.numerals import has_decimal_comma, is_numeral, numeral, seconds_of
-from msg_adapters.tables.text_lines import blocks_of_lines
+from msg_adapters.tables.layout import (
+    BLANKS,
+    TextLayout,
+    counts,
+    has_decimal_comma,
+    index_in,
+    is_numeral,
+    layout_of,
+    numeral,
+    seconds_of,
+)
 from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.wording import brief, quote
 from rsea_ros.records.record import FloatArray
+
+BLOCK = 1 << 22
+"""Characters that are held at a time."""
+LONGEST = 1 << 20
+"""Characters of a line. A table of numbers has some hundred."""
+_HEAD = 1 << 16
+_MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+
+
+def blocks_of_lines(path: Path) -> Iterator[list[str]]:
+    """Yield the lines of a file without their ends. Raises ValueError for a file that is not text."""
+    rest = ""
+    with _open(path) as file:
+        text = io.TextIOWrapper(cast("IO[bytes]", file), encoding=_encoding(path), errors="replace")
+        while chunk := text.read(BLOCK):
+            lines = (rest + chunk).split("\n")
+            rest = lines.pop()
+            if len(rest) > LONGEST:
+                raise ValueError(f"a line of more than {LONGEST} characters, expected a table of numbers")
+            yield lines
+    if rest:
+        yield [rest]
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[IO[bytes] | gzip.GzipFile]:
+    if stat.S_ISFIFO(path.stat().st_mode):
+        raise ValueError("is a pipe, expected a file")
+    with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as file:
+        yield file
+
+
+def _encoding(path: Path) -> str:
+    """Return the encoding: by its mark, else UTF-8 where the beginning is that, else Latin-1."""
+    with _open(path) as file:
+        head = file.read(_HEAD)
+    for mark, name in _MARKS.items():
+        if head.startswith(mark):
+            return name
+    if b"\0" in head:
+        raise ValueError("not a text (it has zero bytes), expected CSV or TSV in UTF-8")
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
 
 MISSING = {"", "-", "--", "na", "n/a", "#n/a", "nan", "nil", "none", "null"}
 """What stands, in small letters, where there is no value."""

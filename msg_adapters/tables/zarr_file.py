@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from msg_adapters.tables.blosc import unpack_blosc
-from msg_adapters.tables.child import finite_table
+from msg_adapters.tables.child import finite_table, place_of
 from msg_adapters.tables.column_table import Table, check_size, index_of
-from msg_adapters.tables.elements import place_of
 from msg_adapters.tables.zarr_store import ARRAY, ArrayStore, open_zarr
 from rsea_ros.documents.wording import quote
 from rsea_ros.records.record import FloatArray

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.benchmark.dataset import Dataset
-from rsea_ros.benchmark.documents import json_object, read_text, text_of
+from rsea_ros.benchmark.dataset import Dataset, json_object, read_text, text_of
 from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import BenchmarkError
 

@@ -1,4 +1,4 @@
-"""A data set of the benchmark: a folder with a manifest, and a table and a rig for each record."""
+"""A dataset of records with hidden causes, and its documents."""
 
 from __future__ import annotations
 
@@ -7,12 +7,43 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from rsea_ros.benchmark.documents import read_json, read_text, text_of
+from rsea_ros.documents.wording import no_utf_8, quote
 from rsea_ros.errors import BenchmarkError
 from rsea_ros.records.record import UNITS, Channel, Record
+
+text_of = quote
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file. Raises BenchmarkError where it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise BenchmarkError(f"{path}: {error.strerror}, expected a file that can be read") from None
+    except UnicodeDecodeError as error:
+        raise BenchmarkError(f"{path}: {no_utf_8(error)}, expected JSON") from None
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Return the object of a JSON file."""
+    return json_object(read_text(path), str(path))
+
+
+def json_object(text: str, where: str) -> dict[str, Any]:
+    """Return the object that a text is in JSON. Raises BenchmarkError for anything else."""
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        reason = error.msg if isinstance(error, json.JSONDecodeError) else type(error).__name__
+        raise BenchmarkError(f"{where}: {reason}, expected JSON") from None
+    if not isinstance(value, dict):
+        raise BenchmarkError(f"{where}: {quote(value)}, expected a JSON object")
+    return value
+
 
 VERSION = "1"
 """Of the rules and of the way records are drawn; scores of different versions are not comparable."""

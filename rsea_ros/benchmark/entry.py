@@ -1,8 +1,11 @@
-"""Entries of this project: the diagnosis, and the fit that leaves least, without any judgement."""
+"""Entries: the project's own and baselines."""
 
 from __future__ import annotations
 
+import numpy as np
+
 from rsea_ros.benchmark.answers import Answer
+from rsea_ros.benchmark.dataset import Dataset
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.diagnose import diagnose, nominal_problem, searched_effects
@@ -39,3 +42,21 @@ def largest_gain(record: Record, rig: Rig) -> Answer:
 
 ENTRIES = {"diagnose": diagnosis_answer, "largest_gain": largest_gain}
 """Entries by name."""
+
+
+SEED = 0
+
+
+def no_names(dataset: Dataset) -> dict[str, Answer]:
+    """Return answers that name nothing."""
+    return {name: Answer() for name in dataset.hashes}
+
+
+def random_names(dataset: Dataset) -> dict[str, Answer]:
+    """Return answers that name one effect of the list at random, as certain."""
+    rng = np.random.default_rng(SEED)
+    return {name: Answer({str(rng.choice(dataset.effects)): 1.0}) for name in dataset.hashes}
+
+
+BASELINES = {"no names": no_names, "random": random_names}
+"""Rows that every table of scores begins with."""

@@ -6,9 +6,8 @@ import argparse
 import runpy
 from pathlib import Path
 
-from rsea_ros.cli._numbers import positive, whole_number
 from rsea_ros.cli._output import path
-from rsea_ros.cli._progress import progress
+from rsea_ros.cli._terminal import positive, progress, whole_number
 from rsea_ros.errors import BenchmarkError, ParameterError
 
 GENERATOR = Path(__file__).resolve().parents[2] / "bench" / "cause_naming.py"
@@ -48,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _secret(file: Path) -> str:
     """Return the seed in a file. Raises ParameterError for one that could be found by trying."""
-    from rsea_ros.benchmark.documents import read_text
+    from rsea_ros.benchmark.dataset import read_text
 
     text = read_text(file).strip()
     if len(text) < SHORTEST:

@@ -10,9 +10,8 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
-from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import add_force, path
-from rsea_ros.cli._progress import progress
+from rsea_ros.cli._terminal import progress, say
 from rsea_ros.errors import RseaError
 from rsea_ros.outputs.new_files import check_free, write_text
 from rsea_ros.progress import Progress

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rsea_ros.checks.carried import note_unused, require_motion, with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings, unused_sentence
-from rsea_ros.cli._lines import say
+from rsea_ros.cli._terminal import say
 from rsea_ros.model.extent import check_pace
 from rsea_ros.model.inverse import is_inverse, require_position
 from rsea_ros.model.rig import Rig

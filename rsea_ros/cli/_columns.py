@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rsea_ros.cli import _lines
+from rsea_ros.cli import _terminal as _lines
 from rsea_ros.report.wrapped_lines import wrap
 
 _NARROWEST = 16

@@ -11,13 +11,13 @@ from shlex import quote
 from typing import TYPE_CHECKING, get_args
 
 from rsea_ros.cli._output import FOUND, add_fail_on
-from rsea_ros.cli._progress import progress
+from rsea_ros.cli._terminal import progress
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.fleet.executor import Executor, serial
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.joints import Diagnose, load_joints
 from rsea_ros.fleet.summary import RunSummary
-from rsea_ros.fleet.time_limit import TIME_LIMIT
+from rsea_ros.fleet.task import TIME_LIMIT
 from rsea_ros.processes import Stopped
 
 if TYPE_CHECKING:

@@ -1,15 +1,16 @@
-"""The graph of launch/graph.yaml: which nodes a launch starts, and with which parameters."""
+"""Graphs of nodes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import did_you_mean, list_names
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.model.rig_file import rig_folders
 
 
@@ -105,3 +106,9 @@ def parameters_of_bench() -> Path:
 def _share() -> Path:
     """Return the folder of config/ and launch/: the clone, or the share of the installed package."""
     return next(folder.parents[1] for folder in rig_folders())
+
+
+def need_ros() -> None:
+    """Raise RseaError if rclpy is missing."""
+    if find_spec("rclpy") is None:
+        raise RseaError("rclpy is missing, expected a sourced ROS 2, or ./rsea in a clone on x86_64")

@@ -1,14 +1,17 @@
-"""Options of every verb that writes: destination, whether existing files may be replaced, JSON instead."""
+"""Where results go, and where they come from."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rsea_ros.errors import OutputError
+from rsea_ros.model.rig_file import rig_path
 from rsea_ros.outputs.files import unused_path
 from rsea_ros.outputs.new_files import Destination, check_free
+from rsea_ros.report.result_files import Provenance, provenance_of
 
 FOUND = 1
 """Exit status for a finding listed in --fail-on."""
@@ -76,3 +79,9 @@ def results_place(
         raise OutputError(f"--out {folder}: is a symbolic link, expected a directory or a new name")
     check_free((folder / name for name in names), force=args.force, inputs=list(filter(None, inputs)))
     return Destination(folder, args.force)
+
+
+def provenance(verb: str, files: Sequence[str | Path], rig: str = "") -> Provenance:
+    """Return version, date and command line, with the hashes of some files and of a rig, if there is one."""
+    inputs = [*map(Path, files), *([rig_path(rig)] if rig else [])]
+    return provenance_of(["rsea", verb, *sys.argv[2:]], inputs)

@@ -1,4 +1,4 @@
-"""Nodes as separate processes on a private ROS domain, each with its log."""
+"""Programs that a verb starts, and ends together."""
 
 from __future__ import annotations
 
@@ -6,15 +6,27 @@ import json
 import os
 import re
 import subprocess
+import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
-from rsea_ros.cli._node_process import POLL, start, stop
+from rsea_ros import processes
 from rsea_ros.errors import RseaError
 from rsea_ros.processes import hold_signals
+
+POLL = 0.1
+"""s, interval between checks of the running nodes."""
+stop = processes.stop
+
+
+def start(name: str, arguments: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+    """Start a node by name, with ROS arguments. options: of Popen."""
+    return processes.start([sys.executable, "-m", f"rsea_ros.nodes.{name}", *arguments], **options)
+
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -104,3 +116,30 @@ def _text(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return json.dumps(str(value), ensure_ascii=False) if isinstance(value, (str, Path)) else str(value)
+
+
+def together(nodes: Mapping[str, Sequence[str]]) -> int:
+    """Run nodes, by name with their arguments, until all have ended; return the first nonzero status.
+
+    If a node fails, the others are stopped, because the graph is no longer complete.
+    Raises Stopped, once all have ended, when a signal asks this process to stop.
+    """
+    running: dict[str, subprocess.Popen[bytes]] = {}
+    try:
+        for name, arguments in nodes.items():
+            with hold_signals():
+                running[name] = start(name, arguments)
+        while any(process.poll() is None for process in running.values()):
+            if failed := _first_failure(running):
+                print(f"{failed} ended with status {running[failed].returncode}: stopping the others")
+                return running[failed].returncode
+            time.sleep(POLL)
+        failed = _first_failure(running)
+        return running[failed].returncode if failed else 0
+    finally:
+        with hold_signals():
+            stop(list(running.values()))
+
+
+def _first_failure(running: Mapping[str, subprocess.Popen[bytes]]) -> str | None:
+    return next((name for name, process in running.items() if process.poll() not in (None, 0)), None)

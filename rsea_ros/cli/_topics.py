@@ -1,15 +1,18 @@
-"""Options of every verb that reads or writes a bag: namespace, topic names, joint, axis, window."""
+"""Options that choose topics and runs."""
 
 from __future__ import annotations
 
 import argparse
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from msg_adapters.topic_map import AXES, ROLES, TopicMap
 from rsea_ros.errors import ParameterError
+from rsea_ros.identification.result import Remark
+from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.records.record import Channel, Record
 
 
@@ -153,3 +156,45 @@ def _window(args: argparse.Namespace) -> tuple[float, float]:
     if not begin < end:
         raise ParameterError(f"window {begin:g} to {end:g} s: expected a beginning before its end")
     return begin, end
+
+
+RIG = "paper_high_impedance"
+"""The rig of a verb that is not given one."""
+OFF_RIG = "off_rig"
+"""Finding of --fail-on: a fitted value is far from the rig's."""
+_RIGS = "rig file, or the name of one in config/rigs"
+
+
+def add_runs(parser: argparse.ArgumentParser, several: str = "") -> None:
+    """Declare the bags. several: what more than one of them are."""
+    about = f"rosbag2 directory, .mcap or .db3{f'; {several}' if several else ''}"
+    parser.add_argument("bags", nargs="+", metavar="BAG", help=about)
+
+
+def add_rig(parser: argparse.ArgumentParser, about: str = _RIGS) -> None:
+    """Declare --rig."""
+    parser.set_defaults(rig_is_default=True)
+    parser.add_argument("--rig", default=RIG, action=_Given, help=f"{about} (default %(default)s)")
+
+
+def rig_choice(args: argparse.Namespace) -> RigChoice:
+    """Return how the rig and the data of a verb with --rig were chosen."""
+    return RigChoice(args.rig, args.rig_is_default, topic_options(args), window_options(args))
+
+
+def off_rig(remarks: Iterable[Remark]) -> list[str]:
+    """Return the finding that a value is far from the rig's, if one is."""
+    return [OFF_RIG] if any(r.code == OFF_RIG for r in remarks) else []
+
+
+class _Given(argparse.Action):
+    """Stores the rig, and that it is not the default."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[Any] | None,
+        option_string: str | None = None,
+    ) -> None:
+        namespace.rig, namespace.rig_is_default = values, False

@@ -14,18 +14,15 @@ from pathlib import Path
 from shlex import quote
 
 from rsea_ros.cli._graph import parameters_of_bench
-from rsea_ros.cli._numbers import whole_number
 from rsea_ros.cli._output import path
-from rsea_ros.cli._runs import RIG
+from rsea_ros.cli._terminal import whole_number
+from rsea_ros.cli._topics import RIG
 from rsea_ros.errors import ParameterError
-from rsea_ros.hardware.peer.ft import ForceSensor
-from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.peer_encoder import IDENTITY, EmulatedEncoder
-from rsea_ros.hardware.peer.peer_motor import KEPT, EmulatedMotor
+from rsea_ros.hardware.peer.ft import ForceSensor, Misbehaviour
+from rsea_ros.hardware.peer.peer_motor import IDENTITY, KEPT, EmulatedEncoder, EmulatedMotor
 from rsea_ros.hardware.peer.registers import ENCODER, MODELS
-from rsea_ros.hardware.peer.requests import LineRequests
+from rsea_ros.hardware.peer.requests import LineRequests, Station
 from rsea_ros.hardware.peer.serial_line import EmulatedBus
-from rsea_ros.hardware.peer.station import Station
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.rig_file import load_rig

@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._numbers import positive
-from rsea_ros.cli._ros import need_ros
+from rsea_ros.cli._graph import need_ros
+from rsea_ros.cli._terminal import positive
 
 if TYPE_CHECKING:
     from rsea_ros.nodes._caller import Caller

@@ -11,11 +11,18 @@ from typing import TYPE_CHECKING
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topic_map import AXES
-from rsea_ros.cli import _lines
-from rsea_ros.cli._lines import say
+from rsea_ros.cli import _terminal as _lines
 from rsea_ros.cli._output import FOUND
-from rsea_ros.cli._runs import add_rig, add_runs, rig_choice
-from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
+from rsea_ros.cli._terminal import say
+from rsea_ros.cli._topics import (
+    add_rig,
+    add_runs,
+    add_topic_options,
+    add_window_options,
+    cut,
+    rig_choice,
+    topic_map,
+)
 from rsea_ros.errors import RseaError
 from rsea_ros.records.record import Channel
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._output import add_json, add_results, print_file, results_place
-from rsea_ros.cli._progress import progress
-from rsea_ros.cli._runs import RIG
+from rsea_ros.cli._terminal import progress
+from rsea_ros.cli._topics import RIG
 from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report.result_files import CONTROL_JSON, REPORT
 
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Design the controller, run the trials, write the results."""
-    from rsea_ros.cli._provenance import provenance
+    from rsea_ros.cli._output import provenance
     from rsea_ros.control.loads import lightest
     from rsea_ros.control.study import study
     from rsea_ros.model.rig_file import load_rig

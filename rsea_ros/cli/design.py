@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
+from rsea_ros.cli._terminal import say
 from rsea_ros.design.requirement import Requirement, check_magnitude
 from rsea_ros.model.train import TRAINS
 from rsea_ros.outputs.new_files import NewFiles
@@ -75,7 +75,7 @@ def _add_demand(parser: argparse.ArgumentParser, default: Requirement, name: str
 
 def run(args: argparse.Namespace) -> int:
     """Test the stiffness, find the stiffnesses that meet all demands, write the results."""
-    from rsea_ros.cli._provenance import provenance
+    from rsea_ros.cli._output import provenance
     from rsea_ros.design.motor_gear_units import unit_named
     from rsea_ros.design.spring_design import least_stiffness, spring_design
     from rsea_ros.design.tolerance import robust_stiffness

@@ -9,11 +9,21 @@ from typing import get_args
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.records import write_overlay
-from rsea_ros.cli import _lines
+from rsea_ros.cli import _terminal as _lines
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
-from rsea_ros.cli._progress import progress
-from rsea_ros.cli._runs import OFF_RIG, add_rig, add_runs, off_rig, rig_choice
-from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
+from rsea_ros.cli._terminal import progress
+from rsea_ros.cli._topics import (
+    OFF_RIG,
+    add_rig,
+    add_runs,
+    add_topic_options,
+    add_window_options,
+    cut,
+    each_once,
+    off_rig,
+    rig_choice,
+    topic_map,
+)
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.records.record import Record
@@ -65,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
         raw, records = records[0], check_records(records, rig, topics.axis, quiet=args.json, masks=True)
         holdout = records.pop() if args.holdout else None
-        from rsea_ros.cli._provenance import provenance
+        from rsea_ros.cli._output import provenance
         from rsea_ros.diagnosis.diagnose import (
             diagnose,
         )  # after the bags, so that a bad bag is refused at once

@@ -8,10 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._lines import say
-from rsea_ros.cli._numbers import positive, whole_number
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
-from rsea_ros.cli._progress import progress
+from rsea_ros.cli._terminal import positive, progress, say, whole_number
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.outputs.new_files import Destination, NewFiles
@@ -125,7 +123,7 @@ def _possible(
 
 def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
-    from rsea_ros.cli._provenance import provenance
+    from rsea_ros.cli._output import provenance
     from rsea_ros.experiment.run_shape import run_text
     from rsea_ros.report.experiment.page import advice_page
     from rsea_ros.report.experiment.words import advice_json

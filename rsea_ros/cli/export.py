@@ -8,14 +8,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsea_ros.cli._lines import say
-from rsea_ros.cli._numbers import positive
 from rsea_ros.cli._output import FOUND, add_force, path
+from rsea_ros.cli._terminal import positive, say
 from rsea_ros.outputs.new_files import check_free, write_file
 
 if TYPE_CHECKING:
-    from rsea_ros.exports.difference import Difference
-    from rsea_ros.exports.represented import Export
+    from rsea_ros.exports.mujoco_play import Difference
+    from rsea_ros.exports.others import Export
     from rsea_ros.exports.verification import Verification
     from rsea_ros.model.rig import Rig
     from rsea_ros.records.record import FloatArray
@@ -87,8 +86,7 @@ def _exporters(args: argparse.Namespace) -> Mapping[str, Callable[[Rig], Export]
     from rsea_ros.exports.fmu import export_fmu
     from rsea_ros.exports.isaac import export_isaac
     from rsea_ros.exports.mjcf import export_mjcf
-    from rsea_ros.exports.sdf import export_sdf
-    from rsea_ros.exports.urdf import export_urdf
+    from rsea_ros.exports.urdf import export_sdf, export_urdf
 
     def bam(rig: Rig) -> Export:
         return export_bam(rig, args.actuator)
@@ -116,7 +114,7 @@ def _chirp(rig: Rig, args: argparse.Namespace) -> FloatArray:
     """Return the command that verifies the export, N m or rad."""
     from dataclasses import replace
 
-    from rsea_ros.exports.difference import RATE
+    from rsea_ros.exports.mujoco_play import RATE
     from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
 
     default = JOINT if rig.loop else ExcitationSettings(amplitude=10.0, noise=2.0, high=60.0)
@@ -129,7 +127,7 @@ def _chirp(rig: Rig, args: argparse.Namespace) -> FloatArray:
 
 def _lines(made: Export, rig: Rig, out: Path, verified: Verification) -> list[str]:
     """Return the report as text: file, content, omissions and what they cost, differences."""
-    from rsea_ros.exports.represented import coverage_lines
+    from rsea_ros.exports.others import coverage_lines
 
     lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]
     lines += [f"  {line}" for line in coverage_lines(made.represented, made.omitted)]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from rsea_ros.cli import _fleet_report, _fleet_run, _fleet_sql, _fleet_watch
 from rsea_ros.cli._actions import Action, add_actions
-from rsea_ros.fleet.extra import need_extra
+from rsea_ros.fleet.fleet_error import need_extra
 
 HELP = "process bags of many joints: store (run), reports (report), alarms (watch), queries (sql)"
 EXAMPLE = "rsea fleet run recordings --map joints.yaml --out store && rsea fleet report store --out report"

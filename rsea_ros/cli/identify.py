@@ -8,11 +8,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from msg_adapters import read_record
-from rsea_ros.cli._lines import say, show
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
-from rsea_ros.cli._progress import progress
-from rsea_ros.cli._runs import OFF_RIG, add_rig, add_runs, off_rig, rig_choice
-from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
+from rsea_ros.cli._terminal import progress, say, show
+from rsea_ros.cli._topics import (
+    OFF_RIG,
+    add_rig,
+    add_runs,
+    add_topic_options,
+    add_window_options,
+    cut,
+    each_once,
+    off_rig,
+    rig_choice,
+    topic_map,
+)
 from rsea_ros.identification.result import Verdict
 from rsea_ros.report.result_files import IDENTIFICATION, IDENTIFICATION_JSON, MODEL
 
@@ -47,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.cli._checks import check_records
 
         records = check_records(records, rig, topics.axis, quiet=args.json, masks=False)
-        from rsea_ros.cli._provenance import provenance
+        from rsea_ros.cli._output import provenance
         from rsea_ros.identification.identify import (
             identify,
         )  # takes 0.7 s, which a refused bag need not wait for

@@ -8,11 +8,10 @@ from pathlib import Path
 
 from msg_adapters import write_record
 from msg_adapters.tables import Imported, ImportMap, import_records, load_map, summary
-from rsea_ros.cli._lines import say
-from rsea_ros.cli._maps import map_path
-from rsea_ros.cli._numbers import whole_numbers
 from rsea_ros.cli._output import add_force
+from rsea_ros.cli._terminal import say, whole_numbers
 from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.cli.maps import map_path
 from rsea_ros.errors import OutputError
 from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
 

@@ -23,9 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Start the nodes and wait until they have ended; return the worst of their statuses."""
-    from rsea_ros.cli._graph import node_calls
-    from rsea_ros.cli._ros import need_ros
-    from rsea_ros.cli._together import together
+    from rsea_ros.cli._graph import need_ros, node_calls
+    from rsea_ros.cli._processes import together
 
     need_ros()
     return together({call.name: call.arguments for call in node_calls(args.graph, args.arguments)})

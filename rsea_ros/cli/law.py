@@ -6,11 +6,17 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
-from rsea_ros.cli._progress import progress
-from rsea_ros.cli._runs import add_rig, add_runs, rig_choice
-from rsea_ros.cli._topics import add_topic_options, add_window_options, each_once, topic_map
+from rsea_ros.cli._terminal import progress, say
+from rsea_ros.cli._topics import (
+    add_rig,
+    add_runs,
+    add_topic_options,
+    add_window_options,
+    each_once,
+    rig_choice,
+    topic_map,
+)
 from rsea_ros.report.result_files import LAW, LAW_JSON
 
 HELP = "fit a law to the residual that no known effect explains, and write it as an effect file"
@@ -42,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
         records = [readable(bag, topics, args) for bag in each_once(args.bags)]
         records = check_records(records, rig, topics.axis, quiet=args.json, masks=True)
-        from rsea_ros.cli._provenance import provenance
+        from rsea_ros.cli._output import provenance
         from rsea_ros.laws.effect_source import LawProvenance
         from rsea_ros.laws.learn import learn
         from rsea_ros.report.law.page import write_law

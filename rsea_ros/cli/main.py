@@ -1,27 +1,55 @@
-"""The command line: finds the module of a verb, runs it, and turns its errors into one line and a status."""
+"""The command `rsea`: finds the verb, runs it, turns errors into one line."""
 
 from __future__ import annotations
 
 import argparse
 import ast
 import importlib
+import logging
 import os
 import re
 import sys
 import traceback
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn, Protocol, cast
 
-from rsea_ros.cli import _lines
+from rsea_ros.cli import _terminal as _lines
 from rsea_ros.cli._columns import columns
-from rsea_ros.cli._compiling import compilation_announced
 from rsea_ros.cli._shown import show_controls
 from rsea_ros.documents.wording import did_you_mean, printable
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.processes import Stopped, Stops
 from rsea_ros.report.wrapped_lines import wrap
+
+COMPILER = "rsea_ros.compiler"
+
+
+class _LineHandler(logging.Handler):
+    """Writes each message as a line on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a message."""
+        print(f"rsea: {record.getMessage()}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def compilation_announced() -> Iterator[None]:
+    """In this block the compiler says on stderr that it compiles, if stderr is a terminal."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield
+        return
+    logger, line = logging.getLogger(COMPILER), _LineHandler()
+    level = logger.level
+    logger.addHandler(line)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(line)
+        logger.setLevel(level)
+
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
 _HELP, _VERSION = ("-h", "--help"), "--version"

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._numbers import whole_number
 from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
-from rsea_ros.cli._progress import progress
+from rsea_ros.cli._terminal import progress, whole_number
 from rsea_ros.errors import ParameterError
 from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
 from rsea_ros.report.result_files import PAPER_JSON, REPORT

@@ -7,8 +7,8 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import add_force, path
+from rsea_ros.cli._terminal import say
 from rsea_ros.errors import ParameterError
 
 if TYPE_CHECKING:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._numbers import positive, whole_number
-from rsea_ros.cli._ros import need_ros
+from rsea_ros.cli._graph import need_ros
+from rsea_ros.cli._terminal import positive, whole_number
 
 if TYPE_CHECKING:
-    from rsea_ros.nodes._listener import Listener
+    from rsea_ros.nodes._visitor import Listener
 
 HELP = "show the published topics: list, rate of a topic, its messages (echo)"
 EXAMPLE = "rsea topics rate /rsea/ft"
@@ -38,8 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Listen, and print."""
     need_ros()
-    from rsea_ros.nodes._listener import Listener
-    from rsea_ros.nodes._visitor import visit
+    from rsea_ros.nodes._visitor import Listener, visit
 
     with visit("rsea_topics") as node:
         listener = Listener(node)

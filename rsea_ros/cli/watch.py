@@ -7,10 +7,10 @@ import os
 import sys
 from pathlib import Path
 
-from rsea_ros.cli._numbers import positive
+from rsea_ros.cli._graph import need_ros
 from rsea_ros.cli._output import path
-from rsea_ros.cli._ros import need_ros
-from rsea_ros.cli._runs import RIG
+from rsea_ros.cli._terminal import positive
+from rsea_ros.cli._topics import RIG
 
 HELP = "show torques, deflection, flag and health live in a browser; record, identify and diagnose there"
 EXAMPLE = "rsea watch --rig paper_high_impedance --host 0.0.0.0"

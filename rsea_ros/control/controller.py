@@ -22,15 +22,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.control.acted import Acted
 from rsea_ros.control.compensation import Compensation, compensation
-from rsea_ros.control.law import FeedbackLaw, FeedbackState, Gains, feedback, hold, law_of
+from rsea_ros.control.law import FeedbackLaw, FeedbackState, Gains, feedback, hold, law_of, sample_rig
 from rsea_ros.control.learning import Learning
 from rsea_ros.control.link import LinkMotion, LinkShare
 from rsea_ros.control.loads import lightest, load_range, lock
-from rsea_ros.control.prediction import AHEAD, Prediction
+from rsea_ros.control.prediction import AHEAD, Acted, Prediction
 from rsea_ros.control.reference import Reference
-from rsea_ros.control.sampled import sample_rig
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import design
 from rsea_ros.model.rig import Rig

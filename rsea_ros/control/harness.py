@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.control.controller import Measurement, TorqueController
-from rsea_ros.control.grid import Grid
-from rsea_ros.control.lateness import Lateness
+from rsea_ros.control.grid import Grid, Lateness
 from rsea_ros.model.plant import Plant, PlantSample
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from rsea_ros.control.sampled import check_controllable
+from rsea_ros.control.law import check_controllable
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig

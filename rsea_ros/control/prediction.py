@@ -1,6 +1,6 @@
-"""Prediction of the desired torque to the instant when a command acts: a parabola, where it can be trusted.
+"""Prediction over the delay from the commands that have acted.
 
-    r'[k|k-1] = A r[k-1],   r[k] = r'[k|k-1] + g (desired[k] - r'[k|k-1])
+r'[k|k-1] = A r[k-1],   r[k] = r'[k|k-1] + g (desired[k] - r'[k|k-1])
     ahead = trust (desired + rate j + second j^2 / 2) + (1 - trust) smooth
     trust = 1 / (1 + (surprise / (0.3 change))^4)
 
@@ -10,6 +10,13 @@ Prediction, 1969, ch. 13). Where the torque surprises the parabola by much of wh
 (RMS of the last few: a step, noise, a sine faster than a fifteenth of the rate) it is taken through a low
 pass, two samples late: prediction amplifies fast changes, and then would only amplify;
 a jump passed unfiltered would need 50 N m of the motor per N m at 280 Hz.
+
+A bench that reads before it writes measures the command of the sample before. A driver that writes first, so
+that a command acts near its instant, reads a current that is the new command's already; a current loop that
+lags, or a motor that looks at its goal now and then, is somewhere between. The part a of the new command is
+learned by least squares with forgetting, from what the controller has sent:
+
+    m[k] = (1 - a) u[k-1] + a u[k],     acted over the sample before = (1 - a) m[k] + a m[k-1]
 """
 
 from __future__ import annotations
@@ -18,7 +25,7 @@ import math
 
 import numpy as np
 
-from rsea_ros.control.sampled import z_of
+from rsea_ros.control.law import z_of
 from rsea_ros.records.record import ComplexArray, FloatArray
 
 ALONG: FloatArray = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
@@ -121,3 +128,42 @@ def smoothed_response(period: float, hz: FloatArray) -> ComplexArray:
     pole = math.exp(-2.0 * math.pi * SMOOTH * period)
     response: ComplexArray = ((1.0 - pole) / (1.0 - pole * back)) ** 2 * back**AHEAD
     return response
+
+
+MEMORY = 0.5
+"""s of changes, as of the controller's learning (learning.py)."""
+CHANGES = 0.3
+"""N m: a command that changes by less teaches nothing beside the quantum of a current (0.11 N m); and so much
+speaks for the command of the sample before, at first."""
+
+
+class Acted:
+    """Follow measured torques sample by sample. part: a, from 0 to 1."""
+
+    def __init__(self, period: float) -> None:
+        """period: s."""
+        self._fresh = 1.0 - math.exp(-period / MEMORY)
+        self._together, self._square, self.part = 0.0, CHANGES**2, 0.0
+        self.start(0.0)
+
+    def start(self, measured: float) -> None:
+        """Begin at a measured torque, N m, and keep what was learned."""
+        self._last = measured
+
+    def over_sample(self, measured: float, before: float, newest: float, *, sure: bool = True) -> float:
+        """Return the torque (N m) that acted over the sample that has just ended.
+
+        measured: N m, of this sample. before, newest: N m, commands over the sample before and from this
+        one on. sure: whether they acted in time and no sample was lost; else nothing is learned.
+        Without a measured torque it is nan.
+        """
+        if math.isnan(measured):
+            return measured
+        change = newest - before
+        if sure and abs(change) > CHANGES:
+            self._together += self._fresh * ((measured - before) * change - self._together)
+            self._square += self._fresh * (change * change - self._square)
+            self.part = min(max(self._together / self._square, 0.0), 1.0)
+        acted = measured + self.part * (self._last - measured)
+        self._last = measured
+        return acted

@@ -1,7 +1,9 @@
-"""The whole set of benches, swept: the worst of every margin, and the case that has it.
+"""Robust stability, and behaviour at large signals.
 
 No structured singular value: a dense grid of the sampled loop is exact at its points, and counts the delay
 and the mode exactly (python-control's mu needs slycot, which is not installed, and a rational delay).
+
+|T_m| = A / |P|,   |w| = A |P_w / P|          P = T_d / T_m, P_w = w / T_m, continuous, at A sin(2 pi f t)
 """
 
 from __future__ import annotations
@@ -10,13 +12,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rsea_ros.control.law import law_of
-from rsea_ros.control.loop import returns
-from rsea_ros.control.margins import Margins, encirclements, least, margins
+from rsea_ros.control.margins import Margins, encirclements, least, margins, returns
 from rsea_ros.control.synthesis import ControllerDesign, grid
 from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, dense, family
+from rsea_ros.model import outputs
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.transfer import frequency_response
+from rsea_ros.records.record import FloatArray
 
 
 @dataclass(frozen=True)
@@ -52,3 +57,55 @@ def robustness(
             worst, where = float(peaks.max()), f.cases[int(np.argmax(peaks))]
         every += [margins(row, hz, 1.0 / designed.rate) for row in whole / memory - 1.0]
     return Robustness(total, unstable, worst, where, least(every))
+
+
+HIGHEST = 400.0
+LOWEST = 0.01
+POINTS = 4000
+
+
+@dataclass(frozen=True)
+class Reach:
+    """amplitude: N m.
+
+    torque, speed: Hz, from which it needs more of either than the motor has; inf: never.
+    """
+
+    amplitude: float
+    torque: float
+    speed: float
+
+    @property
+    def hz(self) -> float:
+        """Where it can no longer be tracked."""
+        return min(self.torque, self.speed)
+
+
+def motor_demand(rig: Rig, hz: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return motor torque (N m) and speed of the gear output (rad/s) per N m of distal torque, shape (n,)."""
+    torque = np.abs(frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz))
+    angle = np.abs(frequency_response(rig, outputs.position(), hz))
+    return 1.0 / torque, 2.0 * np.pi * hz * angle / torque
+
+
+def reach(rig: Rig, amplitude: float, torque: float, speed: float) -> Reach:
+    """Return the lowest frequency from which an amplitude (N m) needs more than the motor has.
+
+    torque: N m, speed: rad/s at the gear output; inf where not stated. A demand above the limit only in a
+    narrow band below (a pendulum that swings) counts as well.
+    """
+    hz = np.geomspace(LOWEST, HIGHEST, POINTS)
+    per_torque, per_speed = motor_demand(rig, hz)
+    return Reach(
+        amplitude, _first(hz, amplitude * per_torque > torque), _first(hz, amplitude * per_speed > speed)
+    )
+
+
+def _first(hz: FloatArray, short: npt.NDArray[np.bool_]) -> float:
+    return float(hz[np.argmax(short)]) if short.any() else float("inf")
+
+
+def largest(rig: Rig, hz: float, torque: float, speed: float) -> float:
+    """Return the largest amplitude, N m, that can be tracked at a frequency, Hz."""
+    per_torque, per_speed = motor_demand(rig, np.array([hz]))
+    return float(min(torque / per_torque[0], speed / per_speed[0]))

@@ -15,10 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.control.impedance import moved_bench
-from rsea_ros.control.law import law_of
+from rsea_ros.control.law import FT, law_of
 from rsea_ros.control.loads import LOCKED
-from rsea_ros.control.loop import returns
-from rsea_ros.control.sampled import FT
+from rsea_ros.control.margins import returns
 from rsea_ros.control.synthesis import ControllerDesign, grid
 from rsea_ros.control.uncertainty import Uncertainty, corners, family, mode_of
 from rsea_ros.model.rig import Rig

@@ -10,9 +10,8 @@ import numpy as np
 
 from rsea_ros.control.following import Following, follow
 from rsea_ros.control.impedance import OutputImpedance, impedance
-from rsea_ros.control.large_signal import Reach, reach
 from rsea_ros.control.loads import LOCKED, load_range, with_ends
-from rsea_ros.control.robustness import Robustness, robustness
+from rsea_ros.control.robustness import Reach, Robustness, reach, robustness
 from rsea_ros.control.spread import Softness, Spread, softness, spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, design
 from rsea_ros.control.trials import Compensated, TrialResult, compensations, hard, trials

@@ -16,10 +16,9 @@ import numpy as np
 from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.following import Following, Step, fall, step_response
 from rsea_ros.control.harness import closed_loop
-from rsea_ros.control.large_signal import largest
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LOCKED, lock
-from rsea_ros.control.robustness import Robustness
+from rsea_ros.control.robustness import Robustness, largest
 from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.spread import Spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits

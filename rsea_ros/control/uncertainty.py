@@ -1,12 +1,15 @@
-"""The set of benches that a design must stand: every load, and what nobody knows to better than so much.
+"""Uncertainty of the actuator: corners of the rig's spread, and lags.
 
-    loads           locked, and the free ends with 0.5 to 100 times their inertia           loads.py
+loads           locked, and the free ends with 0.5 to 100 times their inertia           loads.py
     K_s             ± 10 %          b_m   ± 50 %
     path            one sample more than the one of the design, 2 ms of delay, both
     sensor          a mode of 33 Hz, damping ratio 0.02, 0.3 of the spring's torque in it
 
 A case is a bench of the set as frequency responses: exact for hold, delays and mode (whose aliases are left
 out, as all of those that lie above half the rate).
+
+Each is the response of an effect where it is linear (Effect.response): at the command it is on the path to
+the current, at the motor on all torque, at the F/T sensor on ft. The law does not know them; the margins do.
 """
 
 from __future__ import annotations
@@ -18,10 +21,27 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from rsea_ros.control.lags import lag_responses
-from rsea_ros.control.sampled import FT, sample_rig, z_of
+from rsea_ros.control.law import FT, Sampled, responses, sample_rig, z_of
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.signal_table import Port
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import ComplexArray, FloatArray
+
+
+def lag_responses(rig: Rig, plant: Sampled, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return the response of a sampled rig, shape (4, n), and of the path from command to current, (n,)."""
+    response, path = responses(plant, hz), np.ones(len(hz), dtype=np.complex128)
+    s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
+    for setting in rig.effects:
+        effect = effect_named(setting.name)
+        if effect.response is None:
+            continue
+        factor = effect.response(effect.vector(setting.parameters), s)
+        if effect.port == Port.COMMAND:
+            path = path * factor
+        else:
+            response[FT if effect.port == Port.SENSOR else slice(None)] *= factor
+    return response, path
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,15 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from rsea_ros.exports.others import finite_sizes, omitted_effects, omitted_parts, without_null_effects
-from rsea_ros.exports.represented import Export, Omitted, Represented
+from rsea_ros.exports.others import (
+    Export,
+    Omitted,
+    Represented,
+    finite_sizes,
+    omitted_effects,
+    omitted_parts,
+    without_null_effects,
+)
 from rsea_ros.model.equations import gear_inertia
 from rsea_ros.model.rig import Rig
 

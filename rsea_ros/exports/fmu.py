@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
+from rsea_ros.exports.others import Export, Omitted, Represented, coverage_lines
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.model.simulation import build

@@ -10,8 +10,16 @@ import math
 from collections.abc import Mapping
 
 from rsea_ros.documents.wording import in_docstring
-from rsea_ros.exports.others import finite_sizes, omitted_effects, omitted_parts, without_null_effects
-from rsea_ros.exports.represented import Export, Omitted, Represented, coverage_lines
+from rsea_ros.exports.others import (
+    Export,
+    Omitted,
+    Represented,
+    coverage_lines,
+    finite_sizes,
+    omitted_effects,
+    omitted_parts,
+    without_null_effects,
+)
 from rsea_ros.model.equations import gear_inertia
 from rsea_ros.model.rig import Rig
 

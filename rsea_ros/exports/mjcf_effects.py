@@ -9,7 +9,7 @@ from xml.etree import ElementTree as xml
 import numpy as np
 
 from rsea_ros.design.mujoco_model import SOLIMP, SOLREF, STEP
-from rsea_ros.exports.represented import Unrepresentable
+from rsea_ros.exports.others import Unrepresentable
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
 

@@ -1,15 +1,52 @@
-"""Parts that targets without a spring or without sensor dynamics leave out."""
+"""Effects in the terms of another simulator, and what is left out."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 from rsea_ros.documents.units import plain
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.exports.represented import Omitted, Represented
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import END_NAMES, Rig
+
+
+@dataclass(frozen=True)
+class Represented:
+    """Something of a rig that the target has. how: in the target's terms."""
+
+    name: str
+    how: str
+
+
+@dataclass(frozen=True)
+class Omitted:
+    """A part of a rig that the file leaves out. why: the feature that the target lacks."""
+
+    name: str
+    why: str
+
+
+class Unrepresentable(Exception):
+    """Raised by the translation of an effect that the target has no words for; the text says why."""
+
+
+@dataclass(frozen=True)
+class Export:
+    """The file for a target, with exported and omitted parts. content: text or the bytes of an archive."""
+
+    target: str
+    suffix: str
+    content: str | bytes
+    represented: tuple[Represented, ...]
+    omitted: tuple[Omitted, ...]
+
+
+def coverage_lines(represented: Iterable[Represented], omitted: Iterable[Omitted]) -> list[str]:
+    """Return both lists for people, a line each."""
+    lines = [f"says {one.name}: {one.how}" for one in represented]
+    return [*lines, *(f"leaves out {one.name}: {one.why}" for one in omitted)]
 
 
 def without_null_effects(rig: Rig) -> Rig:

@@ -1,19 +1,52 @@
-"""An export against this project's simulation: played by the target, and what its omissions cost."""
+"""Exports played against the own simulation."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.exports.difference import RATE, Difference, differences, losses, ours
-from rsea_ros.exports.fmu_play import play_fmu
-from rsea_ros.exports.mujoco_play import play_mujoco
-from rsea_ros.exports.represented import Export
+from rsea_ros.exports.mujoco_play import CHANNELS, RATE, Difference, differences, losses, ours, play_mujoco
+from rsea_ros.exports.others import Export
 from rsea_ros.model.rig import Rig
+from rsea_ros.outputs.files import write_new
 from rsea_ros.records.record import FloatArray
+
+
+def play_fmu(archive: bytes, rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
+    """Return the measurements of the exported rig at the beginning of each command's hold.
+
+    command: N m, or target rad of a rig with a position loop, at RATE. Raises ParameterError without FMPy.
+    """
+    try:
+        from fmpy import simulate_fmu
+        from fmpy.fmi1 import FMICallException
+    except ImportError:
+        raise ParameterError(
+            "playing the FMU needs the package fmpy, which is not installed: pip install fmpy, or --no-play"
+        ) from None
+    driven = "torque_command" if rig.loop is None else "desired_position"
+    t = np.arange(len(command)) / RATE
+    given = np.array(list(zip(t, command, strict=True)), dtype=[("time", "f8"), (driven, "f8")])
+    names = [name for name in CHANNELS if rig.measures(name)]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "rig.fmu"
+        write_new(file, archive)
+        try:
+            result = simulate_fmu(
+                str(file), stop_time=float(t[-1]), step_size=1.0 / RATE, output_interval=1.0 / RATE,
+                input=given, output=names, validate=True, start_values={"duration": len(t) / RATE},
+            )  # fmt: skip
+        except FMICallException as error:
+            raise ParameterError(f"FMPy: {' '.join(str(error).split())}") from None
+    return {name: np.asarray(result[name], np.float64) for name in names}
+
 
 PLAYERS: Mapping[str, Callable[..., Any]] = MappingProxyType({"mjcf": play_mujoco, "fmu": play_fmu})
 NO_NOISE = "the rig states no sensor noise, expected sensors.ft.noise or another"
@@ -57,4 +90,3 @@ def _losses(rig: Rig, names: list[str], command: FloatArray) -> Mapping[str, Dif
         return losses(rig, names, ours(rig, command, RATE), command, RATE)
     except RseaError:
         return {}
-

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rsea_ros.fleet.store_columns import history, recordings
+    from rsea_ros.fleet.query import history, recordings
 
 __all__ = ["history", "recordings"]
 
@@ -17,8 +17,8 @@ def __getattr__(name: str) -> Any:
     if name in __all__:
         import importlib
 
-        from rsea_ros.fleet.extra import need_extra
+        from rsea_ros.fleet.fleet_error import need_extra
 
         need_extra()
-        return getattr(importlib.import_module("rsea_ros.fleet.store_columns"), name)
+        return getattr(importlib.import_module("rsea_ros.fleet.query"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

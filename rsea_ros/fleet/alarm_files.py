@@ -17,9 +17,8 @@ from typing import Any
 
 from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import OutputError
-from rsea_ros.fleet.query import NoRowsError
+from rsea_ros.fleet.query import NoRowsError, history, recordings
 from rsea_ros.fleet.store import Store
-from rsea_ros.fleet.store_columns import history, recordings
 from rsea_ros.outputs.files import make_folder
 from rsea_ros.outputs.new_files import write_text
 from rsea_ros.trends import Alarm, alarms

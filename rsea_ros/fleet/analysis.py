@@ -1,16 +1,22 @@
-"""One recording of one joint: read, checked, identified and, on request, diagnosed."""
+"""One recording read and analysed."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from msg_adapters.bags import read_contents
+from msg_adapters.decoding import DIAGNOSTICS, mean_temperature
+from msg_adapters.reading import record_from
+from msg_adapters.tables import import_record
+from msg_adapters.topic_map import ROLES
 from rsea_ros.checks.carried import check_diagnosable, require_motion, with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.faults import check
@@ -18,8 +24,7 @@ from rsea_ros.checks.signal_findings import band
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError
-from rsea_ros.fleet.joints import MappedJoint
-from rsea_ros.fleet.read_recording import JointRecording, read_run
+from rsea_ros.fleet.joints import MappedJoint, date_in
 from rsea_ros.fleet.row import Row
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification, ParameterEstimate
@@ -30,6 +35,56 @@ from rsea_ros.model.rig_file import rig_text
 from rsea_ros.records.record import UNITS, Fault, Record
 from rsea_ros.report.identification.words import identification_json
 from rsea_ros.report.result_files import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODEL, REPORT, json_text, strict
+
+_DATED_NS = 10**17
+"""Stamps below (1973) count since a machine's start, not since 1970."""
+
+
+@dataclass(frozen=True)
+class JointRecording:
+    """A recording of one joint. lenient: with gaps, repeats and NaN as they were recorded.
+
+    strict: as a fit takes it; raises the error of a recording that it cannot take.
+    """
+
+    lenient: Record
+    strict: Callable[[], Record]
+    temperature: float | None
+    time: datetime | None
+
+
+def read_run(path: Path, url: str, joint: MappedJoint) -> JointRecording:
+    """Read a recording. path: on this machine. Raises RseaError for one that cannot be read."""
+    if joint.table is not None:
+        record = import_record(path, joint.table, joint.index)
+        return JointRecording(record, lambda: record, None, time_of(record, url, joint.date))
+    topics = joint.topics
+    wanted = {DIAGNOSTICS, *(topics.topic(role) for role in ROLES), joint.temperature}
+    contents = read_contents(path, wanted)
+    record = record_from(contents, url, topics, strict=False)
+    return JointRecording(
+        record,
+        lambda: record_from(contents, url, topics),
+        mean_temperature(contents, joint.temperature),
+        time_of(record, url, joint.date),
+    )
+
+
+def time_of(record: Record, url: str, date: str) -> datetime | None:
+    """Return when a recording began: by its stamps, else by the date in its path, else None."""
+    if record.epoch_ns > _DATED_NS:
+        return datetime.fromtimestamp(record.epoch_ns // 1000 * 1e-6, timezone.utc)
+    return date_in(url, date) if date else None
+
+
+def is_refused(run: JointRecording) -> RseaError | None:
+    """Return why a run cannot be read strictly, None where it can."""
+    try:
+        run.strict()
+    except RseaError as error:
+        return error
+    return None
+
 
 _MAIN = ("ft", "deflection", "position", "velocity")
 """Channels that show how well a fit is; the first that a recording has stands in the row."""

@@ -16,12 +16,10 @@ from itertools import count
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.executor import Done, Executor, Job, WorkerLost
 from rsea_ros.fleet.plan import Held
-from rsea_ros.fleet.rate import Rate
 from rsea_ros.fleet.sources import Bag
 from rsea_ros.fleet.store import Store, TaskOutcome
-from rsea_ros.fleet.summary import RunSummary
-from rsea_ros.fleet.task import Changed, Task, read_fingerprint, reason
-from rsea_ros.fleet.time_limit import TIME_LIMIT
+from rsea_ros.fleet.summary import Rate, RunSummary
+from rsea_ros.fleet.task import TIME_LIMIT, Changed, Task, read_fingerprint, reason
 from rsea_ros.progress import Progress
 from rsea_ros.version import version
 

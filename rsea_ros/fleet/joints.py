@@ -1,25 +1,78 @@
-"""joints.yaml: which joint has which rig, where its recordings are, and how they are read."""
+"""Joints of a fleet, and the dates in the paths of their recordings."""
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime, timezone
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 from msg_adapters.tables import ImportMap, load_map
-from msg_adapters.topic_map import TopicMap
+from msg_adapters.topic_map import ROLES, TopicMap
 from rsea_ros.documents import strict_yaml
-from rsea_ros.documents.strict_yaml import mapping, names, only_keys, text
+from rsea_ros.documents.strict_yaml import NEEDED, Key, mapping, names, only_keys, table, text
 from rsea_ros.documents.wording import quote
 from rsea_ros.errors import FieldError, RseaError
-from rsea_ros.fleet.dated_paths import names_a_day
 from rsea_ros.fleet.fleet_error import JointMapError
-from rsea_ros.fleet.joint_keys import JOINT, MAP, TOPIC
 from rsea_ros.model.rig_file import load_rig, rig_folders, rig_text
+
+MAP = (
+    Key("joints", "mapping", NEEDED, "a mapping for each joint; names have letters, digits, `_ - .`"),
+    Key("defaults", "mapping", "empty", "values for every joint that does not state its own"),
+)
+JOINT = (
+    Key("rig", "name or file", NEEDED, "a rig of config/rigs, or a file beside this map"),
+    Key("bags", "pattern, or a list", "every bag", "end of the paths of its bags; `*` also matches `/`"),
+    Key("namespace", "name", "`/rsea`", "namespace of the topics"),
+    Key("topics", "mapping", "standard names", "other names, `role: topic`"),
+    Key("joint", "name", "the only one", "name in the messages, if they hold several joints"),
+    Key("axis", "`torque.z`, `-force.x`, …", "`torque.z`", "axis of the actuator in the wrench"),
+    Key("temperature", "topic", "none", "a sensor_msgs/Temperature; its mean goes into the row"),
+    Key("date", "such as `%Y-%m-%d`", "none", "date in the path, if stamps have none (strptime, UTC)"),
+    Key("import", "name or file", "bags", "an import map for recordings that are tables, see import.md"),
+    Key("index", "0 or more", "none", "number of the joint, if the cells of a table hold several"),
+    Key("diagnose", "`misfit`, `always`, `never`", "`misfit`", "which bags are also diagnosed"),
+)  # fmt: skip
+TOPIC = tuple(Key(role, "topic", f"`{role}`") for role in ROLES)
+SECTIONS: Mapping[str, Sequence[Key]] = {"map": MAP, "joints.NAME": JOINT, "joints.NAME.topics": TOPIC}
+
+
+def tables() -> str:
+    """Return the tables of docs/fleet.md in Markdown."""
+    return "\n".join(table(section, keys) for section, keys in SECTIONS.items())
+
+
+_LETTERS = {"Y": r"\d{4}", "m": r"\d{2}", "d": r"\d{2}", "H": r"\d{2}", "M": r"\d{2}", "S": r"\d{2}",
+            "y": r"\d{2}", "j": r"\d{3}", "f": r"\d{1,6}", "b": r"[A-Za-z]{3}"}  # fmt: skip
+"""Directives of strptime that a pattern may have, as regular expressions."""
+_SAMPLE = datetime(2001, 2, 3, tzinfo=timezone.utc)
+"""A day that a pattern has to name."""
+
+
+def date_in(path: str, pattern: str) -> datetime | None:
+    """Return the last date in a path that matches a strptime pattern, or None."""
+    parts = re.split(r"%(.)", pattern)
+    letters = [_LETTERS.get(part, re.escape(part)) for part in parts[1::2]]
+    texts = [re.escape(part) for part in parts[::2]]
+    expression = "".join(text + letter for text, letter in zip(texts, [*letters, ""], strict=True))
+    for found in reversed(re.findall(expression, path)):
+        try:
+            return datetime.strptime(found, pattern).replace(tzinfo=timezone.utc)
+        except ValueError:
+            continue
+    return None
+
+
+def names_a_day(pattern: str) -> bool:
+    """Return whether a pattern has known directives only, and year, month and day among them."""
+    if not set(re.findall(r"%(.?)", pattern)) <= {*_LETTERS, "%"}:
+        return False
+    return date_in(_SAMPLE.strftime(pattern), pattern) == _SAMPLE
+
 
 Diagnose = Literal["misfit", "always", "never"]
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")

@@ -8,10 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from rsea_ros.hardware.device import State, Wrench
-from rsea_ros.hardware.dynamixel.encoder import BusEncoder, EncoderConnection
+from rsea_ros.hardware.dynamixel.encoder import BusEncoder, EncoderConnection, MotorSample, Unwrapper
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
-from rsea_ros.hardware.dynamixel.sample import MotorSample, Unwrapper
 from rsea_ros.hardware.limits import Limits, check_limits
 from rsea_ros.hardware.netft.sensor import ForceTorqueSensor, SensorConnection
 from rsea_ros.hardware.protection import Protection

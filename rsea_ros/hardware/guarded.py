@@ -1,22 +1,103 @@
-"""A device behind its limits: the work of a driver in each cycle, without ROS."""
+"""A device behind its limits: every cycle checked, alone or together with others, lost samples counted."""
 
 from __future__ import annotations
 
 import math
 import threading
-from collections import Counter
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
+from typing import Protocol
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Guard, Limits, unmeasured_quantities, without
-from rsea_ros.hardware.losses import Losses
 from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring
-from rsea_ros.hardware.together import cycle
+
+
+class Shared(Protocol):
+    """A bus whose devices are written and read in one transaction."""
+
+    def exchange(self) -> None:
+        """Send written values, and fetch those to be read."""
+
+    def send(self) -> None:
+        """Send written values."""
+
+
+def cycle(
+    joints: Sequence[GuardedDevice],
+    wanted: Sequence[tuple[float, float | None]],
+    buses: Sequence[Shared] = (),
+) -> list[State | None]:
+    """Write the torques of all joints, then read all; return the reading of each, None of one without.
+
+    wanted: torque (N m) and age of its command (s) of each, see GuardedDevice. A reading that trips a fault
+    zeroes that joint's torque at once, and a motor that may not obey is switched off. The write comes first,
+    so that a command takes effect as near to the start of its cycle as can be. A joint whose device is being
+    switched, cleared or rebooted is left out, and holds up no other.
+    """
+    with ExitStack() as kept:
+        taken = [joint.take(kept) for joint in joints]
+        before = [joint.fault for joint in joints]
+        for joint, is_taken, (torque, age) in zip(joints, taken, wanted, strict=True):
+            if is_taken:
+                joint.write(torque, age)
+        for bus in buses:
+            bus.exchange()
+        states = [joint.read() if is_taken else None for joint, is_taken in zip(joints, taken, strict=True)]
+        for joint, is_taken, fault, (_, age) in zip(joints, taken, before, wanted, strict=True):
+            if is_taken and joint.fault is not fault:
+                joint.write(0.0, age)
+        for bus in buses:
+            bus.send()
+        for joint, state in zip(joints, states, strict=True):
+            if state is not None:
+                joint.switch_off_if_due()
+        return states
+
+
+WINDOW, SHARE = 10, 0.5
+"""Answers that are looked at, as a multiple of those that are a fault in a row, and the part of them."""
+
+
+class Losses:
+    """Lost answers of one kind of transaction. limit: cycles in a row that are a fault."""
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._recent: deque[bool] = deque(maxlen=WINDOW * limit)
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self._recent.clear()
+        self._in_a_row = self._count = 0
+
+    def take_back(self) -> None:
+        """Count the last answer, which was lost, as one that came after all."""
+        if self._recent and self._recent[-1]:
+            self._recent[-1] = False
+            self._count -= 1
+        self._in_a_row = 0
+
+    def take(self, *, lost: bool) -> DeviceFault | None:
+        """Take in whether the answer of a cycle was lost; return the fault that it is."""
+        if len(self._recent) == self._recent.maxlen:
+            self._count -= self._recent[0]
+        self._recent.append(lost)
+        self._count += lost
+        self._in_a_row = self._in_a_row + 1 if lost else 0
+        if self._in_a_row >= self._limit:
+            return DeviceFault("no_reply", self._in_a_row, self._limit, "cycles")
+        most = math.ceil(SHARE * WINDOW * self._limit)
+        if lost and self._count >= most:
+            return DeviceFault("no_reply", self._count, most, "cycles", f"of the last {len(self._recent)}: ")
+        return None
+
 
 BUSY = "clear_fault or reboot is under way, expected it to be over"
 STOPPED = DeviceFault("stopped", detail="the service stop was called")

@@ -1,11 +1,212 @@
-"""Protection that ends the torque when the driver's process dies or hangs; each device states its kind."""
+"""What ends the torque if the process dies: the motor's own watchdog, or a supervisor."""
 
 from __future__ import annotations
 
+import json
 import math
+import os
+import socket
+import subprocess
+import sys
+import time
 from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Protocol
 
-from rsea_ros.hardware.supervised import Supervisor
+from rsea_ros.errors import DeviceError
+
+SURE = 0.8
+"""Share of the time-out from which on the supervisor may have acted."""
+BEATS = 20
+"""A time-out; a beat each cycle would wake the supervisor a thousand times a second."""
+ANSWER = 1.0
+"""s that a supervisor may take to answer, or to end."""
+ECHO = 0.5
+"""s without an echo after which a supervisor stands still: the driver has no guard."""
+SCRIPT = Path(__file__).with_name("supervisor.py")
+
+
+class SupervisorLost(DeviceError):
+    """The process that would stop the motor after the driver's death is dead itself."""
+
+
+class HeldUp(DeviceError):
+    """This process was stopped with torque on for about as long as the supervisor tolerates."""
+
+
+class _End(Protocol):
+    """Where beats go."""
+
+    def send(self, beat: bytes) -> None:
+        """Send a beat. Raises OSError when nobody listens."""
+
+    def heard(self) -> bool:
+        """Return whether it has answered beats since the last call."""
+
+    def alive(self) -> bool:
+        """Return whether the supervisor runs."""
+
+    def close(self) -> None:
+        """End the connection."""
+
+
+class _Child:
+    """A process of this driver, in a session of its own: it survives every signal to the driver's group."""
+
+    def __init__(
+        self, descriptor: int, timeout: float, frames: Sequence[str], replies: Sequence[str]
+    ) -> None:
+        words = [str(descriptor), f"{timeout:g}", *frames, "--", *replies]
+        self._process = subprocess.Popen(
+            [sys.executable, "-I", "-S", str(SCRIPT), *words],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            pass_fds=(descriptor,), start_new_session=True,
+        )  # fmt: skip
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._stdin, self._stdout = self._process.stdin, self._process.stdout
+        for end in (self._stdin, self._stdout):
+            os.set_blocking(end.fileno(), False)  # one that stands still is lost, and holds up no cycle
+
+    def send(self, beat: bytes) -> None:
+        os.write(self._stdin.fileno(), beat)
+
+    def heard(self) -> bool:
+        try:
+            return os.read(self._stdout.fileno(), 4096) != b""
+        except BlockingIOError:
+            return False
+
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
+    def close(self) -> None:
+        self._stdin.close()
+        try:
+            self._process.wait(ANSWER)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._stdout.close()
+
+
+class _Service:
+    """A supervisor that runs apart from the driver, at a Unix socket: it survives the driver's group."""
+
+    def __init__(
+        self, path: str, descriptor: int, timeout: float, frames: Sequence[str], replies: Sequence[str]
+    ) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket.settimeout(ANSWER)
+        words = {"timeout": timeout, "frames": list(frames), "replies": list(replies)}
+        order = json.dumps(words).encode() + b"\n"
+        try:
+            self._socket.connect(path)
+            socket.send_fds(self._socket, [order], [descriptor])
+            answer = self._socket.recv(64)
+        except OSError as error:
+            answer = str(error).encode()
+        if answer != b"ready\n":
+            self._socket.close()
+            raise SupervisorLost(
+                f"parameter supervisor = {path!r}: {answer.decode() or 'no answer'}, expected a supervisor"
+                " that listens there (docs/hardware.md)"
+            )
+        self._socket.settimeout(0.0)
+
+    def send(self, beat: bytes) -> None:
+        self._socket.send(beat)
+
+    def heard(self) -> bool:
+        try:
+            return self._socket.recv(4096) != b""
+        except OSError:
+            return False
+
+    def alive(self) -> bool:
+        self.heard()
+        try:
+            return self._socket.recv(1, socket.MSG_PEEK) != b""
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+
+    def close(self) -> None:
+        """Wait until it has let the port go, which nobody else can open before."""
+        self._socket.settimeout(ANSWER)
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_WR)
+            while self._socket.recv(4096):
+                pass
+        self._socket.close()
+
+
+class Supervisor:
+    """Sends `frames` on `descriptor` when this process ends, or does not beat for `timeout` s.
+
+    replies: what acknowledges a frame: it is sent until then. Empty: nothing does.
+    service: path of the Unix socket of one that runs apart; empty: a child process.
+    """
+
+    def __init__(
+        self,
+        descriptor: int,
+        timeout: float,
+        frames: Sequence[bytes],
+        replies: Sequence[bytes] = (),
+        service: str = "",
+    ) -> None:
+        self._timeout, self._last, self._beat, self._armed = timeout, 0.0, 0.0, False
+        self._lost, self._unanswered = False, math.inf
+        words = [frame.hex() for frame in frames], [reply.hex() for reply in replies]
+        self._end: _End = (
+            _Service(service, descriptor, timeout, *words) if service else _Child(descriptor, timeout, *words)
+        )
+
+    def alive(self) -> bool:
+        """Return whether it runs, and takes beats."""
+        return not self._lost and self._end.alive()
+
+    def beat(self, armed: bool | None = None) -> None:
+        """Report that this process runs, and whether torque is commanded (None: as before).
+
+        A change of the torque is reported at once, otherwise the last report counts for a 20th of the
+        time-out.
+        Raises SupervisorLost, and HeldUp when the last beat is so old that the supervisor may have acted.
+        """
+        now = time.monotonic()
+        gap, armed_before = now - self._last, self._armed
+        self._last, self._armed = now, armed_before if armed is None else armed
+        if self._armed != armed_before or now - self._beat > self._timeout / BEATS:
+            self._beat = now
+            self._tell(now)
+        if armed_before and gap > SURE * self._timeout:
+            limit = f"{1e3 * SURE * self._timeout:.0f} ms"
+            raise HeldUp(f"no cycle for {1e3 * gap:.0f} ms, limit {limit}: the motor may have been stopped")
+
+    def _tell(self, now: float) -> None:
+        """Send a beat, and look for the echo of the last ones."""
+        if self._end.heard():
+            self._unanswered = math.inf
+        self._unanswered, wrong = min(self._unanswered, now), ""
+        if now - self._unanswered > ECHO:
+            wrong = f"no answer for {now - self._unanswered:.2f} s, limit {ECHO:g} s"
+        try:
+            self._end.send(b"a" if self._armed else b"d")
+        except OSError as error:
+            wrong = error.strerror or f"{error}"
+        if wrong:
+            self._lost = True
+            raise SupervisorLost(f"supervisor process: {wrong}, expected it to run")
+
+    def close(self, *, safe: bool = True) -> None:
+        """End it. safe: the motor has acknowledged zero torque; else the supervisor sends its frames."""
+        if safe:
+            with suppress(OSError):
+                self._end.send(b"q")
+        self._end.close()
+
 
 BUS_WATCHDOG, SUPERVISOR, PROCESS, NONE = "bus watchdog", "supervisor", "process", "none"
 

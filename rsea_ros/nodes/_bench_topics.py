@@ -1,10 +1,10 @@
-"""The topics of a bench, which plant and driver share: measurements out, commands in."""
+"""Topics of a bench: what it publishes, what it hears, and the states of several joints in one message."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rclpy.node import Node
@@ -16,6 +16,7 @@ from msg_adapters.ros import (
     WrenchStamped,
     deflection_message,
     joint_state_message,
+    joint_states_message,
     wrench_message,
 )
 from msg_adapters.topic_map import JOINT_STATE, TYPES
@@ -26,8 +27,25 @@ from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import JOINT, NodeParameter
-from rsea_ros.nodes._publishers import Obeyed
 from rsea_ros.nodes._qos import COMMAND, MEASURED, OVERRIDES
+
+
+class Obeyed:
+    """ignored: messages of others while the one that is obeyed went on."""
+
+    def __init__(self) -> None:
+        self._who: object = None
+        self._heard = 0
+        self.ignored = 0
+
+    def admit(self, who: object, now: int) -> bool:
+        """Return whether a message of a publisher (by identity) counts. now: ns, of a clock without steps."""
+        if who != self._who and self._who is not None and now - self._heard < HORIZON:
+            self.ignored += 1
+            return False
+        self._who, self._heard = who, now
+        return True
+
 
 NAMES = (
     JOINT,
@@ -159,3 +177,31 @@ class BenchTopics:
 
 def _publisher(node: Node, kind: Any, topic: str) -> Any:
     return node.create_publisher(kind, topic, MEASURED, qos_overriding_options=OVERRIDES)
+
+
+class Combined:
+    """The topic `joint_states` of the node beside those of its joints. names: of all joints, in order."""
+
+    def __init__(self, node: Node, names: Sequence[str]) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(
+            JointState, "joint_states", MEASURED, qos_overriding_options=OVERRIDES
+        )
+        template = serialize_message(joint_states_message(names))
+        self._writer = RawWriter(template, TYPES["joint_states"], "position", "velocity", "effort")
+
+    def publish(self, states: Sequence[State | None], shift: int) -> None:
+        """Publish the readings of a cycle under the first one's stamp; nothing where one is lost.
+
+        shift: ns, of the stamps.
+        """
+        read = [state for state in states if state is not None]
+        if len(read) < len(states):
+            return
+        numbers = [state.position for state in read] + [state.velocity for state in read]
+        numbers += [state.motor_torque for state in read]
+        self._publisher.publish(self._writer.write(read[0].stamp + shift, numbers))
+
+    def close(self) -> None:
+        """Take the topic away."""
+        self._node.destroy_publisher(self._publisher)

@@ -9,12 +9,11 @@ from typing import Any
 from msg_adapters.topic_map import sign_and_index
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.device import Device
+from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.encoder import EncoderConnection
-from rsea_ros.hardware.dynamixel.line import Line
-from rsea_ros.hardware.dynamixel.line_motor import LineMotor
+from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
-from rsea_ros.hardware.dynamixel.settings import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.netft.sensor import SensorConnection

@@ -1,15 +1,22 @@
-"""Inputs of the health node: all topics together, sorted by stamp, once they are complete."""
+"""What the health node hears, and the noise that it and the model node expect."""
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rclpy.node import Node
 
 from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.extent import LARGEST
+from rsea_ros.model.observer import Noise, noise_of
 from rsea_ros.model.observer.log import COMMAND, FT, STATE
+from rsea_ros.model.rig import Rig
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
@@ -93,3 +100,39 @@ class HealthInputs:
 
     def _refuse(self) -> None:
         self.refused += 1
+
+
+_EXPECTED = "expected an identification.json of rsea identify"
+
+
+def noise_from(rig: Rig, path: str) -> Noise:
+    """Return the noise of a rig, measured where an identification.json is named.
+
+    Raises ParameterError for a file of another kind.
+    """
+    if not path:
+        return noise_of(rig)
+    document = _document(path)
+    return noise_of(rig, _numbers(document, "noise_rms", path), _numbers(document, "residual_rms", path))
+
+
+def _document(path: str) -> Mapping[str, Any]:
+    try:
+        document = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        why = error.strerror if isinstance(error, OSError) else "no JSON"
+        raise ParameterError(f"parameter identification = {path!r}: {why}, {_EXPECTED}") from None
+    if not isinstance(document, dict):
+        raise ParameterError(f"parameter identification = {path!r}, {_EXPECTED}")
+    return document
+
+
+def _numbers(document: Mapping[str, Any], name: str, path: str) -> dict[str, float]:
+    values = document.get(name)
+    if not isinstance(values, dict):
+        raise ParameterError(f"{path}: {name} = {values!r}, expected numbers by channel")
+    numbers = {channel: v for channel, v in values.items() if isinstance(v, (int, float))}
+    for channel, value in numbers.items():
+        if not 0 <= value <= LARGEST:
+            raise ParameterError(f"{path}: {name}.{channel} = {str(value)[:40]}, expected 0 to {LARGEST:g}")
+    return {channel: float(value) for channel, value in numbers.items()}

@@ -18,7 +18,7 @@ from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._devices import limits_of, spring_of
 from rsea_ros.nodes._drive import DriverCycle
 from rsea_ros.nodes._health import ERROR, OK, Health, NodeHealth
-from rsea_ros.nodes._jobs import Jobs
+from rsea_ros.nodes._joints import Jobs
 
 LOST = {"failed_reads": "reads lost", "failed_writes": "writes lost"}
 Work = Callable[[], str]

@@ -1,13 +1,19 @@
-"""Several joints of one driver: which they are, and the parameters of each."""
+"""The joints of a driver, and jobs that wait for a cycle."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.task import Future
+
 from rsea_ros.errors import ParameterError
+from rsea_ros.nodes._health import STEADY
 from rsea_ros.nodes._parameters import NodeParameter
 
 JOINTS = NodeParameter(
@@ -55,3 +61,43 @@ def joint_values(values: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
         })
         for joint in names
     ]  # fmt: skip
+
+
+TICK = 0.02
+"""s between two looks of the executor at whether the work is over, while there is some."""
+
+
+class Jobs:
+    """Threads of a node's services. group: the callback group of these services."""
+
+    def __init__(self, node: Node) -> None:
+        self.group = ReentrantCallbackGroup()
+        self._tick = node.create_timer(TICK, lambda: None, self.group, clock=STEADY)
+        self._tick.cancel()
+        self._threads: set[threading.Thread] = set()
+
+    async def do(self, work: Callable[[], str]) -> str:
+        """Return the result of the work or raise its error; the executor goes on meanwhile."""
+        future: Future[str] = Future()
+        thread = threading.Thread(target=_fulfil, args=(future, work), daemon=True)
+        self._threads.add(thread)
+        self._tick.reset()
+        thread.start()
+        try:
+            return str(await future)
+        finally:
+            self._threads.discard(thread)
+            if not self._threads:
+                self._tick.cancel()
+
+    def join(self, timeout: float) -> None:
+        """Wait for what is under way, s each."""
+        for thread in list(self._threads):
+            thread.join(timeout)
+
+
+def _fulfil(future: Future[str], work: Callable[[], str]) -> None:
+    try:
+        future.set_result(work())
+    except Exception as error:  # raised in the coroutine of whoever waits for it
+        future.set_exception(error)

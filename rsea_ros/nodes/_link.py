@@ -1,21 +1,30 @@
-"""What the controller node makes of an encoder on the spring: the link's motion, or why not."""
+"""What a controller measures: the actuator's topics and the link's motion."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from rclpy.node import Node
 
+from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.control.compensation import compensation
+from rsea_ros.control.controller import Measurement
 from rsea_ros.control.law import law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
 from rsea_ros.control.loads import lightest, load_range
-from rsea_ros.control.spring_encoder import SpringEncoder, spread
+from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading, spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes._anchor import Anchor
+from rsea_ros.nodes._commands import CommandQueue
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from rsea_ros.records.record import NONSENSE, is_measured
 
 LOUD = 0.02
 """Of torque_limit: RMS of the torque that the noise of both encoders may make."""
@@ -87,3 +96,93 @@ def _noise(rig: Rig, designed: ControllerDesign, share: LinkShare) -> float:
     motion = LinkMotion(law_of(rig, designed.rate, designed.gains), share)
     torques = [motion.torque(angle * x, 0.0) for x in np.random.default_rng(0).normal(size=HEARD)]
     return math.sqrt(sum(torque**2 for torque in torques) / HEARD)
+
+
+WAITING = 500
+"""Measurements that wait for their other half."""
+
+OLD = 1.5
+"""Samples: what is older than the sample before is no deflection of a reading."""
+
+MOST = 100
+"""Desired torques that are taken at once."""
+
+
+class Measurements:
+    """Pairs of joint_states and ft, with the link's angle. period: ns. desired: messages of desired_torque.
+
+    encoder: checks `deflection`; None: that topic is not heard.
+    limit: the largest torque, N m.
+    unusable: readings that were not finite, or of NONSENSE times the limit, and messages of several joints.
+    """
+
+    def __init__(
+        self, node: Node, axis: str, period: float, joint: str = "", *,
+        encoder: SpringEncoder | None = None, limit: float = math.inf,
+    ) -> None:  # fmt: skip
+        self._period = period
+        self._sign, along = sign_and_index(axis)
+        self._waiting_states: deque[tuple[int, Sequence[float]]] = deque(maxlen=WAITING)
+        self._waiting_fts: deque[tuple[int, float]] = deque(maxlen=WAITING)
+        self.desired, self._most = CommandQueue(limit=limit), NONSENSE * limit
+        self.unusable = self._heard = 0
+        state = (("position", 0), ("velocity", 0), ("effort", 0))
+        states = MessageFields(JOINT_STATE, state, joint)
+        self._states = Mailbox(node, "joint_states", states, MEASUREMENT, self._refuse)
+        wrench = MessageFields(WRENCH, (("wrench", along),))
+        self._fts = Mailbox(node, "ft", wrench, MEASUREMENT, self._refuse)
+        self._encoder, self._before = encoder, 0
+        self._waiting_deflections: deque[tuple[int, float]] = deque(maxlen=WAITING)
+        self._deflection = (0, math.nan)
+        angle = MessageFields(JOINT_STATE, (("position", 0),), joint)
+        self._deflections = encoder and Mailbox(node, "deflection", angle, MEASUREMENT, lambda: None)
+        torque = MessageFields(JOINT_STATE, (("effort", 0),), joint)
+        self._desired = Mailbox(node, "desired_torque", torque, COMMAND, self.desired.refuse)
+        self.subscriptions = [self._states.subscription, self._fts.subscription]
+
+    def take(self) -> Iterator[tuple[int, Measurement]]:
+        """Yield stamp (ns) and reading of each state that has a torque of its instant, or of a later one.
+
+        Of its instant: to half a period. All that has arrived is taken first, so that a process that was held
+        up has the newest at once.
+        """
+        self._waiting_fts += ((stamp, self._sign * torque) for stamp, (torque,), _ in self._fts.take())
+        self._waiting_states += ((stamp, numbers) for stamp, numbers, _ in self._states.take())
+        if self._deflections:
+            self._waiting_deflections += ((t, angle) for t, (angle,), _ in self._deflections.take())
+        while self._waiting_states and self._waiting_fts:
+            stamp, (position, velocity, effort) = self._waiting_states[0]
+            at, torque = self._waiting_fts[0]
+            if at < stamp - 0.5 * self._period:
+                self._waiting_fts.popleft()
+                continue
+            self._waiting_states.popleft()
+            if is_measured(torque, self._most) and is_measured(velocity) and is_measured(position):
+                ft_age = (stamp - at) / self._period
+                link = self._link(stamp, torque, position, ft_age) if self._encoder else math.nan
+                yield stamp, Measurement(torque, velocity, position, effort, ft_age, link)
+            else:
+                self._refuse()
+
+    def _link(self, stamp: int, torque: float, position: float, ft_age: float) -> float:
+        """Return the link's angle, rad, from the deflection of a state's instant or of the sample before."""
+        assert self._encoder is not None
+        waiting = self._waiting_deflections
+        while waiting and waiting[0][0] <= stamp + 0.5 * self._period:
+            self._deflection = waiting.popleft()
+        at, deflection = self._deflection
+        age, periods = (stamp - at) / self._period, (stamp - self._before) / self._period
+        self._before = stamp
+        if not -0.5 <= age <= OLD:
+            deflection = math.nan
+        return self._encoder.link(SpringReading(deflection, torque, position, age, ft_age, periods))
+
+    def hear_desired(self, anchor: Anchor) -> None:
+        """Queue all desired torques that have arrived."""
+        now = anchor.now()
+        for stamp, (torque,), received in self._desired.take(MOST):
+            self.desired.add(stamp, torque, anchor.arrival(received, self._heard))
+        self._heard = now
+
+    def _refuse(self) -> None:
+        self.unusable += 1

@@ -1,10 +1,13 @@
-"""Status of the model node on /diagnostics: band and errors, doubt, consistency, and presence of ft."""
+"""Health of the model node, and its latched flags."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 
+from rclpy.node import Node
+
+from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
 from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
 from rsea_ros.model.observer.signal_noise import Consistency, consistency
@@ -13,6 +16,7 @@ from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._model_inputs import ModelInputs
+from rsea_ros.nodes._qos import LATCHED, await_arrival
 
 EVERY = 64
 """Estimates between two looks at their noise."""
@@ -157,3 +161,34 @@ def _test_values(tests: Mapping[str, Consistency]) -> dict[str, object]:
         values |= {f"{name}.innovation": f"{test.ratio:.3f}", f"{name}.innovation_limit": f"{test.limit:.3f}"}
         values[f"{name}.innovation_mean"] = f"{test.mean:.3g}"
     return values
+
+
+NAME = "pure_torque"
+
+
+class Flags:
+    """`pure_torque` (Bool) and `pure_torque_stamped` (JointState: effort[0] is 1 or 0), both latched."""
+
+    def __init__(self, node: Node) -> None:
+        self._bare = node.create_publisher(Bool, NAME, LATCHED)
+        self._stamped = node.create_publisher(JointState, f"{NAME}_stamped", LATCHED)
+        self._up, self._stamp = False, 0
+        self._publish()
+
+    def show(self, stamp: int, up: bool) -> None:
+        """Publish the flag from a sample (its stamp in ns) on, if it has changed."""
+        self._stamp = stamp
+        if up != self._up:
+            self._up = up
+            self._publish()
+
+    def lower(self) -> None:
+        """Lower the flag, and wait until all subscribers have it."""
+        self._up = False
+        self._publish()
+        for publisher in (self._bare, self._stamped):
+            await_arrival(publisher)
+
+    def _publish(self) -> None:
+        self._bare.publish(bool_message(self._up))
+        self._stamped.publish(efforts_message(self._stamp, {NAME: float(self._up)}))

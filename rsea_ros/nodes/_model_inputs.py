@@ -1,10 +1,10 @@
-"""Inputs of the model node: commands, states and wrenches, processed in the order of their stamps."""
+"""What the model node hears, and sensors that stopped or stand still."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from statistics import median
@@ -13,11 +13,100 @@ from rclpy.node import Node
 
 from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.observer import Observer, TorqueEstimate
+from rsea_ros.model.rig import Rig
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
-from rsea_ros.nodes._stopped_sensors import StoppedSensors
+
+SAMPLES, TIME = 10, 50_000_000
+"""Equal samples, and ns of them, that are no chance."""
+
+
+class Frozen:
+    """One topic's values. A sensor at rest may show the same counts; then something else must have moved.
+
+    least: motion of the other sensor that proves a freeze; 0: none needed, this sensor's noise suffices.
+    """
+
+    def __init__(self, least: float = 0.0) -> None:
+        self._least = least
+        self._last: Sequence[float] = ()
+        self._since = self._count = 0
+        self._low, self._high = math.inf, -math.inf
+        self.frozen = False
+
+    def take(self, stamp: int, values: Sequence[float]) -> bool:
+        """Process a sample (stamp in ns); return whether the sensor has stopped."""
+        if values != self._last or stamp < self._since:
+            self._last, self._since, self._count, self.frozen = values, stamp, 0, False
+            self._low, self._high = math.inf, -math.inf
+        self._count += 1
+        if self._count >= SAMPLES and stamp - self._since >= TIME:
+            self.frozen = self.frozen or self._high - self._low >= self._least or self._least == 0.0
+        return self.frozen
+
+    def beside(self, value: float) -> None:
+        """Process a sample of another sensor."""
+        self._low, self._high = min(self._low, value), max(self._high, value)
+
+
+MOVED, LEAST = 12.0, 0.1
+"""Standard deviations of ft, and N m, by which it must move while joint_states stand still, to tell that they
+have stopped: more than noise does in a second, less than what matters."""
+
+
+class StoppedSensors:
+    """Watches joint_states and ft beside the commands."""
+
+    def __init__(self, ft_noise: float, stiffness: float = 0.0, *, ft_repeats: bool = False) -> None:
+        """ft_noise: standard deviation, N m. stiffness: of the spring, N m/rad.
+
+        ft_repeats: whether ft may repeat a value at rest because its quantum exceeds its noise, as that of an
+        encoder does.
+        """
+        least = max(MOVED * ft_noise, LEAST)
+        self._states_by_ft, self._states_by_command = Frozen(least), Frozen(least)
+        self._ft, self._stiffness = Frozen(least if ft_repeats else 0.0), stiffness
+
+    def take_state(self, stamp: int, position: float, effort: float) -> bool:
+        """Process a state (ns, rad, N m); return whether joint_states have stopped."""
+        self._states_by_command.take(stamp, (position, effort))
+        self._ft.beside(self._stiffness * position)
+        return self._states_by_ft.take(stamp, (position, effort))
+
+    def take_ft(self, stamp: int, torque: float) -> bool:
+        """Process a torque of the sensor (ns, N m); return whether ft has stopped."""
+        self._states_by_ft.beside(torque)
+        return self._ft.take(stamp, (torque,))
+
+    def take_command(self, torque: float) -> None:
+        """Process a commanded torque, N m."""
+        self._states_by_command.beside(torque)
+
+    @property
+    def ft_frozen(self) -> bool:
+        """Whether ft repeats a value where it should change."""
+        return self._ft.frozen
+
+    @property
+    def frozen(self) -> list[str]:
+        """Topics that repeat a value where it should change."""
+        topics = (("joint_states", self._states_by_ft), ("ft", self._ft))
+        return [topic for topic, sensor in topics if sensor.frozen]
+
+    @property
+    def unmoved(self) -> bool:
+        """Whether joint_states repeat a value while commands move: they have stopped, or the drive is off."""
+        return self._states_by_command.frozen
+
+
+def stopped_sensors(rig: Rig, ft_noise: float) -> StoppedSensors:
+    """Return the watch of a rig's sensors. ft_noise: standard deviation, N m."""
+    ft = rig.sensors.get("ft")
+    ft_repeats = ft is not None and ft.quantum > 2.0 * ft.noise
+    return StoppedSensors(ft_noise, rig["spring.stiffness"], ft_repeats=ft_repeats)
+
 
 PERIODS = 64
 _STATE, _FT = range(2)

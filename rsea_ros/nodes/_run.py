@@ -1,4 +1,9 @@
-"""From the start of a node's process to its exit status."""
+"""How a node runs and ends.
+
+Fast DDS gives messages to listeners on the same machine through shared memory. For one that was stopped
+(SIGSTOP, a debugger) while it takes a message out, `publish` waits for a second or two, and rclpy keeps the
+interpreter meanwhile: the cycle stands still under torque.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from types import FrameType
 from typing import Any, Protocol
 
@@ -14,15 +20,37 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
+from rclpy.utilities import get_rmw_implementation_identifier, remove_ros_args
 
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._parameters import NodeParameter, declare, usage
-from rsea_ros.nodes._pulse import Pulse
-from rsea_ros.nodes._sockets import publish_by_sockets
+from rsea_ros.nodes._waiter import Pulse, anything_to_do
 from rsea_ros.processes import ENDING, STOPPING, Stopped
+
+RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
+LOCALHOST, AS_PROFILE = "LOCALHOST", "SYSTEM_DEFAULT"
+"""Of RANGE: with the first rmw_fastrtps adds shared memory whatever else is said, with the second nothing."""
+PROFILE = "FASTDDS_DEFAULT_PROFILES_FILE"
+USERS = (PROFILE, "FASTRTPS_DEFAULT_PROFILES_FILE")
+OLDER = ("humble", "iron")
+"""Distributions whose Fast DDS does not read PROFILE: it would be open to the network."""
+FILE = Path(__file__).with_name("localhost_sockets.xml")
+"""Who may find the node is the same: this machine."""
+
+
+def publish_by_sockets() -> None:
+    """Do so from the next participant on, unless the user has a profile of Fast DDS, or other middleware."""
+    if any(name in os.environ for name in USERS) or os.environ.get("ROS_DISTRO") in OLDER:
+        return
+    if not get_rmw_implementation_identifier().startswith("rmw_fastrtps"):
+        return
+    if os.environ.get(RANGE) == LOCALHOST and PEERS not in os.environ and FILE.is_file():
+        os.environ[RANGE] = AS_PROFILE
+        os.environ[PROFILE] = str(FILE)
+    else:
+        os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+
 
 NAMESPACE = "rsea"
 SUCCESS, BAD_INPUT = 0, 2

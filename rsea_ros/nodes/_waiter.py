@@ -1,18 +1,55 @@
-"""A thread that works when subscriptions have something: rclpy's executor costs more than the work."""
+"""How a node waits for work: a wake-up for each message, a pulse, and idle time.
+
+The middleware may count the timeouts of its waits by the system clock (FastDDS built for glibc before
+2.30). If that clock is set back by an hour, a wait of 0.1 s lasts an hour longer: Ctrl-C does not end the
+node, and its timers rest.
+
+All threads of a node share one interpreter lock, so the time that the executor spends ten times a second to
+find nothing to do makes a cycle at 1 kHz late.
+"""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+import time
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack, suppress
 from typing import Any
 
+from rclpy.executors import Executor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from rsea_ros.nodes._pulse import FOR_EVER, Pulse
 from rsea_ros.nodes._realtime import exact_timers
+
+FOR_EVER = -1
+
+
+class Pulse:
+    """Triggers `guard` every period (s) until it is closed. Only one wait set may hold it."""
+
+    def __init__(self, node: Node, period: float) -> None:
+        context = node.context.handle
+        assert context is not None
+        with context:
+            self.guard = rclpy_implementation.GuardCondition(context)
+        self._period = period
+        self._is_over = False
+        self._thread = threading.Thread(target=self._beat, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the triggers."""
+        self._is_over = True
+        self._thread.join()
+        self.guard.destroy_when_not_in_use()
+
+    def _beat(self) -> None:
+        while not self._is_over:
+            time.sleep(self._period)
+            with self.guard:
+                self.guard.trigger_guard_condition()
 
 
 class Waiter:
@@ -67,3 +104,46 @@ class Waiter:
             self.error = error
         finally:
             pulse.close()
+
+
+def anything_to_do(node: Node, executor: Executor, pulse: Pulse) -> bool:
+    """Wait until an entity of an executor's node is ready, or for a pulse; return whether one is ready.
+
+    Entities are its subscriptions, timers, clients and services. Events of publishers and subscriptions wake
+    nobody; the executor sees to them when it runs next.
+    """
+    assert node.context.handle is not None
+    with ExitStack() as held:
+        subscriptions, timers, clients, services = (
+            _hold(held, executor, entities)
+            for entities in (node.subscriptions, node.timers, node.clients, node.services)
+        )
+        counts = (len(subscriptions), 1, len(timers), len(clients), len(services), 0)
+        waits = rclpy_implementation.WaitSet(*counts, node.context.handle)
+        waits.clear_entities()
+        waits.add_guard_condition(pulse.guard)
+        for subscription in subscriptions:
+            waits.add_subscription(subscription)
+        for timer in timers:
+            waits.add_timer(timer)
+        for client in clients:
+            waits.add_client(client)
+        for service in services:
+            waits.add_service(service)
+        waits.wait(FOR_EVER)
+        ready = waits.get_ready_entities
+        return any(ready(kind) for kind in ("subscription", "timer", "client", "service"))
+
+
+def _hold(held: ExitStack, executor: Executor, entities: Iterable[Any]) -> list[Any]:
+    """Return the handles of entities that an executor may serve, kept alive while they are waited for.
+
+    Another thread may have destroyed some since, as a session does with the subscriptions of its last run.
+    """
+    handles = []
+    for entity in entities:
+        if executor.can_execute(entity):
+            with suppress(rclpy_implementation.InvalidHandle):
+                held.enter_context(entity.handle)
+                handles.append(entity.handle)
+    return handles

@@ -19,12 +19,10 @@ from rsea_ros.control.grid import Grid
 from rsea_ros.control.polarity import Polarity
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._control import TABLE, controller_of, design_of, summary
-from rsea_ros.nodes._controller_limits import ControllerLimits
+from rsea_ros.nodes._control import TABLE, ControllerLimits, controller_of, design_of, summary
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
-from rsea_ros.nodes._link import link_of, link_values, link_words
-from rsea_ros.nodes._measurements import Measurements
+from rsea_ros.nodes._link import Measurements, link_of, link_values, link_words
 from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._realtime import keep_time
 from rsea_ros.nodes._run import run_node

@@ -19,18 +19,14 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, ManagedEntity, Transi
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
-from rsea_ros.nodes._alarm import SignalListener
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._bench_topics import NAMES, SPRING_FRAME
-from rsea_ros.nodes._buses import devices_of
-from rsea_ros.nodes._combined import Combined
+from rsea_ros.nodes._bench_topics import NAMES, SPRING_FRAME, Combined
 from rsea_ros.nodes._cycle import Cycle
-from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR
+from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
 from rsea_ros.nodes._devices import DEVICES
-from rsea_ros.nodes._drive import step
-from rsea_ros.nodes._jobs import Jobs
+from rsea_ros.nodes._drive import SignalListener, step
 from rsea_ros.nodes._joint import DrivenJoint, offer
-from rsea_ros.nodes._joints import JOINTS, joint_table, joint_values
+from rsea_ros.nodes._joints import JOINTS, Jobs, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
 from rsea_ros.nodes._run import run_node

@@ -19,11 +19,9 @@ from rsea_ros.health.monitor import Monitor
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._findings import FindingsPublisher, instant, sentence
+from rsea_ros.nodes._findings import FindingsPublisher, Keeper, Ring, instant, sentence
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
-from rsea_ros.nodes._health_inputs import Events, HealthInputs
-from rsea_ros.nodes._kept import Keeper, Ring
-from rsea_ros.nodes._model_noise import noise_from
+from rsea_ros.nodes._health_inputs import Events, HealthInputs, noise_from
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._run import NAMESPACE, run_node
 

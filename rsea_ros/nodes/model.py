@@ -18,16 +18,14 @@ from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._flags import Flags
 from rsea_ros.nodes._health import Health, NodeHealth
-from rsea_ros.nodes._model_health import ModelHealth
-from rsea_ros.nodes._model_inputs import InputSettings, ModelInputs
-from rsea_ros.nodes._model_noise import noise_from
+from rsea_ros.nodes._health_inputs import noise_from
+from rsea_ros.nodes._model_health import Flags, ModelHealth
+from rsea_ros.nodes._model_inputs import InputSettings, ModelInputs, stopped_sensors
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._realtime import REALTIME, keep_time
 from rsea_ros.nodes._run import run_node
-from rsea_ros.nodes._stopped_sensors import stopped_sensors
 from rsea_ros.nodes._waiter import Waiter
 
 TABLE = (

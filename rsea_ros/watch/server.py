@@ -14,10 +14,9 @@ from tornado.ioloop import PeriodicCallback
 from tornado.web import Application
 
 from rsea_ros.errors import RseaError
-from rsea_ros.watch.access import Access, addresses
 from rsea_ros.watch.command import Commander
 from rsea_ros.watch.desk import Desk
-from rsea_ros.watch.handlers import routes
+from rsea_ros.watch.handlers import Access, addresses, routes
 from rsea_ros.watch.page_frames import FrameSource, frame
 from rsea_ros.watch.runs import Runs
 

@@ -7,8 +7,7 @@ import math
 import pytest
 
 from rsea_ros.benchmark.answers import Answer
-from rsea_ros.benchmark.scoring import score
-from rsea_ros.benchmark.truth import RecordTruth, truth_hash
+from rsea_ros.benchmark.scoring import RecordTruth, score, truth_hash
 
 EFFECTS = ("a", "b", "c", "d")
 

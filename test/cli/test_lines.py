@@ -9,7 +9,7 @@ from io import StringIO
 import pytest
 
 from rsea_ros import compiler
-from rsea_ros.cli import _lines
+from rsea_ros.cli import _terminal as _lines
 from rsea_ros.cli.main import main
 from rsea_ros.report.wrapped_lines import command_row, row, wrap
 

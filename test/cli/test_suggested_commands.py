@@ -13,8 +13,7 @@ import pytest
 import rsea_ros as rsea
 from msg_adapters import TopicMap, write_record
 from rsea_ros.cli import diagnose, identify
-from rsea_ros.cli._runs import rig_choice
-from rsea_ros.cli._topics import topic_map
+from rsea_ros.cli._topics import rig_choice, topic_map
 from rsea_ros.cli.main import attach_axis, main
 from rsea_ros.report.rig import command
 

@@ -18,7 +18,7 @@ from rsea_ros.design import spring_design, tolerance
 from rsea_ros.diagnosis import diagnose
 from rsea_ros.experiment import advice
 from rsea_ros.experiment import run_shape as run_file
-from rsea_ros.fleet import store_columns
+from rsea_ros.fleet import query as store_columns
 from rsea_ros.identification import identify
 from rsea_ros.laws import learn
 from rsea_ros.model.rig_file import RigChoice

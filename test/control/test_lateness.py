@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.controller import Measurement, TorqueController
+from rsea_ros.control.grid import Lateness, Tolerance
 from rsea_ros.control.harness import Arrivals, irregular
-from rsea_ros.control.lateness import Lateness, Tolerance
 from rsea_ros.control.law import Gains
 from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes import _controller_limits
+from rsea_ros.nodes import _control as _controller_limits
 
 RATES = {
     280.0: Gains(0.2575, 0.003029, 1.195, 6.99, 42.9),

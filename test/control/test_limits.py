@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.impedance import impedance
-from rsea_ros.control.large_signal import largest, reach
 from rsea_ros.control.law import Gains
+from rsea_ros.control.robustness import largest, reach
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.trials import sine

@@ -6,11 +6,19 @@ import pytest
 
 from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.harness import closed_loop
-from rsea_ros.control.law import FeedbackState, Gains, feedback, hold, law_of
+from rsea_ros.control.law import (
+    FT,
+    VELOCITY,
+    FeedbackState,
+    Gains,
+    feedback,
+    hold,
+    law_of,
+    responses,
+    sample_rig,
+)
 from rsea_ros.control.loads import LOCKED, load_range
-from rsea_ros.control.loop import largest_pole, open_loop
-from rsea_ros.control.margins import margins
-from rsea_ros.control.sampled import FT, VELOCITY, responses, sample_rig
+from rsea_ros.control.margins import largest_pole, margins, open_loop
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import check, grid
 from rsea_ros.errors import ParameterError

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.control.human import measure_impedance
+from rsea_ros.control.human import Virtual, felt_impedance, measure_impedance, passive_to, stiffest
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import Gains
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.virtual import Virtual, felt_impedance, passive_to, stiffest
 from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")

@@ -14,8 +14,8 @@ from similar_machine import record_with
 import rsea_ros.effects as effects
 from rsea_ros.cli.main import main
 from rsea_ros.control.compensation import compensation
-from rsea_ros.control.lags import lag_responses
-from rsea_ros.control.sampled import responses, sample_rig
+from rsea_ros.control.law import responses, sample_rig
+from rsea_ros.control.uncertainty import lag_responses
 from rsea_ros.diagnosis.candidate import with_common_clock_in_delay
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming.conclusion import undetermined_play

@@ -11,8 +11,7 @@ import pytest
 from rsea_ros.documents.units import STANDARD_GRAVITY
 from rsea_ros.errors import RigError
 from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.sdf import export_sdf
-from rsea_ros.exports.urdf import export_urdf
+from rsea_ros.exports.urdf import export_sdf, export_urdf
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.rival_models import lumped_rig

@@ -13,11 +13,10 @@ import pytest
 from rsea_ros.cli.main import main
 from rsea_ros.design.mujoco_model import STEP
 from rsea_ros.exports import mujoco_play
-from rsea_ros.exports.difference import RATE, differences, ours
 from rsea_ros.exports.fmu import export_fmu
-from rsea_ros.exports.fmu_play import play_fmu
 from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.mujoco_play import play_mujoco
+from rsea_ros.exports.mujoco_play import RATE, differences, ours, play_mujoco
+from rsea_ros.exports.verification import play_fmu
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig, save_rig
 

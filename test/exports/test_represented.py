@@ -14,8 +14,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.exports.bam import export_bam
 from rsea_ros.exports.isaac import export_isaac
 from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.sdf import export_sdf
-from rsea_ros.exports.urdf import export_urdf
+from rsea_ros.exports.urdf import export_sdf, export_urdf
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 

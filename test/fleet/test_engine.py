@@ -159,7 +159,7 @@ def test_many_rows_become_one_file_and_stay_all_there(store, folder, monkeypatch
 
 
 def test_a_compaction_killed_half_way_leaves_no_row_twice(store, folder, monkeypatch):
-    monkeypatch.setattr("rsea_ros.fleet.compaction._remove", lambda folder, names: None)
+    monkeypatch.setattr("rsea_ros.fleet.store_keys._remove", lambda folder, names: None)
     run_engine(store, folder)
     monkeypatch.undo()
     assert len(list(store.rows.rglob("*.parquet"))) == 6

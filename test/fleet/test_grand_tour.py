@@ -12,9 +12,9 @@ from missions import JOINTS, NOT_WALKING, STIFFNESS, torque, write_mission
 
 from msg_adapters import read_record
 from rsea_ros.cli.main import main
+from rsea_ros.fleet.analysis import read_run
 from rsea_ros.fleet.joints import load_joints
 from rsea_ros.fleet.query import answer
-from rsea_ros.fleet.read_recording import read_run
 from rsea_ros.fleet.sources import bags_of, fingerprint, relist
 from rsea_ros.fleet.store import open_store
 

@@ -101,7 +101,7 @@ def test_a_mistake_is_reported_with_its_line(mapped, tmp_path, change, said):
 
 
 def test_the_tables_of_the_docs_are_those_of_the_keys():
-    from rsea_ros.fleet.joint_keys import tables
+    from rsea_ros.fleet.joints import tables
 
     page = (Path(__file__).parents[2] / "docs/fleet.md").read_text(encoding="utf-8")
     assert tables() in page

@@ -16,7 +16,7 @@ import pytest
 from msg_adapters import write_record
 from rsea_ros.cli.main import main
 from rsea_ros.fleet import history, recordings
-from rsea_ros.fleet.dated_paths import date_in
+from rsea_ros.fleet.joints import date_in
 from rsea_ros.fleet.row import VARYING
 from rsea_ros.fleet.store_keys import read
 from rsea_ros.fleet.task import Changed, Task, read_fingerprint, work

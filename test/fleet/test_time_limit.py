@@ -11,14 +11,14 @@ import pytest
 from fleet_stubs import KNEE, stub_work
 
 from rsea_ros.cli.main import main
-from rsea_ros.fleet import analysis, time_limit
+from rsea_ros.fleet import analysis
+from rsea_ros.fleet import task as time_limit
 from rsea_ros.fleet.engine import Engine, EngineLimits
 from rsea_ros.fleet.executor import Serial
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
 from rsea_ros.fleet.store import TaskOutcome
-from rsea_ros.fleet.task import Task, work
-from rsea_ros.fleet.time_limit import TIME_LIMIT, OutOfTime, limit_time
+from rsea_ros.fleet.task import TIME_LIMIT, OutOfTime, Task, limit_time, work
 
 MAP = "joints:\n  knee: {rig: paper_high_impedance}\n"
 

@@ -7,8 +7,8 @@ from functools import partial
 
 import pytest
 
+from rsea_ros.hardware.dynamixel.control_tables import MotorConnection
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.settings import MotorConnection
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits

@@ -8,19 +8,17 @@ import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply
+from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.encoder import LINK, BusEncoder, EncoderConnection
-from rsea_ros.hardware.dynamixel.line import Line
-from rsea_ros.hardware.dynamixel.line_motor import LineMotor
+from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.settings import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.guarded import GuardedDevice, cycle
 from rsea_ros.hardware.limits import Limits
-from rsea_ros.hardware.peer.peer_encoder import IDENTITY
+from rsea_ros.hardware.peer.peer_motor import IDENTITY
 from rsea_ros.hardware.peer.registers import ENCODER
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.hardware.spring_sensor import Spring
-from rsea_ros.hardware.together import cycle
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._devices import dynamixel_netft, limits_of
 from test.hardware.conftest import LATENCY, PERIOD, STIFFNESS, WATCHDOG

@@ -5,8 +5,7 @@ import random
 
 import pytest
 
-from rsea_ros.hardware.dynamixel.frame_stream import StatusFrameParser
-from rsea_ros.hardware.dynamixel.frames import crc16, frame, stuff, unstuff
+from rsea_ros.hardware.dynamixel.frames import StatusFrameParser, crc16, frame, stuff, unstuff
 from rsea_ros.hardware.dynamixel.handler import PacketHandler
 from rsea_ros.hardware.peer import protocol2
 

@@ -7,10 +7,9 @@ import pytest
 
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.bus import Bus
-from rsea_ros.hardware.dynamixel.control_tables import TABLES, TorqueConstant
+from rsea_ros.hardware.dynamixel.control_tables import TABLES, MotorConnection, TorqueConstant
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import Turns
-from rsea_ros.hardware.dynamixel.settings import MotorConnection
 from rsea_ros.hardware.peer.protocol2 import status
 
 SIZE = TABLES[54024].sample[1]

@@ -7,15 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.dynamixel.line import Line
-from rsea_ros.hardware.dynamixel.line_motor import LineMotor
-from rsea_ros.hardware.dynamixel.settings import MotorConnection
+from rsea_ros.hardware.dynamixel.control_tables import MotorConnection
+from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.guarded import GuardedDevice, cycle
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.peer.remote import RemoteBench
-from rsea_ros.hardware.together import cycle
 from test.hardware.conftest import FT_TIMEOUT, LATENCY, PERIOD, WATCHDOG
 
 MODELS = (1020, 1120, 1170)

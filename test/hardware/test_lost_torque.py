@@ -16,7 +16,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware import supervisor
 from rsea_ros.hardware.device import PortLost
 from rsea_ros.hardware.dynamixel.port import SerialPort
-from rsea_ros.hardware.supervised import SupervisorLost
+from rsea_ros.hardware.protection import SupervisorLost
 from test.hardware.conftest import Loop, well_behaved
 
 SECOND = 280

@@ -5,7 +5,7 @@ import argparse
 import pytest
 
 from rsea_ros.cli.bench import _motors
-from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
+from rsea_ros.hardware.peer.ft import Misbehaviour
 from rsea_ros.hardware.peer.protocol2 import instruction
 from rsea_ros.hardware.peer.serial_line import EmulatedBus
 

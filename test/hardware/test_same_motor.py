@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.dynamixel.sample import Unwrapper
+from rsea_ros.hardware.dynamixel.encoder import Unwrapper
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits
 from test.hardware.conftest import Loop, well_behaved

@@ -6,7 +6,7 @@ import pytest
 
 from rsea_ros.hardware.netft.rdt import RdtRecord
 from rsea_ros.hardware.netft.receiver import Arrival
-from rsea_ros.hardware.netft.stillness import Stillness
+from rsea_ros.hardware.netft.sensor import Stillness
 
 MS = 1_000_000
 

@@ -13,7 +13,7 @@ from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
-from rsea_ros.nodes import _measurements
+from rsea_ros.nodes import _link as _measurements
 from rsea_ros.nodes._control import TABLE
 from rsea_ros.nodes._link import link_of, link_values, link_words
 

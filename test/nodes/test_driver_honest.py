@@ -13,11 +13,10 @@ from rclpy.qos import QoSProfile
 
 from msg_adapters.ros import DiagnosticArray, JointState, Trigger, torque_command_message
 from rsea_ros.hardware.peer.remote import RemoteBench
-from rsea_ros.nodes._alarm import SignalListener
-from rsea_ros.nodes._idle import anything_to_do
-from rsea_ros.nodes._publishers import Obeyed
-from rsea_ros.nodes._pulse import Pulse
+from rsea_ros.nodes._bench_topics import Obeyed
+from rsea_ros.nodes._drive import SignalListener
 from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._waiter import Pulse, anything_to_do
 from test.nodes.clock_shim import in_python, preload, set_clock
 from test.nodes.stalls import is_stall
 

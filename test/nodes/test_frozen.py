@@ -1,6 +1,6 @@
 """Frozen sensors are recognised by values that do not change."""
 
-from rsea_ros.nodes._frozen import Frozen
+from rsea_ros.nodes._model_inputs import Frozen
 
 PERIOD = 3_571_429
 

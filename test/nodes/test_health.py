@@ -8,9 +8,8 @@ import pytest
 from msg_adapters import TopicMap, read_record
 from msg_adapters.ros import ERROR, OK, WARN, JointState, WrenchStamped, joint_state_message, wrench_message
 from rsea_ros.health.health_finding import NAMES, HealthFinding
-from rsea_ros.nodes._findings import FindingsPublisher
+from rsea_ros.nodes._findings import FindingsPublisher, Keeper, Ring
 from rsea_ros.nodes._health_inputs import HealthInputs
-from rsea_ros.nodes._kept import Keeper, Ring
 from rsea_ros.nodes._qos import COMMAND
 
 EPOCH, PERIOD = 1_700_000_000_000_000_000, round(1e9 / 280.0)

@@ -4,8 +4,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import Empty
 
-from rsea_ros.nodes._idle import anything_to_do
-from rsea_ros.nodes._pulse import Pulse
+from rsea_ros.nodes._waiter import Pulse, anything_to_do
 
 
 def test_what_another_thread_has_just_destroyed_ends_no_node():

@@ -13,9 +13,8 @@ from msg_adapters.ros import (
 )
 from rsea_ros.model.observer import Observer, noise_of
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._model_inputs import InputSettings, ModelInputs
+from rsea_ros.nodes._model_inputs import InputSettings, ModelInputs, StoppedSensors
 from rsea_ros.nodes._qos import COMMAND
-from rsea_ros.nodes._stopped_sensors import StoppedSensors
 
 RIG = load_rig("paper_high_impedance")
 READ = InputSettings(0.02, "torque.z", True)

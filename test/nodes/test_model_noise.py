@@ -6,7 +6,7 @@ import pytest
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._model_noise import noise_from
+from rsea_ros.nodes._health_inputs import noise_from
 
 
 @pytest.mark.parametrize(

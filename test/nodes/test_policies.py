@@ -8,7 +8,8 @@ from xml.etree import ElementTree as XML
 
 import pytest
 
-from rsea_ros.nodes import _policies, _run, _sockets
+from rsea_ros.nodes import _policies, _run
+from rsea_ros.nodes import _run as _sockets
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "security" / "policies.xml"
 

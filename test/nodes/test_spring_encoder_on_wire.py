@@ -3,7 +3,7 @@
 import pytest
 
 from msg_adapters.ros import DiagnosticArray, JointState, WrenchStamped, stamp_of
-from rsea_ros.hardware.peer.peer_encoder import IDENTITY
+from rsea_ros.hardware.peer.peer_motor import IDENTITY
 from rsea_ros.hardware.peer.registers import ENCODER
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig_file import load_rig

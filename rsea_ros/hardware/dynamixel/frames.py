@@ -1,10 +1,11 @@
-"""Frames of Protocol 2.0: `FF FF FD 00 ID LEN_L LEN_H INST PARAM… CRC_L CRC_H`, LEN = parameters + 3.
+"""Frames of Dynamixel Protocol 2.0, and a stream of bytes cut into them.
 
 Source: Dynamixel Protocol 2.0 of the maker. Pure functions of bytes, no port.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 
 HEADER = b"\xff\xff\xfd\x00"
@@ -52,3 +53,83 @@ def frame(identity: int, payload: bytes) -> bytes:
     body = stuff(payload)
     head = HEADER + bytes((identity,)) + (len(body) + 2).to_bytes(2, "little") + body
     return head + crc16(head).to_bytes(2, "little")
+
+
+SHORTEST = 4
+"""LEN of a status without parameters: INST, error, CRC."""
+HIGHEST_ID = 252
+BROADCAST = 254
+"""Sender of the joint reply to a fast read."""
+ERROR_CODES = frozenset(range(8))
+"""Of the error byte, the bits below the alert."""
+
+
+class StatusFrameParser:
+    """Take bytes as they come and give out each whole, intact status frame once, unstuffed.
+
+    rejected: how many frames were not, by kind: `crc`, `stuffing`, `length`, `instruction`.
+    """
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self.rejected: Counter[str] = Counter()
+
+    def reset(self) -> None:
+        """Forget a frame that has begun."""
+        self._buffer.clear()
+
+    @property
+    def waiting(self) -> int:
+        """Bytes of a frame that is not whole yet."""
+        return len(self._buffer)
+
+    def feed(self, data: bytes, raw: bool = False) -> list[bytes]:
+        """Return the frames that these bytes complete, header to CRC. raw: fast replies are not stuffed."""
+        self._buffer += data
+        frames = []
+        while (size := self._size()) is not None:
+            frame = self._check(bytes(self._buffer[:size]), raw)
+            if frame is None:
+                del self._buffer[:1]  # search for a header inside the rejected frame
+            else:
+                frames.append(frame)
+                del self._buffer[:size]
+        return frames
+
+    def _size(self) -> int | None:
+        """Drop the bytes before a header; return the size of the frame behind it once it is whole."""
+        buffer = self._buffer
+        while True:
+            at = buffer.find(HEADER)
+            if at < 0:
+                del buffer[: max(0, len(buffer) - len(HEADER) + 1)]
+                return None
+            del buffer[:at]
+            if len(buffer) < OVERHEAD:
+                return None
+            length = int.from_bytes(buffer[5:7], "little")
+            if SHORTEST <= length <= LONGEST - OVERHEAD:
+                return length + OVERHEAD if len(buffer) >= length + OVERHEAD else None
+            self.rejected["length"] += 1
+            del buffer[:1]
+
+    def _check(self, frame: bytes, raw: bool) -> bytes | None:
+        """Return an intact status frame with its payload unstuffed."""
+        if crc16(frame[:-2]) != int.from_bytes(frame[-2:], "little"):
+            self.rejected["crc"] += 1
+            return None
+        payload: bytes | None = frame[OVERHEAD:-2]
+        if not raw:
+            payload = unstuff(frame[OVERHEAD:-2])
+        if payload is None:
+            self.rejected["stuffing"] += 1
+            return None
+        if payload[0] != STATUS or not _possible(frame[4], payload[1]):
+            self.rejected["instruction"] += 1
+            return None
+        length = (len(payload) + 2).to_bytes(2, "little")
+        return frame[:5] + length + payload + frame[-2:]
+
+
+def _possible(identity: int, error: int) -> bool:
+    return (identity <= HIGHEST_ID or identity == BROADCAST) and error & 0x7F in ERROR_CODES

@@ -16,8 +16,15 @@ from dynamixel_sdk import (
     Protocol2PacketHandler,
 )
 
-from rsea_ros.hardware.dynamixel.frame_stream import StatusFrameParser
-from rsea_ros.hardware.dynamixel.frames import LONGEST, OVERHEAD, crc16, frame, stuff, unstuff
+from rsea_ros.hardware.dynamixel.frames import (
+    LONGEST,
+    OVERHEAD,
+    StatusFrameParser,
+    crc16,
+    frame,
+    stuff,
+    unstuff,
+)
 from rsea_ros.hardware.dynamixel.port import SerialPort
 
 EMPTY = 11

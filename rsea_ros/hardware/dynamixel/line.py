@@ -1,4 +1,4 @@
-"""Several motors on one bus: one sync write and one sync read a cycle for all of them.
+"""Several motors on one line, read and written in one exchange.
 
 A sync write has no acknowledgement: a goal that is lost is sent again in the next cycle, with all the others,
 and that a motor does not make its torque shows in its current. Its own bus watchdog, or its supervisor, ends
@@ -13,9 +13,11 @@ from typing import NamedTuple
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, PortLost
-from rsea_ros.hardware.dynamixel.control_tables import ControlTable
-from rsea_ros.hardware.dynamixel.frame_stream import BROADCAST, StatusFrameParser
-from rsea_ros.hardware.dynamixel.frames import frame
+from rsea_ros.hardware.dynamixel.bus import ALERT
+from rsea_ros.hardware.dynamixel.control_tables import ControlTable, MotorConnection
+from rsea_ros.hardware.dynamixel.encoder import MotorSample
+from rsea_ros.hardware.dynamixel.frames import BROADCAST, StatusFrameParser, frame
+from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import SerialPort
 
 SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
@@ -182,3 +184,46 @@ def _joint(packet: bytes, size: int) -> dict[int, tuple[int, bytes]]:
     for at in range(0, len(parts), step):
         replies[parts[at + 1]] = (parts[at], parts[at + 2 : at + 2 + size])
     return replies
+
+
+class LineMotor(Motor):
+    """As Motor. The exchange comes between `write` and `read`; without one `read` asks the motor alone."""
+
+    def __init__(self, settings: MotorConnection, line: Line) -> None:
+        super().__init__(settings, line.port)
+        self._line, self._id = line, settings.identity
+
+    def _set_up(self) -> None:
+        """Join the line and be set up, torque off. Raises DeviceError, also for a motor of another series."""
+        self._line.join(self._id, self.close)
+        super()._set_up()
+        self._line.admit(self._id, self.control_table, self.bus.return_delay)
+
+    def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
+        """Return the reading of the exchange, or a separate one. Raises NoReply, PortLost, Refused."""
+        if not self._line.has_read(self._id):
+            return super().read(meanwhile)
+        if meanwhile is not None:
+            meanwhile()
+        answer = self._line.answer(self._id)
+        self.bus.alert = bool(answer.error & ALERT)
+        return self.sample(answer.data, answer.instant)
+
+    def write(self, torque: float) -> None:
+        """Set the goal (N m) that the next exchange writes. Raises PortLost."""
+        self._line.set_goal(self._id, self.counts(torque))
+
+    def recover(self) -> None:
+        """Reconnect; where the port was lost, every motor of the line must be recovered."""
+        try:
+            self.bus.patiently(self.bus.ping)
+        except PortLost:
+            self._line.give_up()
+        except DeviceError:
+            pass  # a fault of this motor alone is handled below
+        super().recover()
+
+    def close(self) -> None:
+        """Zero torque, off; the last motor of the line closes the port."""
+        super().close()
+        self._line.leave(self._id)

@@ -10,13 +10,17 @@ from dataclasses import asdict
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply, PortLost
 from rsea_ros.hardware.dynamixel.bus import ALERT, Bus
-from rsea_ros.hardware.dynamixel.control_tables import TABLES, ControlTable, TorqueConstant, error_names
+from rsea_ros.hardware.dynamixel.control_tables import (
+    TABLES,
+    ControlTable,
+    MotorConnection,
+    TorqueConstant,
+    error_names,
+)
+from rsea_ros.hardware.dynamixel.encoder import MotorSample, sample_of
 from rsea_ros.hardware.dynamixel.frames import frame
-from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, own_limits
+from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, Watchlist, own_limits
 from rsea_ros.hardware.dynamixel.port import SerialPort
-from rsea_ros.hardware.dynamixel.sample import MotorSample, sample_of
-from rsea_ros.hardware.dynamixel.settings import MotorConnection
-from rsea_ros.hardware.dynamixel.watchlist import Watchlist
 from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection, Supervised
 
 TORQUE_MODE, ACKNOWLEDGE_ALL = 0, 2

@@ -1,13 +1,15 @@
-"""The settings of the motor: its limits, zero and drive mode, read and compared with the driver's."""
+"""Limits that the motor holds itself, and registers that must not change."""
 
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 
 from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.bus import Bus
-from rsea_ros.hardware.dynamixel.control_tables import ControlTable
+from rsea_ros.hardware.dynamixel.control_tables import ControlTable, Item
 from rsea_ros.hardware.limits import Limits
 
 REVERSED, ENABLED_BY_GOAL = 0x01, 0x08
@@ -79,3 +81,37 @@ def check_own_limits(limits: Limits, motor_limits: OwnLimits, name: str) -> None
         )
     if wrong:
         raise ParameterError(f"parameter {'; '.join(wrong)} ({name})")
+
+
+LOOK = 0.8
+"""s in which each register is looked at once; a fault is latched within a second."""
+
+
+class Watchlist:
+    """Registers of one motor and the values that they shall have."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        self._expected: tuple[tuple[str, Item, int], ...] = ()
+        self._looks, self._looked = 0, 0.0
+
+    def expect(self, *registers: tuple[str, Item, int]) -> None:
+        """Set the expected registers from now on: name, item, value; empty: nothing is checked."""
+        self._expected = registers
+
+    def look(self) -> str:
+        """Read one of them in turn, each once in LOOK; return its fault.
+
+        A lost reply is ignored: the register is read again later.
+        """
+        now = time.monotonic()
+        if not self._expected or now - self._looked < LOOK / len(self._expected):
+            return ""
+        name, item, expected = self._expected[self._looks % len(self._expected)]
+        self._looked = now
+        try:
+            value = self._bus.get(item)
+        except NoReply:
+            return ""
+        self._looks += 1
+        return "" if value == expected else f"{name} is {value}, expected {expected}"

@@ -1,4 +1,4 @@
-"""The motor behind the wire: a control table with the rules of the real one, and a torque on the plant."""
+"""A simulated motor and a simulated encoder."""
 
 from __future__ import annotations
 
@@ -192,3 +192,29 @@ class EmulatedMotor:
         self.put("current", round(state.motor_torque / self._constant / model.ampere))
         if "tick" in model.registers:
             self.put("tick", now // 1_000_000 % 32768)
+
+
+IDENTITY = 100
+
+
+class EmulatedEncoder(EmulatedMotor):
+    """A device of the bus whose position is the deflection of the plant's spring."""
+
+    def __init__(self, plant: Mechanism, origin: int = -777, kept: int = 0) -> None:
+        super().__init__(ENCODER.number, plant, origin=origin, kept=kept)
+        self.put("id", IDENTITY)
+
+    def serve(self, now: int) -> None:
+        """Do nothing: it has no torque that could be taken away."""
+
+    def torque(self) -> float:
+        """Return none."""
+        return 0.0
+
+    def _act(self, now: int) -> None:
+        """Do nothing."""
+
+    def _measure(self, now: int) -> None:
+        turns = self._plant.read().deflection / (2 * math.pi)
+        counts = round(turns * self.model.counts_per_turn)
+        self.put("position", self._origin + self.get("homing_offset") + counts)

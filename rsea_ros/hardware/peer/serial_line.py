@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
+from rsea_ros.hardware.peer.ft import Misbehaviour
 from rsea_ros.hardware.peer.peer_motor import KEPT, LENGTH, UNKNOWN, EmulatedMotor
 from rsea_ros.hardware.peer.protocol2 import Request, RequestParser, checksum, status
 from rsea_ros.outputs.files import PREFIX

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.control.large_signal import Reach
+from rsea_ros.control.robustness import Reach
 from rsea_ros.control.study import AtRate, Study
 from rsea_ros.control.trials import Compensated, TrialResult
 from rsea_ros.report import words

@@ -180,7 +180,7 @@ def test_units_are_read_as_people_write_them(files):
 def test_blocks_make_no_difference(files, monkeypatch):
     text = LONG.replace("0.50,50,50,50\n", "0.50,50,50\n").replace("0.07,7,", "0.07,,")
     whole = files(MAP, text)
-    monkeypatch.setattr("msg_adapters.tables.text_lines.BLOCK", 37)
+    monkeypatch.setattr("msg_adapters.tables.text_file.BLOCK", 37)
     parts = files(MAP, text)
     assert parts.faults == whole.faults
     assert all(np.array_equal(parts[name].y, whole[name].y) for name in whole.channels)
