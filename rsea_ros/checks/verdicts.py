@@ -32,7 +32,7 @@ _ANGLES = {"deg": math.degrees(1.0), "mrad": 1e3, "rev": 1.0 / _TURN, "arcmin": 
 _SPEEDS = {"rpm": 60.0 / _TURN, "deg/s": math.degrees(1.0), "rev/s": 1.0 / _TURN}
 _TORQUES = {"mN m": 1e3, "N cm": 100.0, "kN m": 1e-3, "lbf in": 8.8507}
 _UNITS = {"position": _ANGLES, "deflection": _ANGLES, "velocity": _SPEEDS}
-SAME_NUMBER = {"mN m": "mN m or N mm"}
+SAME_NUMBER = {"mN m": ("mN m", "N mm")}
 """Units that a factor cannot distinguish."""
 _BY_A_CONSTANT = "a current, a voltage or a count"
 RIGHT_RIG = "is this the right rig? name another with --rig, or another joint with --joint"
@@ -85,7 +85,7 @@ class Factor:
     @property
     def meaning(self) -> str:
         """Return `rpm at the motor`."""
-        unit = SAME_NUMBER.get(self.unit, self.unit)
+        unit = " or ".join(SAME_NUMBER.get(self.unit, (self.unit,)))
         return f"{unit} at the motor" if self.at_motor else unit
 
 
