@@ -135,6 +135,11 @@ COUNTERS: Mapping[str, tuple[str, str]] = {
     "lost_messages": ("lost_messages", "messages"),
 }
 """By key of a node's status: the kind of fault and its unit."""
+OWN = (
+    "controller", "diagnose", "driver", "excite", "experiment", "health", "identify", "model", "plant",
+    "record", "replay", "watch",
+)  # fmt: skip
+"""Nodes of this package: other packages have keys of the same names, and other meanings."""
 _FAULT, _NONE = "fault", "none"
 _START = 1_500_000_000
 """ns after the first message: a node first heard of later than this started during the run, all counts 0."""
@@ -172,13 +177,24 @@ class _States:
             self.counters[node, key] = _Counter(int(text), int(text) if late else 0)
 
 
-def tell_health(contents: Contents, report: Contents) -> None:
-    """Add the faults that the nodes of the run have reported."""
+def is_of_the_run(node: str, namespace: str) -> bool:
+    """Return whether a node of /diagnostics is one of this package's in a namespace, or in one above it.
+
+    A part of a node has a name behind it.
+    """
+    parts = node.strip("/").split("/")
+    own = next((k for k, part in enumerate(parts) if part in OWN), -1)
+    above = [part for part in namespace.split("/") if part]
+    return own >= 0 and parts[:own] == above[:own] and (own > 0 or not above)
+
+
+def tell_health(contents: Contents, report: Contents, namespace: str) -> None:
+    """Add the faults that the nodes of the run have reported: this package's, in its namespace."""
     messages = contents.topics.get(DIAGNOSTICS)
     if messages is None or messages.msgtype != TYPE or not messages.raw:
         return
     begin = min(min(m.log_times) for m in contents.topics.values() if m.raw)
-    states = _follow(messages, begin)
+    states = _follow(messages, begin, namespace)
     for (node, key), counter in states.counters.items():
         if counter.grown:
             kind, unit = COUNTERS[key]
@@ -191,12 +207,13 @@ def tell_health(contents: Contents, report: Contents) -> None:
         report.tell("damaged_messages", DIAGNOSTICS, detail, states.damaged, "messages", share)
 
 
-def _follow(messages: Messages, begin: int) -> _States:
+def _follow(messages: Messages, begin: int, namespace: str) -> _States:
     states = _States()
     for log_time, raw in zip(messages.log_times, messages.raw, strict=True):
         try:
             for node, key, text in _values(raw):
-                states.take(node, key, text, late=log_time - begin > _START)
+                if is_of_the_run(node, namespace):
+                    states.take(node, key, text, late=log_time - begin > _START)
         except ValueError:
             states.damaged += 1
     return states

@@ -79,7 +79,7 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
             note_repeats(one, report.notes)
     series = on_the_clock_of_the_command(series, report)
     _require_values(source, series, strict, report)
-    tell_health(contents, report)
+    tell_health(contents, report, topics.namespace)
     return _record(series, source, report, strict)
 
 

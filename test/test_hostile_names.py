@@ -24,7 +24,7 @@ from rsea_ros.laws.law import FittedTerm, Law
 from rsea_ros.laws.terms import GEAR_TERMS
 from rsea_ros.model.rig_file import RigChoice, load_rig, rig_text
 from rsea_ros.report.figures.figure import Figure
-from rsea_ros.report.page import code, page
+from rsea_ros.report.page import Html, code, page
 from rsea_ros.report.rig import command
 
 RIG = load_rig("paper_high_impedance")
@@ -118,7 +118,7 @@ def test_a_page_has_the_same_tags_whatever_a_name_is():
     def tags(name: str) -> list[str]:
         figure = Figure(name, name, [{"type": "scatter", "name": name}], {"title": name})
         parser = Tags()
-        parser.feed(page(name, name, [figure, f"<p>{code(name)}</p>"], [name]))
+        parser.feed(page(name, name, [figure, Html(f"<p>{code(name)}</p>")], [name]))
         return parser.found
 
     expected = tags("knee")

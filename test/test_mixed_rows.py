@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import rsea_ros as rsea
+from rsea_ros.checks.check import check_record
 from rsea_ros.records.record import Channel
 from rsea_ros.records.stamps import repair_stamps
 
@@ -43,3 +46,21 @@ def test_messages_that_came_twice_are_no_mixed_rows():
         twice[n] = Channel(c.t[k], c.y[k])
     record = SOUND.with_channels(**twice)
     assert {f.kind for f in repair_stamps(record)[1]} == {"duplicate_stamps"}
+
+
+def test_a_log_whose_rate_halves_keeps_every_row():
+    """`the clock stepped back by 18.6 s`, and 76 % of a sound record left out: the dense half of it."""
+    sparse = {}
+    for n, c in SOUND.channels.items():
+        k = np.r_[np.arange(0, 2100), np.arange(2100, len(c), 2)]
+        sparse[n] = Channel(c.t[k], c.y[k])
+    record, faults = repair_stamps(SOUND.with_channels(**sparse))
+    assert "mixed_rows" not in {f.kind for f in faults}
+    assert len(record["position"]) == len(sparse["position"])
+
+
+def test_rows_that_are_left_out_can_be_kept_and_are_red():
+    mixed = sorted_after(3.0013)
+    assert len(repair_stamps(replace(mixed, keeps_rows=True))[0]["ft"]) == len(SOUND["ft"])
+    (left_out,) = [f for f in check_record(mixed, RIG).findings if f.kind == "mixed_rows"]
+    assert left_out.light == "red" and "--keep-rows" in left_out.remedy

@@ -131,7 +131,7 @@ def _map(path: Path, document: object) -> ImportMap:
         if name not in CHANNELS and re.search(r"curr|amp|^i_?q|effort|torque", str(name), re.IGNORECASE):
             raise FieldError(
                 f"channels: no {quote(name)}: map it as `command` if it was commanded, as `motor_torque` if"
-                " measured; a current with `scale:`, N m for each A",
+                " measured; a current with `scale:`, N·m for each A",
                 f"channels.{name}",
             )
     channels = checked_keys(body["channels"], "channels", CHANNEL)

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from rsea_ros.checks.expected import (
     Side,
-    far_off,
-    in_step,
     is_commanded,
     is_full_of_gaps,
-    lag_behind,
-    lag_findings,
-    open_findings,
     quotients,
     sides,
 )
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings, in_words_of, missing_command, unused_sentence
-from rsea_ros.checks.gains import Readings, gain_findings, readings_of, strangers
-from rsea_ros.checks.linearised_rig import LinearisedFit, linear_of
+from rsea_ros.checks.linearised_rig import LinearisedFit, Start, linear_of
+from rsea_ros.checks.pairs import is_held
 from rsea_ros.checks.response_shape import Quotient, quotient
 from rsea_ros.checks.rig_findings import (
     at_rates,
     clock_findings,
     clock_rates,
     drift_findings,
-    impedance_findings,
     lag_lines,
     restoring_findings,
     value_findings,
@@ -45,6 +39,7 @@ from rsea_ros.checks.signal_findings import (
     standstill_findings,
 )
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
+from rsea_ros.checks.verdicts import RIGHT_RIG, in_step, start_of, verdict_findings
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.solver import one_blas_thread
 from rsea_ros.model.extent import bound_values, is_too_fast
@@ -58,10 +53,10 @@ Wrench = Callable[[], Mapping[str, Channel]]
 """Reads the other axes of the wrench, by their names for --axis."""
 _WHOLE = 0.1
 """Share of masked samples above which a channel's response is not compared."""
+_APART = 5.0
+"""Factor between the sizes of a channel and of what the rig would give, from which the rig is in doubt."""
 _BRIDGED = 0.01
 """Share of masked samples above which the lines that bridge them are no measure of a sensor's noise."""
-_IN_COMMON = 0.3
-"""Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
 FAULTY = (
     "sign", "scale", "offset", "angle_jumps", "standstill", "smoothing", "clock_offset", "clock_drift",
     "wrong_rig",
@@ -98,7 +93,8 @@ def check_record(
     doubts = (*(f for f in every if f.kind in FAULTY and f.light != "green"), *idle)
     faults = (*checked.faults, *map(_fault, doubts))
     findings = tuple(_of_targets(f) for f in every) if rig.loop is not None else tuple(every)
-    return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults, masked=checked.masked)
+    found = tuple(dict.fromkeys(findings))
+    return Findings(record.source, rig.name, found, faults, pairs=checked.pairs, masked=checked.masked)
 
 
 def _no_targets(record: Record) -> Finding:
@@ -175,24 +171,26 @@ def _compare(
 
     rates: of clocks (s/s) that are already taken out of the record.
     """
-    record, findings, whole = checked.record, list[Finding](), _whole(checked)
+    record, whole = checked.record, _whole(checked)
+    pairs = [p for p in checked.pairs if {p.law.x, p.law.y} <= whole]
+    findings, late = verdict_findings(pairs, rig, axis)
     compared = {n: s for n, s in both.items() if n in whole}
-    lag_by_channel = {n: lag_behind(record, rig, n, side) for n, side in compared.items()}
-    late = far_off(lag_by_channel)
-    findings += open_findings(lag_by_channel, record)
     if late:
         record = in_step(record, late)
-        findings += lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
     if elsewhere := angle_offset_findings(rig, compared):
         return [*findings, *elsewhere], None
-    readings, matched = _match(record, compared, rig, axis)
-    scaled = any(f.kind == "scale" and f.channel == "ft" and f.light == "red" for f in matched)
-    matched += [] if scaled else offset_findings(record, compared)
-    findings += [*noises(record, rig, but=_bridged_channels(checked)), *matched]
-    if readings is None or late or _is_elsewhere(findings):
+    wrong = {f.channel for f in findings if f.light == "red"}
+    findings += [] if wrong & {"ft", "command"} else offset_findings(record, compared)
+    findings += noises(record, rig, but=_bridged_channels(checked) | wrong)
+    related = quotients(compared)
+    findings += smoothing_findings(related, {n: 1.0 / record[n].rate for n in related})
+    findings += _another(record, rig, related, findings)
+    if late or _is_elsewhere(findings):
         return findings, None
-    more, linear = _linearise(checked, rig, readings, rates, values)
+    start = start_of(pairs, rig)
+    start = start._replace(delay={}) if rates else start  # the record is not the one that the pairs are of
+    more, linear = _linearise(checked, rig, start, rates, values)
     return [*findings, *more], linear
 
 
@@ -206,25 +204,30 @@ def _bridged_channels(checked: Checked) -> set[str]:
     return {n for n, bad in checked.masked.items() if np.count_nonzero(bad) > _BRIDGED * len(bad)}
 
 
-def _match(
-    record: Record, compared: Mapping[str, Side], rig: Rig, axis: str
-) -> tuple[Readings | None, list[Finding]]:
-    """Return the readings of the channels, and findings on signs, scales and the rig."""
-    related = quotients(compared)
-    readings = readings_of(related, rig)
-    silent = set(related) - set(readings.channels if readings else ())
-    findings = strangers([q for n, q in related.items() if n in silent or q.related < _IN_COMMON])
-    findings += gain_findings(readings, rig, axis) if readings else []
-    findings += smoothing_findings(related, {n: 1.0 / record[n].rate for n in related})
-    another = _another(record, compared, rig)
-    return readings, [*another, *(f for f in findings if not (another and f.kind == "wrong_rig"))]
-
-
-def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Finding]:
-    """Return the findings by which the machine of a record differs from a rig without a spring."""
-    if not is_inverse(rig):
+def _another(
+    record: Record, rig: Rig, related: Mapping[str, Quotient], known: Sequence[Finding]
+) -> list[Finding]:
+    """Return the findings by which the machine of a record differs from a rig whose values no pair shows."""
+    named = {f.channel for f in known if f.kind != "noise"}
+    if is_inverse(rig):
+        return [] if "spring_end.stiffness" in named else restoring_findings(record, rig)
+    if {f.kind for f in known} & {"sign", "scale", "wrong_rig", "clock_offset"} or is_held(rig):
         return []
-    return impedance_findings(compared.get("motor_torque"), rig) or restoring_findings(record, rig)
+    far = {n: q.measured / q.predicted for n, q in related.items() if n not in named}
+    return [_other_size(n, r) for n, r in far.items() if max(r, 1.0 / max(r, 1e-300)) > _APART]
+
+
+def _other_size(name: str, times: float) -> Finding:
+    return Finding(
+        "amber",
+        "wrong_rig",
+        name,
+        times,
+        "1",
+        expected="about 1",
+        detail="times what the rig would give",
+        remedy=RIGHT_RIG,
+    )
 
 
 def _is_elsewhere(findings: list[Finding]) -> bool:
@@ -233,12 +236,12 @@ def _is_elsewhere(findings: list[Finding]) -> bool:
 
 
 def _linearise(
-    checked: Checked, rig: Rig, readings: Readings, rates: Mapping[str, float], values: bool
+    checked: Checked, rig: Rig, start: Start, rates: Mapping[str, float], values: bool
 ) -> tuple[list[Finding], LinearisedFit | None]:
     if is_inverse(rig):
         return [], None
     try:
-        linear = linear_of(checked.record, checked.masked, rig, readings.applied)
+        linear = linear_of(checked.record, checked.masked, rig, start)
         fitted = value_findings(linear, rig) if values else []
     except (RseaError, ValueError, np.linalg.LinAlgError):
         return [], None

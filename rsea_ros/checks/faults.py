@@ -6,24 +6,25 @@ Each takes a channel and returns which samples are bad, shape (n,). A sample tha
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rsea_ros.checks.expected import (
+    WITNESSES,
     MotionBeside,
     Side,
     is_commanded,
-    lag_behind,
+    is_still,
     motion_beside,
-    quotients,
     sides,
     witness_of,
 )
+from rsea_ros.checks.pairs import Pair, pairs_of
 from rsea_ros.checks.stamp_findings import rounded_stamps
 from rsea_ros.identification.noise import FEW, step_of
-from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.extent import is_too_fast
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.holds import repeats_of
 from rsea_ros.records.record import MEASURED, BoolArray, Channel, Fault, FloatArray, Record
@@ -172,7 +173,7 @@ def _motion(record: Record, name: str, suspect: BoolArray, kind: str) -> MotionB
     motion only if the noise of one of them would have shown at standstill.
     """
     if kind != "frozen_samples":
-        return motion_beside(record, name, witness_of(record, name))
+        return _both_moved(record, name, witness_of(record, name))
     long = suspect & in_long_runs(suspect, record[name].rate)
     at = record[name].t[long if long.any() else suspect]  # a quantum repeats values by chance
     held = {n for n in record.channels if n != "command" and _is_held(record[n], at)}
@@ -180,7 +181,22 @@ def _motion(record: Record, name: str, suspect: BoolArray, kind: str) -> MotionB
     others = witness_of(record, name)
     alone = others != witness and witness in (None, "command", "motor_torque")
     shown = not alone or any(_dithers(record[n]) for n in held)
-    return motion_beside(record, name, witness if shown else others)
+    return _both_moved(record, name, witness if shown else others, held - {name})
+
+
+def _both_moved(
+    record: Record, name: str, witness: str | None, but: Collection[str] = ()
+) -> MotionBeside | None:
+    """Return how a witness moved, where another one did too: a dead sensor moves by its noise.
+
+    A sensor's own noise, which would change its value at standstill, is a second witness.
+    """
+    first = motion_beside(record, name, witness)
+    others = [n for n in WITNESSES[name] if n in record and n not in but and n != witness]
+    beside = [m for n in others if (m := motion_beside(record, name, n)) is not None]
+    if first is None or not beside or _dithers(record[name]):
+        return first
+    return MotionBeside(first.moved & np.any([m.moved for m in beside], axis=0), first.speed)
 
 
 def _is_held(channel: Channel, at: FloatArray) -> bool:
@@ -214,33 +230,48 @@ def longest(channel: Channel, marked: BoolArray) -> str:
 
 _VISIBLE = 3.0
 """Times the sensor's noise: a smaller signal than that may well be lost in it."""
-_CONFIRMED = 0.5
-"""Correlation of a speed with the rate of the position, far above what noise has by chance, either sign."""
+_LINKED, _NOTHING = 0.5, 0.2
+"""Coherence by power of channels that measure one machine, and of two that share nothing but chance."""
 _SHOWS = 0.3
 """Of the channel's RMS: a predicted signal so large would show in it, whatever else is in the channel."""
 
 
 def dead_channels(
-    record: Record, compared: Mapping[str, Side], rig: Rig, frozen: Collection[str] = ()
+    record: Record,
+    compared: Mapping[str, Side],
+    rig: Rig,
+    frozen: Collection[str] = (),
+    pairs: Sequence[Pair] | None = None,
 ) -> list[Fault]:
     """Return a fault for every sensor that does not measure. record: finite values, rising stamps.
 
-    compared: the record beside the rig's simulation.
-    frozen: channels of which a part is held, which says why they have little to do with the command.
-    Where the signal that the rig's simulation predicts is below the noise, no sensor is
-    called dead.
+    A channel is dead where it has nothing in common with any other and two others have much in common, or
+    where every one is white noise.
+    compared: the record beside the rig's simulation: where the signal that it predicts is below the noise, no
+    sensor is called dead. frozen: channels of which a part is held, which says why they have little to do
+    with the others. pairs: of the record, where they are known.
     """
     if not is_commanded(record):
         return []
     constant = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in MEASURED}
-    # A torque also has friction that no motion shows.
-    responses = {} if is_inverse(rig) else quotients(compared)
-    for n, q in responses.items():
-        shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
-        alone = shows and q.is_unrelated and not lag_behind(record, rig, n, compared[n])
-        if n in constant and not constant[n] and n not in frozen and alone and not _is_confirmed(record, n):
-            constant[n] = "noise that has nothing to do with the command"
+    pairs = pairs_of(record, rig) if pairs is None else pairs
+    nothing_moves = is_still(record)
+    linked = {n for p in pairs if p.coherence > _LINKED and not p.unrelated for n in (p.law.x, p.law.y)}
+    for n in constant:
+        of = [p for p in pairs if n in (p.law.x, p.law.y) and (p.coherence or p.unrelated)]
+        alone = of and all(p.unrelated or p.coherence < _NOTHING for p in of)
+        alone = alone and (len(linked - {n}) > 1 or (not linked and nothing_moves))
+        if alone and not constant[n] and n not in frozen and _shows(n, compared.get(n), rig):
+            constant[n] = "noise that has nothing to do with the other channels"
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in constant.items() if detail]
+
+
+def _shows(name: str, side: Side | None, rig: Rig) -> bool:
+    """Return whether the signal that the rig would give is large enough to be seen in a channel."""
+    if side is None:
+        return True
+    predicted = float(np.std(side.p))
+    return predicted > max(_SHOWS * float(np.std(side.y)), _VISIBLE * _noise(rig, name))
 
 
 def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:
@@ -250,17 +281,6 @@ def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:
     if side is not None and float(np.std(side.p)) < _VISIBLE * _noise(rig, name):
         return ""
     return f"constant at {channel.y[0]:.4g}"
-
-
-def _is_confirmed(record: Record, name: str) -> bool:
-    """Return whether position and velocity agree: one is the rate of the other, whatever the rig says."""
-    if name not in ("position", "velocity") or not {"position", "velocity"} <= record.channels.keys():
-        return False
-    position, velocity = record["position"], record["velocity"]
-    rate = np.interp(velocity.t, position.t, np.gradient(position.y, position.t))
-    if not (np.std(rate) > 0.0 and np.std(velocity.y) > 0.0):
-        return False
-    return bool(abs(np.corrcoef(rate, velocity.y)[0, 1]) > _CONFIRMED)
 
 
 def _noise(rig: Rig, name: str) -> float:
@@ -286,12 +306,14 @@ class Checked:
     """A record with its faults: finite, rising stamps; and which samples must not count, by channel.
 
     compared: the record beside the rig's simulation, where nothing was masked or left out; None elsewhere.
+    pairs: what its channels say of each other.
     """
 
     record: Record
     masked: Mapping[str, BoolArray]
     faults: tuple[Fault, ...]
     compared: Mapping[str, Side] | None = None
+    pairs: tuple[Pair, ...] = ()
 
 
 def check(record: Record, rig: Rig) -> Checked:
@@ -308,7 +330,8 @@ def check(record: Record, rig: Rig) -> Checked:
     finite = {n: not_finite(c, n) for n, c in repaired.channels.items()}
     filled = _fill(repaired, finite)
     compared = sides(filled, rig) if is_commanded(filled) else {}
-    dead = dead_channels(filled, compared, rig, frozen_ones)
+    pairs = pairs_of(filled, rig) if is_commanded(filled) and not is_too_fast(filled) else ()
+    dead = dead_channels(filled, compared, rig, frozen_ones, pairs)
     repaired = _without(repaired, {f.channel for f in dead})
     known = {(f.kind, f.channel) for f in faults}
     faults += [*clock_faults, *(f for f in dead if (f.kind, f.channel) not in known)]
@@ -318,7 +341,7 @@ def check(record: Record, rig: Rig) -> Checked:
     repaired, masked = _without_unknown_commands(repaired, masked)
     alive = _without(repaired, {n for n, bad in masked.items() if bad.all() and n != "command"})
     whole = not dead and not any(bad.any() for bad in masked.values())
-    return Checked(_fill(alive, masked), masked, tuple(faults), compared if whole else None)
+    return Checked(_fill(alive, masked), masked, tuple(faults), compared if whole else None, pairs)
 
 
 def _without_unknown_commands(

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from rsea_ros.checks.pairs import Pair
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import RigChoice
@@ -21,8 +22,8 @@ class Finding:
     """The result of one check.
 
     kind: `topics`, `rate`, `gaps`, `order`, `clock_offset`, `clock_drift`, `noise`, `quantum`, `sign`,
-    `scale`, `offset`, `angle_jumps`, `standstill`, `wrong_rig`, `rig_value`, `excitation`, `rest`,
-    `identifiability`, or the kind of a fault of the data.
+    `scale`, `contradiction`, `offset`, `angle_jumps`, `standstill`, `wrong_rig`, `rig_value`, `excitation`,
+    `rest`, `identifiability`, or the kind of a fault of the data.
     channel: the channel or rig value concerned, empty for the whole record.
     value, low, high: the number with its 95 % interval, in `unit`, where one belongs to it.
     expected: the green range. detail: what and where. remedy: the advice, or the option to give.
@@ -45,7 +46,8 @@ class Findings:
     """All findings of a record compared with a rig, the most important first.
 
     faults: those of the data, of which every result made from the record repeats the whole list.
-    masked: which samples must not count, by channel, at the repaired stamps.
+    pairs: what the channels say of each other. masked: which samples must not count, by channel, at the
+    repaired stamps.
     """
 
     source: str
@@ -53,6 +55,7 @@ class Findings:
     findings: tuple[Finding, ...]
     faults: tuple[Fault, ...] = ()
     rig_choice: RigChoice = field(default_factory=RigChoice)
+    pairs: tuple[Pair, ...] = ()
     masked: Mapping[str, BoolArray] = field(default_factory=dict, repr=False, compare=False)
 
     @property

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.checks.response_shape import FittedShape
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import inverse_of, sum_by_block
 from rsea_ros.identification.problem import Case, Problem, case_from, channels_that_tell
@@ -32,6 +31,13 @@ _BLOCKS = 40
 """At least: with fewer than unknowns a sandwich is too thin."""
 _NEAR = 0.02
 """Of the scale of every value: a move so small leaves the derivatives as they are."""
+
+
+class Start(NamedTuple):
+    """Where the rounds begin. values: of the rig, by name; delay: s, by channel."""
+
+    values: Mapping[str, float]
+    delay: Mapping[str, float]
 
 
 class LinearState(NamedTuple):
@@ -236,24 +242,29 @@ class LinearisedFit:
     theta: FloatArray
 
     @property
+    def fits(self) -> bool:
+        """Whether no channel has a misfit for which a clock might stand in."""
+        return all(misfit < BESIDE for misfit in self.misfit.values())
+
+    @property
     def is_clear(self) -> bool:
-        """Whether the clocks converged and no channel has a misfit that they might stand in for."""
-        return self.settled and all(misfit < BESIDE for misfit in self.misfit.values())
+        """Whether the clocks converged and the rig fits."""
+        return self.settled and self.fits
 
 
-def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: FittedShape) -> LinearisedFit:
+def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, known: Start) -> LinearisedFit:
     """Return the linearised fit from where the quick fit of the shape ended.
 
     Only the LONGEST of the record in which the command changes most is looked at. Raises IdentificationError
     where the record has no channel of the rig's, or all their samples are masked.
     """
-    setting, state = _setting(record, masked, rig, shape)
+    setting, state = _setting(record, masked, rig, known)
     state, rows, sd, settled = _descend(setting, state)
     return _linear(setting, state, rows, sd, settled)
 
 
 def _setting(
-    record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: FittedShape
+    record: Record, masked: Mapping[str, BoolArray], rig: Rig, known: Start
 ) -> tuple[LinearSetting, LinearState]:
     """Return the constants of all rounds, and the state where the quick fit ended."""
     start = float(record["command"].t[0])
@@ -263,10 +274,10 @@ def _setting(
     informative = channels_that_tell(record, rig)
     sensed = [n for n in SENSED if n in informative]  # a held motor torque shows no clock
     values = unknowns_of_rig(rig)
-    theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
+    theta = np.array([u.inner(known.values.get(u.name, u.start)) for u in values])
 
     def start_state(timed: Sequence[str]) -> LinearState:
-        return LinearState(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
+        return LinearState(theta, np.array([known.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
 
     case = case_from(on_time(record, start, sensed, start_state(sensed)), rig, masked)
     timed = tuple(n for n in sensed if case.mask[n].any())

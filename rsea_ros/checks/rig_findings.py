@@ -7,14 +7,8 @@ simulation, followed from second to second (identification/clocks.py), says how 
 small enough for the linearised fit. Where the rig misfits even so, the line itself is the number: a cause in
 the machine moves the lags of all sensors, a clock only those of its sensor.
 
-Another machine than a rig without a spring states shows in its impedance,
-
-    torque / position = Z(f) = K - J w^2 + i w b,    w = 2 pi f
-
-measured as Z_0 / R with Z_0 the rig's and R the torque that the rig's inverse model makes of the measured
-motion over the torque that acted: the torque has far less noise than a motion differentiated twice.
-
-and in the torque that acted, by least squares along the measured motion, without and with restoring terms:
+Another machine than a rig without a spring states shows in the torque that acted, by least squares along the
+measured motion, without and with restoring terms:
 
     T = J q'' + b q' + c sign(q') + T_0 (+ K q + G sin(q - q_0))
 """
@@ -23,15 +17,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding, Light
-from rsea_ros.checks.gains import RIGHT_RIG, inertia_spread
 from rsea_ros.checks.linearised_rig import BESIDE, LinearisedFit, Number
-from rsea_ros.checks.response_shape import Quotient, quotient
+from rsea_ros.checks.verdicts import RIGHT_RIG
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.clocks import BLOCK, LEAST_RISE, SCATTER, LagLine, lag_line
 from rsea_ros.identification.confidence import FAR, confidence_of, off_rig, parameters_of
@@ -39,8 +32,7 @@ from rsea_ros.identification.fit import reweight
 from rsea_ros.identification.result import ParameterEstimate, Remark
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import unknowns_of_rig
-from rsea_ros.model.equations import mechanics
-from rsea_ros.model.inverse import CUT_OFF, Motion, motion_from
+from rsea_ros.model.inverse import Motion, motion_from
 from rsea_ros.model.rig import CLOCK_DOUBT, Rig
 from rsea_ros.records.record import SENSED, Channel, FloatArray, Record
 from rsea_ros.records.statistics import Z95
@@ -140,7 +132,7 @@ def value_findings(linear: LinearisedFit, rig: Rig) -> list[Finding]:
     if not math.isfinite(solution.cost):
         return []
     parameters = parameters_of(solution, confidence_of(solution))
-    off = off_rig(parameters) if linear.settled else ()
+    off = off_rig(parameters) if linear.settled or linear.fits else ()
     return [*(_identifiability(p) for p in parameters), *(_far(remark, rig) for remark in off)]
 
 
@@ -218,98 +210,6 @@ def with_rates(linear: LinearisedFit, rates: Mapping[str, float]) -> LinearisedF
     """Return the fit of a record at_rates as one of the record with its stamps."""
     drift = {n: Number(d.value + rates.get(n, 0.0), d.sd) for n, d in linear.drift.items()}
     return replace(linear, drift=drift)
-
-
-_COHERENT = 0.5
-_FEWEST, _MOST = 6, 0.4
-"""Coherent lines that a fit needs: so many, and that share of those below the filter's edge."""
-_MODEL_ERROR = 0.1
-"""Of Z: what friction leaves of a linear fit."""
-_SURE = 4.0
-"""Sigmas."""
-_INSIDE = 2.0
-"""Times the lowest frequency that was measured: the machine swings at more, or its K is not seen."""
-_FAR, _ELSEWHERE = 4.0, 4.0
-"""Factor of the rig's inertia that is another machine's, and spreads that go with it."""
-_STIFFER = 4.0
-"""Times the rig's stiffness that is another machine's; a pendulum's falls with its swing, so less is none."""
-_SHAPED = 0.35
-"""Largest median of what the fit leaves of Z, over Z."""
-
-
-@dataclass(frozen=True)
-class ImpedanceFit:
-    """K (N m/rad) and J (kg m^2) with one sigma each, and the median residual of the fit over Z."""
-
-    stiffness: float
-    stiffness_sd: float
-    inertia: float
-    inertia_sd: float
-    left: float
-    lowest: float
-
-    @property
-    def natural_frequency(self) -> float:
-        """Return the frequency at which the machine would swing by itself, Hz; 0 where it would not."""
-        return math.sqrt(max(self.stiffness / max(self.inertia, 1e-300), 0.0)) / (2.0 * math.pi)
-
-
-def impedance_findings(side: Side | None, rig: Rig) -> list[Finding]:
-    """Return the findings by which the machine differs from the rig: a spring or pendulum, another inertia.
-
-    side: of the torque.
-    """
-    measured = None if side is None else impedance_of(side, rig)
-    if measured is None or measured.left > _SHAPED or measured.inertia <= 0.0:
-        return []
-    m = mechanics(rig, linear_gravity=True)
-    stiffness, inertia = float(m.stiffness[0, 0]), float(m.mass[0, 0])
-    held = measured.stiffness - _SURE * measured.stiffness_sd > _STIFFER * stiffness
-    if held and measured.natural_frequency > _INSIDE * measured.lowest:
-        swing = f"a spring or pendulum holds the output: it swings at {measured.natural_frequency:.2g} Hz"
-        return [_another("stiffness", measured.stiffness, "N m/rad", stiffness, swing)]
-    factor = measured.inertia / inertia
-    sure = measured.inertia > 2.0 * _SURE * measured.inertia_sd
-    if sure and abs(math.log(factor)) > max(math.log(_FAR), _ELSEWHERE * inertia_spread(rig)):
-        return [_another("inertia", measured.inertia, "kg m^2", inertia, f"{factor:.2g} times the rig's")]
-    return []
-
-
-def _another(key: str, value: float, unit: str, expected: float, detail: str) -> Finding:
-    return Finding(
-        "red", "wrong_rig", f"spring_end.{key}", value, unit, expected=f"{expected:.3g}", detail=detail,
-        remedy=RIGHT_RIG,
-    )
-
-
-def impedance_of(side: Side, rig: Rig) -> ImpedanceFit | None:
-    """Return the impedance that a record shows; None where too few lines are coherent."""
-    q = quotient("motor_torque", side.t, side.p, side.y)
-    m = mechanics(rig, linear_gravity=True)
-    if q is None or m.order != 1:
-        return None
-    band = q.frequency < CUT_OFF
-    keep = band & (q.coherence > _COHERENT)
-    if np.count_nonzero(keep) < max(_FEWEST, _MOST * np.count_nonzero(band)):
-        return None
-    w = 2.0 * np.pi * q.frequency[keep]
-    nominal = m.stiffness[0, 0] - m.mass[0, 0] * w**2 + 1j * w * m.damping[0, 0]
-    return _fit(nominal / q.value[keep], w, q, q.sd[keep])
-
-
-def _fit(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> ImpedanceFit:
-    """Return K and J from the real part of Z, each line by its doubt."""
-    doubt = np.abs(z) * np.hypot(sd, _MODEL_ERROR)
-    rows = np.column_stack([np.ones(len(w)), -(w**2)])
-    size = np.linalg.norm(rows / doubt[:, None], axis=0)
-    inverse = np.linalg.pinv(rows / doubt[:, None] / size)
-    stiffness, inertia = (inverse @ (z.real / doubt)) / size
-    stiffness_sd, inertia_sd = np.linalg.norm(inverse, axis=1) / size
-    misfit = np.abs(z.real - rows @ [stiffness, inertia]) / np.abs(z)
-    return ImpedanceFit(
-        stiffness=float(stiffness), stiffness_sd=float(stiffness_sd), inertia=float(inertia),
-        inertia_sd=float(inertia_sd), left=float(np.median(misfit)), lowest=float(w[0]) / (2.0 * math.pi),
-    )
 
 
 _FALLS = 0.55

@@ -25,6 +25,8 @@ _PER_CYCLE = 4.0
 """Samples to a cycle of the rig's natural frequency, at least."""
 _SLOW = 0.6
 """Of the command's rate: a slower sensor folds what is above its Nyquist frequency."""
+_LEFT_OUT, _MUCH = ("mixed_rows", "stray_stamps"), 0.02
+"""Faults whose rows are left out for their stamps, and the share of them that is red."""
 _OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "rounded_stamps", "clock_jump",
            "partly_recorded", "early_torque", "held_samples", "mixed_rows")  # fmt: skip
 """Faults of a whole channel, whose share of its samples means nothing."""
@@ -40,7 +42,8 @@ _REMEDIES = {
     "partly_recorded": "start the recorder first and stop it last, or cut the run with --from and --to",
     "unnamed_file": "remove it, or give its own name to read it",
     "duplicate_stamps": "stamp at acquisition, not on arrival",
-    "mixed_rows": "keep the clocks from being set during a run; log the time of arrival beside the stamps",
+    "mixed_rows": "keep the clocks from being set during a run; --keep-rows leaves these rows in",
+    "stray_stamps": "look at the clock; --keep-rows leaves these rows in",
     "clock_jump": "keep the clocks from being set during a run",
     "out_of_order": "sort by the stamps of the headers; nothing else to do",
     "early_torque": "stamp it when it was measured; nothing else to do",
@@ -56,7 +59,8 @@ def fault_finding(fault: Fault) -> Finding:
     """Return the finding of a fault of the data."""
     bad = fault.kind == "dead_channel" or (fault.kind != "missing_topic" and fault.share > _RED_SHARE)
     whole = fault.kind in _OF_ALL
-    light: Light = "red" if bad and not whole else "green" if fault.kind in _MENDED else "amber"
+    bad = (bad and not whole) or (fault.kind in _LEFT_OUT and fault.share > _MUCH)
+    light: Light = "red" if bad else "green" if fault.kind in _MENDED else "amber"
     share = None if whole or not math.isfinite(fault.share) else 100.0 * fault.share
     value, unit = (fault.size, fault.unit) if fault.size is not None else (share, "%" if share else "")
     return Finding(

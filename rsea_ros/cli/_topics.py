@@ -56,7 +56,8 @@ def topic_options(args: argparse.Namespace) -> tuple[str, ...]:
 def window_options(args: argparse.Namespace) -> tuple[str, ...]:
     """Return the options of `add_window_options` as they were given."""
     given = {"from": args.begin, "to": args.end, "window": args.window}
-    return (*_options(given), *(f"--shift={shift}" for shift in args.shift))
+    keep = ("--keep-rows",) if args.keep_rows else ()
+    return (*_options(given), *(f"--shift={shift}" for shift in args.shift), *keep)
 
 
 def _options(given: Mapping[str, str | float | None]) -> Iterator[str]:
@@ -74,7 +75,7 @@ def each_once(bags: Sequence[str]) -> Sequence[str]:
 
 
 def add_window_options(parser: argparse.ArgumentParser) -> None:
-    """Declare --from, --to, --window and --shift."""
+    """Declare --from, --to, --window, --shift and --keep-rows."""
     group = parser.add_argument_group("a part of the record, s since its first stamp")
     group.add_argument("--from", dest="begin", type=float, metavar="S", help="leave out samples before S")
     group.add_argument("--to", dest="end", type=float, metavar="S", help="leave out samples after S")
@@ -86,6 +87,7 @@ def add_window_options(parser: argparse.ArgumentParser) -> None:
         metavar="CHANNEL=S",
         help="add S seconds to the stamps of a channel that another clock has stamped",
     )
+    group.add_argument("--keep-rows", action="store_true", help="leave no row out for its stamps")
 
 
 def cut(record: Record, args: argparse.Namespace) -> Record:
@@ -94,7 +96,7 @@ def cut(record: Record, args: argparse.Namespace) -> Record:
     Which channels cover the whole of it is for the checks to say again.
     Raises ParameterError for an invalid or empty window, and for a shift of an unknown channel.
     """
-    record = _shift_stamps(record, args.shift)
+    record = replace(_shift_stamps(record, args.shift), keeps_rows=args.keep_rows)
     begin, end = _window(args)
     if begin == -math.inf and end == math.inf:
         return record

@@ -95,7 +95,8 @@ def is_noise(
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
     False where the record is too short to decide.
     """
-    residual = residual_of(case, outputs, channel)
+    span = _span(case, channel)
+    residual = residual_of(case, outputs, channel)[span]
     if len(residual) < rule.fewest or not np.any(residual):
         return False
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
@@ -108,7 +109,7 @@ def is_noise(
     if _kurtosis(shape, residual) > rule.spiky:
         return False
     short_spectra = unit_spectra(residual, _SHORT, 16)
-    others = (unit_spectra(w, _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
+    others = (unit_spectra(w[span], _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
     return all(_coherent_share(short_spectra, other, rate) < rule.shared for other in others)
 
 
@@ -196,7 +197,9 @@ def reestimate_noise(
     rms = {n: float(np.sqrt(np.mean(residuals[n][case.mask[n]] ** 2))) for n in channels}
     noise = dict(case.noise)
     for n in channels:
-        white, is_white = top_of_band(residuals[n], _seams(case, n), rule)
+        span = _span(case, n)
+        white, is_white = top_of_band(residuals[n][span], _seams(case, n) - span.start, rule)
+        white /= float(np.sqrt(np.mean(case.mask[n][span])))  # what does not count in between is zero
         level = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
         noise[n] = max(min(noise[n], level), case.least.get(n, 0.0))
     above = [n for n in channels if rms[n] > rule.above * noise[n]]
@@ -206,6 +209,12 @@ def reestimate_noise(
     for n in above:
         noise[n] = rms[n] * (1.0 + 2.0 * _doubt(case, residuals[n], n) if n in coloured else 1.0)
     return replace(case, noise=noise, coloured=coloured)
+
+
+def _span(case: Case, channel: str) -> slice:
+    """Return the part of a channel from its first sample that counts to its last."""
+    at = np.flatnonzero(case.mask[channel])
+    return slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(0, len(case.mask[channel]))
 
 
 def _seams(case: Case, channel: str) -> IntArray:

@@ -20,7 +20,7 @@ from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.records.record import BoolArray, FloatArray, Record
+from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
 
 FEWEST = 64
 """Samples of a channel: fewer show no spectrum, so no noise to weigh them by."""
@@ -99,18 +99,27 @@ def case_from(
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
     start = float(record["command"].t[0]) + SKIPPED_START
     known = {n: outside_gaps(record, record[n].t, SKIPPED_START) for n in channels}
+    counts = {
+        n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels
+    }
+    heard = record.with_channels(**{n: _counted_span(record[n], counts[n]) for n in channels})
     return Case(
         drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
-        noise=MappingProxyType({n: noise_floor(record, n, sensors[n], rule) for n in channels}),
-        mask=MappingProxyType(
-            {n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
-        ),
+        noise=MappingProxyType({n: noise_floor(heard, n, sensors[n], rule) for n in channels}),
+        mask=MappingProxyType(counts),
         source=record.source,
         floating=floating,
-        least=MappingProxyType({n: least_noise(record[n].y, sensors[n], rule) for n in channels}),
+        least=MappingProxyType({n: least_noise(heard[n].y, sensors[n], rule) for n in channels}),
     )
+
+
+def _counted_span(channel: Channel, counts: BoolArray) -> Channel:
+    """Return a channel from its first sample that counts to its last: noise elsewhere is not the fit's."""
+    at = np.flatnonzero(counts)
+    span = slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(None)
+    return Channel(channel.t[span], channel.y[span])
 
 
 def channels_that_tell(record: Record, rig: Rig) -> list[str]:

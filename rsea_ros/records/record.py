@@ -138,7 +138,7 @@ class Record:
 
     epoch_ns: the stamp that is t = 0, nanoseconds since the epoch of the recording clock.
     source: path or topic prefix, for messages. notes: repairs and assumptions. faults: damage found while
-    reading; every result made from the record repeats it.
+    reading; every result made from the record repeats it. keeps_rows: no row is left out for its stamps.
     """
 
     channels: Mapping[str, Channel]
@@ -146,6 +146,7 @@ class Record:
     epoch_ns: int = 0
     notes: tuple[str, ...] = field(default=())
     faults: tuple[Fault, ...] = field(default=())
+    keeps_rows: bool = False
 
     def __post_init__(self) -> None:
         unknown = set(self.channels) - set(UNITS)

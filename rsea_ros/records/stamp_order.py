@@ -38,12 +38,15 @@ def in_order(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
     return (channel, []) if jumps_back(channel.t).any() else sort_by_stamp(channel, name)
 
 
-def sort_by_stamp(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
-    """Return a channel sorted by its stamps, without stamps that fit nowhere, and its faults."""
+def sort_by_stamp(channel: Channel, name: str, keep: bool = False) -> tuple[Channel, list[Fault]]:
+    """Return a channel sorted by its stamps, without stamps that fit nowhere, and its faults.
+
+    keep: leave those in too.
+    """
     if not np.any(np.diff(channel.t) < 0.0):
         return channel, []
     late = _out_of_order(channel.t)
-    stray = _stray(channel.t, late)
+    stray = _stray(channel.t, late) & (not keep)
     order = np.argsort(channel.t[~stray], kind="stable")
     sorted_channel = Channel(channel.t[~stray][order], channel.y[~stray][order])
     faults = []

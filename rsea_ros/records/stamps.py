@@ -98,6 +98,8 @@ _APART = 0.2
 """s. So far the spans of two channels may differ at their ends."""
 _SAME = 0.25
 """Share of the steps without a change: where more have none, messages came twice."""
+_ALTERNATES = 1.5
+"""Times the change over two samples that the change over one has where samples of two times alternate."""
 
 
 def without_mixed_rows(record: Record) -> tuple[Record, list[Fault]]:
@@ -107,6 +109,8 @@ def without_mixed_rows(record: Record) -> tuple[Record, list[Fault]]:
     if len(known) < 2 or len(known) < len(spans) or np.ptp(np.array(known), axis=0).max() > _APART:
         return record, []
     begin, end = min(a for a, _ in known), max(b for _, b in known)
+    if record.keeps_rows or not any(_alternates(record[n].between(begin, end).y) for n in record.channels):
+        return record, []
     left = {
         n: Channel(c.t[keep], c.y[keep])
         for n, c in record.channels.items()
@@ -139,6 +143,14 @@ def _doubled_stretch(channel: Channel) -> tuple[float, float] | None:
     if length < _SHORTEST or not _DOUBLE[0] < times < _DOUBLE[1] or not whole or same > _SAME:
         return None
     return float(t[first]), float(t[last])
+
+
+def _alternates(y: FloatArray) -> bool:
+    """Return whether neighbours differ more than next neighbours do: values of two times."""
+    if len(y) < _AROUND:
+        return False
+    by_one, by_two = (float(np.nanmedian(np.abs(y[k:] - y[:-k]))) for k in (1, 2))
+    return by_one > _ALTERNATES * by_two > 0.0
 
 
 def _share_of_repeats(y: FloatArray) -> float:
@@ -192,7 +204,7 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     channels = {}
     for name, channel in record.channels.items():
         channel, jumps = _without_jumps(channel, name, _expected_span(record, name), _pauses(record, name))
-        channel, disorder = sort_by_stamp(channel, name)
+        channel, disorder = sort_by_stamp(channel, name, record.keeps_rows)
         count = len(channel)
         channel, repeats = _without_repeats(channel, name)
         faults += [*jumps, *disorder, *repeats]
@@ -252,7 +264,7 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
     faults: list[Fault] = []
     channels = {}
     for name, channel in record.channels.items():
-        channels[name], stray = _without_stray_parts(channel, name)
+        channels[name], stray = _without_stray_parts(channel, name, record.keeps_rows)
         faults += stray
     pauses = {name: np.abs(np.diff(c.t)) > _pause(c.t) for name, c in channels.items()}
     if all(at.any() for at in pauses.values()):
@@ -267,10 +279,10 @@ def _pause(t: FloatArray) -> float:
     return max(LONGEST_PAUSE, _SHORTEST_JUMP * median_period(t))
 
 
-def _without_stray_parts(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
+def _without_stray_parts(channel: Channel, name: str, keep: bool) -> tuple[Channel, list[Fault]]:
     """Leave out the few samples that lie far from the others."""
     stray = far_apart(channel.t, LONGEST_PAUSE)
-    if not stray.any():
+    if keep or not stray.any():
         return channel, []
     return Channel(channel.t[~stray], channel.y[~stray]), [stray_fault(stray, name)]
 

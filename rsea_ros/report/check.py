@@ -9,6 +9,7 @@ from typing import Any
 from rich.text import Text
 
 from rsea_ros.checks.finding import Finding, Findings, worst
+from rsea_ros.checks.pairs import Pair
 from rsea_ros.report import words
 from rsea_ros.report.result_files import fault_json, pick, strict
 from rsea_ros.report.rig import rig_in_brackets
@@ -109,7 +110,7 @@ def check_json(checks: Sequence[Findings]) -> dict[str, Any]:
         "light": worst([c.light for c in checks]),
         "records": [
             {**pick(c, "bag=source light"), "findings": [_finding(f) for f in c.findings],
-             "faults": [fault_json(f) for f in c.faults]}
+             "faults": [fault_json(f) for f in c.faults], "pairs": [_pair(p) for p in c.pairs]}
             for c in checks
         ],
     }  # fmt: skip
@@ -118,3 +119,8 @@ def check_json(checks: Sequence[Findings]) -> dict[str, Any]:
 def _finding(f: Finding) -> dict[str, Any]:
     interval = None if f.low is None or f.high is None else strict([f.low, f.high])
     return {**pick(f, "light kind channel value unit"), "ci95": interval, **pick(f, "expected detail remedy")}
+
+
+def _pair(p: Pair) -> dict[str, Any]:
+    """Return a pair by the names of the contract: factor of y on x, lag of y behind x, s; from, to in s."""
+    return {"channels": [p.law.y, p.law.x], **pick(p, "factor sign lag coherence from=start to=stop")}

@@ -14,7 +14,6 @@ from scipy.signal import lfilter
 
 from rsea_ros.checks.carried import check_diagnosable, with_check_faults
 from rsea_ros.checks.check import check_record
-from rsea_ros.checks.expected import Side
 from rsea_ros.checks.faults import clipping, dead_channels
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig_file import load_rig
@@ -70,11 +69,9 @@ def test_a_speed_that_is_the_rate_of_the_measured_position_is_alive():
     position = Channel(t, 0.5 * np.sin(2.0 * t) + 1e-4 * RNG.normal(size=N))
     velocity = Channel(t, np.cos(2.0 * t) + 0.02 * RNG.normal(size=N))
     record = good().with_channels(position=position, velocity=velocity)
-    elsewhere = {"velocity": Side(t, velocity.y, np.sin(2.0 * np.pi * 20.0 * t) + RNG.normal(size=N))}
-    assert dead_channels(record, elsewhere, RIG) == []
+    assert "velocity" not in {f.channel for f in dead_channels(record, {}, RIG)}
     noise = record.with_channels(velocity=Channel(t, 0.02 * RNG.normal(size=N)))
-    apart = {"velocity": Side(t, noise["velocity"].y, elsewhere["velocity"].p)}
-    assert [f.channel for f in dead_channels(noise, apart, RIG)] == ["velocity"]
+    assert "velocity" in {f.channel for f in dead_channels(noise, {}, RIG)}
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5])
@@ -132,4 +129,4 @@ def test_where_the_driver_had_a_fault_it_is_named_before_the_dead_sensors():
     record = replace(good().with_channels(**still), faults=(fault,))
     with pytest.raises(IdentificationError, match="driver latched a fault, no_reply: 3 cycles; ") as refused:
         with_check_faults(record, RIG, masks=True)
-    assert str(refused.value).count("noise that has nothing to do with the command") == 1
+    assert str(refused.value).count("noise that has nothing to do with the other") == 1

@@ -10,8 +10,8 @@ from independent.bench import drawn_bench, record_run
 
 import rsea_ros as rsea
 from rsea_ros.checks.check import check_record
-from rsea_ros.checks.gains import RIGHT_RIG
 from rsea_ros.checks.rig_findings import restoring_findings
+from rsea_ros.checks.verdicts import RIGHT_RIG
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 
@@ -31,8 +31,8 @@ def test_a_rig_without_a_spring_is_questioned_on_a_bench_with_one(rig):
     """This check was green."""
     record = record_run(drawn_bench(np.random.default_rng(2)), 4, duration=10.0)
     findings = check_record(record, load_rig(rig))
-    assert lights_of(findings) == {"spring_end.stiffness": "red"}
-    (finding,) = (f for f in findings.of("wrong_rig") if f.light == "red")
+    (finding,) = (f for f in findings.of("wrong_rig") if f.channel == "spring_end.stiffness")
+    assert finding.light == "red"
     assert finding.value == pytest.approx(1530.0, rel=0.1)
     assert finding.remedy == RIGHT_RIG
 
@@ -58,7 +58,7 @@ def test_the_right_rig_is_not_questioned(name, amplitude):
     assert lights_of(check_record(run_of(name, amplitude), load_rig(name))) == {}
 
 
-@pytest.mark.parametrize(("factor", "light"), [(0.144, {}), (0.02, {"motor_torque": "red"})])
+@pytest.mark.parametrize(("factor", "light"), [(0.144, {}), (0.02, {"spring_end.inertia": "red"})])
 def test_a_drive_within_the_coarse_spread_of_its_rig_is_not_questioned(factor, light):
     """A rig that states its inertia to 100 % was the wrong one in red at a seventh of it."""
     rig = load_rig("emps")

@@ -126,7 +126,7 @@ def test_a_stopped_suite_waits_for_pytest_and_has_the_status_of_the_signal(
     sent, waits = [], []
 
     class Pytest:
-        def __init__(self, command, cwd):
+        def __init__(self, command, cwd, env):
             self.send_signal = sent.append
 
         def wait(self):
@@ -147,7 +147,7 @@ def test_groups_name_folders_that_exist_and_other_words_go_to_pytest(monkeypatch
     assert [p for paths in module.GROUPS.values() for p in paths if not (ROOT / p).exists()] == []
     asked = []
     done = types.SimpleNamespace(wait=int)
-    pytest_of = types.SimpleNamespace(Popen=lambda words, cwd: asked.append(words) or done)
+    pytest_of = types.SimpleNamespace(Popen=lambda words, cwd, env: asked.append(words) or done)
     monkeypatch.setattr(module, "subprocess", pytest_of)
     assert cli.main(["test", "safety", "-x"]) == cli.main(["test", "all"]) == 0
     assert asked[0][-1] == "-x" and set(module.GROUPS["safety"]) < set(asked[0])

@@ -9,6 +9,7 @@ import pytest
 from benches import bench, record_bench
 from scipy.signal import lfilter
 
+from rsea_ros import simulate
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.noise import noise_floor, step_of, top_of_band
 from rsea_ros.identification.noise_level import is_noise, reestimate_noise
@@ -123,3 +124,13 @@ def test_a_channel_that_repeats_the_command_has_positive_noise():
     command = Channel(t, 20.0 * np.sin(0.01 * t))
     torque = Channel(t + 1.0 / 280.0, 3.0 * command.y)
     assert noise_floor(Record({"command": command, "motor_torque": torque}), "motor_torque", Sensor()) >= 0.0
+
+
+@pytest.mark.parametrize("rest", [2.0, 6.0])
+def test_a_recording_that_begins_before_the_first_command_fits_as_well(rest):
+    """1.15 and 1.37 times the noise: read off the whole channel, the rest before included."""
+    rig = load_rig("paper_high_impedance")
+    torque = 15.0 * np.random.default_rng(1).standard_normal(1400)
+    run = simulate(rig, np.concatenate([np.zeros(int(280 * rest)), torque]), rate=280.0, seed=3)
+    run = run.with_channels(command=run["command"].between(rest - 1e-9, np.inf))
+    assert max(identify([run], rig).times_noise.values()) < 1.08

@@ -40,26 +40,32 @@ def _faults_of(tmp_path, *statuses, strict=True):
     ],
 )
 def test_counts_that_grow_during_the_run_are_faults(tmp_path, key, kind, unit, strict):
-    rising = [status(EPOCH + k * SECOND, "/rsea/node", **{key: 5 + k, "else": 3}) for k in range(4)]
+    rising = [status(EPOCH + k * SECOND, "/rsea/driver", **{key: 5 + k, "else": 3}) for k in range(4)]
     (fault,) = _faults_of(tmp_path, *rising, strict=strict).values()
-    assert (fault.kind, fault.channel, fault.size, fault.unit) == (kind, "/rsea/node", 3, unit)
+    assert (fault.kind, fault.channel, fault.size, fault.unit) == (kind, "/rsea/driver", 3, unit)
 
 
 def test_counts_of_a_node_that_starts_during_the_run_begin_at_zero(tmp_path):
-    assert (
-        _faults_of(tmp_path, status(EPOCH + 5 * SECOND, "/n", left_out=4))["commands_left_out", "/n"].size
-        == 4
-    )
+    late = status(EPOCH + 5 * SECOND, "/rsea/plant", left_out=4)
+    assert _faults_of(tmp_path, late)["commands_left_out", "/rsea/plant"].size == 4
+
+
+@pytest.mark.parametrize("node", ["/left/driver", "/rsea/camera", "camera_driver: status", "/rsea_2/driver"])
+def test_counts_and_faults_of_other_machines_and_packages_are_theirs(tmp_path, node):
+    """Another machine's lost cycles were blamed on the run, and the `fault` key of any package."""
+    told = [status(EPOCH + k * SECOND, node, lost_cycles=5 + k, fault="lens cap on") for k in range(4)]
+    assert _faults_of(tmp_path, *told) == {}
 
 
 def test_counts_of_a_node_that_restarts_begin_at_zero(tmp_path):
     counts = enumerate([10, 12, 0, 3])
-    statuses = [status(EPOCH + k * SECOND, "/n", watchdog_trips=count) for k, count in counts]
-    assert _faults_of(tmp_path, *statuses)["watchdog_trips", "/n"].size == 5
+    statuses = [status(EPOCH + k * SECOND, "/rsea/plant", watchdog_trips=count) for k, count in counts]
+    assert _faults_of(tmp_path, *statuses)["watchdog_trips", "/rsea/plant"].size == 5
 
 
 def test_faults_before_the_run_are_not_reported(tmp_path):
-    old = [status(EPOCH + k * SECOND, "/n", left_out=7, fault="none", missed_cycles=k) for k in range(3)]
+    values = {"left_out": 7, "fault": "none"}
+    old = [status(EPOCH + k * SECOND, "/rsea/plant", missed_cycles=k, **values) for k in range(3)]
     assert _faults_of(tmp_path, *old) == {}
 
 
@@ -69,7 +75,7 @@ def test_a_latched_fault_of_the_device_is_reported(tmp_path):
 
 
 def test_diagnostics_that_are_damaged_are_counted(tmp_path):
-    rows = [*run_rows(60), *(status(EPOCH + k * SECOND, "/n", left_out=k) for k in range(5))]
+    rows = [*run_rows(60), *(status(EPOCH + k * SECOND, "/rsea/plant", left_out=k) for k in range(5))]
 
     def encode(k, row):
         raw = bytes(STORE.serialize_cdr(row[2], row[2].__msgtype__))
@@ -77,7 +83,7 @@ def test_diagnostics_that_are_damaged_are_counted(tmp_path):
 
     got = read_record(write(tmp_path / "a.mcap", McapFile(rows, encode=encode).file()))
     told = {(fault.kind, fault.channel): fault.size for fault in got.faults}
-    assert told == {("damaged_messages", "/diagnostics"): 1, ("commands_left_out", "/n"): 4}
+    assert told == {("damaged_messages", "/diagnostics"): 1, ("commands_left_out", "/rsea/plant"): 4}
 
 
 def test_the_keys_are_those_that_the_nodes_publish():

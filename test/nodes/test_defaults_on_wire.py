@@ -103,7 +103,7 @@ FAULTS = {
     "torque switched off": (ask("set", torque_enable=0), HEALTHY, ("effort", "motor_state"), 3),
     "mode changed": (ask("set", mode=3), HEALTHY, ("effort", "motor_state"), SECOND),
     "mode changed, turning": (ask("set", mode=1, goal_velocity=3000), HEALTHY, MOVED, SECOND),
-    "position jumps": (ask("set", homing_offset=40_000), HEALTHY, "position_step", 2),
+    "position jumps": (ask("set", homing_offset=40_000), HEALTHY, "position_step", 3),
     "alert": (ask("alert", bits=32), HEALTHY, "hardware_error", 3),
     "F/T saturated": (ask("ft_status"), ask("ft_status", bits=0), "ft", 3),
     "F/T silent": (ask("misbehave", ft_silent=True), CALM, "ft", 8),

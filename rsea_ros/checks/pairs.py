@@ -1,0 +1,413 @@
+"""Consistency among the channels of a record, before any rig is believed: pairs, in windows of seconds.
+
+Two channels of one machine are tied by a law y = P(s) x, late by a lag; the rig states its structure alone:
+
+    velocity = s position      motor_torque = command      ft = (K + c s) deflection
+    output held:  deflection = position     ft = (K + c s) position     torque = (K + b s + J s^2) position
+                  torque = (1 + b/K s + J/K s^2) ft            torque = (K/s + b + J s) velocity
+    without a spring:  torque = (G + b s + J s^2) position
+    otherwise:    torque - ft = (b s + J s^2) position       torque ~ ft, of which the lag counts
+
+The coefficients are fitted to the measured response over its coherent lines, for each lag within 2 s, with no
+value of the rig. Where the windows agree, the pair has one part; elsewhere one for each span that does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from rsea_ros.checks.response_shape import Quotient, quotient, usable
+from rsea_ros.errors import RseaError
+from rsea_ros.model.equations import Mechanics, gear_inertia, mechanics
+from rsea_ros.model.rig import Rig
+from rsea_ros.records.record import Channel, FloatArray, Record
+
+REACH = 2.0
+"""s, either way: lags that are looked for."""
+NEAR = 0.05
+"""s. A shorter lag may be that of a drive, a filter or a mode: a fit finds it."""
+_WINDOWS, _SHORTEST = 8, 2.0
+"""Windows of a record, of so many seconds at least."""
+_FINEST, _SLOW = 400.0, 40.0
+"""Hz. What is faster says nothing more of a lag of NEAR; what is slower survives a lag that changes."""
+_RELATED = 0.5
+"""Coherence by power from which a lag and a factor are those of a law."""
+_FITS = 0.35
+"""Median of what the law leaves of the response, over the response."""
+_MODEL_ERROR = 0.1
+"""Of the response: what friction and play leave of a linear law."""
+_COVERED = 0.5
+"""Of a record, that windows must cover which are sure, to speak for it part by part."""
+_STEPS, _MOST_STEPS, _SMOOTH = (0.5, 1.0, 2.0), 60, 0.6
+"""s; steps of a record; share of them that must follow each other."""
+_GRID, _MOST_SAMPLES, _BESIDE = 5e-3, 4000, 0.7
+"""s; samples of a correlation; and of the best one, what every other lag must stay below."""
+_AS_GOOD = 0.9
+"""Of the best correlation: a lag near zero that reaches so much is the one."""
+_RIVAL = 12.0
+"""By how much the cost of every other lag must be above the best one, e^6 in likelihood."""
+_AROUND = 0.1
+"""s about the best lag that belong to its minimum."""
+_FEWEST_LINES = 6
+_SAME_FACTOR = 0.35
+"""Logarithm, for each coefficient, within which windows share a factor: friction and play move it less."""
+_ENOUGH = 0.6
+"""Of a span, that both channels must cover."""
+_SLOWEST, _MATCHED = 20.0, 16
+"""Hz, below which a channel is compared sample by sample with a faster one; samples that this takes."""
+_TORQUES = ("motor_torque", "command")
+_ROTOR = ("rotor.reflected_damping", "rotor.reflected_inertia")
+
+
+@dataclass(frozen=True)
+class Law:
+    """y = sum_k c_k s^power_k x. expected: c_k by the rig, 0 where it states none. names: of the rig's values
+    that they are, empty for a pure number. less: a channel that is taken off y first."""
+
+    y: str
+    x: str
+    powers: tuple[int, ...]
+    expected: tuple[float, ...]
+    names: tuple[str, ...]
+    less: str = ""
+
+    @property
+    def inverted(self) -> bool:
+        """Whether the response is measured from y to x: a torque, as the cause, has no sensor's noise."""
+        return self.y in _TORQUES and self.x not in _TORQUES
+
+
+@dataclass(frozen=True)
+class Pair:
+    """What two channels say of each other from `start` to `stop`, s.
+
+    factor: the first coefficient that is sure, over the expected one (of `y` per `x` where none is expected),
+    nan where none is. sign: of it. lag: s, of y behind x. coherence: 0 to 1, by power. ratios, sds: of every
+    coefficient over the expected one, and one sigma of its logarithm. left: median of what the law leaves of
+    the response, over the response. fits: the law describes it. clear: no other lag does as well. unrelated:
+    the two have no more in common than noise has by chance.
+    """
+
+    law: Law
+    start: float
+    stop: float
+    factor: float = math.nan
+    sign: int = 0
+    lag: float = math.nan
+    coherence: float = 0.0
+    ratios: tuple[float, ...] = ()
+    sds: tuple[float, ...] = ()
+    left: float = math.inf
+    fits: bool = False
+    clear: bool = False
+    unrelated: bool = False
+
+
+def is_held(rig: Rig) -> bool:
+    """Return whether the output is held behind the spring, so that position, deflection and F/T are one."""
+    try:
+        one = mechanics(rig, linear_gravity=True).order == 1
+    except (RseaError, ValueError):
+        return False
+    return one and not rig.rigid_spring and rig.ft_end == "spring_end"
+
+
+def laws(record: Record, rig: Rig) -> tuple[Law, ...]:
+    """Return the laws between the channels of a record, by the structure of the rig."""
+    try:
+        m = mechanics(rig, linear_gravity=True)
+    except (RseaError, ValueError):
+        return ()
+    spring = "" if rig.rigid_spring else "spring.stiffness"
+    k = 0.0 if rig.rigid_spring else rig["spring.stiffness"]
+    held = is_held(rig)
+    possible = [
+        Law("velocity", "position", (1,), (1.0,), ("",)),
+        Law("motor_torque", "command", (0,), (1.0,), ("",)),
+    ]
+    if not rig.rigid_spring and rig.ft_end == "spring_end":
+        possible += [Law("ft", "deflection", (0, 1), (k, 0.0), (spring, ""))]
+    if held:
+        possible += [
+            Law("deflection", "position", (0,), (1.0,), ("",)),
+            Law("ft", "position", (0, 1), (k, 0.0), (spring, "")),
+            Law("ft", "velocity", (-1, 0), (k, 0.0), (spring, "")),
+        ]
+    for torque in _TORQUES:
+        possible += _of_torque(torque, rig, m, held)
+    if "reference" in record or rig.loop is not None:
+        possible = [law for law in possible if "command" not in (law.x, law.y)]
+    return tuple(law for law in possible if {law.x, law.y, law.less or law.y} <= record.channels.keys())
+
+
+def _of_torque(torque: str, rig: Rig, m: Mechanics, held: bool) -> list[Law]:
+    """Return the laws between a torque and what it moves."""
+    if m.order != 1:
+        stated = (rig["rotor.reflected_damping"], gear_inertia(rig))
+        rotor = [Law(torque, "position", (1, 2), stated, _ROTOR, "ft")]
+        grounded = "housing_end" in rig.clamped and rig.ft_end == "spring_end"
+        return [Law(torque, "ft", (0,), (0.0,), ("",)), *(rotor if grounded else [])]
+    mass, damping, stiffness = (float(v[0, 0]) for v in (m.mass, m.damping, m.stiffness))
+    inertia = "spring_end.inertia" if rig.rigid_spring else "rotor.reflected_inertia"
+    names = ("spring.stiffness" if held else "spring_end.stiffness", "rotor.reflected_damping", inertia)
+    values = (stiffness, damping, mass)
+    found = [
+        Law(torque, "position", (0, 1, 2), values, names),
+        Law(torque, "velocity", (-1, 0, 1), values, names),
+    ]
+    if held:
+        shares = (1.0, damping / stiffness, mass / stiffness)
+        found += [Law(torque, "ft", (0, 1, 2), shares, ("", "", ""))]
+        found += [Law(torque, "deflection", (0, 1, 2), values, names)]
+    return found
+
+
+def pairs_of(record: Record, rig: Rig) -> tuple[Pair, ...]:
+    """Return what each pair of channels says, a part for each span in which it says the same.
+
+    record: finite values, rising stamps.
+    """
+    with np.errstate(all="ignore"):
+        return tuple(p for law in laws(record, rig) for p in _parts(record, law))
+
+
+def _parts(record: Record, law: Law) -> list[Pair]:
+    y, x = record[law.y], record[law.x]
+    if law.less:
+        y = Channel(y.t, y.y - np.interp(y.t, record[law.less].t, record[law.less].y))
+    start, stop = max(y.t[0], x.t[0]), min(y.t[-1], x.t[-1])
+    if min(y.rate, x.rate) < min(_SLOWEST, 0.6 * max(y.rate, x.rate)):
+        simple = law.powers[-1] < 2 and law.powers[0] >= 0 and y.rate < x.rate
+        return [_matched(y, x, Pair(law, float(start), float(stop)))] if simple else []
+    if min(y.rate, x.rate) < min(_SLOWEST, 0.6 * max(y.rate, x.rate)):
+        simple = law.powers[-1] < 2 and law.powers[0] >= 0 and y.rate < x.rate
+        return [_matched(y, x, Pair(law, float(start), float(stop)))] if simple else []
+    if len(y) < 64 or len(x) < 64 or not stop - start > _SHORTEST:
+        return []
+    both = Signals(y, x, *(_thinned(c) for c in (y, x)))
+    whole = _measure(both, law, float(start), float(stop))
+    number = 0 if whole.unrelated else int(min(_WINDOWS, (stop - start) // _SHORTEST))
+    edges = np.linspace(start, stop, number + 1)
+    windows = [_measure(both, law, float(a), float(b)) for a, b in pairwise(edges)]
+    sure = [w for w in windows if w.fits and w.clear]
+    if whole.fits and whole.clear and all(_agree(w, whole) for w in sure):
+        return [whole]
+    if sum(w.stop - w.start for w in sure) < _COVERED * (stop - start):
+        if whole.fits and whole.clear:
+            return [whole]
+        sure = _followed(y, x, law, float(start), float(stop)) or [whole]
+    runs: list[list[Pair]] = []
+    for w in sure:
+        if runs and _agree(runs[-1][-1], w) and _agree(runs[-1][0], w):
+            runs[-1].append(w)
+        else:
+            runs.append([w])
+    return [_joined(run, both) for run in runs]
+
+
+def _matched(y: Channel, x: Channel, pair: Pair) -> Pair:
+    """Return the pair of a channel whose samples are further apart than the lags that are looked for."""
+    reach = min(REACH, 0.25 * float(np.ptp(x.t)))
+    kept = np.flatnonzero((y.t >= x.t[0] + reach) & (y.t <= x.t[-1] - reach))
+    kept = kept[np.linspace(0, len(kept) - 1, min(len(kept), 400)).astype(np.int64)]
+    if len(kept) < _MATCHED or not np.ptp(y.y[kept]) > 0.0:
+        return pair
+    lag = np.arange(-reach, reach, max(1.0 / x.rate, 2.0 * reach / 4000))
+    values = np.gradient(x.y, x.t) if pair.law.powers[0] == 1 else x.y
+    b = np.interp(y.t[kept] - lag[:, None], x.t, values)
+    b, a = b - b.mean(axis=1, keepdims=True), y.y[kept] - y.y[kept].mean()
+    power = np.sum(b**2, axis=1) + 1e-300
+    alike = (b @ a) ** 2 / (power * float(a @ a))
+    k = int(np.argmax(alike))
+    rival = float(alike[np.abs(lag - lag[k]) > _AROUND].max(initial=0.0))
+    clear = bool(alike[k] > _RELATED and rival < _BESIDE * alike[k])
+    factor = float((b[k] @ a) / power[k]) / (pair.law.expected[0] or 1.0)
+    return replace(
+        pair,
+        factor=abs(factor),
+        sign=int(np.sign(factor)),
+        lag=float(lag[k]),
+        coherence=float(alike[k]),
+        ratios=(factor,),
+        sds=(_MODEL_ERROR,),
+        left=1.0 - float(alike[k]),
+        fits=clear,
+        clear=clear,
+    )
+
+
+def _followed(y: Channel, x: Channel, law: Law, start: float, stop: float) -> list[Pair]:
+    """Return a lag that changes too fast for windows of seconds, followed from one short step to the next."""
+    if 0 not in law.powers:
+        return []
+    for length in _STEPS:
+        edges = np.arange(start, stop, max(length, (stop - start) / _MOST_STEPS))
+        steps = [_correlated(y, x, Pair(law, float(a), float(b))) for a, b in pairwise(edges)]
+        sure = [p for p in steps if p.clear and p.coherence > _RELATED]
+        near = (NEAR * (b.start - a.start) / (a.stop - a.start) for a, b in pairwise(sure))
+        smooth = sum(abs(b.lag - a.lag) < most for (a, b), most in zip(pairwise(sure), near, strict=True))
+        if smooth > _SMOOTH * (len(steps) - 1):
+            return sure
+    return []
+
+
+def _joined(run: Sequence[Pair], both: Signals) -> Pair:
+    """Return one part of windows in a row that agree: measured over all of them, if that is clear."""
+    first, last = run[0], run[-1]
+    if len(run) == 1:
+        return first
+    whole = _measure(both, first.law, first.start, last.stop)
+    middle = sorted(run, key=lambda p: p.lag)[len(run) // 2]
+    return whole if whole.fits and whole.clear else replace(middle, start=first.start, stop=last.stop)
+
+
+def _agree(a: Pair, b: Pair) -> bool:
+    """Return whether two parts say the same: sign, lag, and the factor where both are sure of one."""
+    if abs(a.lag - b.lag) > 0.5 * NEAR:
+        return False
+    if not (a.sign and b.sign) or not (a.fits and b.fits):
+        return True
+    return a.sign == b.sign and abs(math.log(a.factor / b.factor)) < _SAME_FACTOR * len(a.law.powers)
+
+
+class Signals(NamedTuple):
+    """The two channels of a law, as recorded and as slow as SLOW."""
+
+    y: Channel
+    x: Channel
+    slow_y: Channel
+    slow_x: Channel
+
+
+def _thinned(channel: Channel) -> Channel:
+    """Return the channel averaged over periods of the slow rate, itself where it is no faster."""
+    if channel.rate <= _SLOW:
+        return channel
+    t = np.arange(channel.t[0], channel.t[-1], 1.0 / _SLOW)
+    return Channel(t, _averaged(channel, t, 1.0 / _SLOW))
+
+
+def _measure(both: Signals, law: Law, start: float, stop: float) -> Pair:
+    """Return the pair over a span, s: of all that both can show, or else of the slow part of it."""
+    pair = Pair(law, start, stop)
+    y, x, slow_y, slow_x = both
+    fast = max(1.0 / y.rate, 1.0 / x.rate, 1.0 / _FINEST)
+    slow = max(1.0 / _SLOW, fast)
+    q, late = _response(y, x, law, (start, stop), fast, 0.0), 0.0
+    if q is None or q.related < _RELATED:
+        tried = np.arange(-REACH, REACH + 0.5 * NEAR, NEAR)
+        scanned = [(_response(slow_y, slow_x, law, (start, stop), slow, float(v)), float(v)) for v in tried]
+        known = [(r, v) for r, v in scanned if r is not None]
+        best, late = max(known, key=lambda both: both[0].related, default=(None, 0.0))
+        q = _response(y, x, law, (start, stop), fast, late)
+        q = best if best is not None and (q is None or q.related < _RELATED) else q
+    if q is None:
+        return pair
+    pair = replace(pair, coherence=q.related, unrelated=q.is_unrelated)
+    keep = usable(q)
+    if np.count_nonzero(keep) >= max(_FEWEST_LINES, len(law.powers) + 2):
+        pair = _fit(q, keep, law, late, pair)
+    return pair if pair.fits or law.powers[-1] == 2 else _correlated(y, x, pair)
+
+
+def _response(
+    y: Channel, x: Channel, law: Law, span: tuple[float, float], period: float, late: float
+) -> Quotient | None:
+    """Return the response over a span, s, of y to x, or of x to y, with y taken earlier by `late`, s."""
+    low, high = max(span[0], x.t[0] + late, y.t[0]), min(span[1], x.t[-1] + late, y.t[-1])
+    if not high - low > _ENOUGH * (span[1] - span[0]):
+        return None
+    t = np.arange(low, high, period)
+    a, b = _averaged(y, t, period), _averaged(x, t - late, period)
+    return quotient("", t, *((b, a) if law.inverted else (a, b)))
+
+
+def _averaged(channel: Channel, t: FloatArray, period: float) -> FloatArray:
+    """Return the means of a channel over the periods about some times: what is faster does not fold."""
+    if period < 1.5 / channel.rate:
+        return np.interp(t, channel.t, channel.y)
+    area = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(channel.t) * (channel.y[1:] + channel.y[:-1]))])
+    low, high = (np.clip(t + side * period, channel.t[0], channel.t[-1]) for side in (-0.5, 0.5))
+    sums = np.diff([np.interp(v, channel.t, area) for v in (low, high)], axis=0)[0]
+    return np.asarray(sums / np.maximum(high - low, 1e-300))
+
+
+def _correlated(y: Channel, x: Channel, pair: Pair) -> Pair:
+    """Return a pair that its law does not describe: the lag and the factor by which they correlate best."""
+    period = max(_GRID, (pair.stop - pair.start) / _MOST_SAMPLES)
+    t = np.arange(pair.start, pair.stop, period)
+    most = int(min(REACH, 0.5 * (x.t[-1] - x.t[0])) / period)
+    wide = t[0] + period * np.arange(-most, len(t) + most)
+    known = ((wide >= x.t[0]) & (wide <= x.t[-1])).astype(float)
+    a, b = np.interp(t, y.t, y.y), np.interp(wide, x.t, x.y)
+    b = np.gradient(b, period) if pair.law.powers[0] == 1 else b
+    a, b = a - a.mean(), known * (b - b.mean())
+    power = np.correlate(b**2, np.ones(len(a)), "valid") + 1e-300
+    both = np.correlate(b, a, "valid")
+    energy = np.correlate(known, a**2, "valid")
+    alike = both**2 / np.maximum(power * energy, 1e-300)
+    alike = np.where(np.correlate(known, np.ones(len(a)), "valid") > _ENOUGH * len(a), alike, 0.0)
+    lag = period * (most - np.arange(len(both)))
+    near = np.where(np.abs(lag) < _AROUND, alike, 0.0)
+    k = int(np.argmax(near if near.max() > _AS_GOOD * alike.max() else alike))
+    rival = float(alike[np.abs(lag - lag[k]) > _AROUND].max(initial=0.0))
+    sensors = pair.law.powers[-1] < 2
+    factor = abs(float(both[k] / power[k]) / (pair.law.expected[0] or 1.0)) if sensors else math.nan
+    return replace(
+        pair,
+        lag=float(lag[k]),
+        factor=factor,
+        sign=int(np.sign(both[k])) if sensors else 0,
+        coherence=float(alike[k]),
+        clear=rival < _BESIDE * float(alike[k]),
+    )
+
+
+def _fit(q: Quotient, keep: np.ndarray, law: Law, late: float, pair: Pair) -> Pair:
+    """Return the pair with the lag and the coefficients that fit its response best."""
+    w = 2.0 * np.pi * q.frequency[keep]
+    response = q.value[keep] / np.sqrt(q.coherence[keep])  # the noise of x lowers it
+    doubt = np.hypot(q.sd[keep], _MODEL_ERROR)
+    h = 1.0 / response if law.inverted else response
+    span = min(REACH, 0.5 * math.pi * len(w) / float(w.max() - w.min() + 1e-9) + _AROUND)
+    lag = np.arange(-span, span, min(0.25 / float(w.max()), 0.01))
+    turned = h * np.exp(1j * w * lag[:, None])
+    rows = np.column_stack([(1j * w) ** p for p in law.powers]) / (np.abs(h) * doubt)[:, None]
+    rows = np.vstack([rows.real, rows.imag])
+    right = turned / (np.abs(h) * doubt)
+    right = np.hstack([right.real, right.imag])
+    size = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    basis, triangle = np.linalg.qr(rows / size)
+    cost = np.sum(right**2, axis=1) - np.sum((right @ basis) ** 2, axis=1)
+    k = int(np.argmin(cost))
+    apart = np.abs(lag - lag[k]) > _AROUND
+    scale = max(1.0, float(cost[k]) / max(2 * len(w) - len(law.powers) - 1, 1))
+    clear = not apart.any() or float(cost[apart].min() - cost[k]) > _RIVAL * scale
+    inverse = np.linalg.pinv(triangle)
+    c = (inverse @ (basis.T @ right[k])) / size
+    sd = np.linalg.norm(inverse, axis=1) / size * math.sqrt(scale)
+    left = np.abs(turned[k] - sum(v * (1j * w) ** p for v, p in zip(c, law.powers, strict=True)))
+    share = float(np.median(left / np.abs(h)))
+    fits = share < _FITS and q.related > _RELATED
+    relative = sd / np.maximum(np.abs(c), 1e-300)
+    ratios = tuple(float(v / e) if e else float(v) for v, e in zip(c, law.expected, strict=True))
+    sure = [i for i, r in enumerate(relative) if r < 0.25 and (law.expected[i] or len(c) == 1)]
+    factor = ratios[sure[0]] if sure else math.nan
+    fits &= len({np.sign(c[i]) for i in sure}) < 2  # no machine has a mass and a negative damping
+    return replace(
+        pair,
+        factor=abs(factor),
+        sign=int(np.sign(factor)) if sure else 0,
+        lag=late + float(lag[k]),
+        ratios=ratios,
+        sds=tuple(relative.tolist()),
+        left=share,
+        fits=bool(fits),
+        clear=bool(clear),
+    )
