@@ -170,7 +170,7 @@ def _line(entry: dict[str, Any]) -> str:
     """Return one record in a line: truth, what was accepted with the spread of its lambda, time."""
     first = [place[0] for place in entry.get("places", [])]
     said = ", ".join(
-        f"{e['name']} {'+' if e['name'] in entry['truth'] else 'WRONG'} {e['signature']['spread']:.3f}"
+        f"{e['name']} {'+' if e['name'] in entry['truth'] else 'WRONG'} {e['signature']['overall']:.3f}"
         for e in first
     )
     truth = "+".join([*entry["truth"], *([f"({entry['off']})"] if entry["off"] else [])])

@@ -24,7 +24,7 @@ SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
     ".bag": ros1_file.scan,
 }
 PACKED = ".zstd"
-TABLES = (".csv", ".tsv", ".txt", ".dat", ".mat", ".npz", ".npy", ".json", ".parquet", ".pq", ".zarr", ".tar")
+TABLES = (".csv", ".tsv", ".txt", ".dat", ".mat", ".npz", ".npy", ".json", ".parquet", ".pq")
 """Suffixes of files that `rsea import` converts."""
 
 BagPath = str | Path

@@ -66,11 +66,6 @@ def unpack_message(raw: bytes, allowance: Allowance) -> bytes:
     return message
 
 
-def unpack_zstd(packed: bytes, most: int) -> bytes:
-    """Return the first `most` bytes of a zstd frame. Raises one of ERRORS for a damaged one."""
-    return bytes(zstd.ZstdDecompressor().decompress(packed, most))
-
-
 def unpack_file(path: Path, directory: Path) -> Path:
     """Decompress `NAME.zstd` to `NAME` in a directory; return its path."""
     target = directory / path.stem

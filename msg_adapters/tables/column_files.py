@@ -17,8 +17,6 @@ from msg_adapters.tables.json_file import read_json
 from msg_adapters.tables.mat_file import HDF5, read_mat
 from msg_adapters.tables.npz_file import read_npy, read_npz
 from msg_adapters.tables.text_file import read_text
-from msg_adapters.tables.zarr_file import read_zarr
-from msg_adapters.tables.zarr_store import is_group
 from rsea_ros.errors import ImportMapError
 
 PARQUET, TIME = Path(__file__).with_name("_parquet_reader.py"), 90.0
@@ -46,13 +44,10 @@ READERS: Mapping[str, Callable[[Path, Wanted], Table]] = {
     ".npy": read_npy,
     ".parquet": read_parquet,
     ".pq": read_parquet,
-    ".zarr": lambda path, wanted: read_zarr(path, wanted.columns),
-    ".tar": lambda path, wanted: read_zarr(path, wanted.columns),
     ".json": read_json,
     **dict.fromkeys(json_file.LINES, read_json),
 }
-"""By suffix; a file with any other is text: CSV, TSV, blanks between numbers, gzipped or not. A directory
-with a .zgroup is a zarr group whatever its name."""
+"""By suffix; a file with any other is text: CSV, TSV, blanks between numbers, gzipped or not."""
 
 
 def read_columns(path: Path, columns: Sequence[str], **options: Any) -> Table:
@@ -63,7 +58,7 @@ def read_columns(path: Path, columns: Sequence[str], **options: Any) -> Table:
     Raises ImportMapError with file, line, column, value and expectation.
     """
     wanted = Wanted(tuple(columns), **options)
-    reader = READERS.get(".zarr" if is_group(path) else path.suffix.lower())
+    reader = READERS.get(path.suffix.lower())
     try:
         if reader:
             return reader(path, wanted)
@@ -100,11 +95,19 @@ _KINDS: tuple[tuple[bytes, str, str], ...] = (
     (b"CDF\x02", "a netCDF file", _AS_NPZ),
 )
 """First bytes, kind, and what a person can do."""
-_LONGEST = max(len(start) for start, _, _ in _KINDS)
+_TAR, _TAR_AT = b"ustar", 257
+_LONGEST = _TAR_AT + len(_TAR)
+_ZARR = (".zgroup", ".zarray", "zarr.json")
+"""Headers of zarr 2 and 3; the command reads both, with the user's zarr."""
+_ZARR_TO_NPZ = (
+    """python -c 'import numpy, zarr; numpy.savez("run.npz", **dict(zarr.open("FOLDER").arrays()))'"""
+)
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raise ValueError with kind and remedy for a file whose first bytes say that it is not a text."""
+    """Raise ValueError with kind and remedy for a zarr group, and a file whose first bytes are no text's."""
+    if any((path / name).is_file() for name in _ZARR):
+        raise ValueError(f"is a zarr group, expected a table: convert it to NPZ by {_ZARR_TO_NPZ}")
     if not path.is_file():
         return
     with path.open("rb") as file:
@@ -112,3 +115,5 @@ def refuse_foreign(path: Path) -> None:
     for start, kind, remedy in _KINDS:
         if head.startswith(start):
             raise ValueError(f"is {kind}, expected a table: {remedy}")
+    if head[_TAR_AT:] == _TAR:
+        raise ValueError("is a tar archive, expected a table: unpack it, and import a file of it")

@@ -15,7 +15,7 @@ from rsea_ros.cli.maps import map_path
 from rsea_ros.errors import OutputError
 from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
 
-HELP = "convert a measurement (CSV, MAT, Parquet, NPZ, JSON, zarr) to a bag by a map of its columns"
+HELP = "convert a measurement (CSV, MAT, Parquet, NPZ, JSON) to a bag by a map of its columns"
 EXAMPLE = "rsea import run.csv --map map.yaml --out run"
 
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "files", nargs="+", metavar="FILE",
         help="measurements: .csv, .tsv or other text (also .gz), .mat (up to version 7), .parquet, .npz, "
-        ".npy, .json, .jsonl; a zarr group or a .tar of one; a directory for some maps",
+        ".npy, .json, .jsonl; a directory for some maps",
     )  # fmt: skip
     parser.add_argument("--map", required=True, help="map file (YAML), or the name of one in config/imports")
     out = (

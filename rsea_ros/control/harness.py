@@ -85,15 +85,13 @@ def irregular(
     controller: TorqueController,
     desired: FloatArray,
     arrivals: Arrivals,
-    *,
-    seed: int = 0,
 ) -> ControlTrace:
     """Run a controller on a simulated rig with measurements and commands that come when they come.
 
     As the node does it: a grid gives each stamp its place, lateness fades the feedback. Held to a part
     PARTS of a period.
     """
-    plant, grid, lateness = Plant(rig, rate * PARTS, seed=seed), Grid(1e9 / rate), Lateness(rate)
+    plant, grid, lateness = Plant(rig, rate * PARTS), Grid(1e9 / rate), Lateness(rate)
     due = {round((k + off) * PARTS): k for k, off in enumerate(arrivals.taken) if np.isfinite(off)}
     acting: dict[int, float] = {}
     ages = np.broadcast_to(arrivals.ft_age, len(desired))

@@ -112,12 +112,6 @@ def returns(
     return np.broadcast_to(fed_back, whole.shape), whole
 
 
-def open_loop(law: FeedbackLaw, plant: ComplexArray, hz: FloatArray) -> ComplexArray:
-    """Return L, the loop broken at the motor torque behind its current, shape (…, n)."""
-    memory, whole = returns(law, plant, hz)
-    return whole / memory - 1.0
-
-
 def closed_loop_matrix(law: FeedbackLaw, plant: Sampled, share: float = 1.0) -> FloatArray:
     """Return the matrix that takes bench and law from one sample to the next, without a desired torque.
 

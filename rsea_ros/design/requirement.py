@@ -66,11 +66,6 @@ _UNITS = {
 }
 
 
-def gyration(requirement: Requirement) -> float:
-    """Return the chassis' radius of gyration over its outer radius: 0.71 is a full disc, 1 a thin ring."""
-    return math.sqrt(requirement.inertia / requirement.mass) / (0.5 * requirement.diameter)
-
-
 def check_magnitude(name: str, value: float, unit: str) -> None:
     """Raise ParameterError for a value that is not finite and positive, or of no possible size."""
     if not _RANGE[0] <= value <= _RANGE[1]:

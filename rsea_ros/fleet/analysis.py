@@ -77,15 +77,6 @@ def time_of(record: Record, url: str, date: str) -> datetime | None:
     return date_in(url, date) if date else None
 
 
-def is_refused(run: JointRecording) -> RseaError | None:
-    """Return why a run cannot be read strictly, None where it can."""
-    try:
-        run.strict()
-    except RseaError as error:
-        return error
-    return None
-
-
 _MAIN = ("ft", "deflection", "position", "velocity")
 """Channels that show how well a fit is; the first that a recording has stands in the row."""
 

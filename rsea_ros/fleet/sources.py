@@ -17,10 +17,6 @@ from rsea_ros.fleet.joints import MappedJoint
 
 METADATA = "metadata.yaml"
 """The file that makes a folder one bag."""
-_GROUP = ".zgroup"
-"""The file that makes a folder, with its subfolders, one table: a zarr group."""
-_KEPT = (_GROUP, ".zarray", ".zattrs")
-"""Hidden files that belong to a recording."""
 _BAGS = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
 _BLOCK = 1 << 20
 _DIGITS = 16
@@ -143,17 +139,13 @@ def _files(source: str) -> dict[str, Mapping[str, Any]]:
 
 
 def _parts(url: str) -> dict[str, Mapping[str, Any]]:
-    """Return the files of one recording: itself, or those directly in its folder, or all of a zarr group."""
-    files = _files(url)
-    if f"{url}/{_GROUP}" in files:
-        return files
-    return {path: info for path, info in files.items() if url in (path, _parent(path))}
+    """Return the files of one recording: itself, or those directly in its folder."""
+    return {path: info for path, info in _files(url).items() if url in (path, _parent(path))}
 
 
 def _is_hidden(path: str) -> bool:
     """Return whether a name is that of a temporary file."""
-    name = PurePosixPath(path).name
-    return name.startswith(".") and name not in _KEPT
+    return PurePosixPath(path).name.startswith(".")
 
 
 def _bags(files: Mapping[str, Mapping[str, Any]]) -> Iterator[Bag]:
@@ -176,8 +168,6 @@ def _all(files: Mapping[str, Mapping[str, Any]]) -> Iterator[Bag]:
         folders.setdefault(_parent(path), {})[path] = info
         yield _bag(path, {path: info})
     for folder, held in folders.items():
-        if f"{folder}/{_GROUP}" in held:
-            held = {path: info for path, info in files.items() if path.startswith(f"{folder}/")}
         yield _bag(folder, held)
 
 

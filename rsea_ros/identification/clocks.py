@@ -58,11 +58,9 @@ SCATTER = 0.25
 
 
 class LagLine(NamedTuple):
-    """A line through lags: rate (s/s), lag (s) at the start of the record, scatter of the lags about it (s),
-    and how much the line rises over the record (s)."""
+    """A line through lags: rate (s/s), scatter of the lags about it (s), and its rise over the record (s)."""
 
     rate: float
-    at_start: float
     scatter: float
     rise: float
 
@@ -83,7 +81,7 @@ def lag_line(t: FloatArray, y: FloatArray, p: FloatArray, start: float) -> LagLi
         return None
     rate, at_start = np.polyfit(since, lag, 1, w=np.sqrt(weight))
     scatter = math.sqrt(float(np.average((lag - at_start - rate * since) ** 2, weights=weight)))
-    return LagLine(float(rate), float(at_start), scatter, float(rate) * float(np.ptp(t)))
+    return LagLine(float(rate), scatter, float(rate) * float(np.ptp(t)))
 
 
 def _lags(

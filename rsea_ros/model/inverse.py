@@ -13,7 +13,6 @@ Effects on a command are undone where only the commanded torque is known; a limi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -214,11 +213,6 @@ def _undone(machine: Machine, motion: Motion, torque: FloatArray, period: float)
     for _ in range(_UNDOINGS):
         command = command + torque - _command_torque(*_parts(machine), command, motion.v)
     return smooth(command, period)
-
-
-def predict_torque(rig: Rig, motion: Motion) -> Mapping[str, FloatArray]:
-    """Return the one channel of an inverse comparison."""
-    return {"motor_torque": inverse_torque(rig, motion)}
 
 
 @njit(cache=True, error_model="numpy")

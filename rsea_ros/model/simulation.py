@@ -129,15 +129,15 @@ def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
     )
 
 
-def simulate_drive(rig: Rig, drive: Drive, *, on_angle: bool = False) -> dict[str, FloatArray]:
-    """Return each channel of a drive at its sampling instants. on_angle: use the measured rotor angle."""
-    return simulate_drives(rig, (drive,), on_angle=on_angle)[0]
+def simulate_drive(rig: Rig, drive: Drive) -> dict[str, FloatArray]:
+    """Return each channel of a drive at its sampling instants."""
+    return simulate_drives(rig, (drive,))[0]
 
 
 def simulate_drives(
     rig: Rig, drives: Sequence[Drive], *, on_angle: bool = False
 ) -> list[dict[str, FloatArray]]:
-    """Return the channels of several drives of one rig, which is prepared once."""
+    """Return the channels of several drives of one rig, prepared once. on_angle: use the rotor angle."""
     machines: dict[tuple[float, float, bool], Machine] = {}
     results = []
     for drive in drives:

@@ -21,7 +21,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from control import StateSpace, TransferFunction
+    from control import TransferFunction
 
 
 _ROUNDING = 1e-12
@@ -40,16 +40,6 @@ class Fraction:
         return complex(np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
 
-def distal_per_motor(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
-    """Return T_d / T_m. With both ends clamped and `element` it is Eq. (4)."""
-    return transfer(rig, outputs.distal(rig, sees))
-
-
-def proximal_per_motor(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
-    """Return T_p / T_m. With both ends clamped it is Eq. (5) with J_sc + n J_r for J_sc."""
-    return transfer(rig, outputs.proximal(rig, sees))
-
-
 def distal_per_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
     """Return T_d / T_p while the motor drives. Both ends clamped: Eq. (6) with J_sc + n J_r for J_sc."""
     return _transfer_function(distal_over_proximal(rig, sees))
@@ -62,23 +52,13 @@ def distal_over_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> Fraction
     return _reduce(above, below)
 
 
-def position_per_motor(rig: Rig) -> TransferFunction:
-    """Return the encoder's angle over T_m, rad/(N m)."""
-    return transfer(rig, outputs.position())
-
-
 def transfer(rig: Rig, output: Output, port: str = "gear") -> TransferFunction:
-    """Return any output over the torque at any of equations.PORTS."""
+    """Return any output over the torque at any of equations.PORTS.
+
+    Over T_m with both ends clamped, outputs.distal(rig, "element") is Eq. (4), and outputs.proximal(rig) is
+    Eq. (5) with J_sc + n J_r for J_sc.
+    """
     return _transfer_function(_reduce(*_expand(rig, output, port)))
-
-
-def state_space(rig: Rig, output: Output, port: str = "gear") -> StateSpace:
-    """Return the same in states (q, q'): q'' of the output comes from the equations of motion."""
-    from control import StateSpace
-
-    system = propagator.state_space(rig)
-    c, d = read(system, output, port)
-    return StateSpace(system.a, system.b[:, [PORTS.index(port)]], c[None, :], [[d]])
 
 
 def read(system: propagator.StateSpace, output: Output, port: str = "gear") -> tuple[FloatArray, float]:

@@ -35,9 +35,8 @@ Bag = Callable[[str, Record], Record]
 
 @dataclass(frozen=True)
 class MovingOutput:
-    """true_rig: of the bench. rivals: unlumped and lumped, fitted. responses: measured, F/T per command."""
+    """rivals: unlumped and lumped, fitted. responses: measured, F/T per command."""
 
-    true_rig: Rig
     rivals: tuple[Rival, ...]
     responses: Mapping[str, FrequencyResponse]
 
@@ -60,7 +59,7 @@ def moving_output(
     train = _only(records["spring_end"].between(0.0, middle), channels)
     holdout = [(end, record.between(middle, duration + 1.0)) for end, record in records.items()]
     rivals = compare({"unlumped": rig, "lumped": loosen(lumped_rig(rig))}, train, holdout)
-    return MovingOutput(true_rig, rivals, {end: estimate_response(r, "ft") for end, r in records.items()})
+    return MovingOutput(rivals, {end: estimate_response(r, "ft") for end, r in records.items()})
 
 
 def draw(rig: Rig, seed: int) -> Rig:

@@ -85,14 +85,12 @@ class Scan:
     """The days of a naming: mean time (days since 1970) and whether most recordings name it, shape (n,).
 
     ratio: log likelihood of `named more often from this day on` over `as often as before`, shape (n,).
-    always: that of `named all the time` over `as often as in the fleet`.
     """
 
     naming: Naming
     t: FloatArray
     named: FloatArray
     ratio: FloatArray
-    always: float
     p: float
 
 
@@ -134,7 +132,7 @@ def _scan(n: Naming, usual: float, settings: TrendSettings) -> Scan:
     ratio[later < settings.fewest_named] = 0.0
     always = _always(named, usual) if np.sum(named) >= settings.fewest_named else 0.0
     most = max(float(np.max(ratio, initial=0.0)), always)
-    return Scan(n, t, named, ratio, always, float(min(1.0, len(t) * np.exp(-most))))
+    return Scan(n, t, named, ratio, float(min(1.0, len(t) * np.exp(-most))))
 
 
 def _always(named: FloatArray, usual: float) -> float:

@@ -19,7 +19,7 @@ _MOST_TERMS = 12
 
 @dataclass(frozen=True)
 class Tested:
-    """A series without a change, its largest score over all days and kinds, and its p.
+    """A series without a change, and the p of its largest score over all days and kinds.
 
     effect: the day effect without a change. beside: the one beside the step or ramp of that score.
     """
@@ -28,7 +28,6 @@ class Tested:
     effect: DayEffect
     beside: DayEffect
     prior: tuple[float, float]
-    largest: float
     p: float
 
 
@@ -42,7 +41,7 @@ def change_test(days: Days, effect: DayEffect, prior: tuple[float, float], setti
     best, _ = _best(course, settings.fewest_beside)
     beside = _effect_beside(course, best, settings)
     z = _score(course_of(days, beside.variance, prior), best)
-    return Tested(course, effect, beside, prior, z, scan_p(z, _share(days, settings), beside.freedom))
+    return Tested(course, effect, beside, prior, scan_p(z, _share(days, settings), beside.freedom))
 
 
 def _effect_beside(course: Course, change: StepOrRamp, settings: TrendSettings) -> DayEffect:

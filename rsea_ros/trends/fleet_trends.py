@@ -117,7 +117,7 @@ def _undetermined_trend(series: Series, days: int, settings: TrendSettings) -> T
     on = "1 day" if days == 1 else f"{days} days"
     determined = f"{int(np.sum(series.identifiable))} of {many} recordings determine it, on {on}"
     reason = f"{determined}; {settings.fewest_days} days are needed"
-    return Trend(series, "undetermined", days, reason=reason)
+    return Trend(series, "undetermined", reason=reason)
 
 
 def _by_parameter(ready: Iterable[_Prepared]) -> Mapping[str, list[_Prepared]]:

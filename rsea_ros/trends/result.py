@@ -70,12 +70,11 @@ class Trend:
     of the day effect. detectable: the least step in mid-series that these recordings would show. q: false
     discovery rate at which the series is more than noise. by_day: means of the days at the mean temperature,
     with the recordings' own intervals. to_limit_s: POSIX s at which `limit` is reached.
-    days_used: days with an estimate. reason: of a series that is undetermined.
+    reason: of a series that is undetermined.
     """
 
     series: Series
     state: State
-    days_used: int
     q: float = 1.0
     first: Interval | None = None
     now: Interval | None = None

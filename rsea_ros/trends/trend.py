@@ -40,13 +40,12 @@ def trend_of(series: Series, test: Tested, course: Course, q: float, settings: T
     level = abs(now.value)
     if detectable > settings.widest * level and not course.terms:
         reason = f"only steps above {detectable / level:.0%} would show" if level else "no level"
-        return Trend(series, "undetermined", len(course.t), reason=reason, detectable=detectable)
+        return Trend(series, "undetermined", reason=reason, detectable=detectable)
     changes, slope = tuple(_changes(series, whole)), last_slope(whole)
     goes_on = bool(changes) and changes[-1].kind == "ramp" and is_sure(slope)
     trend = Trend(
         series,
         "trending" if goes_on else "changed" if changes else "steady",
-        len(course.t),
         q,
         first,
         now,

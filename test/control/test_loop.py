@@ -18,7 +18,7 @@ from rsea_ros.control.law import (
     sample_rig,
 )
 from rsea_ros.control.loads import LOCKED, load_range
-from rsea_ros.control.margins import largest_pole, margins, open_loop
+from rsea_ros.control.margins import largest_pole, margins, returns
 from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import check, grid
 from rsea_ros.errors import ParameterError
@@ -63,7 +63,8 @@ def test_the_controller_answers_a_sine_as_the_formula_says(hz):
         answers.append(torque)
     late = slice(-round(20 * RATE / hz), None)
     answer = 2.0 * np.mean((np.array(answers) * turn.conj())[late]) * np.exp(-2j * np.pi * hz / RATE)
-    assert answer == pytest.approx(-open_loop(law, response, at)[0], rel=2e-2)
+    memory, whole = returns(law, response, at)
+    assert answer == pytest.approx(1.0 - whole[0] / memory[0], rel=2e-2)
 
 
 def test_margins_are_those_of_python_control():

@@ -11,7 +11,7 @@ import pytest
 from rsea_ros.design import mechanism
 from rsea_ros.design.by_train import band_range, by_train
 from rsea_ros.design.motor_gear_units import catalogue, unit_named
-from rsea_ros.design.requirement import Requirement, gyration
+from rsea_ros.design.requirement import Requirement
 from rsea_ros.design.spring_design import least_stiffness, rig_of, spring_design, stiffness_bounds
 from rsea_ros.design.tolerance import margins, robust_stiffness, spreads_of
 from rsea_ros.errors import ParameterError
@@ -144,10 +144,6 @@ def test_the_band_is_given_over_the_range_of_the_rotors_inertia():
     for hz, factor in ((low, math.exp(1.6449 * 0.5)), (high, math.exp(-1.6449 * 0.5))):
         assert hz == pytest.approx(float(undamped_band(260.0, 6.169e-4 + factor * UNIT.spin)))
     assert band_range(260.0, 6.169e-4, -6.0e-4, 0.5)[1] == math.inf
-
-
-def test_the_chassis_inertia_is_between_a_disc_and_a_ring():
-    assert math.sqrt(0.5) < gyration(PAPER) < 1.0
 
 
 def test_every_number_of_the_catalogue_has_a_source():

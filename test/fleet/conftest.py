@@ -1,4 +1,4 @@
-"""A new store, files that stand for bags, `fleet_stubs` and `zarr_groups` importable."""
+"""A new store, files that stand for bags, and `fleet_stubs` importable."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pytest
 from rsea_ros.fleet.store import Store, open_store
 
 sys.path.append(str(Path(__file__).parent))
-sys.path.append(str(Path(__file__).parents[1] / "msg_adapters"))  # for `zarr_groups`
 
 
 @pytest.fixture

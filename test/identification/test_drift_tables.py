@@ -126,9 +126,9 @@ def test_a_rig_that_is_judged_by_torque_has_no_drifts(world):
     assert world.accepted(2.0) == (None, [])
 
 
-CLEAR = LagLine(-80e-6, 0.0, 0.0, -4.8e-3)
-FLAT = LagLine(-1e-6, 0.0, 0.0, -6e-5)
-SCATTERED = LagLine(-80e-6, 0.0, 2.4e-3, -4.8e-3)
+CLEAR = LagLine(-80e-6, 0.0, -4.8e-3)
+FLAT = LagLine(-1e-6, 0.0, -6e-5)
+SCATTERED = LagLine(-80e-6, 2.4e-3, -4.8e-3)
 
 
 def with_rate(rate):

@@ -36,14 +36,8 @@ def line_of(lag, seconds=12.0, keep=slice(None), amplitude=1.0, start=START):
 def test_a_lag_that_grows_along_a_line_is_found_with_its_sign(rate, first):
     line = line_of(lambda since: first + rate * since)
     assert line.rate == pytest.approx(rate, rel=2e-2)
-    assert line.at_start == pytest.approx(first, abs=3e-5)
     assert line.rise == pytest.approx(12.0 * rate, rel=2e-2)
     assert line.scatter < 0.02 * abs(line.rise) and line.is_clear
-
-
-def test_time_counts_from_the_start_of_the_record():
-    line = line_of(lambda since: 400e-6 * since, start=START - 3.0)
-    assert line.at_start == pytest.approx(-3.0 * 400e-6, rel=5e-2)
 
 
 @pytest.mark.parametrize(("seconds", "has_line"), [(6.9, False), (7.9, True)])
@@ -117,7 +111,7 @@ def test_blocks_weigh_as_much_as_they_show():
     ],
 )
 def test_a_clear_line_rises_far_scatters_little_and_is_no_faster_than_a_clock(rate, rise, scatter, clear):
-    assert LagLine(rate, 0.0, scatter, rise).is_clear is clear
+    assert LagLine(rate, scatter, rise).is_clear is clear
 
 
 def lag_of(true, begin=0.0, far=2e-3, offset=0.0, gain=1.0):

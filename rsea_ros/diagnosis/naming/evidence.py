@@ -35,34 +35,20 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map
 from rsea_ros.records.record import FloatArray, IntArray
 
-_SHIFTS = 6
-"""Shifts in time by which a contribution is held against a residual that it has nothing to do with.
-
-They steer `chance` alone, which people read and no probability does.
-"""
-
 
 @dataclass(frozen=True)
 class Signature:
     """Spreads of lambda, weighted by c.c; 0 for a law that fits everywhere.
 
-    scale: lambda of all test blocks together. spread: over the test blocks; over all blocks `overall`.
-    chance: value of `overall` for a residual unrelated to the cause.
+    overall: over all blocks. amplitude, time, frequency: over parts of these.
     carried: how surely the misfit of lambda lasts from block to block, in standard deviations: near 0 where
     only noise is left, also coloured noise shorter than a block, and large where a sensor wanders.
-    amplitude, time, frequency: over parts of these. share: c.c / r.r. kept: the share of c.c that no other
-    unknown imitates.
     """
 
-    scale: float
-    spread: float
     overall: float
-    chance: float
     amplitude: float
     time: float
     frequency: float
-    share: float
-    kept: float
     carried: float = 0.0
 
 
@@ -70,16 +56,12 @@ def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence)
     """Return the signature of a cause."""
     c, r = (project_out(rows, v) for v in (rows.contribution, rows.residual))
     cc, cr = c * c, c * r
-    held_out = _sums(rows.block, cc * rows.tests, cr * rows.tests)
     every = _sums(rows.block, cc, cr)
-    total = max(float(cc.sum()), 1e-300)
     return Signature(
-        scale=1.0 + float(held_out[1].sum() / max(held_out[0].sum(), 1e-300)), spread=_spread(*held_out),
-        overall=_spread(*every), chance=_by_chance(rows, c, r),
+        overall=_spread(*every),
         amplitude=_spread(*_sums(_parts_by(np.abs(c), cc, rule.parts), cc, cr)),
         time=_spread(*_sums(_parts_by(rows.block.astype(float), cc, rule.parts), cc, cr)),
-        frequency=_over_frequency(rows, c, r, rule.bands), share=total / max(float(r @ r), 1e-300),
-        kept=total / max(float(rows.contribution @ rows.contribution), 1e-300),
+        frequency=_over_frequency(rows, c, r, rule.bands),
         carried=_serial_correlation(*every),
     )
 
@@ -116,15 +98,6 @@ def _parts_by(values: FloatArray, cc: FloatArray, parts: int) -> IntArray:
     return part
 
 
-def _by_chance(rows: ContributionRows, c: FloatArray, r: FloatArray) -> float:
-    """Return the spread over blocks for a contribution that is shifted in time, RMS of several shifts."""
-    spreads = []
-    for k in range(1, _SHIFTS + 1):
-        shifted = np.concatenate([np.roll(c[s], k * (s.stop - s.start) // (_SHIFTS + 1)) for s in rows.runs])
-        spreads.append(_spread(*_sums(rows.block, shifted**2, shifted * r)))
-    return float(np.sqrt(np.mean(np.square(spreads))))
-
-
 def _over_frequency(rows: ContributionRows, c: FloatArray, r: FloatArray, bands: int) -> float:
     """Return the spread of the complex lambda over frequency bands of equal ratio."""
     cc, cr = np.zeros(bands), np.zeros(bands, complex)
@@ -159,8 +132,8 @@ class Evidence:
 
     gain, gain_low: 1 - RMS(with) / RMS(without) of the channel that it helps most, and the lower end of its
     95 % interval. is_sure: the gain pays for the parameters. weight: of this cause among all effects tried in
-    its place, 0 to 1. before: the worst channel's residual over its noise without it, left: what its model
-    leaves of the worst channel. at_edge: a parameter is at a bound. siblings: causes beside it.
+    its place, 0 to 1. left: what its model leaves of the worst channel, over its noise. at_edge: a parameter
+    is at a bound.
     """
 
     name: str
@@ -171,10 +144,8 @@ class Evidence:
     gain_low: float
     is_sure: bool
     weight: float
-    before: float
     left: float
     at_edge: bool
-    siblings: int
 
 
 @dataclass(frozen=True)
@@ -210,10 +181,9 @@ def evidence_for(
         flexible=flexible(problem, claim.theta, claim.name, rows, settings), channel=channel, gain=gained,
         gain_low=low,
         is_sure=preference(claim.with_it, claim.without, parameters, settings.acceptance).sure,
-        weight=claim.weight, before=claim.without.ratio(claim.without.worst),
+        weight=claim.weight,
         left=weights.ratio(weights.worst),
         at_edge=is_at_edge(problem, claim.theta, claim.name, settings.acceptance.near_bound),
-        siblings=len(problem.added) - 1,
     )
 
 

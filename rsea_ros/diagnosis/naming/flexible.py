@@ -111,12 +111,10 @@ and far above rounding."""
 
 @dataclass(frozen=True)
 class Flexible:
-    """The gain of the spline: share of the residual on test blocks, its 95 % interval, and its ratio to the
-    cause's own gain (both as powers)."""
+    """The gain of the spline: share of the residual on test blocks, and its 95 % interval."""
 
     gain: float
     ci95: tuple[float, float]
-    of_cause: float
 
 
 def flexible(
@@ -135,13 +133,7 @@ def flexible(
     normal = matrix[fits].T @ matrix[fits] + _RIDGE * np.eye(matrix.shape[1])
     weights = np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
     before, after = (_by_block(rows, v) for v in (rows.residual, rows.residual - matrix @ weights))
-    cause = float(np.sum((rows.residual + rows.contribution)[rows.tests] ** 2) - before.sum())
-    gain, ci95 = gain_of(after, before, settings.acceptance.resamples)
-    return Flexible(
-        gain=gain,
-        ci95=ci95,
-        of_cause=float(before.sum() - after.sum()) / max(cause, 1e-300),
-    )
+    return Flexible(*gain_of(after, before, settings.acceptance.resamples))
 
 
 def _by_block(rows: ContributionRows, values: FloatArray) -> FloatArray:

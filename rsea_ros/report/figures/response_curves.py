@@ -64,7 +64,7 @@ class Mark:
 
 def response_figure(
     title: str, responses: Sequence[ResponseCurve], marks: Sequence[Mark] = (), caption: str = "",
-    decibel: tuple[float, float] | None = None, phase: bool = True,
+    decibel: tuple[float, float] | None = None,
 ) -> Figure:  # fmt: skip
     """Return gain and phase over frequency; marks are vertical lines. decibel: range of the gain axis."""
     data: list[Json] = []
@@ -72,38 +72,33 @@ def response_figure(
         if r.band is not None:
             shade = faint(r.colour, 0.18)
             data.append(band(r.band.hz, *r.band.gain, shade))
-            data += [band(r.band.hz, *r.band.phase, shade, yaxis="y2")] if phase else []
+            data.append(band(r.band.hz, *r.band.phase, shade, yaxis="y2"))
         gain = 20.0 * np.log10(np.abs(r.values))
         parts: Json = {"line": {"color": r.colour, "width": r.width, "dash": r.dash}}
         data.append(line(r.hz, gain, r.name, r.colour, hovertemplate="%{y:.2f} dB", **parts))
-        if phase:
-            parts |= {"hovertemplate": "%{y:.1f}°", "yaxis": "y2"}
-            data.append(line(r.hz, r.degrees, r.name, r.colour, **parts))
-    return Figure(title, caption, data, _layout(responses, marks, decibel, phase), 560 if phase else 380)
+        parts |= {"hovertemplate": "%{y:.1f}°", "yaxis": "y2"}
+        data.append(line(r.hz, r.degrees, r.name, r.colour, **parts))
+    return Figure(title, caption, data, _layout(responses, marks, decibel), 560)
 
 
 def _layout(
-    responses: Sequence[ResponseCurve],
-    marks: Sequence[Mark],
-    decibel: tuple[float, float] | None,
-    phase: bool,
+    responses: Sequence[ResponseCurve], marks: Sequence[Mark], decibel: tuple[float, float] | None
 ) -> Json:
     low, high = min(r.hz[0] for r in responses), max(r.hz[-1] for r in responses)
     turned = [np.ptp(r.degrees) for r in responses]
     turned += [np.ptp(np.concatenate(r.band.phase)) for r in responses if r.band is not None]
     tick = 90.0 if max(turned) <= 720.0 else 180.0  # not more than eight marks
-    parts = {"yaxis2": axis("phase, °", domain=[0.0, 0.36], dtick=tick)} if phase else {}
     notes = [
         label(m.text, float(np.log10(m.hz)), 1.0, QUIET, yref="paper", yanchor="bottom", xanchor=m.anchor)
         for m in marks
     ]
     stroke: Json = {"type": "line", "xref": "x", "yref": "paper"}
     style = {"color": QUIET, "width": 1, "dash": "dot"}
-    gain = axis("gain, dB", domain=[0.44, 1.0] if phase else [0.0, 1.0])
+    gain = axis("gain, dB", domain=[0.44, 1.0])
     return layout(
-        xaxis=frequency_axis(low, high, anchor="y2" if phase else "y"),
+        xaxis=frequency_axis(low, high, anchor="y2"),
         yaxis={**gain, "range": list(decibel)} if decibel else gain,
-        **parts,
+        yaxis2=axis("phase, °", domain=[0.0, 0.36], dtick=tick),
         annotations=[*names_beside([(r.name, r.colour) for r in responses], 0.075), *notes],
         shapes=[{**stroke, "x0": m.hz, "x1": m.hz, "y0": 0.0, "y1": 1.0, "line": style} for m in marks],
         hoversubplots="axis",

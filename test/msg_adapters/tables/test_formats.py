@@ -238,6 +238,7 @@ def test_the_second_of_two_columns_with_one_name_can_be_read(tmp_path):
         ("log.dat", b"PAR1", r"is a Parquet file, .* call it \.parquet"),
         ("run.mcap", b"\x89MCAP0\r\n", "is a bag, .* needs no import"),
         ("log.pkl", pickle.dumps(np.arange(3), 4), "is a pickle, which may run any program"),
+        ("log.tar", bytes(257) + b"ustar", "is a tar archive, .* unpack it"),
     ],
 )
 def test_a_foreign_file_is_named_with_its_remedy(tmp_path, name, head, words):
@@ -245,6 +246,13 @@ def test_a_foreign_file_is_named_with_its_remedy(tmp_path, name, head, words):
     (tmp_path / name).write_bytes(head + bytes(range(256)) * 3)
     with pytest.raises(ImportMapError, match=f"{name}: {words}"):
         read_columns(tmp_path / name, ["t"])
+
+
+@pytest.mark.parametrize("header", [".zgroup", ".zarray", "zarr.json"])
+def test_a_zarr_group_is_refused_with_the_line_that_converts_it(tmp_path, header):
+    (tmp_path / header).write_text("{}")
+    with pytest.raises(ImportMapError, match=r"is a zarr group, .* NPZ by python -c 'import .*\(\)\)\)'$"):
+        read_columns(tmp_path, ["t"])
 
 
 def test_a_directory_for_a_file_is_one_line(tmp_path):
