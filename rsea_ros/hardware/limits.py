@@ -138,7 +138,8 @@ def derive(
     settle("deflection", (BENT, "5°, where the rig states no stop"), (rig.stop, "hard_stop of the rig"))
     most = settle(
         "torque",
-        (rating.torque, "the motor's own limit") if math.isfinite(rating.torque) else rig.motor,
+        rig.motor,
+        (rating.torque, "the motor's own limit"),
         (rig.stiffness * limits["deflection"], "deflection_limit times the spring's stiffness"),
     )
     most = max(most, stated.get("torque", 0.0))
