@@ -51,10 +51,13 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
         limits[name] = math.inf
         if name in sources:
             sources[name] = why
-    deflection, by_angle = limits["deflection"], _deflects(values, rig)
-    if not by_angle and not rig.rigid_spring and deflection * rig["spring.stiffness"] < limits["ft"]:
-        limits["ft"] = deflection * rig["spring.stiffness"]
-        sources["ft"] = f"deflection_limit {deflection:.4g} rad times the spring's stiffness"
+    by_angle = _deflects(values, rig)
+    if not by_angle and "deflection" not in inapplicable:
+        bent = limits["deflection"] * rig["spring.stiffness"]
+        if bent < limits["ft"]:
+            limits["ft"] = bent
+            sources["ft"] = f"deflection_limit {limits['deflection']:.4g} rad times the spring's stiffness"
+        sources["deflection"] = "ft_limit limits it"
     return Limits(
         torque=limits["torque"],
         slew=values["slew_limit"],
