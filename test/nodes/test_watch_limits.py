@@ -17,7 +17,8 @@ class Answer:
         self.come = lambda: callback(self)
 
     def result(self):
-        return SimpleNamespace(values=[SimpleNamespace(type=3, double_value=v) for v in (self.torque, 100.0, 20.0)])
+        values = (self.torque, 100.0, 20.0)
+        return SimpleNamespace(values=[SimpleNamespace(type=3, double_value=v) for v in values])
 
 
 @pytest.fixture
