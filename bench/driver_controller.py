@@ -68,7 +68,7 @@ FREE = Kind("free", "paper_moving_output", 4.7, 4.0)
 """4.7 N m: a motor of 68 N m cannot make more on a free end."""
 PATIENT = {"lost_cycles": 100, "ft_timeout": 1.0, "command_timeout": 1.0}
 """Limit of the driver on a machine whose terminals stall: the error is then that between stalls."""
-START = {"autostart": "true", "resume": "true"}
+START = {"autostart": "true", "resume": "true", "allow_no_position_limit": "true"}
 TRIES = 3
 """Of a quiet trial in which the wire itself lost the replies."""
 MEASURED, ATTEMPTS = 3, 8

@@ -70,11 +70,11 @@ def run(args: argparse.Namespace) -> int:
 
 def motors(rig: Rig) -> list[MotorLimits]:
     """Return the limit of the driver, and those of the catalogue unit with the gear ratio of the rig."""
-    from rsea_ros.control.settings import TorqueLimits
     from rsea_ros.control.study import MotorLimits
     from rsea_ros.design.motor_gear_units import catalogue
+    from rsea_ros.model.rig import motor_torque
 
-    limit, where = TorqueLimits().torque, "torque_limit of config/nodes/driver.yaml"
+    limit, where = motor_torque(rig)
     limits = [MotorLimits("driver's limit", limit, float("inf"), where)]
     for unit in catalogue().values():
         if unit["ratio"] == rig["gear.ratio"]:

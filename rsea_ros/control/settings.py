@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rsea_ros.model.rig import MOTOR_TORQUE, Rig, motor_torque
+
 CORNER = 80.0
 """Hz: what a desired torque does faster is not predicted. At 280 Hz 5 Hz are predicted within 0.9 %."""
 
 
 @dataclass(frozen=True)
 class TorqueLimits:
-    """torque: N m. slew: N m/s. ramp: s in which the limit grows after the start."""
+    """torque: N m, of the motor. slew: N m/s. ramp: s in which the limit grows after the start."""
 
-    torque: float = 68.0
+    torque: float = MOTOR_TORQUE
     slew: float = 40_000.0
     ramp: float = 0.25
+
+    @classmethod
+    def of(cls, rig: Rig) -> TorqueLimits:
+        """Return the limits of the motor that the rig states, else those of MOTOR_TORQUE."""
+        return cls(motor_torque(rig)[0])
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from rsea_ros.hardware.device import State, Wrench
 from rsea_ros.hardware.dynamixel.encoder import BusEncoder, EncoderConnection, MotorSample, Unwrapper
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
-from rsea_ros.hardware.limits import Limits, check_limits
+from rsea_ros.hardware.limits import Limits, Rating, check_limits
 from rsea_ros.hardware.netft.sensor import ForceTorqueSensor, SensorConnection
 from rsea_ros.hardware.protection import Protection
 
@@ -49,6 +49,12 @@ class DynamixelNetft:
     def protection(self) -> Protection:
         """The motor's."""
         return self._motor.protection
+
+    @property
+    def rating(self) -> Rating:
+        """The motor's own torque limit, its speed without load, and the range of the sensor."""
+        felt = math.inf if self._sensor is None else self._sensor.range[self._limits.ft_axis]
+        return Rating(self._motor.torque_limit, self._motor.control_table.no_load_speed, felt)
 
     def open(self) -> None:
         """Connect to both and check the limits. Raises DeviceError, ParameterError; nothing stays open."""

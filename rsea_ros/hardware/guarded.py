@@ -13,9 +13,18 @@ from typing import Protocol
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
 from rsea_ros.hardware.interlock import DeviceFault
-from rsea_ros.hardware.limits import Guard, Limits, unmeasured_quantities, without
+from rsea_ros.hardware.limits import (
+    UNRATED,
+    Guard,
+    Limits,
+    Rated,
+    Rating,
+    unmeasured_quantities,
+    without,
+)
 from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring
+from rsea_ros.records.record import is_measured
 
 
 class Shared(Protocol):
@@ -119,12 +128,16 @@ class GuardedDevice:
     away: whether another thread uses the device for longer than a cycle; cycles then leave it alone.
     lifted: limits that do not apply, of what a simulation does not have.
     spring: turns a measured deflection into a wrench where no sensor measures one; None: no such wrench.
+    derive: returns the limits for what motor and sensor can do, known once it is open; None: `limits`.
     """
 
-    def __init__(self, device: Device, limits: Limits, rate: float, spring: Spring | None = None) -> None:
+    def __init__(
+        self, device: Device, limits: Limits, rate: float, spring: Spring | None = None,
+        derive: Callable[[Rating], Limits] | None = None,
+    ) -> None:  # fmt: skip
         self.device, self.guard = device, Guard(limits, 1.0 / rate)
         self._limits, self._period = limits, 1.0 / rate
-        self._spring = spring
+        self._spring, self._derive = spring, derive
         self.interlock = self.guard.interlock
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
@@ -147,7 +160,7 @@ class GuardedDevice:
         """Open the device; check its protection against a dead host, and that each limit can be applied.
 
         unprotected: whether protection may be missing. Raises ParameterError for a device without it
-        otherwise and for a limit of what it does not measure, DeviceError; nothing stays open then.
+        otherwise and for a limit of what it does not measure or cannot do, DeviceError; nothing stays open.
         """
         self.device.open()
         self.state, self._inferred, self.guard.limits = None, False, self._limits
@@ -155,6 +168,8 @@ class GuardedDevice:
             losses.clear()
         try:
             self._check_protection(unprotected=unprotected)
+            if self._derive is not None:
+                self._limits = self._derive(self.device.rating if isinstance(self.device, Rated) else UNRATED)
             self._check_measured()
         except Exception:
             self.device.close()
@@ -192,7 +207,7 @@ class GuardedDevice:
     def measures_deflection(self) -> bool:
         """Return whether a reading has the spring's deflection; False also if the device does not answer."""
         try:
-            return math.isfinite(self._patiently().deflection)
+            return is_measured(self._patiently().deflection)
         except DeviceError:
             return False
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from rsea_ros.hardware.device import State, Wrench
+from rsea_ros.records.record import is_measured
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Spring:
 
     def with_wrench(self, state: State) -> State:
         """Return a reading with the wrench of its deflection, unless it has a wrench or no deflection."""
-        if state.wrench is not None or math.isnan(state.deflection):
+        if state.wrench is not None or not is_measured(state.deflection):
             return state
         values = [0.0] * 6
         values[self.place] = self.sign * self.stiffness * state.deflection

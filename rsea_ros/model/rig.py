@@ -104,6 +104,8 @@ def check_value(name: str, value: float, where: str = "rig") -> None:
         raise RigError(f"{with_unit(stated, unit)}, expected a finite value {bound}", name)
 
 
+MOTOR_TORQUE = 68.0
+"""N m, where a rig states no motor: the paper's (H54-200-S500-R) makes 68.19 at its limit of 9.99 A."""
 CLOCK_DOUBT = 1e-4
 """s, one sigma of the time offset of a sensor if the rig states none."""
 Hold = Literal["zero", "first", "band"]
@@ -287,6 +289,21 @@ class Rig:
     def end_is_free(self, end: str) -> bool:
         """Return whether an end can move (it has an inertia of its own)."""
         return end not in self.clamped
+
+
+def motor_torque(rig: Rig) -> tuple[float, str]:
+    """Return the largest torque of the motor at the gear output, N m, and what says so."""
+    stated = [(rig["controller.torque_limit"], "controller.torque_limit of the rig")]
+    if rig.controller is not None:
+        stated.append((rig.controller.limit, "controller.limit of the rig"))
+    stated += [
+        (effect.parameters["limit"], "torque_saturation of the rig")
+        for effect in rig.effects if effect.name == "torque_saturation"
+    ]  # fmt: skip
+    torque, source = min(stated)
+    if math.isinf(torque):
+        return MOTOR_TORQUE, "the paper's motor; the rig states none"
+    return torque, source
 
 
 def check_structure(rig: Rig) -> None:

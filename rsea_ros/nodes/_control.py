@@ -13,6 +13,7 @@ from rsea_ros.control.loads import LIGHTEST, lightest, load_range
 from rsea_ros.control.settings import CORNER, ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, design
 from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig import MOTOR_TORQUE
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._realtime import REALTIME
@@ -45,7 +46,7 @@ TABLE = (
         "prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0
     ),
     NodeParameter(
-        "torque_limit", 68.0, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0
+        "torque_limit", MOTOR_TORQUE, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0
     ),
     NodeParameter("slew_limit", 10_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
     NodeParameter("ramp", 0.25, "in which the limit grows after a start", "s", 0.0, 10.0),

@@ -8,7 +8,14 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import Device
 from rsea_ros.hardware.dynamixel.encoder import LINK, SPRING
 from rsea_ros.hardware.dynamixel.line import Line
-from rsea_ros.nodes._devices import DYNAMIXEL, Values, device_of, dynamixel_netft, latency_of
+from rsea_ros.nodes._devices import (
+    DERIVED,
+    DYNAMIXEL,
+    Values,
+    device_of,
+    dynamixel_netft,
+    latency_of,
+)
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
 
 MOTOR = (
@@ -65,6 +72,9 @@ SAFETY = (
         "allow_no_dead_host_protection", False,
         "whether a device is driven whose torque nothing ends when this process dies",
     ),
+    NodeParameter(
+        "allow_no_position_limit", False, "whether a free end is activated without a position_limit"
+    ),
     NodeParameter("device_options", "", "of a device of RSEA_DEVICES: NAME=VALUE,…"),
 )  # fmt: skip
 """Of every device."""
@@ -76,17 +86,21 @@ SENSOR = (
     NodeParameter("ft_all", False, "whether ft has every record, or one a cycle"),
 )
 LIMITS = (
-    NodeParameter("torque_limit", 68.0, "largest torque that is commanded", "N m", 0.0, 1000.0),
+    NodeParameter(
+        "torque_limit", DERIVED, "largest torque that is commanded; -1: derived", "N m", DERIVED, 1000.0
+    ),
     NodeParameter("slew_limit", 10_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
     NodeParameter(
         "soft_start", 500.0, "growth of the limit after activation, fault, pause", "N m/s", 1.0, 1e6
     ),
-    NodeParameter("deflection_limit", 0.0873, "of the spring; 0: none", "rad", 0.0, 100.0),
-    NodeParameter("velocity_limit", 5.0, "of the gear output; 0: none", "rad/s", 0.0, 1000.0),
+    NodeParameter("deflection_limit", DERIVED, "of the spring; 0: none; -1: derived", "rad", DERIVED, 100.0),
     NodeParameter(
-        "position_limit", 0.0, "either way from zero (position_zero); 0: none", "rad", 0.0, 1e4
+        "velocity_limit", DERIVED, "of the gear output; 0: none; -1: derived", "rad/s", DERIVED, 1000.0
     ),
-    NodeParameter("ft_limit", 110.0, "of the torque that ft measures; 0: none", "N m", 0.0, 1000.0),
+    NodeParameter("position_limit", 0.0, "either way from zero (position_zero); 0: none", "rad", 0.0, 1e4),
+    NodeParameter(
+        "ft_limit", DERIVED, "of the torque that ft measures; 0: none; -1: derived", "N m", DERIVED, 1000.0
+    ),
     NodeParameter("power_limit", 250.0, "of the motor torque times velocity; 0: none", "W", 0.0, 1e5),
     NodeParameter("effort_limit", 6.0, "by which measured may miss commanded; 0: none", "N m", 0.0, 1000.0),
     NodeParameter("effort_time", 0.1, "for which it may", "s", 0.0, 10.0),

@@ -15,45 +15,88 @@ from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.limits import UNRATED, Limits, Mechanics, Rating, derive
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.spring_sensor import Spring
-from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig import END_NAMES, Rig, motor_torque
 from rsea_ros.model.rig_file import load_rig
 
 Values = Mapping[str, Any]
 
 
-def limits_of(values: Values) -> Limits:
-    """Return the limits that the parameters set. Raises ParameterError for one that cannot be applied.
+DERIVED = -1.0
+"""Value of a limit's parameter: the limit comes from rig, motor and sensor."""
+DERIVABLE = ("torque", "deflection", "velocity", "ft")
 
-    Where the drive's angle is not the spring's, the torque that is felt limits the spring.
+
+def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
+    """Return the limits that the parameters set, and those that rig and hardware derive.
+
+    Where the drive's angle is not the spring's, the torque that is felt limits the spring. Raises
+    ParameterError for a limit that cannot be applied, or is beyond what the machine can do.
     """
     rig = load_rig(values["rig"])
-    _check_applicable(values, rig)
+    stated = {name: _stated(name, values[f"{name}_limit"]) for name in DERIVABLE
+              if values[f"{name}_limit"] != DERIVED}  # fmt: skip
+    inapplicable = _inapplicable(values, rig)
+    for name, why in inapplicable.items():
+        if math.isfinite(stated.get(name, math.inf)):
+            raise ParameterError(
+                f"parameter {name}_limit = {stated[name]:g} cannot be applied to rig {rig.name}"
+                f" ({why}), expected 0 for none"
+            )
+    limits, sources = derive(stated, mechanics_of(rig), rating)
+    for name, why in inapplicable.items():
+        limits[name] = math.inf
+        if name in sources:
+            sources[name] = why
     by_angle = _deflects(values, rig)
-    deflection, ft = (values[f"{name}_limit"] or math.inf for name in ("deflection", "ft"))
-    if not by_angle and not rig.rigid_spring:
-        ft = min(ft, deflection * rig["spring.stiffness"])
+    if not by_angle and "deflection" not in inapplicable:
+        bent = limits["deflection"] * rig["spring.stiffness"]
+        if bent < limits["ft"]:
+            limits["ft"] = bent
+            sources["ft"] = f"deflection_limit {limits['deflection']:.4g} rad times the spring's stiffness"
+        sources["deflection"] = "ft_limit limits it"
     return Limits(
-        torque=values["torque_limit"],
+        torque=limits["torque"],
         slew=values["slew_limit"],
-        deflection=deflection if by_angle else math.inf,
+        deflection=limits["deflection"] if by_angle else math.inf,
         temperature=values["temperature_limit"] or math.inf,
         current=values["current_limit"] or math.inf,
         voltage=values["voltage_limit"],
         command_timeout=values["command_timeout"],
         ramp=values["ramp"],
         lost_cycles=max(values["lost_cycles"], math.ceil(values["lost_time"] * values["rate"])),
-        velocity=values["velocity_limit"] or math.inf,
+        velocity=limits["velocity"],
         position=values["position_limit"] or math.inf,
-        ft=ft,
+        ft=limits["ft"],
         power=values["power_limit"] or math.inf,
         soft_start=values["soft_start"],
         effort=values["effort_limit"] or math.inf,
         effort_time=values["effort_time"],
         ft_axis=sign_and_index(values["axis"])[1],
+        derived=sources,
+    )
+
+
+def _stated(name: str, value: float) -> float:
+    """Return a limit that is stated, inf for none. Raises ParameterError for a negative one."""
+    if value < 0.0:
+        expected = f"expected {DERIVED:g} to derive it, or at least 0"
+        raise ParameterError(f"parameter {name}_limit = {value:g}, {expected}")
+    return value if value or name == "torque" else math.inf
+
+
+def mechanics_of(rig: Rig) -> Mechanics:
+    """Return what a rig says of its limits."""
+    return Mechanics(
+        rig.name,
+        motor_torque(rig),
+        math.inf if rig.rigid_spring else rig["spring.stiffness"],
+        rig["rotor.reflected_damping"],
+        min((e.parameters["angle"] for e in rig.effects if e.name == "hard_stop"), default=math.inf),
+        next((end for end in END_NAMES if rig.end_is_free(end)), ""),
     )
 
 
@@ -100,20 +143,18 @@ def _feels(values: Values, rig: Rig) -> bool:
     return outside_device(values["device"], DEVICES).feels
 
 
-def _check_applicable(values: Values, rig: Rig) -> None:
-    """Raise ParameterError for a limit of a quantity that this bench does not measure."""
+def _inapplicable(values: Values, rig: Rig) -> dict[str, str]:
+    """Return the limits of quantities that this bench does not measure, and why it does not."""
     feels = _feels(values, rig)
-    unfelt = "ft_host is empty and encoder_id is -1: nothing measures it"
-    why = "its spring is rigid" if rig.rigid_spring else unfelt
+    why = "ft_host is empty and encoder_id is -1: nothing measures it"
+    if rig.rigid_spring:
+        why = "its spring is rigid"
     if values["device"] not in DEVICES:
         why = f"device {values['device']} does not measure it"
     deflects = _deflects(values, rig) and not rig.rigid_spring
-    for name, applicable in (("deflection", feels or deflects), ("ft", feels)):
-        if values[f"{name}_limit"] and not applicable:
-            raise ParameterError(
-                f"parameter {name}_limit = {values[f'{name}_limit']:g} cannot be applied to rig {rig.name}"
-                f" ({why}), expected 0 for none"
-            )
+    return {
+        name: why for name, applicable in (("deflection", feels or deflects), ("ft", feels)) if not applicable
+    }
 
 
 def _simulated_device(values: Values) -> Device:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from rclpy.node import Node
@@ -12,10 +13,12 @@ from rsea_ros.errors import RseaError
 from rsea_ros.hardware.device import Device, State
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.hardware.limits import check_travel
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import BenchTopics
 from rsea_ros.nodes._cycle import Cycle
-from rsea_ros.nodes._devices import limits_of, spring_of
+from rsea_ros.nodes._devices import limits_of, mechanics_of, spring_of
 from rsea_ros.nodes._drive import DriverCycle
 from rsea_ros.nodes._health import ERROR, OK, Health, NodeHealth
 from rsea_ros.nodes._joints import Jobs
@@ -35,7 +38,8 @@ class DrivenJoint:
         self, node: Node, jobs: Jobs, part: str, values: Mapping[str, Any], device: Device
     ) -> None:
         self._node, self._jobs, self.part, self._values = node, jobs, part, values
-        self.guarded = GuardedDevice(device, limits_of(values), values["rate"], spring_of(values))
+        limits = partial(limits_of, values)
+        self.guarded = GuardedDevice(device, limits(), values["rate"], spring_of(values), limits)
         self.drive: DriverCycle | None = None
         self.topics: BenchTopics | None = None
         self._cycle: Cycle | None = None
@@ -54,9 +58,11 @@ class DrivenJoint:
         self.guarded.open(unprotected=values["allow_no_dead_host_protection"])
         self._ended = ""
         self._health.hardware = _hardware(values, self.guarded.device.health())
+        limits = self.guarded.guard.limits
+        self._node.get_logger().info(self.with_name(f"limits: {limits}"))
         self.topics = BenchTopics(
-            self._node, values, strict=True, every_record=values["ft_all"], part=self.part,
-            deflects=self.guarded.measures_deflection(),
+            self._node, {**values, "torque_limit": limits.torque}, strict=True,
+            every_record=values["ft_all"], part=self.part, deflects=self.guarded.measures_deflection(),
         )  # fmt: skip
         self.drive = DriverCycle(self.guarded, self.topics, anchor, values["rate"])
 
@@ -67,9 +73,11 @@ class DrivenJoint:
     def enable(self, *, zero_first: bool = False) -> None:
         """Switch the torque on and let commands through, from the next one on. Raises DeviceError.
 
-        zero_first: whether that one must be zero.
+        zero_first: whether that one must be zero. Raises ParameterError where nothing limits a free end.
         """
         assert self.drive is not None
+        if not self._values["allow_no_position_limit"]:
+            check_travel(self.guarded.guard.limits, mechanics_of(load_rig(self._values["rig"])))
         with self.drive.deaf():
             self.drive.zero_first = zero_first
             self.guarded.enable()
@@ -159,6 +167,8 @@ class DrivenJoint:
             "limited_commands": self.guarded.guard.limited,
             **cycles,
             **report.values,
+            "refused": self.guarded.guard.refused,
+            "limits": self.guarded.guard.limits,
             **self.guarded.device.health(),
         }
         if fault is None:

@@ -25,7 +25,7 @@ LEAD = SECOND // 50
 MARGIN = SECOND // 200
 """A command that has less than this left until it takes effect is left out, as by excite."""
 LIMITS = ("torque_limit", "slew_limit", "soft_start")
-"""Parameters of a driver; a plant has none."""
+"""Parameters of a driver; a plant has none. A negative one is derived: the driver itself cuts commands."""
 LOOK = 0.5
 """s between looks at who is there."""
 ANSWER = 2.0
@@ -104,7 +104,8 @@ class WatchCommand:
     def _on_limits(self, bench: str, future: Any) -> None:
         if bench != self._bench:  # that bench has left
             return
-        values = [v.double_value if v.type else math.inf for v in future.result().values]
+        told = future.result().values
+        values = [v.double_value if v.type and v.double_value >= 0.0 else math.inf for v in told]
         torque, slew, growth = [*values, math.inf, math.inf, math.inf][:3]
         most = self._most
         self.commander.bounds = Bounds(min(torque, most.torque), slew, min(growth, most.growth))

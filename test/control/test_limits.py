@@ -52,3 +52,9 @@ def test_the_simulated_actuator_stops_following_at_its_reach():
     limits = TorqueLimits(torque=50.0)
     below, above = (sine(RIG, RIG, design, 40.0, share * edge, limits) for share in (0.85, 1.3))
     assert below < 0.06 and above > 4.0 * below
+
+
+def test_a_controller_takes_the_torque_of_the_motor_that_its_rig_states():
+    assert TorqueLimits.of(RIG).torque == TorqueLimits().torque == 68.0
+    assert TorqueLimits.of(RIG.with_effect("torque_saturation", limit=12.0)).torque == 12.0
+    assert TorqueLimits.of(load_rig("pd_joint")).torque == load_rig("pd_joint")["controller.torque_limit"]

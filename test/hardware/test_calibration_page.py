@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 import socket
 import threading
 import time
@@ -53,6 +54,21 @@ def test_a_sensor_that_answers_gives_its_calibration():
         read = calibration.fetch("127.0.0.1", port)
     assert (read.force, read.torque, read.rate) == (1e-6, 1e-6, 7000.0)
     assert requests[0].startswith(b"GET /netftapi2.xml HTTP/1.1\r\nHost: 127.0.0.1:")
+
+
+@pytest.mark.parametrize(
+    ("field", "about_z"),
+    [
+        (b"<cfgmr>700;700;1700;30000;30000;30000</cfgmr>", 30.0),
+        (b"<cfgmr>700, 700, 1700, 30000, 30000, 30000</cfgmr>", 30.0),
+        (b"", math.inf),
+        (b"<cfgmr>700;700</cfgmr>", math.inf),
+        (b"<cfgmr>0;0;0;0;0;0</cfgmr>", math.inf),
+    ],
+)
+def test_the_range_of_the_sensor_is_read_where_its_page_states_one(field, about_z):
+    read = calibration.parse(GOOD.replace(b"</netft>", field + b"</netft>"))
+    assert read.range[5] == pytest.approx(about_z)
 
 
 def test_a_page_in_pieces_and_without_a_length_is_read():

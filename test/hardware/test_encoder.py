@@ -104,8 +104,8 @@ def test_impossible_settings_are_refused(values, told):
 
 def test_the_limits_of_a_free_end_apply_where_an_encoder_feels_it():
     free = DEFAULTS | {"device": "dynamixel_netft", "rig": "paper_moving_output", "ft_host": ""}
-    with pytest.raises(ParameterError, match=r"deflection_limit = 0\.0873 cannot be applied"):
-        limits_of(free)
+    with pytest.raises(ParameterError, match=r"ft_limit = 110 cannot be applied"):
+        limits_of(free | {"ft_limit": 110.0})
     assert limits_of(free | {"encoder_id": 5}).ft == pytest.approx(110.0)
 
 

@@ -16,6 +16,7 @@ from rsea_ros.hardware.limits import (
     unmeasured_quantities,
     without,
 )
+from rsea_ros.hardware.spring_sensor import Spring
 
 ALL = Limits(68.0, deflection=0.25, temperature=60.0, current=12.0, voltage=20.0, velocity=2.0, position=0.5,
              ft=50.0, power=100.0)  # fmt: skip
@@ -137,11 +138,18 @@ def test_the_axis_is_z_by_default():
 
 
 @pytest.mark.parametrize("name", ["position", "velocity", "motor_torque"])
-@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_a_reading_that_is_no_number_is_a_fault_with_its_values(name, value):
     fault = complaint(WIDE, reading(**{name: value}))
     assert fault.cause == "reading"
     assert f"{value}" in fault.detail and "expected finite values" in fault.detail
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
+def test_a_deflection_that_is_not_measured_makes_no_wrench(nothing):
+    """An infinite one made an infinite wrench."""
+    assert Spring(1500.0).with_wrench(reading(deflection=nothing)).wrench is None
+    assert Spring(1500.0).with_wrench(reading(deflection=0.01)).wrench[5] == pytest.approx(15.0)
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,17 @@
 """Limits from parameters: for every rig, and refused where a limit cannot be applied."""
 
 import math
+from functools import partial
 
 import pytest
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.limits import Rating, check_travel
+from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes import driver
-from rsea_ros.nodes._devices import limits_of
+from rsea_ros.nodes._devices import limits_of, mechanics_of
 
 DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
 
@@ -17,7 +22,7 @@ def limits(**values):
 
 def test_the_default_slew_limit_limits_within_a_cycle():
     """40 000 N m/s were 142 N m a cycle at 280 Hz."""
-    assert limits().slew / DEFAULTS["rate"] < DEFAULTS["torque_limit"]
+    assert limits().slew / DEFAULTS["rate"] < limits().torque
     assert limits().soft_start / DEFAULTS["rate"] < 2.0
 
 
@@ -29,8 +34,9 @@ def test_replies_may_be_lost_for_the_same_time_at_any_rate(rate, cycles):
 
 def test_a_spring_with_a_free_end_is_limited_by_what_ft_measures():
     clamped, free = limits(), limits(rig="paper_moving_output", deflection_limit=0.05)
-    assert (clamped.deflection, clamped.ft) == (0.0873, 110.0)
+    assert (clamped.deflection, clamped.ft) == (math.radians(5.0), 110.0)
     assert math.isinf(free.deflection) and free.ft == pytest.approx(0.05 * 1530.456)
+    assert "deflection_limit none (ft_limit limits it), ft_limit 76.52 N·m (deflection_limit" in str(free)
 
 
 def test_an_angle_that_counts_from_the_motors_zero_is_not_the_springs():
@@ -38,7 +44,7 @@ def test_an_angle_that_counts_from_the_motors_zero_is_not_the_springs():
     own_limits = limits(device="dynamixel_netft", position_zero="motor", deflection_limit=0.05)
     assert math.isinf(own_limits.deflection) and own_limits.ft == pytest.approx(0.05 * 1530.456)
     felt = limits(device="dynamixel_netft", position_zero="motor", encoder_id=5, ft_host="")
-    assert felt.deflection == 0.0873
+    assert felt.deflection == math.radians(5.0)
     with pytest.raises(ParameterError, match=r"deflection_limit = 0\.05 cannot be applied"):
         limits(device="dynamixel_netft", position_zero="motor", ft_host="", deflection_limit=0.05)
 
@@ -52,13 +58,18 @@ def test_velocity_power_and_ft_are_limited_by_default_on_every_rig():
 @pytest.mark.parametrize(
     ("values", "told"),
     [
-        ({"rig": "bare_drive"}, "deflection_limit = 0.0873 cannot be applied to rig bare_drive"),
-        ({"rig": "bare_drive", "deflection_limit": 0.0}, "ft_limit = 110 cannot be applied"),
-        ({"rig": "paper_moving_output", "device": "dynamixel_netft", "ft_host": ""},
-         "deflection_limit = 0.0873 cannot be applied to rig paper_moving_output"),
+        ({"rig": "bare_drive", "deflection_limit": 0.08}, "deflection_limit = 0.08 cannot be applied"),
+        ({"rig": "bare_drive", "ft_limit": 110.0}, "ft_limit = 110 cannot be applied"),
+        ({"rig": "paper_moving_output", "device": "dynamixel_netft", "ft_host": "",
+          "deflection_limit": 0.08}, "deflection_limit = 0.08 cannot be applied to rig paper_moving_output"),
+        ({"deflection_limit": 87.3}, r"deflection_limit = 87\.3 rad, expected at most 0\.1333 rad, 3 times"),
+        ({"deflection_limit": 5.0}, "deflection_limit = 5 rad, expected at most"),
+        ({"velocity_limit": 286.0}, r"velocity_limit = 286 rad/s, expected at most 8\.836 rad/s, 3 times"),
+        ({"torque_limit": -0.5}, r"torque_limit = -0\.5, expected -1 to derive it, or at least 0"),
     ],
 )  # fmt: skip
-def test_a_limit_that_cannot_be_applied_is_refused(values, told):
+def test_a_limit_that_cannot_be_applied_or_reached_is_refused(values, told):
+    """Milliradians and degrees of a limit were accepted: it limited nothing."""
     with pytest.raises(ParameterError, match=told):
         limits(**values)
 
@@ -69,5 +80,53 @@ def test_zero_is_no_limit():
 
 
 def test_a_bare_drive_has_the_limits_that_apply_to_it():
-    bounds = limits(rig="bare_drive", deflection_limit=0.0, ft_limit=0.0, position_limit=0.5)
+    bounds = limits(rig="bare_drive", position_limit=0.5)
     assert bounds.position == 0.5 and math.isinf(bounds.ft) and math.isfinite(bounds.velocity)
+    assert "ft_limit none (its spring is rigid)" in str(bounds)
+
+
+def test_limits_that_nobody_states_come_from_rig_motor_and_sensor():
+    rig = limits()
+    assert (rig.torque, rig.velocity) == (68.0, pytest.approx(0.8 * 68.0 / 23.088))
+    assert "velocity_limit 2.356 rad/s (0.8 of what 68 N·m reach against the gear's damping)" in str(rig)
+    small = limits_of(DEFAULTS, Rating(torque=10.0, velocity=0.3, ft=30.0))
+    assert (small.torque, small.velocity, small.ft) == (10.0, 0.3, 30.0)
+    assert "ft_limit 30 N·m (the F/T sensor's range)" in str(small)
+    assert limits(rig="prototype_knee").torque == pytest.approx(260.0 * math.radians(5.0)), "of its spring"
+    stop = load_rig("paper_high_impedance").with_effect("hard_stop", angle=0.02)
+    assert limits(rig=stop).deflection == 0.02
+
+
+def test_a_limit_that_is_stated_wins_unless_the_hardware_cannot_do_it():
+    assert limits(velocity_limit=5.0, ft_limit=0.0).velocity == 5.0
+    assert "velocity" not in limits(velocity_limit=5.0).derived
+    for name, rating in (("torque", Rating(torque=10.0)), ("ft", Rating(ft=10.0))):
+        with pytest.raises(ParameterError, match=f"{name}_limit = 20 N·m, expected at most 10 N·m, the"):
+            limits_of(DEFAULTS | {f"{name}_limit": 20.0}, rating)
+
+
+class Clock:
+    """A clock that stands where it is put, ns."""
+
+    now = 1_700_000_000 * SECOND
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.mark.parametrize("rig", ["paper_moving_output", "bare_drive", "prototype_knee"])
+def test_60_newton_metres_on_a_free_end_are_refused_or_soon_a_fault(rig):
+    """With all defaults they turned it by 5.9 rad in 3 s, without a fault."""
+    values, clock = DEFAULTS | {"rig": rig}, Clock()
+    with pytest.raises(ParameterError, match=r"position_limit = 0 rad \(none\), expected one: \w+ of rig"):
+        check_travel(limits_of(values), mechanics_of(load_rig(rig)))
+    device = SimulatedDevice(load_rig(rig), values["rate"], clock=clock)
+    joint = GuardedDevice(device, limits_of(values), values["rate"], derive=partial(limits_of, values))
+    joint.open()
+    joint.enable()
+    for _ in range(840):
+        clock.now += round(SECOND / values["rate"])
+        joint.cycle(60.0, 0.0)
+        if joint.fault is not None:
+            break
+    assert joint.fault.cause == "velocity" and abs(joint.state.position) < 1.0

@@ -151,6 +151,22 @@ def spied(listener, make_driver, monkeypatch):
     return spy, program, node
 
 
+def test_a_free_end_without_a_position_limit_is_not_activated_unless_that_is_asked_for(
+    make_driver, monkeypatch
+):
+    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: Spy()})
+    values = {p.name: p.default for p in driver.TABLE} | {"rig": "bare_drive", "autostart": True}
+    told = {}
+    for name, given in (
+        ("free", {}), ("allowed", {"allow_no_position_limit": True}), ("limited", {"position_limit": 1.0}),
+    ):  # fmt: skip
+        program, node = make_driver(name, values | given)
+        told[name] = node._state_machine.current_state[1]
+    assert told == {"free": "inactive", "allowed": "active", "limited": "active"}
+    shown = program.joints[0].report().values
+    assert shown["refused"] == 0 and "position_limit 1 rad, deflection_limit none" in str(shown["limits"])
+
+
 @pytest.mark.parametrize("way", ["trigger_deactivate", "trigger_shutdown"])
 def test_every_transition_out_of_active_writes_zero(spied, way):
     spy, _, node = spied

@@ -21,6 +21,7 @@ TRIALS = 10
 X = {
     "torque_limit": 3.0, "current_limit": 3.2, "voltage_limit": 10.0, "effort_limit": 0.0, "ft_limit": 0.0,
     "power_limit": 20.0, "deflection_limit": 0.0, "ft_host": "", "rig": "bare_drive",
+    "allow_no_position_limit": True,
 }  # fmt: skip
 """Of small motors of the X series without a spring."""
 RATE = 100.0
@@ -53,7 +54,7 @@ BUS = {"device": "dynamixel_netft", "ft_host": "", "deflection_limit": 0.0, "ft_
         ({"joints": ["hip", "hip"]}, "hip twice, expected each joint once"),
         ({"joints": ["left knee"]}, "'left knee', expected letters"),
         ({"joints": "hip"}, "joints = 'hip', expected a list of texts"),
-        ({"joints": ["hip"], "hip.torque_limit": -1.0}, "hip.torque_limit = -1.0, expected a number"),
+        ({"joints": ["hip"], "hip.torque_limit": -2.0}, "hip.torque_limit = -2.0, expected a number"),
         ({**BUS, "joints": ["hip", "knee"]}, "knee.id = 1, expected another than hip's"),
         (
             {**BUS, "joints": ["hip", "knee"], "knee.id": 2, "knee.baud": 57600},

@@ -11,11 +11,14 @@ from rsea_ros.nodes._watch_command import ANSWER, LOOK, WatchCommand
 class Answer:
     """The answer to one request; comes when it is told to."""
 
+    torque = 8.0
+
     def add_done_callback(self, callback):
         self.come = lambda: callback(self)
 
     def result(self):
-        return SimpleNamespace(values=[SimpleNamespace(type=3, double_value=v) for v in (8.0, 100.0, 20.0)])
+        values = (self.torque, 100.0, 20.0)
+        return SimpleNamespace(values=[SimpleNamespace(type=3, double_value=v) for v in values])
 
 
 @pytest.fixture
@@ -58,6 +61,15 @@ def test_limits_are_requested_again_where_the_answer_was_lost(bench):
     look_for(watch, clock, 4.0 * ANSWER)
     assert watch.commander.bounds.torque == 8.0 and watch.why_not == ""
     assert len(requests) <= 5, "it asked on"
+
+
+def test_a_torque_limit_that_the_driver_derives_leaves_the_limit_of_the_page(bench):
+    """It is -1 as a parameter: no command would have passed."""
+    watch, clock, _, requests = bench
+    look_for(watch, clock, LOOK)
+    requests[0].torque = -1.0
+    requests[0].come()
+    assert watch.commander.bounds.torque == 10.0
 
 
 def test_limits_of_a_bench_that_has_left_do_not_count(bench):

@@ -55,7 +55,7 @@ class ControlTable:
 
     bus_watchdog, drive_mode, startup: None on a model without. watchdog_firmware: the first with
     the bus watchdog. torque_limit and goal_torque are currents; later series call them so.
-    torque_constant: None without a source.
+    torque_constant: None without a source. no_load_speed: rad/s, at the highest voltage; inf: no source.
     """
 
     model: int
@@ -67,6 +67,7 @@ class ControlTable:
     pulses: int
     torque_constant: TorqueConstant | None
     watchdog_firmware: int = 0
+    no_load_speed: float = math.inf
 
     def __getattr__(self, name: str) -> Item:
         try:
@@ -120,6 +121,7 @@ def _table(number: int, series: str, items: Mapping[str, Item], body: Mapping[st
         pulses=body["pulses"],
         torque_constant=constant,
         watchdog_firmware=body.get("watchdog_firmware", 0),
+        no_load_speed=body.get("no_load_rpm", math.inf) * _RPM,
     )
 
 

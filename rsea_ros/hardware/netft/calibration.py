@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import socket
 import time
 from collections.abc import Mapping
@@ -89,12 +90,13 @@ _MOST = 1e12
 class Calibration:
     """The value of a count: N and N m.
 
-    rate: records a second that the sensor sends, Hz; nan if not stated.
+    rate: records a second that the sensor sends, Hz; nan if not stated. range: of each axis; inf likewise.
     """
 
     force: float
     torque: float
     rate: float = math.nan
+    range: Wrench = (math.inf,) * 6
 
     def wrench(self, counts: tuple[int, ...]) -> Wrench:
         """Return force x, y, z (N) and torque x, y, z (N m) of six counts."""
@@ -109,10 +111,20 @@ def parse(page: bytes, where: str = "netftapi2.xml") -> Calibration:
         fields = _fields(page)
     except (expat.ExpatError, LookupError, ValueError) as error:
         raise DeviceError(f"{where}: not XML ({error}), expected the sensor's calibration") from None
-    force = _unit(fields, "scfgfu", NEWTON, where) / _counts(fields, "cfgcpf", where)
-    torque = _unit(fields, "scfgtu", NEWTON_METRE, where) / _counts(fields, "cfgcpt", where)
+    units = _unit(fields, "scfgfu", NEWTON, where), _unit(fields, "scfgtu", NEWTON_METRE, where)
+    force, torque = units[0] / _counts(fields, "cfgcpf", where), units[1] / _counts(fields, "cfgcpt", where)
     rate = _counts(fields, "comrdtrate", where) if "comrdtrate" in fields else math.nan
-    return Calibration(force, torque, rate)
+    return Calibration(force, torque, rate, _range(fields.get("cfgmr", ""), *units))
+
+
+def _range(text: str, newton: float, newton_metre: float) -> Wrench:
+    """Return the calibrated range of the axes (`cfgmr`, six numbers in the page's units); inf without one."""
+    parts = re.split(r"[;,\s]+", text)
+    if len(parts) != 6 or not all(is_decimal(part) and float(part) > 0.0 for part in parts):
+        return (math.inf,) * 6
+    fx, fy, fz, tx, ty, tz = map(float, parts)
+    f, t = newton, newton_metre
+    return fx * f, fy * f, fz * f, tx * t, ty * t, tz * t
 
 
 def fetch(host: str, port: int = 80, timeout: float = 2.0) -> Calibration:

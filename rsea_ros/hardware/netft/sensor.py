@@ -117,6 +117,11 @@ class ForceTorqueSensor:
         self._stillness.calibrate(arrivals)
         self._restart_watch()
 
+    @property
+    def range(self) -> Wrench:
+        """The largest values that it measures, N and N m; inf where its page states none."""
+        return self._calibration.range
+
     def gather(self) -> None:
         """Fetch received records, so that the next `take` has little to do."""
         self._receiver.drain()
