@@ -129,7 +129,7 @@ def test_the_gear_ratio_reaches_the_search_for_ripple(world, more, ratio):
 
 
 def test_only_valid_samples_of_simulated_channels_count(world):
-    world.white = {4096: (0.5, False), 100: (0.5, True)}
+    world.white = {3096: (0.5, False), 100: (0.5, True)}  # from the first sample that counts
     y, keep = alternate(1.0), np.ones(4096, bool)
     y[:1000], keep[:1000] = 50.0, False
     before = {"ft": 9.0, "position": 7.0, "velocity": 8.0}
@@ -167,10 +167,10 @@ def seconds(*amplitudes):
 )
 def test_coloured_noise_has_an_allowance_for_its_doubt(world, left, first, gone, rms, doubt):
     """Two standard deviations of the RMS, from how the power varies from second to second."""
-    world.white, world.noises = {len(left): (0.1, True)}, {"ft"}
     keep = np.ones(len(left), bool)
     if gone is not None:
         keep[gone] = False
+    world.white, world.noises = {int(np.flatnonzero(keep)[-1]) + 1: (0.1, True)}, {"ft"}
     rms = float(np.sqrt(np.mean(left[keep] ** 2))) if rms is None else rms
     known = world.known(case({"ft": 9.0}, mask={"ft": keep}, first=first, ft=left))
     assert known.coloured == {"ft"}
