@@ -38,5 +38,5 @@ def test_a_mode_above_the_band_is_one_of_the_two_effects_that_make_one():
         [record], load_rig("paper_high_impedance"), settings=DiagnosisSettings(without=WITHOUT)
     )
     (cause,) = diagnosis.causes
-    assert cause.status in ("one_of", "leading")  # 1.036 times the noise without it: the status is at its edge
+    assert cause.status in ("one_of", "leading")  # at the edge: 1.036 times the noise without it
     assert {cause.name, *(a.name for a in diagnosis.alternatives)} == ALIKE
