@@ -34,7 +34,7 @@ _SHOWN = ("position", "velocity", "ft")
 
 @dataclass(frozen=True)
 class DriverLimits:
-    """The defaults of the driver (config/nodes/driver.yaml), which excite has too: torque N m, slew N m/s.
+    """Limits of a driver (config/nodes/driver.yaml), which excite has too: torque N m, slew N m/s.
 
     deflection: rad, of the spring. velocity: rad/s. ft: N m. power: W.
     """

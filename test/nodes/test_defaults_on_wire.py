@@ -28,6 +28,8 @@ class Commanded(Driven):
         super().__init__(bench, listener, name, begin, {"autostart": True})
         self.torque, self.children, self._over = 10.0, (), threading.Event()
         self._thread = threading.Thread(target=self._command, daemon=True)
+        # a command before would be the fault `restarted` too early: the driver would not be activated
+        listener.until(lambda: newest_value(self._health, self.name, "active") == "True")
         self._thread.start()
 
     def _command(self):
