@@ -54,7 +54,7 @@ def move_rig(rig, command):
 
 def test_the_limits_are_the_drivers_defaults():
     driver = {p.name.removesuffix("_limit"): p.default for p in LIMITS}
-    stated = {n: v for n, v in vars(DRIVER).items() if driver[n] != -1.0}  # the others it derives from the rig
+    stated = {n: v for n, v in vars(DRIVER).items() if driver[n] != -1.0}  # the others are derived
     assert {n: driver[n] for n in stated} == stated and set(stated) == {"slew", "power"}
     assert next(p.default for p in TABLE if p.name == "limit") == DRIVER.torque
 
