@@ -4,8 +4,7 @@ Run: python bench/observer.py [SECTION …] [--hours 10] [--seconds 20]
 rigs     RMS error of both torques, unlumped and lumped observer, in the same run
 effects  the same with each effect of the catalogue in the plant: nominal and extended model
 walk     influence of the intensity of the disturbance's random walk
-sines    how soon the flag is right for sines on either side of the edge
-noise    false alarms on the sensors' noise alone, and on noise with a torque in the band
+noise    false alarms on the sensors' noise alone, and whether a torque in the band is lost
 flag     the flag against the true error |T_p - T_d| / |T_d|, over a table of signals
 tight    time of one sample in a loop without other work
 timing   time in the node, latency to a third process, CPU; a bare loop in the same run
@@ -21,15 +20,15 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bench.observer_errors import effects, rigs, walk
-from bench.observer_flag import noise, sines
+from bench.observer_flag import noise
 from bench.observer_flag_error import flag
 from bench.observer_tight import tight
 from bench.observer_timing import timing
 from bench.sections import choose, parser_of
 
 SECTIONS: dict[str, Callable[[argparse.Namespace], Iterable[str]]] = {
-    "rigs": rigs, "effects": effects, "walk": walk, "sines": sines, "noise": noise, "flag": flag,
-    "tight": tight,    "timing": timing,
+    "rigs": rigs, "effects": effects, "walk": walk, "noise": noise, "flag": flag,
+    "tight": tight, "timing": timing,
 }  # fmt: skip
 
 

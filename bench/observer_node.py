@@ -20,8 +20,8 @@ MARK = "RSEA_BENCH_TIMES"
 def main() -> int:
     """Run the node with a note of its times."""
     from rsea_ros.model.observer import Observer
-    from rsea_ros.model.pure_torque import PureTorque
     from rsea_ros.model.pure_torque_error import ErrorFlag
+    from rsea_ros.model.torque_band import TorqueBand
     from rsea_ros.nodes import model
 
     rows: list[tuple[int, ...]] = []
@@ -50,7 +50,7 @@ def main() -> int:
             rows.append((time.monotonic_ns(), wall, cpu, *spent))
 
     note(Observer, "_take")
-    note(PureTorque, "take")
+    note(TorqueBand, "take")
     note(ErrorFlag, "take")
     model.ModelNode._work = wake  # type: ignore[method-assign]
     atexit.register(lambda: np.save(os.environ[MARK], np.array(rows, dtype=np.int64).reshape(-1, 5)))

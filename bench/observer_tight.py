@@ -13,10 +13,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from rsea_ros.model.observer import Observer
-from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.records.record import FloatArray
 
 SAMPLES, WARM, REPEATS, RATE = 3000, 600, 5, 1000.0
@@ -36,7 +36,7 @@ def tight(args: argparse.Namespace) -> Iterator[str]:
 
 
 def _times(rig: Rig, jitter: float, pause: float = 0.0) -> FloatArray:
-    observer, heard, flag, times = Observer(rig), PureTorque(rig), ErrorFlag(rig), []
+    observer, band, flag, times = Observer(rig), TorqueBand(rig), ErrorFlag(rig), []
     shifts = jitter * np.random.default_rng(0).uniform(-1.0, 1.0, SAMPLES)
     for k, shift in enumerate(shifts.tolist()):
         time.sleep(pause)
@@ -45,8 +45,8 @@ def _times(rig: Rig, jitter: float, pause: float = 0.0) -> FloatArray:
         observer.state(t, 0.0, 0.0)
         estimate = observer.ft(t, 0.0)
         assert estimate is not None
-        flag.take(t, estimate, heard=heard.take(t, estimate) != "no torque")
+        flag.take(t, estimate, heard=band.take(t, estimate))
         times.append((time.perf_counter_ns() - begin) / 1e3)
         if k == WARM // 2:
-            heard.calibrate(observer.error_model(1.0 / RATE), 1.0 / RATE)
+            band.calibrate(observer.error_model(1.0 / RATE), 1.0 / RATE)
     return np.array(times[WARM:])

@@ -181,7 +181,7 @@ class ErrorFlag:
     def take(self, t: float, estimate: TorqueEstimate, *, heard: bool = False) -> int:
         """Process an estimate and return the verdict: NOTHING, PURE or BEYOND.
 
-        heard: a finer detector (pure_torque.py) sees a torque that may be too small to be judged here.
+        heard: a finer detector (torque_band.py) sees a torque that may be too small to be judged here.
         """
         distal, proximal, _, sigma_distal, sigma_proximal, _ = estimate
         sigma = sigma_distal + sigma_proximal

@@ -11,9 +11,9 @@ from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
 from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
 from rsea_ros.model.observer.signal_noise import Consistency, consistency
-from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._model_inputs import ModelInputs
 from rsea_ros.nodes._qos import LATCHED, await_arrival
@@ -31,16 +31,16 @@ UNMOVED = "joint_states repeats one value while torque_command moves: stopped, o
 
 
 class ModelHealth:
-    """Assesses the node once a second, and passes the noise of the estimates to the flag.
+    """Assesses the node once a second, and passes the noise of the estimates to the band.
 
     contradictions: sensors that differ from model and others by more than what the flag tolerates, in words.
     """
 
     def __init__(
-        self, rig: Rig, noise: Noise, observer: Observer, flag: PureTorque, error: ErrorFlag,
+        self, rig: Rig, noise: Noise, observer: Observer, band: TorqueBand, error: ErrorFlag,
         inputs: ModelInputs,
     ) -> None:  # fmt: skip
-        self._observer, self._flag, self._error, self._inputs = observer, flag, error, inputs
+        self._observer, self._torque_band, self._error, self._inputs = observer, band, error, inputs
         j_sc = rig["chassis.inertia"]
         sprung = j_sc > 0.0 and not rig.rigid_spring
         self._eq_7 = pure_torque_bandwidth(rig["spring.stiffness"], j_sc) if sprung else math.inf
@@ -52,7 +52,7 @@ class ModelHealth:
         self.count = 0
 
     def tell(self, estimate: TorqueEstimate) -> None:
-        """Process the newest estimate; the flag learns the noise once that has settled or changed."""
+        """Process the newest estimate; the band learns the noise once that has settled or changed."""
         self.estimate = estimate
         self.count += 1
         if self.count % EVERY == 0:
@@ -102,11 +102,11 @@ class ModelHealth:
         now = (self._inputs.period, self.estimate.sigma_distal)
         alike = all(abs(a - b) <= CHANGED * b for a, b in zip(now, self._calibrated, strict=True))
         if not alike:
-            self._flag.calibrate(self._observer.error_model(now[0]), now[0])
+            self._torque_band.calibrate(self._observer.error_model(now[0]), now[0])
             self._calibrated = now
 
     def _edge(self) -> str:
-        return f"{self._flag.edge:.2f}"
+        return f"{self._torque_band.edge:.2f}"
 
     def _silence(self) -> list[str]:
         if not self._inputs.ft_silent or self.estimate is None:
@@ -115,9 +115,9 @@ class ModelHealth:
         return [f"no ft for {self._inputs.ft_age:.2f} s: estimated without it, {doubt}"]
 
     def _band(self) -> dict[str, object]:
-        reading = self._flag.reading()
-        is_known = math.isfinite(reading.occupied)
-        gain, phase = self._flag.error_at(reading.occupied) if is_known else (math.nan, math.nan)
+        reading = self._torque_band.occupied()
+        is_known = math.isfinite(reading.hz)
+        gain, phase = self._torque_band.error_at(reading.hz) if is_known else (math.nan, math.nan)
         return {
             "verdict": self._error.verdict,
             "tolerance": f"{self._error.settings.tolerance:g}",
@@ -127,7 +127,7 @@ class ModelHealth:
             "error_edge_high_hz": f"{self._error.edge.high:.2f}",
             "bandwidth_hz": self._edge(),
             "eq_7_hz": f"{self._eq_7:.2f}",
-            "occupied_hz": f"{reading.occupied:.2f}",
+            "occupied_hz": f"{reading.hz:.2f}",
             "share_above": f"{reading.share_above:.4f}",
             "gain_error_db": f"{gain:.2f}",
             "phase_error_deg": f"{phase:.1f}",

@@ -13,9 +13,9 @@ from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, efforts_message
 from msg_adapters.topic_map import TYPES
 from rsea_ros.model.observer import Observer
-from rsea_ros.model.pure_torque import FlagSettings, PureTorque
 from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import Health, NodeHealth
@@ -48,13 +48,6 @@ TABLE = (
     NodeParameter("error_hysteresis", 0.15, "part of that tolerance, either way", "", 0.0, 0.5),
     NodeParameter("tolerance_db", 3.0, "of |T_d/T_p| in the band of pure torque", "dB", 0.01, 40.0),
     NodeParameter("tolerance_deg", 30.0, "of its phase; 90 leaves that out of account", "deg", 0.1, 90.0),
-    NodeParameter(
-        "share", 0.5, "of the torque's power above the edge, of a sine exactly at it", "", 0.05, 0.5
-    ),
-    NodeParameter("hysteresis", 0.025, "part of the edge's frequency, either way", "", 0.0, 0.2),
-    NodeParameter("window", 0.02, "over which power is measured", "s", 0.001, 0.25),
-    NodeParameter("hold_on", 0.005, "how long the powers must say so before the flag rises", "s", 0.0, 10.0),
-    NodeParameter("hold_off", 0.005, "how long before it falls", "s", 0.0, 10.0),
     NodeParameter("quiet", 0.2, "time below the noise floor that is no torque", "s", 0.0, 100.0),
     JOINT,
     *REALTIME,
@@ -71,8 +64,7 @@ class ModelNode:
         rig = load_rig(values["rig"])
         noise = noise_from(rig, values["identification"])
         observer = Observer(rig, noise, hold=WATCHDOG / SECOND, duration=values["duration"])
-        names = ("tolerance_db", "tolerance_deg", "hysteresis", "window", "hold_on", "hold_off", "quiet")
-        self._flag = PureTorque(rig, FlagSettings(limit=values["share"], **{n: values[n] for n in names}))
+        self._band = TorqueBand(rig, *(values[n] for n in ("tolerance_db", "tolerance_deg", "quiet")))
         asked = (values[n] for n in ("tolerance", "error_window", "error_hysteresis", "quiet"))
         self._error = ErrorFlag(rig, ErrorSettings(*asked))
         self._estimates = node.create_publisher(JointState, "torque_estimate", COMMAND)
@@ -82,7 +74,7 @@ class ModelNode:
         read = InputSettings(**{n: values[n] for n in ("ft_timeout", "axis", "reliable", "joint")})
         self._stopped = stopped_sensors(rig, noise.ft)
         self._inputs = ModelInputs(node, observer, self._stopped, read)
-        self._assess = ModelHealth(rig, noise, observer, self._flag, self._error, self._inputs)
+        self._assess = ModelHealth(rig, noise, observer, self._band, self._error, self._inputs)
         self._lock = threading.Lock()
         self._health = Health(node, self._report, values["rig"])
         self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
@@ -95,7 +87,7 @@ class ModelNode:
             for stamp, estimate in self._inputs.take():
                 self._estimates.publish(self._writer.write(stamp, estimate))
                 t = self._inputs.seconds(stamp)
-                heard = self._flag.take(t, estimate) != "no torque"
+                heard = self._band.take(t, estimate)
                 pure = self._error.take(t, estimate, heard=heard) == PURE
                 self._flags.show(stamp, pure and not self._doubted)
                 self._assess.tell(estimate)

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from rsea_ros.model.observer import Observer, TorqueEstimate
-from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.records.record import is_measured
 
 RIG = load_rig("paper_high_impedance")
@@ -30,7 +30,7 @@ def test_the_observer_goes_on(what, bad):
 
 
 @pytest.mark.parametrize("bad", BAD)
-@pytest.mark.parametrize("kind", [PureTorque, ErrorFlag])
+@pytest.mark.parametrize("kind", [TorqueBand, ErrorFlag])
 def test_the_flags_go_on(kind, bad):
     flag, seen = kind(RIG), []
     for k in range(400):

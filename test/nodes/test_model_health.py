@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from rsea_ros.model.observer import Observer, noise_of
-from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.nodes._health import OK, WARN
 from rsea_ros.nodes._model_health import UNMOVED, ModelHealth
 
@@ -26,7 +26,7 @@ class Node:
             stopped=SimpleNamespace(frozen=[], unmoved=False), ft_silent=False, ft_age=0.0, refused=0,
             unstamped=0, period=math.nan,
         )
-        self.health = ModelHealth(RIG, NOISE, self._observer, PureTorque(RIG), self._error, self.inputs)
+        self.health = ModelHealth(RIG, NOISE, self._observer, TorqueBand(RIG), self._error, self.inputs)
         self._amplitude, self._sensed, self._k = amplitude, sensed, 0
         self.freezes = False
         self._rng = np.random.default_rng(3)

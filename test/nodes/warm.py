@@ -21,7 +21,7 @@ from types import FrameType
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = (
     "rsea_ros.nodes", "rsea_ros.hardware.simulated", "rsea_ros.hardware.dynamixel_netft",
-    "rsea_ros.hardware.guarded", "rsea_ros.model.observer", "rsea_ros.model.pure_torque",
+    "rsea_ros.hardware.guarded", "rsea_ros.model.observer", "rsea_ros.model.torque_band",
     "rsea_ros.control.controller", "rsea_ros.identification.identify", "rsea_ros.health.monitor",
     "rsea_ros.experiment.run_shape", "msg_adapters",
 )  # fmt: skip
