@@ -19,9 +19,8 @@ from fleet_real import make_fleet, run_real
 
 from rsea_ros.fleet import history, recordings
 from rsea_ros.fleet.pool import on_this_machine
-from rsea_ros.fleet.row import ARROW, VARYING, write_table
+from rsea_ros.fleet.row import ARROW, VARYING, read, write_table
 from rsea_ros.fleet.store import Store, open_store
-from rsea_ros.fleet.store_keys import read
 
 MEMORY = 4_000_000_000
 MEGA = 1e6

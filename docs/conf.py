@@ -13,9 +13,9 @@ sys.path.insert(0, str(ROOT))
 
 from rsea_ros import DOOR  # noqa: E402
 from rsea_ros.documents.units import plain  # noqa: E402
-from rsea_ros.effects import scale  # noqa: E402
 from rsea_ros.effects._page import EffectPage  # noqa: E402
 from rsea_ros.effects.catalogue import catalogue  # noqa: E402
+from rsea_ros.effects.parameter import MACHINE  # noqa: E402
 
 project = "rsea_ros"
 author = "The rsea_ros founders"
@@ -37,7 +37,7 @@ def effects_page() -> str:
     parts = [
         "# The effects", "",
         "Every cause that a diagnosis can name. `rsea effects NAME` prints this text.", "",
-        f"Bounds and sizes are for {scale.MACHINE}: largest torque, spring, reflected inertia, largest "
+        f"Bounds and sizes are for {MACHINE}: largest torque, spring, reflected inertia, largest "
         "speed, and rate of the paper's actuator in its high-impedance test. On another machine they are as "
         "many times larger as the column *grows with* says, in powers of four: 2 N·m of friction are typical "
         "where the largest torque is 30 N·m, 2 mN·m where it is 30 mN·m. Bounds in s and Hz only widen.", "",

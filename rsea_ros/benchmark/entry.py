@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.benchmark.answers import Answer
-from rsea_ros.benchmark.dataset import Dataset
+from rsea_ros.benchmark.dataset import Answer, Dataset
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.diagnose import diagnose, nominal_problem, searched_effects

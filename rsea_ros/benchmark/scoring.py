@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.benchmark.answers import Answer
-from rsea_ros.benchmark.dataset import Dataset, read_json, text_of
+from rsea_ros.benchmark.dataset import Answer, Dataset, read_json, text_of
 from rsea_ros.errors import BenchmarkError
 from rsea_ros.records.record import FloatArray
 

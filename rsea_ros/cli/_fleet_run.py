@@ -21,8 +21,8 @@ from rsea_ros.fleet.task import TIME_LIMIT
 from rsea_ros.processes import Stopped
 
 if TYPE_CHECKING:
-    from rsea_ros.fleet.plan import Held
     from rsea_ros.fleet.store import Store
+    from rsea_ros.fleet.task import Held
 
 GIGA, MINUTE = 1e9, 60.0
 MOST_SHOWN = 10
@@ -105,9 +105,8 @@ def bags_in(args: argparse.Namespace) -> list[Held]:
 def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunSummary:
     """Write the rows of all new recordings, and return the outcomes."""
     from rsea_ros.fleet.engine import Engine, EngineLimits
-    from rsea_ros.fleet.plan import is_anything_new
     from rsea_ros.fleet.store import hold_lock, open_store
-    from rsea_ros.fleet.task import work
+    from rsea_ros.fleet.task import is_anything_new, work
 
     store = open_store(out, create=True)
     with hold_lock(store, None if args.no_wait else _say_waiting):
@@ -124,7 +123,7 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
 @contextmanager
 def _reporting_what_is_left(store: Store, held: Sequence[Held]) -> Iterator[None]:
     """Let the report of a signal that stops the block say how many recordings are left."""
-    from rsea_ros.fleet.plan import count_new
+    from rsea_ros.fleet.task import count_new
 
     try:
         yield

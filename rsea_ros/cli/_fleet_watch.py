@@ -13,7 +13,7 @@ from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
 
 if TYPE_CHECKING:
-    from rsea_ros.fleet.plan import Held
+    from rsea_ros.fleet.task import Held
 
 
 def add_watch(parser: argparse.ArgumentParser) -> None:

@@ -108,7 +108,7 @@ def _requirement(args: argparse.Namespace) -> Requirement:
 
 
 def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
-    from rsea_ros.design.by_train import by_train
+    from rsea_ros.design.spring_design import by_train
     from rsea_ros.report import words
     from rsea_ros.report.design.page import verdict
 

@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.cli._terminal import say
     from rsea_ros.effects._page import EffectPage
     from rsea_ros.effects.catalogue import effect_named
-    from rsea_ros.effects.scale import MACHINE
+    from rsea_ros.effects.parameter import MACHINE
 
     if args.name is None:
         for line in repr(effects).splitlines():

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.effects.compensable import AgainstMotion, Gap, OfRotorAngle
+from rsea_ros.effects.effect import AgainstMotion, Gap, OfRotorAngle
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
 

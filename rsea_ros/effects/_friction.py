@@ -14,8 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rsea_ros.compiler import njit
-from rsea_ros.effects.compensable import AgainstMotion, Parameters
-from rsea_ros.effects.effect import Parameter
+from rsea_ros.effects.effect import AgainstMotion, Parameter, Parameters
 from rsea_ros.effects.signal_table import CREEP, GEAR_VELOCITY, GEAR_VELOCITY_SPAN, MOBILITY
 
 PRESLIDING = Parameter(

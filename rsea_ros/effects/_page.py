@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
 from rsea_ros.documents.units import plain
-from rsea_ros.effects.effect import Effect, Parameter
-from rsea_ros.effects.equation import without_equation
-from rsea_ros.effects.scale import powers_of
+from rsea_ros.effects.effect import Effect, Parameter, without_equation
+from rsea_ros.effects.parameter import powers_of
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,7 @@ class EffectPage:
     @property
     def description(self) -> str:
         """The docstring of the effect's file without its equation: meaning and source."""
-        return without_equation(sys.modules[_module(self.effect)].__doc__)
+        return without_equation(self.effect.docstring)
 
     def __repr__(self) -> str:
         """Return name, meaning, equation and parameters as text."""
@@ -91,10 +89,3 @@ def catalogue_table(pages: Sequence[EffectPage]) -> str:
 
 def _after(joint: str, text: str) -> str:
     return joint + text if text else ""
-
-
-def _module(effect: Effect) -> str:
-    """Return the module of an effect: the file that holds its constant."""
-    packaged = f"rsea_ros.effects.{effect.name}"
-    holders = (name for name, module in sys.modules.items() if getattr(module, "EFFECT", None) is effect)
-    return packaged if packaged in sys.modules else next(holders, "rsea_ros.effects")

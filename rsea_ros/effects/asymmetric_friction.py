@@ -9,7 +9,6 @@ Source: Janot, Gautier, Brunot, Data set and reference models of EMPS, 2019 (off
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import B_M, GEAR_TORQUE, GEAR_VELOCITY, Port
 
 
@@ -38,5 +37,4 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY,),
     tags=("friction",),
     about="friction that differs between forward and backward",
-    equation=equation_of(__doc__),
 )

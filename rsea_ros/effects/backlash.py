@@ -15,9 +15,7 @@ Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft w
 from collections.abc import Sequence
 
 from rsea_ros.effects._chassis import GearPath, SprungChassis, along, over_step
-from rsea_ros.effects.compensable import Gap
-from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
+from rsea_ros.effects.effect import Claims, Effect, Gap, Parameter, compiled
 from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
 from rsea_ros.effects.signal_table import (
     B_S,
@@ -111,5 +109,4 @@ EFFECT = Effect(
     tags=("play",),
     compensation=Gap(lambda p: p[0]),
     about="play between the gear output and the spring",
-    equation=equation_of(__doc__),
 )

@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
@@ -91,5 +90,4 @@ EFFECT = Effect(
     tags=("mode",),
     part="support",
     about="the clamped end of the spring gives",
-    equation=equation_of(__doc__),
 )

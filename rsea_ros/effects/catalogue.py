@@ -16,9 +16,7 @@ from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import ParameterError
 from rsea_ros.plugins import plugin_constant, plugin_files
 
-_NOT_EFFECTS = {
-    "catalogue", "compensable", "effect", "equation", "guess", "parameter", "scale", "signal_table"
-}  # fmt: skip
+_NOT_EFFECTS = {"catalogue", "effect", "guess", "parameter", "signal_table"}
 EXTRA_PATH = "RSEA_EFFECTS"
 """Environment variable: effect files or folders of them beside the package's own, separated like PATH."""
 

@@ -10,7 +10,6 @@ Source: Astrom, Wittenmark, Computer-Controlled Systems, 1997, ch. 2 (systems wi
 import numpy as np
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, REFERENCE, STEP, TARGETED, Port
 
 LENGTH = 1023
@@ -62,5 +61,4 @@ EFFECT = Effect(
     response=lambda p, s: np.exp(-p[0] * s),
     part="command",
     about="the command takes effect later than its stamp says",
-    equation=equation_of(__doc__),
 )

@@ -9,7 +9,6 @@ see _friction.py. Source: Armstrong-Helouvry, Control of Machines with Friction,
 from rsea_ros.compiler import njit
 from rsea_ros.effects._friction import PRESLIDING, against, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 
 
@@ -49,5 +48,4 @@ EFFECT = Effect(
     tags=("friction",),
     compensation=against(level, creep=1),
     about="friction torque of fixed size against the motion",
-    equation=equation_of(__doc__),
 )

@@ -9,7 +9,6 @@ Electrical Drives, 2001 (the closed current loop as a lag).
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
 
 
@@ -42,5 +41,4 @@ EFFECT = Effect(
     states=1,
     response=lambda p, s: 1.0 / (p[0] * s + 1.0),
     about="first-order lag of the motor's current",
-    equation=equation_of(__doc__),
 )

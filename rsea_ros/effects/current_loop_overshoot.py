@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
 
 
@@ -63,5 +62,4 @@ EFFECT = Effect(
     states=2,
     response=response,
     about="second-order lag of the motor's current, with overshoot",
-    equation=equation_of(__doc__),
 )  # fmt: skip

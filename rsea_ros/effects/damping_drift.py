@@ -8,7 +8,6 @@ it warms).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import B_M, DURATION, GEAR_TORQUE, GEAR_VELOCITY, TIME, Port
 
 
@@ -31,5 +30,4 @@ EFFECT = Effect(
     function=apply,
     reads=(GEAR_VELOCITY,),
     about="damping of the gear that changes during the record",
-    equation=equation_of(__doc__),
 )

@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, Port
 
@@ -61,5 +60,4 @@ EFFECT = Effect(
     function=apply,
     guesses=guesses,
     about="commands that are too small make no torque",
-    equation=equation_of(__doc__),
 )

@@ -12,7 +12,6 @@ models for the physics simulation of servo actuators, 2024, models M5 and M6 (th
 
 from rsea_ros.effects._friction import PRESLIDING, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, GEAR_TORQUE, GEAR_VELOCITY, LOAD, Port
 
 
@@ -58,5 +57,4 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY, LOAD),
     tags=("friction",),
     about="friction that grows unequally with the motor's torque and the load",
-    equation=equation_of(__doc__),
 )

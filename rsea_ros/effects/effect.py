@@ -16,10 +16,9 @@ from numba import types
 from rsea_ros.compiler import cfunc
 from rsea_ros.documents.units import with_unit
 from rsea_ros.documents.wording import quote
-from rsea_ros.effects.compensable import Compensable
 from rsea_ros.effects.guess import Guess, Guesses
-from rsea_ros.effects.parameter import Parameter as Parameter  # files of effects import it from here
-from rsea_ros.effects.scale import Scale
+from rsea_ros.effects.parameter import Parameter as Parameter
+from rsea_ros.effects.parameter import Scale
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 
@@ -38,7 +37,39 @@ that depends on how it moves. limit: its main parameter is the largest torque, N
 """
 Response = Callable[[Sequence[float], Any], Any]
 """Parameters in order and s = 2 pi i f, shape (n,), to the factor on the effect's signal, shape (n,)."""
+Parameters = Sequence[float]
+"""Of an effect, in order, as the laws of compensation have them. A controller calls these in Python: one that
+compiles in its first cycles is late."""
 
+
+@dataclass(frozen=True)
+class AgainstMotion:
+    """A torque against the motion. mean: speeds of the gear output at both ends of a hold, rad/s, to N m.
+
+    Positive against a positive speed: torque that the motor has to add.
+    """
+
+    mean: Callable[[Parameters, float, float], float]
+
+
+@dataclass(frozen=True)
+class OfRotorAngle:
+    """A torque of the rotor's angle. mean: angles of the rotor at both ends of a hold, rad, to N m.
+
+    Positive where it drives forward: torque that the motor has to subtract.
+    """
+
+    mean: Callable[[Parameters, float, float], float]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A play that the motor has to cross where the torque changes sign. width: the whole gap, rad."""
+
+    width: Callable[[Parameters], float]
+
+
+Compensable = AgainstMotion | OfRotorAngle | Gap
 
 
 @dataclass(frozen=True)
@@ -71,6 +102,7 @@ class Effect:
     response: its linear frequency response on its signal (at a sensor, on ft), for a controller's margins.
     part: of the bench, if not the one of its port.
     idle: the parameters that do nothing on a rig: `f(rig) -> names`.
+    equation: by default the first indented lines of the docstring of its file, where it is written once.
     """
 
     name: str
@@ -98,6 +130,14 @@ class Effect:
             raise ParameterError(
                 f"effect {self.name}: reads at port {self.port.name}, expected port GEAR or SPRING ({known})"
             )
+        if not self.equation:
+            object.__setattr__(self, "equation", equation_of(self.docstring))
+
+    @property
+    def docstring(self) -> str:
+        """Return the docstring of the file of the effect's function."""
+        python = self.structure or getattr(self.function, "__wrapped__", None)
+        return getattr(python, "__globals__", {}).get("__doc__") or ""
 
     @property
     def main(self) -> Parameter:
@@ -171,3 +211,23 @@ class Effect:
 def compiled(function: Callable[[Any, Any, Any], None]) -> Any:
     """Compile an effect's function to an address that the step can call; cached on disk."""
     return cfunc(_SIGNATURE, cache=True, error_model="numpy")(function)
+
+
+def equation_of(docstring: str) -> str:
+    """Return the first indented lines of a docstring as one line; empty without any."""
+    begin, end = _place(lines := docstring.splitlines())
+    return " ".join(line.strip() for line in lines[begin:end])
+
+
+def without_equation(docstring: str) -> str:
+    """Return a docstring without its first indented lines, and the empty line after them."""
+    begin, end = _place(lines := docstring.strip().splitlines())
+    return "\n".join([*lines[:begin], *lines[end + 1 :]]).strip()
+
+
+def _place(lines: list[str]) -> tuple[int, int]:
+    """Return the first and the one after the last of the first indented lines; both the end without any."""
+    indented = [line.startswith("    ") and bool(line.strip()) for line in lines]
+    begin = indented.index(True) if True in indented else len(lines)
+    rest = indented[begin:]
+    return begin, begin + (rest.index(False) if False in rest else len(rest))

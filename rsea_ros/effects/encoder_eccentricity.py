@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import OUTPUT_ANGLE, POSITION, TURNS, VELOCITY, Port
 
@@ -52,5 +51,4 @@ EFFECT = Effect(
     function=apply,
     guesses=guesses,
     about="angle error of the encoder that repeats with the rotor's angle",
-    equation=equation_of(__doc__),
 )  # fmt: skip

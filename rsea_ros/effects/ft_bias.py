@@ -6,7 +6,6 @@ Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (interferi
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import FT, Port
 
 
@@ -29,5 +28,4 @@ EFFECT = Effect(
     claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_drift",)),
     function=apply,
     about="zero of the F/T sensor that is off",
-    equation=equation_of(__doc__),
 )

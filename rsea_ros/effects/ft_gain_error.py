@@ -6,7 +6,6 @@ Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (modifying
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import FT, Port
 
 
@@ -30,5 +29,4 @@ EFFECT = Effect(
     function=apply,
     response=lambda p, s: p[0] + 0.0 * s,
     about="calibration of the F/T sensor that is off",
-    equation=equation_of(__doc__),
 )

@@ -9,7 +9,6 @@ Measurement Systems, 2005, section 4.1 (element of first order).
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import FT, STEP, Port
 
 OUT, LAST, STARTED = range(3)
@@ -45,5 +44,4 @@ EFFECT = Effect(
     states=3,
     response=lambda p, s: 1.0 / (p[0] * s + 1.0),
     about="first-order lag of the F/T sensor",
-    equation=equation_of(__doc__),
 )

@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import beside_softer_rotor
 from rsea_ros.effects.signal_table import Port
 
@@ -73,6 +72,5 @@ EFFECT = Effect(
     structure=change,
     guesses=beside_softer_rotor,
     about="gear train that gives between rotor and spring",
-    equation=equation_of(__doc__),
     idle=idle,
 )

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 
@@ -40,5 +39,4 @@ EFFECT = Effect(
     claims=Claims("position", "odd", amplitude_exponent=None),
     structure=change,
     about="weight on the output that the rig does not know of",
-    equation=equation_of(__doc__),
 )

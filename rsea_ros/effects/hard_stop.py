@@ -9,7 +9,6 @@ survey of contact dynamics modelling, Mech. Mach. Theory 37, 2002 (contact as a 
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import at_ends_of_travel
 from rsea_ros.effects.signal_table import DEFLECTION, SPRING_TORQUE, Port
 
@@ -44,5 +43,4 @@ EFFECT = Effect(
     reads=(DEFLECTION,),
     guesses=at_ends_of_travel,
     about="a stop that the spring meets beyond an angle",
-    equation=equation_of(__doc__),
 )

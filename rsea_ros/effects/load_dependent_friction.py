@@ -9,7 +9,6 @@ fraction of the paper's b_m).
 
 from rsea_ros.effects._friction import PRESLIDING, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, LOAD, Port
 
 
@@ -41,5 +40,4 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY, LOAD),
     tags=("friction",),
     about="friction that grows with the torque in the spring",
-    equation=equation_of(__doc__),
 )

@@ -10,7 +10,6 @@ asymmetric).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import DEFLECTION, K_S, SPRING_TORQUE, Port
 
 
@@ -39,5 +38,4 @@ EFFECT = Effect(
     is_searched=False,
     reads=(DEFLECTION,),
     about="spring that is stiffer one way than the other",
-    equation=equation_of(__doc__),
 )

@@ -11,7 +11,6 @@ IEEE Trans. Autom. Control 40, 1995, eqs. (1) to (4).
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, STEP, Port
 from rsea_ros.effects.spring_hysteresis import reach
 
@@ -70,5 +69,4 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY,),
     tags=("friction",),
     about="friction of bristles that bend before they slip",
-    equation=equation_of(__doc__),
 )  # fmt: skip

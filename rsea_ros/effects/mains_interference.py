@@ -8,7 +8,6 @@ Source: Ott, Electromagnetic Compatibility Engineering, 2009, ch. 2 (cabling).
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import at_lines
 from rsea_ros.effects.signal_table import FT, TIME, Port
 
@@ -42,5 +41,4 @@ EFFECT = Effect(
     function=apply,
     guesses=at_lines("ft", sine=("amplitude", "phase")),
     about="mains hum in the F/T sensor",
-    equation=equation_of(__doc__),
 )

@@ -9,7 +9,6 @@ Source: Kovacic, Brennan, The Duffing Equation, 2011, ch. 1.
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import DEFLECTION, K_S, SPRING_TORQUE, Port
 
 
@@ -36,5 +35,4 @@ EFFECT = Effect(
     function=apply,
     reads=(DEFLECTION,),
     about="spring that hardens or softens as it deflects",
-    equation=equation_of(__doc__),
 )

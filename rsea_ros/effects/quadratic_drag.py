@@ -10,7 +10,6 @@ de Wit, Automatica 30, 1994, section 2.
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, MOBILITY, Port
 
 
@@ -38,5 +37,4 @@ EFFECT = Effect(
     states=1,
     reads=(GEAR_VELOCITY,),
     about="drag that grows with the square of the speed",
-    equation=equation_of(__doc__),
 )

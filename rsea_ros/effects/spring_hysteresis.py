@@ -14,7 +14,6 @@ import math
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMIT, DEFLECTION, DEFLECTION_SPAN, SPRING_TORQUE, Port
 
 Z, LAST, STARTED = range(3)
@@ -99,5 +98,4 @@ EFFECT = Effect(
     states=3,
     reads=(DEFLECTION,),
     about="spring torque that depends on the way the deflection came",
-    equation=equation_of(__doc__),
 )

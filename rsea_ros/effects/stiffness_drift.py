@@ -6,7 +6,6 @@ Source: Lakes, Viscoelastic Materials, 2009 (stiffness over time and temperature
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import DEFLECTION, DURATION, K_S, SPRING_TORQUE, TIME, Port
 
 
@@ -29,5 +28,4 @@ EFFECT = Effect(
     function=apply,
     reads=(DEFLECTION,),
     about="stiffness of the spring that changes during the record",
-    equation=equation_of(__doc__),
 )

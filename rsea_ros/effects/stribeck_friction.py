@@ -12,7 +12,6 @@ import math
 from rsea_ros.compiler import njit
 from rsea_ros.effects._friction import PRESLIDING, against, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 
 
@@ -61,5 +60,4 @@ EFFECT = Effect(
     tags=("friction",),
     compensation=against(level, creep=3),
     about="friction that is larger near rest than at speed",
-    equation=equation_of(__doc__),
 )

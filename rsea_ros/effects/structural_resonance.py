@@ -9,7 +9,6 @@ torque that goes straight from step to step. Source: Ewins, Modal Testing, 2000,
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import at_lines
 from rsea_ros.effects.signal_table import FT, STEP, Port
 
@@ -58,5 +57,4 @@ EFFECT = Effect(
     tags=("mode",),
     part="support",
     about="a mode of the structure that the F/T sensor sees beside the spring",
-    equation=equation_of(__doc__),
 )

@@ -9,7 +9,6 @@ efficiency of PM motors, IEEE Trans. Ind. Appl. 31, 1995.
 
 from rsea_ros.effects._drift import SETTLING, progress
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, DURATION, STEP, TIME, Port
 
 
@@ -32,5 +31,4 @@ EFFECT = Effect(
     claims=Claims("velocity", "odd", amplitude_exponent=1.0),
     function=apply,
     about="the motor's torque constant changes during the record",
-    equation=equation_of(__doc__),
 )

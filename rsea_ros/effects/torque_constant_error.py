@@ -10,7 +10,6 @@ Motors and Drives, 2013, ch. 3 (torque and current).
 from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import COMMAND, Port
 
@@ -51,5 +50,4 @@ EFFECT = Effect(
     guesses=guesses,
     response=lambda p, s: p[0] + 0.0 * s,
     about="the motor makes more or less torque than its current says",
-    equation=equation_of(__doc__),
 )

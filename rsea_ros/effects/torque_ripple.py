@@ -11,9 +11,7 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.compiler import njit
-from rsea_ros.effects.compensable import OfRotorAngle
-from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
+from rsea_ros.effects.effect import Claims, Effect, OfRotorAngle, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port
 
@@ -70,5 +68,4 @@ EFFECT = Effect(
         lambda p, start, end: float(mean_ripple.py_func(p, 0.5 * (start + end), end - start))
     ),
     about="torque that repeats with the rotor's angle",
-    equation=equation_of(__doc__),
 )

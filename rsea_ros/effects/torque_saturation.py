@@ -8,7 +8,6 @@ Source: Khalil, Nonlinear Systems, 2002, section 1.2.7.
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import at_limits
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, Port
 
@@ -36,5 +35,4 @@ EFFECT = Effect(
     guesses=at_limits,
     tags=("limit",),
     about="motor torque that stops growing at a limit",
-    equation=equation_of(__doc__),
 )

@@ -10,7 +10,6 @@ Drury, Electric Motors and Drives, 2013, section 3.4 (torque-speed line at const
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import at_limits
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, OUTPUT_VELOCITY, Port
 
@@ -48,5 +47,4 @@ EFFECT = Effect(
     guesses=at_limits,
     tags=("limit",),
     about="torque limit that falls with speed, by the supply's voltage",
-    equation=equation_of(__doc__),
 )  # fmt: skip

@@ -15,11 +15,10 @@ from itertools import count
 
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.executor import Done, Executor, Job, WorkerLost
-from rsea_ros.fleet.plan import Held
 from rsea_ros.fleet.sources import Bag
 from rsea_ros.fleet.store import Store, TaskOutcome
 from rsea_ros.fleet.summary import Rate, RunSummary
-from rsea_ros.fleet.task import TIME_LIMIT, Changed, Task, read_fingerprint, reason
+from rsea_ros.fleet.task import TIME_LIMIT, Changed, Held, Task, read_fingerprint, reason
 from rsea_ros.progress import Progress
 from rsea_ros.version import version
 

@@ -13,9 +13,8 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from rsea_ros.fleet.fleet_error import FleetError
-from rsea_ros.fleet.row import ARROW
+from rsea_ros.fleet.row import ARROW, EXPECTED_FILES
 from rsea_ros.fleet.store import Store, open_store
-from rsea_ros.fleet.store_keys import EXPECTED_FILES
 
 _ANALYSES = """
 CREATE VIEW analyses AS SELECT * FROM (

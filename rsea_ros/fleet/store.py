@@ -21,8 +21,18 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from rsea_ros.fleet.fleet_error import FleetError
-from rsea_ros.fleet.row import SCHEMA, Row, analysis_of, month_of, write
-from rsea_ros.fleet.store_keys import compact, compact_loose, finish, known_rows, take_out
+from rsea_ros.fleet.row import (
+    SCHEMA,
+    Row,
+    analysis_of,
+    compact,
+    compact_loose,
+    finish,
+    known_rows,
+    month_of,
+    take_out,
+    write,
+)
 from rsea_ros.outputs.files import make_folder
 from rsea_ros.outputs.new_files import Destination, NewFiles, write_text
 

@@ -15,7 +15,7 @@ import resource
 import threading
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,8 +25,9 @@ from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import MappedJoint
 from rsea_ros.fleet.row import Row, analysis_of, empty
 from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relist
-from rsea_ros.fleet.store import TaskOutcome
+from rsea_ros.fleet.store import Store, TaskOutcome
 from rsea_ros.identification.solver import on_cores
+from rsea_ros.version import version
 
 TIME_LIMIT = 3600.0
 """s of a task. A diagnosis of a minute at 280 Hz takes about one minute, one of ten minutes about ten."""
@@ -189,3 +190,25 @@ def _peak() -> int:
         lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()
         return next(1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+Held = tuple[Bag, tuple[MappedJoint, ...]]
+
+
+def is_anything_new(store: Store, held: Sequence[Held]) -> bool:
+    """Return whether some recording of a joint has no row, by paths, bytes and stamps."""
+    return any(_new(store, held))
+
+
+def count_new(store: Store, held: Sequence[Held]) -> int:
+    """Return how many rows are to be made, by paths, bytes and stamps."""
+    return sum(_new(store, held))
+
+
+def _new(store: Store, held: Sequence[Held]) -> Iterator[bool]:
+    """Yield for each joint of each recording whether it has no row."""
+    keys, recordings = store.known_rows()
+    for bag, joints in held:
+        recording = recordings.get((bag.url, bag.size, bag.stamp))
+        for joint in joints:
+            yield recording is None or Task(bag, joint, recording, version()).key not in keys

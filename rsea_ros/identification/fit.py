@@ -22,7 +22,7 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
-from rsea_ros.effects.scale import Scale
+from rsea_ros.effects.parameter import Scale
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.clocks import (
     MISFIT,

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rsea_ros.effects.scale import STIFFNESS, TORQUE, Scale, scale_to
+from rsea_ros.effects.parameter import STIFFNESS, TORQUE, Scale, scale_to
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.frequency_response import model_response
 from rsea_ros.identification.problem import Case

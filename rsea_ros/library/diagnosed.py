@@ -67,7 +67,7 @@ class Diagnosed:
 
         Raises ParameterError without pandas.
         """
-        from rsea_ros.library.data_frames import parameter_frame
+        from rsea_ros.library.notebook import parameter_frame
 
         return parameter_frame(self.result.final)
 
@@ -117,8 +117,7 @@ def diagnose(
     """
     from rsea_ros.checks.carried import check_diagnosable, with_check_faults
     from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
-    from rsea_ros.library.inputs import records_of
-    from rsea_ros.library.notebook_progress import shown_in_notebook
+    from rsea_ros.library.notebook import records_of, shown_in_notebook
 
     rig, records = load_rig(rig), records_of(data)
     for record in [*records, *([holdout] if holdout is not None else [])]:

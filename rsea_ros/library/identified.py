@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rsea_ros.documents import units
 from rsea_ros.identification.result import Identification, ParameterEstimate
-from rsea_ros.library.data_frames import parameter_frame, plain
+from rsea_ros.library.notebook import parameter_frame, plain
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.progress import Progress
@@ -100,8 +100,7 @@ def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progr
     """
     from rsea_ros.checks.carried import with_check_faults
     from rsea_ros.identification.identify import identify as identify_records
-    from rsea_ros.library.inputs import records_of, without_missing
-    from rsea_ros.library.notebook_progress import shown_in_notebook
+    from rsea_ros.library.notebook import records_of, shown_in_notebook, without_missing
 
     rig = load_rig(rig)
     records = [without_missing(with_check_faults(r, rig, masks=False)) for r in records_of(data)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from control import TransferFunction
 
-from rsea_ros.design.by_train import band_range
+from rsea_ros.design.spring_design import band_range
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import (
     end_to_end,

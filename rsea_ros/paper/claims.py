@@ -132,3 +132,12 @@ def _from_the_parts() -> Iterator[PaperClaim]:
         ("b_m, viscous", "b_m", drag, "N m s/rad", "at most: the maker's no-load 1.65 A at 33.1 rpm"),
     ):
         yield PaperClaim("Table 2", what, TABLE_2[name][0], ours, unit, how, "unclear")
+
+
+@dataclass(frozen=True)
+class PaperFinding:
+    """found: two statements that cannot both hold. silent: what is left out. unclear: two readings."""
+
+    status: Status
+    where: str
+    text: str

@@ -16,8 +16,8 @@ from rsea_ros.model.rig import END_NAMES, Quantity
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import claims, formulas
-from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
-from rsea_ros.paper.paper_finding import PaperFinding
+from rsea_ros.paper.claims import PaperFinding
+from rsea_ros.paper.rival_models import largest_gap, readings, resonance_hz
 
 
 def identification() -> Iterator[PaperFinding]:

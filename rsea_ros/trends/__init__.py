@@ -3,6 +3,6 @@
 from rsea_ros.trends.alarms import Alarm, alarms, alarms_of
 from rsea_ros.trends.fleet_trends import fleet_trends
 from rsea_ros.trends.result import FleetTrends
-from rsea_ros.trends.settings import TrendSettings
+from rsea_ros.trends.series import TrendSettings
 
 __all__ = ["Alarm", "FleetTrends", "TrendSettings", "alarms", "alarms_of", "fleet_trends"]

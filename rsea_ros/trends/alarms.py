@@ -11,8 +11,7 @@ import numpy as np
 
 from rsea_ros.trends.fleet_trends import fleet_trends
 from rsea_ros.trends.result import Appearance, Change, FleetTrends, Growth, Interval, Outlier, Trend
-from rsea_ros.trends.series import Table
-from rsea_ros.trends.settings import DEFAULT, TrendSettings
+from rsea_ros.trends.series import DEFAULT, Table, TrendSettings
 
 Kind = Literal["change", "trend", "outlier", "cause", "fault"]
 

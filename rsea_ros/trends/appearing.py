@@ -15,7 +15,7 @@ from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import MAD_TO_SD, Z95
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Growth, Interval, Trend
-from rsea_ros.trends.settings import DAY, TrendSettings
+from rsea_ros.trends.series import DAY, TrendSettings
 
 _SMALLEST = 1e-280
 _SUREST = 37.0

@@ -10,8 +10,7 @@ from scipy.ndimage import median_filter
 
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import MAD_TO_SD
-from rsea_ros.trends.series import BoolArray, Series
-from rsea_ros.trends.settings import DAY, TrendSettings
+from rsea_ros.trends.series import DAY, BoolArray, Series, TrendSettings
 
 _NEIGHBOURS = 9
 """Recordings of the running median: three alike at an end outvote the others."""

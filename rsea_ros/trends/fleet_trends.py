@@ -13,8 +13,15 @@ from rsea_ros.trends.cause_series import namings, size_series, temperatures
 from rsea_ros.trends.course_search import Tested, change_test, describe
 from rsea_ros.trends.days import DayEffect, Days, day_effect, day_means, fleet_prior
 from rsea_ros.trends.result import FleetTrends, Outlier, Trend
-from rsea_ros.trends.series import RECORDINGS, Series, Table, all_series, check_columns
-from rsea_ros.trends.settings import DEFAULT, TrendSettings
+from rsea_ros.trends.series import (
+    DEFAULT,
+    RECORDINGS,
+    Series,
+    Table,
+    TrendSettings,
+    all_series,
+    check_columns,
+)
 from rsea_ros.trends.trend import trend_of
 
 

@@ -11,7 +11,7 @@ from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.trends.course import Course, Regression, StepOrRamp, date_range, term
 from rsea_ros.trends.result import Interval
-from rsea_ros.trends.settings import DAY
+from rsea_ros.trends.series import DAY
 
 _SURE_SLOPE = 3.0
 """|z| of a slope from which it is a trend: one in 370, of a series that is more than noise."""

@@ -25,8 +25,7 @@ from rsea_ros.trends.quantities import (
     time_to_limit,
 )
 from rsea_ros.trends.result import Change, Interval, ParameterCourse, Trend
-from rsea_ros.trends.series import Series
-from rsea_ros.trends.settings import DAY, YEAR, TrendSettings
+from rsea_ros.trends.series import DAY, YEAR, Series, TrendSettings
 
 _POINTS = 24
 """Places at which a course is drawn, beside its steps."""

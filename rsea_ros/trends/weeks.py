@@ -9,8 +9,7 @@ import numpy as np
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.trends.result import Trend
-from rsea_ros.trends.series import BoolArray
-from rsea_ros.trends.settings import DAY
+from rsea_ros.trends.series import DAY, BoolArray
 
 _WEEK, _SHORT, _MOST = 7.0, 70.0, 110
 """Days of a week; days up to which a step is a day; steps of a picture: more are no longer distinguished."""

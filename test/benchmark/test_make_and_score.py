@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.benchmark import entry
-from rsea_ros.benchmark.answers import Answer
-from rsea_ros.benchmark.dataset import read_dataset
+from rsea_ros.benchmark.dataset import Answer, read_dataset
 from rsea_ros.cli.main import main
 from rsea_ros.model.rig_file import load_rig
 

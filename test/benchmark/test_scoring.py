@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from rsea_ros.benchmark.answers import Answer
+from rsea_ros.benchmark.dataset import Answer
 from rsea_ros.benchmark.scoring import RecordTruth, score, truth_hash
 
 EFFECTS = ("a", "b", "c", "d")

@@ -9,10 +9,16 @@ import numpy as np
 import pytest
 
 from rsea_ros.design import mechanism
-from rsea_ros.design.by_train import band_range, by_train
 from rsea_ros.design.motor_gear_units import catalogue, unit_named
 from rsea_ros.design.requirement import Requirement
-from rsea_ros.design.spring_design import least_stiffness, rig_of, spring_design, stiffness_bounds
+from rsea_ros.design.spring_design import (
+    band_range,
+    by_train,
+    least_stiffness,
+    rig_of,
+    spring_design,
+    stiffness_bounds,
+)
 from rsea_ros.design.tolerance import margins, robust_stiffness, spreads_of
 from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs

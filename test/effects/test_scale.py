@@ -7,7 +7,7 @@ import math
 import pytest
 
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.effects.scale import INERTIA, PERIOD, SPEED, STIFFNESS, TORQUE, Scale, scale_to, widest
+from rsea_ros.effects.parameter import INERTIA, PERIOD, SPEED, STIFFNESS, TORQUE, Scale, scale_to, widest
 
 REFERENCE = (TORQUE, STIFFNESS, INERTIA, SPEED, PERIOD)
 

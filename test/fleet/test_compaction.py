@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fleet_stubs import KNEE, stub_work
 
-from rsea_ros.fleet import store_keys as compaction
+from rsea_ros.fleet import row as compaction
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import Bag
 from rsea_ros.fleet.task import Task

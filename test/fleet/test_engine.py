@@ -17,11 +17,10 @@ from rsea_ros.fleet import engine as engines
 from rsea_ros.fleet.engine import ATTEMPTS, Engine, EngineLimits
 from rsea_ros.fleet.executor import Done, Job, Serial, WorkerLost
 from rsea_ros.fleet.fleet_error import FleetError
-from rsea_ros.fleet.plan import is_anything_new
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
 from rsea_ros.fleet.store import TaskOutcome, hold_lock, open_store
-from rsea_ros.fleet.task import Changed, Task
+from rsea_ros.fleet.task import Changed, Task, is_anything_new
 
 
 def run_engine(store, folder, joints=(KNEE,), executor=None, work=stub_work, limits=None):
@@ -159,7 +158,7 @@ def test_many_rows_become_one_file_and_stay_all_there(store, folder, monkeypatch
 
 
 def test_a_compaction_killed_half_way_leaves_no_row_twice(store, folder, monkeypatch):
-    monkeypatch.setattr("rsea_ros.fleet.store_keys._remove", lambda folder, names: None)
+    monkeypatch.setattr("rsea_ros.fleet.row._remove", lambda folder, names: None)
     run_engine(store, folder)
     monkeypatch.undo()
     assert len(list(store.rows.rglob("*.parquet"))) == 6

@@ -10,9 +10,9 @@ from rsea_ros.fleet import history, query, recordings
 from rsea_ros.fleet.alarm_files import write_alarms
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.query import MergedError, answer
+from rsea_ros.fleet.row import read
 from rsea_ros.fleet.sources import Bag
 from rsea_ros.fleet.store import open_store
-from rsea_ros.fleet.store_keys import read
 from rsea_ros.fleet.task import Task
 
 COUNT = "SELECT count(*) FROM recordings"

@@ -17,8 +17,7 @@ from msg_adapters import write_record
 from rsea_ros.cli.main import main
 from rsea_ros.fleet import history, recordings
 from rsea_ros.fleet.joints import date_in
-from rsea_ros.fleet.row import VARYING
-from rsea_ros.fleet.store_keys import read
+from rsea_ros.fleet.row import VARYING, read
 from rsea_ros.fleet.task import Changed, Task, read_fingerprint, work
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig, rig_text

@@ -10,9 +10,9 @@ from rsea_ros.model import outputs
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims, last_digit
-from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
 from rsea_ros.paper.findings import findings
 from rsea_ros.paper.findings_bench import clamp_error
+from rsea_ros.paper.rival_models import largest_gap, readings, resonance_hz
 
 
 @pytest.mark.parametrize(("text", "step"), [("3.14", 0.01), ("7", 1.0), ("6.169e-4", 1e-7), ("1e8", 1e8)])

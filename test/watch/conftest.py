@@ -8,9 +8,8 @@ import time
 import pytest
 
 from rsea_ros.watch.command import Bounds, Commander
-from rsea_ros.watch.page_frames import CHANNELS
 from rsea_ros.watch.runs import Runs
-from rsea_ros.watch.server import Server
+from rsea_ros.watch.server import CHANNELS, Server
 
 
 class MadeUp:

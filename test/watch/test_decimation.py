@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rsea_ros.watch.page_frames import extremes
+from rsea_ros.watch.server import extremes
 
 
 @pytest.mark.parametrize(

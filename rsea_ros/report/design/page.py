@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.design.by_train import by_train
-from rsea_ros.design.spring_design import SpringDesign, least_for_band, rig_of, stiffness_bounds
+from rsea_ros.design.spring_design import SpringDesign, by_train, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import end_to_end, undamped_stiffness
 from rsea_ros.model.transfer import frequency_response

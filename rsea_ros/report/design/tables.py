@@ -7,8 +7,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from rsea_ros.design.by_train import WithTrain, by_train, sense_unknown
-from rsea_ros.design.spring_design import Check, SpringDesign, spring_design, stiffness_bounds
+from rsea_ros.design.spring_design import (
+    Check,
+    SpringDesign,
+    WithTrain,
+    by_train,
+    sense_unknown,
+    spring_design,
+    stiffness_bounds,
+)
 from rsea_ros.design.tolerance import Margin, margins, spreads_of
 from rsea_ros.records.statistics import Z90
 from rsea_ros.report import words

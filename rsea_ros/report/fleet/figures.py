@@ -24,7 +24,7 @@ from rsea_ros.report.fleet.words import (
 )  # fmt: skip
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Change, Interval, Trend
-from rsea_ros.trends.settings import DAY, YEAR
+from rsea_ros.trends.series import DAY, YEAR
 from rsea_ros.trends.weeks import Binned, Steps, bin_days
 
 _DAY = "%-d %b\n%Y"

@@ -19,8 +19,7 @@ from rsea_ros.report.page import Block, Html, bullets, fold, key_numbers, page, 
 from rsea_ros.trends.alarms import Alarm, alarms_of, by_joint, worst_first
 from rsea_ros.trends.fleet_trends import fleet_trends
 from rsea_ros.trends.result import FleetTrends
-from rsea_ros.trends.series import Table
-from rsea_ros.trends.settings import DEFAULT, TrendSettings
+from rsea_ros.trends.series import DEFAULT, Table, TrendSettings
 from rsea_ros.trends.weeks import Steps, steps_over
 
 INDEX = "index.html"

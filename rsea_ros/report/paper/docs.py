@@ -11,8 +11,7 @@ import numpy as np
 from rsea_ros.model import outputs
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.transfer import frequency_response
-from rsea_ros.paper.figure_18 import readings
-from rsea_ros.paper.rival_models import lumped_rig
+from rsea_ros.paper.rival_models import lumped_rig, readings
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, BEFORE, GRID, INK, QUIET, TRUTH

@@ -7,9 +7,8 @@ from html import escape
 
 from rsea_ros.paper.arrangements import Arrangement, Limit
 from rsea_ros.paper.bands import TOLERANCES, Bands
-from rsea_ros.paper.claims import TABLE_2, PaperClaim
+from rsea_ros.paper.claims import TABLE_2, PaperClaim, PaperFinding
 from rsea_ros.paper.moving_output import MovingOutput
-from rsea_ros.paper.paper_finding import PaperFinding
 from rsea_ros.report import words
 from rsea_ros.report.page import Html, equation, listed, named, paragraph, section, table
 

@@ -1,0 +1,105 @@
+"""Arguments and results of the library: records in, tables and a notebook's bar of progress out."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from html import escape
+from importlib import import_module
+from io import StringIO
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.identification.result import ParameterEstimate
+from rsea_ros.progress import Progress
+from rsea_ros.records.record import MEASURED, Channel, Record
+
+
+@dataclass(frozen=True)
+class Bar:
+    """The present step, and the share of the work that is done, 0 to 1; empty without a step."""
+
+    step: str = ""
+    share: float = 0.0
+
+    def __repr__(self) -> str:
+        """Return step and share for a notebook that shows plain text."""
+        return f"{self.step}: {100.0 * self.share:.0f} %" if self.step else ""
+
+    def _repr_html_(self) -> str:
+        bar = f"<progress value='{self.share:.3f}'></progress> {escape(self.step)}"
+        return bar if self.step else ""
+
+
+@contextmanager
+def shown_in_notebook(progress: Progress | None) -> Iterator[Progress | None]:
+    """Yield the caller's progress if there is one, else in a notebook a bar that vanishes at the end."""
+    if progress is not None or not _is_notebook():
+        yield progress
+        return
+    handle = import_module("IPython.display").display(Bar(), display_id=True)
+    try:
+        yield lambda step, share: handle.update(Bar(step, share))
+    finally:
+        handle.update(Bar())
+
+
+def _is_notebook() -> bool:
+    """Return whether a notebook's kernel runs this code; a terminal of IPython has none."""
+    if "ipykernel" not in sys.modules:
+        return False
+    return hasattr(import_module("IPython").get_ipython(), "kernel")
+
+
+_WIDTH = 140
+"""Characters: the width at which `rsea check` prints its table into a file."""
+
+
+def parameter_frame(parameters: Sequence[ParameterEstimate]) -> Any:
+    """Return parameters as a DataFrame: value, unit, low, high (95 %), rig, told_by_data; index: the name.
+
+    Raises ParameterError where pandas is not installed.
+    """
+    try:
+        pandas = import_module("pandas")
+    except ImportError:
+        raise ParameterError("to_frame: pandas is not installed, expected it (pip install pandas)") from None
+    rows = {p.name: (p.value, p.unit, *p.ci95, p.start, p.told_by_data) for p in parameters}
+    columns = ["value", "unit", "low", "high", "rig", "told_by_data"]
+    return pandas.DataFrame.from_dict(rows, orient="index", columns=columns)
+
+
+def plain(table: Table) -> str:
+    """Return a table as text without colours."""
+    text = StringIO()
+    Console(file=text, width=_WIDTH).print(table)
+    return text.getvalue().rstrip()
+
+
+def records_of(data: Record | Sequence[Record]) -> list[Record]:
+    """Return one or several records as a list. Raises ParameterError for anything else."""
+    items: list[object] = [data] if isinstance(data, Record) else list(data)
+    records = [item for item in items if isinstance(item, Record)]
+    if len(records) < len(items):
+        kind = next(type(item).__name__ for item in items if not isinstance(item, Record))
+        raise ParameterError(f"data: {kind}, expected a Record (Record.from_arrays, rsea.read_bag)")
+    if len({id(record) for record in records}) < len(records):
+        raise ParameterError("data: a record is given twice, expected each record once")
+    if not records:
+        raise ParameterError("data: no record, expected one or more")
+    return records
+
+
+def without_missing(record: Record) -> Record:
+    """Return a record without the samples that from_arrays holds as NaN: measurements that are missing."""
+    channels = {name: channel for name, channel in record.channels.items() if name in MEASURED}
+    missing = {name: np.isnan(channel.y) for name, channel in channels.items()}
+    return record.with_channels(
+        **{n: Channel(c.t[~missing[n]], c.y[~missing[n]]) for n, c in channels.items() if missing[n].any()}
+    )
