@@ -82,7 +82,7 @@ def _kept_answers(dataset: Dataset, entry: str, partial: Path) -> dict[str, dict
 def _answer(dataset: Dataset, entry: str, name: str) -> dict[str, Any]:
     """Return the answer to a record; one that cannot be diagnosed names no effect."""
     from rsea_ros.benchmark.dataset import Answer
-    from rsea_ros.benchmark.entry import ENTRIES as FUNCTIONS
+    from rsea_ros.benchmark.scoring import ENTRIES as FUNCTIONS
     from rsea_ros.model.rig_file import load_rig
 
     record, rig = dataset.record(name), load_rig(dataset.rig_path(name))

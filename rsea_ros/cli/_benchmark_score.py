@@ -31,8 +31,7 @@ def add_score(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the scores, each with its 95 % interval over records."""
     from rsea_ros.benchmark.dataset import read_answers, read_dataset
-    from rsea_ros.benchmark.entry import BASELINES
-    from rsea_ros.benchmark.scoring import read_truth, score
+    from rsea_ros.benchmark.scoring import BASELINES, read_truth, score
 
     dataset = read_dataset(args.dataset)
     truths = read_truth(args.truth or dataset.truth, dataset)

@@ -111,7 +111,7 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
     from rsea_ros.identification.frequency_response import estimate_response
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.model.simulation import synthesize
-    from rsea_ros.paper.moving_output import RATE, moving_output
+    from rsea_ros.paper.rival_models import RATE, moving_output
     from rsea_ros.records.record import Channel
     from rsea_ros.report.paper.page import PaperTests
 

@@ -108,6 +108,14 @@ def flat_band(
     return float(roots.min()) / (2.0 * math.pi) if len(roots) else math.inf
 
 
+def edge_of_error(function: Fraction, tolerance: float) -> float:
+    """Return the lowest frequency, Hz, at which |1/f - 1| is the tolerance; inf without."""
+    difference = np.asarray(np.polysub(function.denominator, function.numerator), np.float64)
+    top, bottom = (_inner(part, part) for part in _parts(Fraction(difference, function.numerator)))
+    roots = _positive_roots(polynomial.polysub(top, tolerance**2 * bottom))
+    return float(roots.min()) / (2.0 * math.pi) if len(roots) else math.inf
+
+
 def resonance_peak(function: TransferFunction) -> tuple[float, float]:
     """Return where |f| is highest, Hz, and how high, dB; (0, gain at rest) where it only falls."""
     top, bottom = (_inner(part, part) for part in _parts(function))

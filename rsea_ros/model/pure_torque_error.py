@@ -19,16 +19,13 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
-from numpy.polynomial import polynomial
 
 from rsea_ros.compiler import njit
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.bandwidth import end_over_end, inner_inertia
+from rsea_ros.model.bandwidth import edge_of_error, end_over_end, inner_inertia
 from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.rig import Rig, check_two_torques
-from rsea_ros.model.transfer import Fraction
 from rsea_ros.records.record import HUGE, FloatArray, is_measured
 from rsea_ros.records.statistics import Z90
 
@@ -211,8 +208,8 @@ class ErrorFlag:
 
 def edge_of(rig: Rig, tolerance: float) -> Edge:
     """Return where |1/H - 1| reaches a tolerance, and its range over 90 % of b_s and J_m and over trains."""
-    edges = [_edge(end_over_end(other), tolerance) for other in _possible(rig)]
-    return Edge(_edge(end_over_end(rig), tolerance), min(edges), max(edges))
+    edges = [edge_of_error(end_over_end(other), tolerance) for other in _possible(rig)]
+    return Edge(edge_of_error(end_over_end(rig), tolerance), min(edges), max(edges))
 
 
 def _possible(rig: Rig) -> Iterator[Rig]:
@@ -241,21 +238,3 @@ def _cancelling_inertias(rig: Rig, j_m: tuple[float, ...]) -> list[float]:
         return []
     cancelling = -rig["chassis.inertia"] * rig[ROTOR] / spin
     return [cancelling] if min(j_m) < cancelling < max(j_m) else []
-
-
-def _edge(function: Fraction, tolerance: float) -> float:
-    """Return the lowest Hz at which |1/f - 1| is the tolerance, from roots of a polynomial; inf without."""
-    top = polynomial.polysub(function.denominator[::-1], function.numerator[::-1])
-    squares = [_square(p) for p in (top, function.numerator[::-1])]
-    roots = polynomial.polyroots(
-        polynomial.polytrim(polynomial.polysub(squares[0], tolerance**2 * squares[1]))
-    )
-    real = roots[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)].real
-    return float(real.min()) / (2.0 * math.pi) if len(real) else math.inf
-
-
-def _square(lowest_first: npt.NDArray[np.floating]) -> FloatArray:
-    """Return |p(i w)|^2 as a polynomial in w, lowest power first."""
-    values = np.asarray(lowest_first, dtype=np.float64) * 1j ** np.arange(len(lowest_first))
-    parts = [polynomial.polymul(part, part) for part in (values.real, values.imag)]
-    return np.asarray(polynomial.polyadd(*parts), dtype=np.float64)

@@ -61,12 +61,12 @@ def transfer(rig: Rig, output: Output, port: str = "gear") -> TransferFunction:
     return _transfer_function(_reduce(*_expand(rig, output, port)))
 
 
-def read(system: propagator.StateSpace, output: Output, port: str = "gear") -> tuple[FloatArray, float]:
-    """Return C and D of an output: its row on the states (q, q'), and its factor of the torque at a port."""
-    p = PORTS.index(port)
+def read(system: propagator.StateSpace, output: Output) -> tuple[FloatArray, FloatArray]:
+    """Return C, shape (2n,), on the states (q, q'), and D, shape (5,), on the torques at the ports: q'' comes
+    from the equations of motion."""
     placed, n = output.c @ system.mechanics.placement, system.mechanics.order
     c = np.concatenate([placed[0], placed[1]]) + placed[2] @ system.a[n:]
-    return c, float(output.d[p] + placed[2] @ system.b[n:, p])
+    return c, output.d + placed[2] @ system.b[n:]
 
 
 def _expand(rig: Rig, output: Output, port: str) -> tuple[FloatArray, FloatArray]:

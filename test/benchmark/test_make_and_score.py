@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rsea_ros.benchmark import entry
+from rsea_ros.benchmark import scoring
 from rsea_ros.benchmark.dataset import Answer, read_dataset
 from rsea_ros.cli.main import main
 from rsea_ros.model.rig_file import load_rig
@@ -178,7 +178,7 @@ def test_the_projects_answers_are_the_probabilities_of_its_diagnosis(made, monke
     cause = SimpleNamespace(name="backlash", probability=0.4)
     rival = SimpleNamespace(name="dead_zone", probability=0.6)
     result = SimpleNamespace(causes=[cause], alternatives=[rival])
-    monkeypatch.setattr(entry, "diagnose", lambda records, rig: result)
+    monkeypatch.setattr(scoring, "diagnose", lambda records, rig: result)
     out = made / "answers.jsonl"
     assert main(["benchmark", "run", str(made / "set"), "--out", str(out)]) == 0
     lines = [json.loads(line) for line in out.read_text().splitlines()]
@@ -193,7 +193,7 @@ def test_a_record_that_cannot_be_diagnosed_is_reported(made, monkeypatch, tmp_pa
     def refuse(record, rig):
         raise IdentificationError("too short")
 
-    monkeypatch.setitem(entry.ENTRIES, "diagnose", refuse)
+    monkeypatch.setitem(scoring.ENTRIES, "diagnose", refuse)
     assert main(["benchmark", "run", str(made / "set"), "--out", str(tmp_path / "a.jsonl")]) == 0
     assert "refused     4 records, no effect named; the first: too short" in capsys.readouterr().out
 
@@ -232,7 +232,7 @@ def test_a_stopped_run_goes_on_where_it_stopped(made, tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return Answer({"backlash": 0.5})
 
-    monkeypatch.setitem(entry.ENTRIES, "diagnose", stop_run)
+    monkeypatch.setitem(scoring.ENTRIES, "diagnose", stop_run)
     words = ["benchmark", "run", str(made / "set"), "--out", str(tmp_path / "a.jsonl")]
     assert main(words) == 130 and not (tmp_path / "a.jsonl").exists()
     with (tmp_path / "a.jsonl.partial").open("a") as partial:

@@ -43,9 +43,10 @@ def proximal_per_motor(rig):
 def by_state_space(rig, output, port):
     """Return C (s I - A)^-1 B + D at every s."""
     system = state_space(rig)
-    c, d = transfer.read(system, output, port)
-    b = system.b[:, PORTS.index(port)]
-    return np.array([c @ np.linalg.solve(s * np.eye(len(b)) - system.a, b) + d for s in S])
+    c, d = transfer.read(system, output)
+    p = PORTS.index(port)
+    b = system.b[:, p]
+    return np.array([c @ np.linalg.solve(s * np.eye(len(b)) - system.a, b) + d[p] for s in S])
 
 
 def agree(a, b, tolerance=1e-7):

@@ -11,7 +11,7 @@ from rsea_ros.model import outputs
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS
 from rsea_ros.model.transfer import frequency_response
-from rsea_ros.paper.arrangements import HZ, arrangements, limits
+from rsea_ros.paper.bands import HZ, arrangements, limits
 
 LIMITS = limits(load_rig("paper_moving_output"))
 

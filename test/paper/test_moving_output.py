@@ -6,7 +6,7 @@ import numpy as np
 
 from rsea_ros.model import outputs
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.paper.moving_output import draw
+from rsea_ros.paper.rival_models import draw
 
 
 def test_the_bench_differs_from_what_the_rig_states():

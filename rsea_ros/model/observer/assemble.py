@@ -20,11 +20,11 @@ from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.equations import PORTS, with_structure
 from rsea_ros.model.observer.filter import CLOCK, SIGMA, FilterModel, FilterState, disturbance
 from rsea_ros.model.observer.signal_noise import Noise
-from rsea_ros.model.outputs import Output
-from rsea_ros.model.propagator import StateSpace, state_space
+from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls
+from rsea_ros.model.transfer import read
 from rsea_ros.records.record import FloatArray
 
 _GEAR_PLACE = PORTS.index("gear")
@@ -60,20 +60,13 @@ def linear_model(rig: Rig) -> LinearModel:
     a, block = np.zeros((size, size)), np.zeros((n + len(PORTS), n + len(PORTS)))
     a[:n, :n], a[:n, n] = falling.a, falling.b[:, _GEAR_PLACE]
     block[:n, :n], block[:n, n:] = system.a, system.b
-    rows = [_rows(system, output) for output in (outputs.distal(rig), outputs.proximal(rig))]
+    rows = [read(system, output) for output in (outputs.distal(rig), outputs.proximal(rig))]
     torques = np.array([d for _, d in rows])
     estimated = np.zeros((2, size))
     estimated[:, :n], estimated[:, n] = [c for c, _ in rows], torques[:, _GEAR_PLACE]
     half = n // 2
     start = np.array([ANGLE] * half + [SPEED] * half + [0.0] + [ANGLE] * zero)
     return LinearModel(a, block, estimated, torques, start)
-
-
-def _rows(system: StateSpace, output: Output) -> tuple[FloatArray, FloatArray]:
-    """Return C, shape (n,), and D, shape (5,), of an output: q'' comes from the equations of motion."""
-    placed, half = output.c @ system.mechanics.placement, system.mechanics.order
-    c = np.concatenate([placed[0], placed[1]]) + placed[2] @ system.a[half:]
-    return c, output.d + placed[2] @ system.b[half:]
 
 
 _GEAR = int(st.Port.GEAR)

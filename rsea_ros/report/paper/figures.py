@@ -16,8 +16,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
-from rsea_ros.paper.moving_output import MovingOutput
-from rsea_ros.paper.rival_models import largest_gap, readings, resonance_hz
+from rsea_ros.paper.rival_models import MovingOutput, largest_gap, readings, resonance_hz
 from rsea_ros.records.record import ComplexArray, FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.design.surface import Point, bandwidth_contours, slices

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from html import escape
 
-from rsea_ros.paper.arrangements import Arrangement, Limit
-from rsea_ros.paper.bands import TOLERANCES, Bands
+from rsea_ros.paper.bands import TOLERANCES, Arrangement, Bands, Limit
 from rsea_ros.paper.claims import TABLE_2, PaperClaim, PaperFinding
-from rsea_ros.paper.moving_output import MovingOutput
+from rsea_ros.paper.rival_models import MovingOutput
 from rsea_ros.report import words
 from rsea_ros.report.page import Html, equation, listed, named, paragraph, section, table
 
