@@ -26,8 +26,8 @@ from threadpoolctl import threadpool_limits
 from bench.health_runs import FAULTS, draw_bench, faulty, monitor_of, pieces, watch, work
 from bench.sections import choose, parser_of
 from rsea_ros.cli._processes import start, stop
-from rsea_ros.health.hypotheses import events_of
 from rsea_ros.health.recursive_estimates import Cusum, threshold
+from rsea_ros.model.observer.log import events_of
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel

@@ -15,9 +15,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 from independent.bench import Bench, record_command
 
 from rsea_ros.health.health_finding import HealthFinding, WatchSettings
-from rsea_ros.health.hypotheses import events_of
 from rsea_ros.health.monitor import Monitor
 from rsea_ros.model.observer import noise_of
+from rsea_ros.model.observer.log import events_of
 from rsea_ros.model.rig import EffectSetting, Quantity, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, FloatArray, Record

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
@@ -218,10 +218,6 @@ def slow(command: FloatArray, most: float, *, is_stepped: bool) -> FloatArray:
     return ramp_ends(smooth, width)
 
 
-def _multisine(shape: Shape, n: int, rate: float) -> FloatArray:
-    return _flat_multisine(n, rate, shape.low, _top(shape, rate), shape.tilt)
-
-
 @lru_cache(64)
 def _flat_multisine(n: int, rate: float, low: float, top: float, tilt: float) -> FloatArray:
     """Return a multisine of low crest with lines n / rate apart, its peak 1, shape (n,)."""
@@ -248,14 +244,6 @@ def _chirp(shape: Shape, n: int, rate: float) -> FloatArray:
     return chirp(settings)[:n]
 
 
-def _steps(shape: Shape, n: int, rate: float) -> FloatArray:
-    return _levels(_STEPS, shape, n, rate)
-
-
-def _holds(shape: Shape, n: int, rate: float) -> FloatArray:
-    return _levels(_HOLDS, shape, n, rate)
-
-
 def _levels(levels: FloatArray, shape: Shape, n: int, rate: float) -> FloatArray:
     which = (np.arange(n) / rate / shape.hold).astype(np.int64)
     result: FloatArray = levels[which % len(levels)]
@@ -267,7 +255,12 @@ def _top(shape: Shape, rate: float) -> float:
 
 
 KINDS: Mapping[Kind, Callable[[Shape, int, float], FloatArray]] = MappingProxyType(
-    {"multisine": _multisine, "chirp": _chirp, "steps": _steps, "holds": _holds}
+    {
+        "multisine": lambda s, n, rate: _flat_multisine(n, rate, s.low, _top(s, rate), s.tilt),
+        "chirp": _chirp,
+        "steps": partial(_levels, _STEPS),
+        "holds": partial(_levels, _HOLDS),
+    }
 )
 """Each makes the moving part, its peak 1, from shape, number of samples and rate."""
 FEWEST: Mapping[Kind, int] = MappingProxyType({"multisine": 4, "chirp": 10, "steps": 4, "holds": 4})

@@ -85,7 +85,8 @@ def chain_of(rig: Rig) -> Chain:
     if rig.train == "lumped":
         raise RigError(f"rig {rig.name}: the lumped train cannot be exported, expected a real train")
     rig = with_structure(rig.with_effects(*(one for one in rig.effects if one.name == "gravity_error")))
-    spring = _beside_gear(rig) if rig.rigid_spring else (rig["spring.damping"], rig["spring.stiffness"])
+    beside_gear = "spring_end" if rig.rigid_spring else "spring"
+    spring = rig[f"{beside_gear}.damping"], rig[f"{beside_gear}.stiffness"]
     b_m = rig["rotor.reflected_damping"]
     moves = rig.end_is_free("housing_end"), rig.end_is_free("spring_end")
     chassis, housing = _chassis(rig), _end(rig, "housing_end", "housing")
@@ -99,7 +100,8 @@ def chain_of(rig: Rig) -> Chain:
     elif moves[1]:
         base = "housing"
         links += [housing, chassis]
-        joints = [_to_world(rig, "housing_end", "housing"), Joint("gear", base, "chassis", b_m)]
+        held = rig["housing_end.damping"], rig["housing_end.stiffness"]
+        joints = [Joint("housing_end", WORLD, base, *held), Joint("gear", base, "chassis", b_m)]
     else:
         base = "housing"
         links += [chassis, housing]
@@ -121,11 +123,6 @@ def check_rotary(rig: Rig) -> None:
         raise RigError(f"rig {rig.name}: moves along a line, expected a rotary rig for this target")
 
 
-def _beside_gear(rig: Rig) -> tuple[float, float]:
-    """Return damping and stiffness that a rigid spring's end has to the world, the gear's other side."""
-    return rig["spring_end.damping"], rig["spring_end.stiffness"]
-
-
 def _chassis(rig: Rig) -> Link:
     """Return the chassis, with the distal side where the spring is rigid."""
     inertia, load = rig["chassis.inertia"], None
@@ -143,10 +140,6 @@ def _end(rig: Rig, end: str, name: str) -> Link:
     fixed_to_it = rig["housing.inertia"] if end == "housing_end" else 0.0
     inertia = rig[f"{end}.inertia"] + fixed_to_it
     return Link(name, inertia, rig[f"{end}.gravity"], rig[f"{end}.gravity_angle"])
-
-
-def _to_world(rig: Rig, end: str, name: str) -> Joint:
-    return Joint(end, WORLD, name, rig[f"{end}.damping"], rig[f"{end}.stiffness"])
 
 
 def _omitted_elements(rig: Rig) -> dict[str, str]:

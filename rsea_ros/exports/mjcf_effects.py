@@ -106,10 +106,6 @@ def _stribeck_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
     return _lugre(root, "stribeck", stiffness, p, damping) + ", bristles in the place of creep"
 
 
-def _lugre_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
-    return _lugre(root, "lugre", p["bristle_stiffness"], p, p["bristle_damping"])
-
-
 def _lugre(root: xml.Element, name: str, stiffness: float, p: Parameters, damping: float) -> str:
     static = p["coulomb_torque"] + p["stribeck_torque"]
     law = (stiffness, damping, p["coulomb_torque"], static, p["stribeck_velocity"])
@@ -131,14 +127,6 @@ def _quadratic_drag(root: xml.Element, rig: Rig, p: Parameters) -> str:
     losses = tendon(root, "motor")
     losses.set("damping", f"{losses.get('damping', '0')} {p['coefficient']!r} 0")
     return f"tendon damping polynomial, {p['coefficient']:g} v|v|"
-
-
-def _nonlinear_spring(root: xml.Element, rig: Rig, p: Parameters) -> str:
-    return _polynomial(root, rig, 2, p["cubic"], "x^3")
-
-
-def _lopsided_spring(root: xml.Element, rig: Rig, p: Parameters) -> str:
-    return _polynomial(root, rig, 1, p["quadratic"], "x^2")
 
 
 def _polynomial(root: xml.Element, rig: Rig, at: int, factor: float, power: str) -> str:
@@ -216,11 +204,13 @@ EFFECTS: Mapping[str, Effect] = {
     "torque_constant_error": _torque_constant_error,
     "coulomb_friction": _coulomb_friction,
     "stribeck_friction": _stribeck_friction,
-    "lugre_friction": _lugre_friction,
+    "lugre_friction": lambda root, rig, p: _lugre(
+        root, "lugre", p["bristle_stiffness"], p, p["bristle_damping"]
+    ),
     "asymmetric_friction": _asymmetric_friction,
     "quadratic_drag": _quadratic_drag,
-    "nonlinear_spring": _nonlinear_spring,
-    "lopsided_spring": _lopsided_spring,
+    "nonlinear_spring": lambda root, rig, p: _polynomial(root, rig, 2, p["cubic"], "x^3"),
+    "lopsided_spring": lambda root, rig, p: _polynomial(root, rig, 1, p["quadratic"], "x^2"),
     "hard_stop": _hard_stop,
     "spring_hysteresis": _spring_hysteresis,
     "torque_ripple": _torque_ripple,

@@ -144,7 +144,8 @@ def work(task: Task) -> TaskOutcome:
         except RseaError as error:
             row |= {"outcome": "refused", "reason": reason(str(error))}
         except OutOfTime:
-            row |= {"outcome": "quarantined", "reason": _too_slow(task.time_limit)}
+            slow = f"took more than {task.time_limit / 60.0:g} min: a larger --time-limit, then --again"
+            row |= {"outcome": "quarantined", "reason": slow}
         except Exception as error:
             row |= {"outcome": "quarantined", "reason": reason(_fault(error))}
     if _now(task.bag) != task.bag:
@@ -155,10 +156,6 @@ def work(task: Task) -> TaskOutcome:
 def reason(text: str) -> str:
     """Return the text of an error as one line of a row."""
     return brief(" ".join(text.split()), _LONGEST)
-
-
-def _too_slow(limit: float) -> str:
-    return f"took more than {limit / 60.0:g} min: a larger --time-limit, then --again"
 
 
 def _now(bag: Bag) -> Bag | None:

@@ -22,7 +22,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.observer.log import COMMAND, FT, STATE, BatchObserver
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import EffectSetting, Rig
-from rsea_ros.records.record import FloatArray, IntArray, Record
+from rsea_ros.records.record import FloatArray, IntArray
 from rsea_ros.records.statistics import Z95
 
 FILTER_SETTLING, LENGTH = 0.25, 1.0
@@ -102,25 +102,6 @@ class Cutter:
         before = np.flatnonzero(self._kind[:first] == COMMAND)[-1:]
         keep = int(before[0]) if len(before) else first
         self._t, self._kind, self._values = self._t[keep:], self._kind[keep:], self._values[keep:]
-
-
-def events_of(record: Record) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Return the events of a record, sorted: t, kind and values as a Look has them."""
-    t, kind, values = [], [], []
-    for name, number in (("position", STATE), ("ft", FT), ("command", COMMAND)):
-        if name not in record:
-            continue
-        channel = record[name]
-        both = np.full((len(channel), 2), np.nan)
-        both[:, 0] = channel.y
-        if name == "position" and "motor_torque" in record and len(record["motor_torque"]) == len(channel):
-            both[:, 1] = record["motor_torque"].y
-        t.append(channel.t)
-        kind.append(np.full(len(channel), number))
-        values.append(both)
-    whole, kinds = np.concatenate(t), np.concatenate(kind)
-    order = np.lexsort((kinds, whole))
-    return whole[order], kinds[order], np.concatenate(values)[order]
 
 
 FACTOR = "friction.factor"

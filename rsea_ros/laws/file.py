@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -107,13 +106,6 @@ def effect_from(source: str, name: str) -> Effect:
         return plugin_constant("law", str(path), "EFFECT", Effect)
 
 
-@contextmanager
-def register(effects: Sequence[Effect]) -> Iterator[None]:
-    """Have laws known to the simulation within the block."""
-    with lend(*effects):
-        yield
-
-
 def with_laws(
     problem: Problem, laws: Sequence[tuple[Effect, Mapping[str, float]]], held: frozenset[str] = frozenset()
 ) -> Problem:
@@ -161,10 +153,11 @@ class Draft:
     law: Law
     effect: Effect
 
-    @staticmethod
-    def source(law: Law) -> str:
-        """Return the text of a draft's file."""
-        return source_of(law, Claims("velocity", "neither", None), _NO_PROVENANCE)
+
+def draft_of(law: Law) -> Draft:
+    """Return a law with the effect of its file, which claims nothing yet."""
+    source = source_of(law, Claims("velocity", "neither", None), _NO_PROVENANCE)
+    return Draft(law, effect_from(source, law.name))
 
 
 def finish_laws(
@@ -189,7 +182,7 @@ def finish_laws(
         law = draft.law if draft.law.is_learnt else draft.law.with_parameters(values, intervals)
         shown = torque_points(problem, refined, law, values)
         whole = len(law.parts) == len(draft.law.parts)
-        effect = draft.effect if whole else effect_from(Draft.source(law), law.name)
+        effect = draft.effect if whole else draft_of(law).effect
         with lend(effect):
             claims = claims_of(law, effect, rig, cases[0])
         written.append(

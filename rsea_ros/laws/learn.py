@@ -12,6 +12,7 @@ from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.score import gain_of as gain_of_blocks
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.solver import one_blas_thread
 from rsea_ros.identification.unknowns import apply
@@ -29,7 +30,7 @@ from rsea_ros.laws.choice import (
     summarize_models,
 )
 from rsea_ros.laws.effect_source import LawProvenance
-from rsea_ros.laws.file import Draft, Refined, effect_from, finish_laws, refine, register
+from rsea_ros.laws.file import Draft, Refined, draft_of, finish_laws, refine
 from rsea_ros.laws.law import FittedTerm, Law, LawResult, LearntCurve, WrittenLaw, join_names, ranges_of
 from rsea_ros.laws.sparse_regression import SELECTION, Dependence, Gram, SparseLaw, dependences
 from rsea_ros.laws.variables import CaseModel
@@ -67,14 +68,10 @@ def _again(
     """Fit from a fit on, with some parameters held: coefficients at zero, shapes where they are."""
     nearer = replace(base.solution, theta=refined.solution.theta[: len(base.solution.theta)])
     starts = [
-        (e, {n: 0.0 if f"{e.name}.{n}" in held and _is_size(d, n) else v for n, v in values.items()})
+        (e, values | {n: 0.0 for n, _ in d.law.names if f"{e.name}.{n}" in held})
         for d, (e, values) in zip(drafts, _starts(drafts, refined), strict=True)
     ]
     return refine(nearer, base.cases, weights, starts, held)
-
-
-def _is_size(draft: Draft, name: str) -> bool:
-    return name in {c for c, _ in draft.law.names}
 
 
 def _least(drafts: Sequence[Draft], refined: Refined, held: frozenset[str]) -> frozenset[str] | None:
@@ -231,8 +228,8 @@ def _result(
 ) -> LawResult:  # fmt: skip
     base = search.base
     laws = _laws(search, choice)
-    drafts = [Draft(law, effect_from(Draft.source(law), law.name)) for law in laws]
-    with register([d.effect for d in drafts]):
+    drafts = [draft_of(law) for law in laws]
+    with lend(*(d.effect for d in drafts)):
         refined = refined_laws(base, drafts) if drafts else None
         if refined is None or not is_better(*gain_on_tests(base, refined)):
             return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,

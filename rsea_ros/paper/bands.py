@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from control import TransferFunction
 
 from rsea_ros.design.spring_design import band_range
 from rsea_ros.model import outputs
@@ -78,14 +77,10 @@ def bands(rig: Rig, motor_torque: float, deflection: float = math.radians(5.0)) 
         eq_7=pure_torque_bandwidth(k_s, j_sc),
         eq_7_spin=edge,
         spin_range=band_range(k_s, j_sc, inner - j_sc, spread),
-        rows=tuple(BandRow(what, _edges(function)) for what, function in functions.items()),
+        rows=tuple(BandRow(n, tuple(flat_band(f, *t) for t in TOLERANCES)) for n, f in functions.items()),
         spring_limit=0.5 * k_s * math.sin(2.0 * deflection),
         motor_limit={f: motor_torque * _gain(rig, f) for f in (1.0, 5.0, 10.0, edge)},
     )
-
-
-def _edges(function: TransferFunction) -> tuple[float, ...]:
-    return tuple(flat_band(function, db, deg) for db, deg in TOLERANCES)
 
 
 def _gain(rig: Rig, hz: float) -> float:
@@ -142,7 +137,8 @@ def limits(rig: Rig) -> tuple[Limit, ...]:
         _limit("A large ratio at the same J_m: T_p/T_m becomes Eq. (5), star", "N",
                (5e1, 5e3, 5e5), lambda v: _off_eq_5(star.with_values({"gear.ratio": v}))),
         _limit("A large ratio: star and planetary train are one, housing free", "N",
-               (5e1, 5e3, 5e5), lambda v: _trains_apart(rig.with_values({"gear.ratio": v}))),
+               (5e1, 5e3, 5e5), lambda v: _off(*(replace(rig, train=train).with_values({"gear.ratio": v})
+                                                for train in ("star", "planetary")))),
         _limit("A stiff spring: T_d/T_p becomes 1", "K_s, N·m/rad",
                (1e6, 1e8, 1e10), lambda v: _end_to_end_off(clamped.with_values({"spring.stiffness": v}))),
     )  # fmt: skip
@@ -171,10 +167,6 @@ def _off_eq_5(rig: Rig) -> float:
         rig["spring.stiffness"], *rotor, ratio, rig["chassis.inertia"], rig["spring.damping"]
     )
     return _worst(_proximal(rig), eq_5(2j * np.pi * HZ))
-
-
-def _trains_apart(rig: Rig) -> float:
-    return _worst(_distal(replace(rig, train="star")), _distal(replace(rig, train="planetary")))
 
 
 def _end_to_end_off(rig: Rig) -> float:

@@ -38,7 +38,7 @@ class Evaluation:
         if self.state != "running":
             return
         status = self.process.poll()
-        self.words = _first_line(self.log) if status == 0 else _last_line(self.log)
+        self.words = _line(self.log, first=status == 0)
         if status is not None:
             self.state = "done" if status == 0 and (self.folder / REPORT).is_file() else "failed"
             self.log.close()
@@ -125,7 +125,7 @@ def _see_to(recording: Recording) -> None:
     if status is not None:
         recording.process = None
         complete = status == 0 and recording.bag.exists()
-        recording.words = "" if complete else _last_line(recording.log) or "failed"
+        recording.words = "" if complete else _line(recording.log) or "failed"
         recording.log.close()
 
 
@@ -141,17 +141,11 @@ def _python(words: Sequence[str]) -> tuple[subprocess.Popen[bytes], IO[bytes]]:
     return start([sys.executable, *words], stdout=log, stderr=subprocess.STDOUT), log
 
 
-def _lines(log: IO[bytes], first: bool) -> Sequence[str]:
+def _line(log: IO[bytes], *, first: bool = False) -> str:
+    """Return the last line with words, or the first."""
     log.seek(0, 2)
     size = log.tell()
     log.seek(0 if first else max(0, size - _TAIL))
     text = log.read(_TAIL).decode(errors="replace")
-    return [line.strip() for line in text.splitlines() if line.strip()]
-
-
-def _first_line(log: IO[bytes]) -> str:
-    return next(iter(_lines(log, first=True)), "")
-
-
-def _last_line(log: IO[bytes]) -> str:
-    return next(iter(reversed(_lines(log, first=False))), "")
+    lines = [line.strip() for line in text.splitlines() if line.strip()] or [""]
+    return lines[0 if first else -1]

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rsea_ros.health.hypotheses import Bank, Cutter, events_of, hypotheses_of
+from rsea_ros.health.hypotheses import Bank, Cutter, hypotheses_of
 from rsea_ros.health.recursive_estimates import Estimates
 from rsea_ros.model.observer import Observer, noise_of
-from rsea_ros.model.observer.log import BatchObserver
+from rsea_ros.model.observer.log import BatchObserver, events_of
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel

@@ -6,10 +6,11 @@ from independent.bench import Bench, record_command
 
 from rsea_ros.errors import RigError
 from rsea_ros.health.health_finding import WatchSettings
-from rsea_ros.health.hypotheses import Bank, Cutter, events_of
+from rsea_ros.health.hypotheses import Bank, Cutter
 from rsea_ros.health.monitor import Monitor, learn
 from rsea_ros.health.recursive_estimates import scatter_of
 from rsea_ros.model.observer import noise_of
+from rsea_ros.model.observer.log import events_of
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record

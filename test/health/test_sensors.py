@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from rsea_ros.health.health_finding import Sensors, sensor_findings
-from rsea_ros.health.hypotheses import events_of
 from rsea_ros.health.monitor import Monitor
 from rsea_ros.model.observer import noise_of
+from rsea_ros.model.observer.log import events_of
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel

@@ -4,9 +4,9 @@ import numpy as np
 from independent.bench import Bench, record_command
 
 from rsea_ros.health.changes import FINALISTS, Fitter
-from rsea_ros.health.hypotheses import Cutter, events_of, hypotheses_of
+from rsea_ros.health.hypotheses import Cutter, hypotheses_of
 from rsea_ros.model.observer import noise_of
-from rsea_ros.model.observer.log import BatchObserver
+from rsea_ros.model.observer.log import BatchObserver, events_of
 from rsea_ros.model.rig_file import load_rig
 
 RATE = 280.0

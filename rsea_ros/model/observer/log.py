@@ -33,7 +33,7 @@ from rsea_ros.model.observer.filter import (
 )
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray, Record
 
 STATE, FT, COMMAND = range(3)
 """Kinds: position and motor torque; ft; command."""
@@ -171,6 +171,25 @@ def _run(model, state, t, kind, values, out):  # type: ignore[no-untyped-def]
             out[k, 0] = math.copysign(math.sqrt(state.score[3 * channel]), state.score[3 * channel + 2])
         if state.score[7] > 0.0:
             out[k, 1] = math.copysign(math.sqrt(state.score[6]), state.score[8])
+
+
+def events_of(record: Record) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Return the events of a record in order: t (s, shape (n,)), kind, and values (n, 2): position with the
+    motor torque of the same stamp, ft, or command; nan where there is none."""
+    t, kind, values = [np.empty(0)], [np.empty(0, np.int64)], [np.empty((0, 2))]
+    torque: dict[float, float] = {}
+    if "motor_torque" in record:
+        torque = dict(zip(record["motor_torque"].t.tolist(), record["motor_torque"].y.tolist(), strict=True))
+    for name, number in (("position", STATE), ("ft", FT), ("command", COMMAND)):
+        if name in record:
+            at = record[name].t
+            beside = [torque.get(s, math.nan) if number == STATE else math.nan for s in at.tolist()]
+            t.append(at)
+            kind.append(np.full(len(at), number))
+            values.append(np.column_stack([record[name].y, beside]))
+    whole, kinds = np.concatenate(t), np.concatenate(kind)
+    order = np.lexsort((kinds, whole))
+    return whole[order], kinds[order], np.concatenate(values)[order]
 
 
 class BatchObserver:

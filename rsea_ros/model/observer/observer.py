@@ -19,7 +19,18 @@ from numba.extending import intrinsic
 from rsea_ros.compiler import njit
 from rsea_ros.model.observer.assemble import assemble, without_delay
 from rsea_ros.model.observer.filter import SIGMA, FilterModel, FilterState, inner
-from rsea_ros.model.observer.log import COMMAND, FT, LATE, NONE, REFUSED, STATE, Log, empty_log, take_in
+from rsea_ros.model.observer.log import (
+    COMMAND,
+    FT,
+    LATE,
+    NONE,
+    REFUSED,
+    STATE,
+    Log,
+    empty_log,
+    events_of,
+    take_in,
+)
 from rsea_ros.model.observer.signal_noise import Consistency, Noise, consistency, noise_of
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
@@ -238,27 +249,13 @@ def observe(observer: Observer, record: Record) -> tuple[FloatArray, FloatArray]
     Stamps: those of the F/T samples, or of the positions if there is no sensor, s, shape (n,). Estimates:
     N m, shape (n, 6), in the order of Estimate.
     """
-    wanted, t, rows = ("ft" if "ft" in record else "position"), [], []
-    for stamp, channel, a, b in _events(record):
-        if channel == "command":
+    wanted, t, rows = (FT if "ft" in record else STATE), [], []
+    for stamp, kind, (a, b) in zip(*(each.tolist() for each in events_of(record)), strict=True):
+        if kind == COMMAND:
             observer.command(stamp, a)
             continue
-        estimate = observer.state(stamp, a, b) if channel == "position" else observer.ft(stamp, a)
-        if channel == wanted and estimate is not None:
+        estimate = observer.state(stamp, a, b) if kind == STATE else observer.ft(stamp, a)
+        if kind == wanted and estimate is not None:
             t.append(stamp)
             rows.append(estimate)
     return np.array(t), np.array(rows)
-
-
-def _events(record: Record) -> Iterator[tuple[float, str, float, float]]:
-    """Yield the samples of a record by stamp, position with the motor torque of the same stamp."""
-    events: list[tuple[float, int, str, float, float]] = []
-    torque = {}
-    if "motor_torque" in record:
-        torque = dict(zip(record["motor_torque"].t.tolist(), record["motor_torque"].y.tolist(), strict=True))
-    for order, name in enumerate(("position", "ft", "command")):
-        if name in record:
-            pairs = zip(record[name].t.tolist(), record[name].y.tolist(), strict=True)
-            events += [(t, order, name, y, torque.get(t, math.nan)) for t, y in pairs]
-    events.sort(key=lambda event: event[:2])
-    yield from ((t, name, a, b) for t, _, name, a, b in events)
