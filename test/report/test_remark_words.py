@@ -44,19 +44,6 @@ def test_every_code_has_its_words():
     assert {remark.code for remark in SAID} == set(get_args(Code))
 
 
-def test_the_suggested_measurements_differ_for_loop_gains_and_springs():
-    spring, loop = remark_sentences([
-        Remark("only_ratios", ("spring.stiffness", "rotor.reflected_inertia")),
-        Remark("only_ratios", ("controller.k_p", "rotor.reflected_inertia")),
-    ])  # fmt: skip
-    assert "A measured spring stiffness" in spring and "a gain known from the firmware" in loop
-
-
-def test_effects_are_written_as_proper_names():
-    (sentence,) = remark_sentences([Remark("also_in_model", ("coulomb_friction",))])
-    assert "has Coulomb friction:" in sentence
-
-
 DISORDER = [
     Fault("out_of_order", name, 0.05, "first at 0.4 s, sorted", 84, "samples")
     for name in ("position", "velocity", "motor_torque")

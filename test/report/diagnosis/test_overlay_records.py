@@ -52,15 +52,6 @@ def test_overlay_reads_back_as_the_arrays_with_the_stamps_of_the_record(diagnose
     assert np.array_equal([m.effort[0] for m in command], diagnosed.record["command"].y)
 
 
-def test_the_simulation_after_is_nearer_to_the_measurement(diagnosed) -> None:
-    read = messages(diagnosed.out / "overlay.mcap")
-    measured, before, after = (
-        np.array([m.wrench.torque.z for m in read[f"/rsea{ns}/ft geometry_msgs/msg/WrenchStamped"]])
-        for ns in ("", "/simulated_before", "/simulated_after")
-    )
-    assert np.std(measured - after) < 0.1 * np.std(measured - before)
-
-
 def plottable(diagnosed) -> set[str]:
     """Return every series of the overlay as PlotJuggler names it."""
     series = set()

@@ -1,18 +1,25 @@
-"""The page of a diagnosis for every verdict; files are complete or absent."""
+"""Pages and files of a diagnosis for every verdict."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment
-from rsea_ros.errors import BagError
-from rsea_ros.records.record import Fault
-from rsea_ros.report.diagnosis.files import write_diagnosis
+from rsea_ros import simulate
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.result import Cause, CauseParameter, Diagnosis, Experiment
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.records.record import Channel, Fault
+from rsea_ros.records.statistics import Z95
+from rsea_ros.report.diagnosis.files import diagnosis_json
 from rsea_ros.report.diagnosis.page import diagnosis_report
+from rsea_ros.report.result_files import DIAGNOSIS
 
 HEADINGS = (
     "explains the misfit",
@@ -34,7 +41,6 @@ def test_browser_draws_the_figures_without_an_error(
         assert heading in document
     assert "T = -torque · sign(ω)" in document
     assert "bench &amp; &lt;friends&gt;" in document and "<friends>" not in document
-
 
 VERDICTS: dict[str, Callable[[Diagnosis], Diagnosis]] = {
     "nothing_wrong": lambda d: replace(
@@ -70,13 +76,62 @@ def test_every_verdict_makes_a_page(diagnosed, name: str) -> None:
     assert ("do not distinguish it from hard stop or F/T sensor lag" in head) == (name == "partly_explained")
 
 
-def test_a_failure_leaves_the_old_files_and_nothing_half_written(diagnosed, tmp_path: Path) -> None:
-    (tmp_path / "report.html").write_text("old")
+def test_the_page_of_a_rigid_drive_whose_log_lost_samples_is_written():
+    """The search took minutes, then the page died: samples of the log were counted on the grid."""
+    rng, rig = np.random.default_rng(3), load_rig("bare_drive")
+    run = simulate(rig, np.convolve(2.0 * rng.standard_normal(1200), np.ones(8) / 3.0, "same"), rate=100.0)
+    kept = np.sort(rng.choice(1199, 1080, replace=False))
+    lossy = run.with_channels(**{n: Channel(c.t[kept], c.y[kept]) for n, c in run.channels.items()})
+    diagnosis = diagnose([lossy], rig)
+    assert {f.kind for f in diagnosis.faults} == {"dropped_samples"}
+    assert diagnosis.before[0].t.shape == diagnosis.masked["motor_torque"].shape
+    assert "motor torque" in diagnosis_report(diagnosis)
 
-    def no_disk(records: object, path: Path) -> None:
-        raise BagError(f"{path}: cannot be written: no space left on device")
 
-    with pytest.raises(BagError, match="no space left"):
-        write_diagnosis(diagnosed.diagnosis, diagnosed.record, tmp_path, no_disk)
-    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
-    assert (tmp_path / "report.html").read_text() == "old"
+def strict(text: str) -> Any:
+    """Return parsed JSON; NaN and Infinity, which JSON has not, are errors."""
+
+    def refuse(constant: str) -> None:
+        raise ValueError(constant)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_all_files_are_written_and_nothing_else(diagnosed) -> None:
+    assert sorted(p.name for p in diagnosed.out.iterdir()) == sorted(DIAGNOSIS)
+    assert (diagnosed.out / "report.html").stat().st_size < 8_000_000
+
+
+def test_json_separates_the_noise_from_the_error_of_the_simulation(diagnosed) -> None:
+    """The simulation's 0.25 % dominated nearly every interval, and neither file nor page said so."""
+    (cause,) = strict((diagnosed.out / "diagnosis.json").read_text(encoding="utf-8"))["causes"]
+    torque = cause["parameters"]["torque"]
+    noise = torque["statistical_ci95"][1] - torque["value"]
+    assert 0.0 < noise < torque["ci95"][1] - torque["value"]
+    assert np.hypot(noise, Z95 * torque["model_sd"]) == pytest.approx(torque["ci95"][1] - torque["value"])
+    assert "of which the simulation ±" in (diagnosed.out / "report.html").read_text(encoding="utf-8")
+
+
+def test_not_a_number_is_written_as_null(diagnosed) -> None:
+    unbounded = replace(
+        diagnosed.diagnosis.causes[0],
+        parameters={"torque": CauseParameter(3.0, "N m", (-np.inf, np.inf))},
+        gain_holdout=np.nan,
+    )
+    odd = replace(
+        diagnosed.diagnosis,
+        causes=(unbounded,),
+        noise_rms={"ft": np.nan},
+        faults=(Fault("clock_jump", "ft", np.nan, "3.7 s"),),
+        next_experiment=Experiment(
+            "separates", "a", ("b",), excitation={"kind": "steps", "amplitude": np.inf}
+        ),
+    )
+    document = strict(json.dumps(diagnosis_json(odd), allow_nan=False))
+    assert document["causes"][0]["parameters"]["torque"]["ci95"] == [None, None]
+    assert document["causes"][0]["gain"]["holdout"] is None
+    assert document["baseline"]["noise_rms"]["ft"] is None
+    assert document["data"]["faults"][0] == {
+        "kind": "clock_jump", "channel": "ft", "share": None, "detail": "3.7 s"
+    }  # fmt: skip
+    assert document["next_experiment"]["excitation"] == {"kind": "steps", "amplitude": None}

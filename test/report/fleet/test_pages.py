@@ -1,14 +1,18 @@
-"""The pages of a fleet: their first sentence, their links, and that a browser draws them."""
+"""The pages of a fleet: sentences, links, dates and lasting causes."""
 
 from __future__ import annotations
 
+import json
 import re
 
+import numpy as np
 import pytest
+from fleet_histories import cause, history, recordings
+from worn_fleet import WORN
 
-from rsea_ros.errors import OutputError
 from rsea_ros.report.fleet.links import page_names
 from rsea_ros.report.fleet.page import write_fleet_report
+from rsea_ros.report.fleet.words import doubt_of_date, percent
 from rsea_ros.trends import alarms
 
 
@@ -35,26 +39,42 @@ def test_foreign_names_are_escaped(pages):
     assert not any("<left>" in text for text in pages.values())
 
 
-def test_pages_stay_small_and_ask_for_nothing(pages):
-    for text in pages.values():
-        assert len(text) < 120_000
-        assert not re.search(r'(src|href)="(https?:)?//', text)
-
-
-def test_no_page_is_written_over_what_is_there(tables, tmp_path):
-    (tmp_path / "index.html").write_text("mine")
-    with pytest.raises(OutputError):
-        write_fleet_report(*tables, tmp_path)
-    assert [p.name for p in tmp_path.iterdir()] == ["index.html"]
-
-
-def test_a_browser_draws_a_joint_without_an_error(tables, opened, tmp_path):
-    write_fleet_report(*tables, tmp_path / "out")
-    document, log = opened((tmp_path / "out" / "joint-hip.html").read_text(encoding="utf-8"), tmp_path)
-    assert "CONSOLE" not in log
-    assert document.count('data-drawn="yes"') == 2
-
-
 def test_joints_whose_names_become_alike_have_pages_of_their_own():
     names = page_names(("a b", "a-b", "A b"))
     assert len({n.lower() for n in names.values()}) == 3
+
+
+@pytest.fixture(scope="module")
+def always(tmp_path_factory):
+    """The pages of a fleet of which one joint has Coulomb friction from its first day on, growing later."""
+    joints = ("hip", "knee", "ankle")
+    made = history(
+        np.random.default_rng(1), joints=joints, days=40, each=1, sd=1e-6, day_sd=1e-6,
+        parameter="rotor.reflected_damping",
+    )  # fmt: skip
+    size = {d: 0.2 + 0.02 * max(0, d - 20) for d in range(40)}
+    names = recordings(
+        joints, 40,
+        causes=lambda j, d: [cause("coulomb_friction", size[d], "torque", "N m")] if j == "hip" else [],
+    )  # fmt: skip
+    index = write_fleet_report(made, names, tmp_path_factory.mktemp("always") / "out")
+    return {p.name: p.read_text(encoding="utf-8") for p in index.parent.iterdir()}
+
+
+def test_a_picture_resolves_what_it_shows(always):
+    """Means within 10^-6 of each other were drawn as two heights: five digits were kept."""
+    found = re.search(r'id="figure-\d+-data">(.*?)</script>', always["joint-knee.html"])
+    weeks = next(trace for trace in json.loads(found[1])["data"] if trace.get("name") == "day")
+    assert len(set(weeks["y"])) > 30
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(-0.1512, "−15 %"), (0.021, "+2.1 %"), (-0.00034, "−0.03 %"), (1e-9, "0 %")]
+)
+def test_changes_are_written_as_people_write_them(share, text):
+    assert percent(share) == text
+
+
+def test_the_doubt_of_a_date_says_month_and_year_once(tables):
+    (wear,) = (a for a in alarms(*tables) if a.joint == WORN)
+    assert re.fullmatch(r"\d+ (\w{3} )?to \d+ \w{3} 2025", doubt_of_date(wear))

@@ -1,19 +1,20 @@
-"""The report of an identification as a file and in a browser, and its table of parameters."""
+"""The report of an identification as files and in a browser, and its table of parameters."""
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
-from dataclasses import replace
-from html import escape
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rsea_ros.identification.result import Identification, ParameterEstimate
+from rsea_ros.report import words
+from rsea_ros.report.identification import page as results
 from rsea_ros.report.identification.page import identification_report, parameter_table
-from rsea_ros.report.identification.words import doubt_sentences, next_command, value_text, verdict_sentence
+from rsea_ros.report.identification.words import identification_json, value_text
 
 Browser = Callable[[str, Path], tuple[str, str]]
 LARGEST = 1_500_000
@@ -49,29 +50,6 @@ def test_report_needs_no_network_and_stays_small(identification: Identification)
     assert len(html.encode()) <= LARGEST
 
 
-def test_foreign_text_is_escaped(identification: Identification) -> None:
-    html = identification_report(identification)
-    assert "bench &amp; &lt;friends&gt;" in html
-    assert "<friends>" not in html
-
-
-def test_the_verdict_names_the_channel_above_its_noise(identification: Identification) -> None:
-    assert re.fullmatch(
-        r"The model fits: .* (0|1)\.\d\d times the noise \(rig paper_high_impedance\)",
-        verdict_sentence(identification),
-    )
-    poor = replace(identification, noise_rms={**identification.noise_rms, "ft": 0.01})
-    assert verdict_sentence(poor).startswith("The model does not fit: F/T torque 3 times the noise (rig ")
-    assert next_command(poor) == "rsea diagnose 'runs/bench & <friends>' --rig paper_high_impedance"
-    assert escape(next_command(poor)) in identification_report(poor)
-
-
-def test_an_alternative_is_written_as_a_proper_name(identification):
-    missed = replace(identification, residual_rms={"ft": 1.0}, alternatives=("coulomb_friction", "backlash"))
-    (said,) = doubt_sentences(missed)
-    assert "what Coulomb friction or backlash would make" in said
-
-
 def estimate(
     value: float, low: float, high: float, share: float = 1.0, name: str = "spring.stiffness"
 ) -> ParameterEstimate:
@@ -100,3 +78,37 @@ def test_a_value_within_its_doubt_or_at_a_bound_is_not_determined(p: ParameterEs
 def test_a_lopsided_interval_is_shown_by_its_ends(p: ParameterEstimate, text: str) -> None:
     assert "".join(value_text(p)) == text
     assert value_text(p)[1] in parameter_table([p])
+
+
+def test_json_holds_no_infinity_and_all_that_others_rely_on(identification: Identification) -> None:
+    document = identification_json(identification)
+    text = json.dumps(document, allow_nan=False)
+    assert json.loads(text)["parameters"]["spring.damping"]["ci95"] == [None, None]
+    inertia = document["parameters"]["rotor.reflected_inertia"]
+    assert (inertia["value"], inertia["unit"]) == (0.95312, "kg m^2")
+    assert document["correlation"]["matrix"][1][2] is None
+    assert {"residual_rms", "noise_rms", "fit_percent", "statements", "data"} <= set(document)
+
+
+def test_a_write_that_fails_leaves_nothing(identification: Identification, tmp_path: Path) -> None:
+    (tmp_path / "report.html").mkdir()
+    with pytest.raises(OSError, match=r"report\.html"):
+        results.write_results(identification, tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "text"),
+    [(0.95312, 0.95301, 0.95323, ("0.95312", "0.00011")), (1530.4, 1500.4, 1560.4, ("1530", "30")),
+     (-2.0, -2.5, -1.5, ("−2.00", "0.50")), (1.0, 1.0, 1.0, ("1.000", ""))],
+)  # fmt: skip
+def test_values_are_rounded_to_their_interval(
+    value: float, low: float, high: float, text: tuple[str, str]
+) -> None:
+    assert words.with_interval(value, low, high) == text
+
+
+def test_small_quantities_get_a_prefix() -> None:
+    assert words.quantity(6.17e-6, "rad") == "6.17 µrad"
+    assert words.quantity(0.03, "N m") == "0.0300 N·m"
+    assert words.number(float("inf")) == "∞"

@@ -27,8 +27,6 @@ TWO = Figure(
     layout(annotations=BESIDE, margin={"l": 64, "r": 190, "t": 12, "b": 48}, **UNITS),
 )  # fmt: skip
 PLOTTED = """[...document.querySelectorAll('.figure')].map((f) => f._fullLayout._size.w / f.clientWidth)"""
-SWITCHES = """[...document.querySelectorAll('.tools i')].map((i) => getComputedStyle(i))
-  .map((s) => [s.borderTopColor, s.borderTopStyle])"""
 SHOWN = """[...document.querySelectorAll('.sketch .culprit .cause')].map((e) => e.getBoundingClientRect())
   .filter((r) => r.width > 0).map((r) => [r.left, r.right, r.height])"""
 COLOUR = "document.querySelector('.figure').layout.font.color"
@@ -52,14 +50,6 @@ def test_the_name_of_the_culprit_is_in_view_and_can_be_read(browser, width):
     browser.size(width, 900)
     ((left, right, height),) = browser.value(SHOWN)
     assert 0.0 <= left < right <= width and height > 10.0
-
-
-def test_an_equation_is_in_view_on_a_phone(browser):
-    """Its end was behind the edge of its box."""
-    browser.size(400, 900)
-    shown = "[...document.querySelectorAll('.equation')].map((e) => [e.scrollWidth, e.clientWidth])"
-    ((whole, seen),) = browser.value(shown)
-    assert 0 < whole <= seen < 400
 
 
 def test_figures_follow_the_colours_of_the_system(browser):
@@ -98,16 +88,6 @@ def test_a_figure_drawn_anew_before_it_is_done_has_one_row_of_switches(two_curve
     two_curves.until("document.querySelectorAll('[data-drawn]').length === 2")
     two_curves.value("new Promise((done) => setTimeout(done, 300))")
     assert two_curves.value("document.querySelectorAll('.tools').length") == 2
-
-
-def test_a_switch_shows_the_colour_and_the_dashes_of_its_curve(two_curves):
-    assert two_curves.value(SWITCHES) == [["rgb(31, 41, 51)", "solid"], ["rgb(217, 115, 13)", "dotted"]]
-
-
-def test_an_empty_cell_takes_no_line_on_a_phone(two_curves):
-    two_curves.size(400, 900)
-    shown = "[...document.querySelectorAll('td')].map((c) => c.getBoundingClientRect().height > 0)"
-    assert two_curves.value(shown) == [True, False, True]
 
 
 PRESS = "[...document.querySelectorAll('.tools button')].find((b) => b.textContent === '%s').click()"

@@ -1,7 +1,9 @@
-"""Parts of a page: contents, folds, provenance, correlation, sketch."""
+"""Parts of a page: contents, folds, provenance, correlation, sketch, and the plotly.js that it carries."""
 
 from __future__ import annotations
 
+import base64
+import gzip
 import hashlib
 import json
 import re
@@ -10,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rsea_ros import report
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.result import Identification
-from rsea_ros.report.diagnosis.page import diagnosis_report
 from rsea_ros.report.diagnosis.sketch import part_of, sketch
 from rsea_ros.report.identification.page import (
     correlation_finding,
@@ -20,9 +22,8 @@ from rsea_ros.report.identification.page import (
     identification_report,
 )
 from rsea_ros.report.page import Html, fold, page, section
+from rsea_ros.report.page.bundle import PLANE, SHA256, VENDOR, VERSION, packed_plotly
 from rsea_ros.report.result_files import json_text, provenance_of
-
-from ..conftest import Diagnosed
 
 
 def test_every_section_is_in_the_contents_and_can_be_reached():
@@ -55,16 +56,6 @@ def test_the_most_correlated_pair_is_named():
     assert correlation_section(names[:1], matrix[:1, :1]) == ""
 
 
-def test_the_values_shown_first_are_those_beside_the_cause(diagnosed: Diagnosed):
-    d = diagnosed.diagnosis
-    html = diagnosis_report(d)
-    assert html.index("together with the causes") < html.index("before the search for causes")
-    final = {p.name: p.value for p in d.final}
-    assert final["rotor.reflected_damping"] == d.extended_rig["rotor.reflected_damping"]
-    biased = {p.name: p.value for p in d.baseline}
-    assert abs(final["rotor.reflected_damping"] - biased["rotor.reflected_damping"]) > 0.1
-
-
 @pytest.mark.parametrize(
     ("name", "part"),
     [
@@ -92,9 +83,15 @@ def test_the_name_of_a_culprit_stays_within_the_drawing(name):
     assert 0.0 <= left <= 900.0 - width
 
 
-def test_nothing_is_marked_without_a_cause():
-    assert sketch([]) == ""
+def test_the_bundle_is_npms_with_its_licence():
+    script = gzip.decompress(base64.b64decode(packed_plotly()))
+    assert hashlib.sha256(script).hexdigest() == SHA256 and f"v{VERSION}".encode() in script[:200]
+    assert "MIT License" in (VENDOR / "plotly-cartesian.LICENSE").read_text()
 
 
-def test_the_sketch_writes_coulomb_with_a_capital():
-    assert ">Coulomb friction<" in sketch(["coulomb_friction"])
+def test_every_figure_is_plane():
+    """A surface needed the whole bundle: 2 MB of each page of a design, and 40 MB of every environment."""
+    sources = (path.read_text(encoding="utf-8") for path in Path(report.__file__).parent.rglob("*.py"))
+    drawn = {name for text in sources for name in re.findall(r'"type": "(\w+)"', text)}
+    others = {"log", "linear", "rect", "line", "date", "category", "data"}
+    assert "contour" in drawn and drawn <= PLANE | others
