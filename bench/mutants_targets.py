@@ -21,27 +21,18 @@ TARGETS: dict[str, tuple[str, ...]] = {
         "hardware/test_limits.py",
     ),
     "identification/noise": ("identification/test_noise_tables.py",),
-    "identification/quantum": ("identification/test_noise_tables.py",),
-    "identification/noise_level": ("identification/test_noise_level_tables.py",),
-    "identification/coloured": (
+    "identification/noise_level": (
+        "identification/test_noise_level_tables.py",
         "identification/test_coloured_tables.py",
-        "identification/test_coloured_measures.py",
     ),
     "identification/clocks": (
         "identification/test_clock_tables.py",
         "identification/test_drift_tables.py",
+        "identification/test_lag_line_tables.py",
     ),
-    "identification/lag_line": ("identification/test_lag_line_tables.py",),
-    "diagnosis/score": ("diagnosis/test_score_tables.py", "diagnosis/test_tempering.py"),
-    "diagnosis/criteria": (
-        "diagnosis/test_criteria_edges.py",
-        "diagnosis/test_known_values.py",
-        "diagnosis/test_criteria.py",
-    ),
+    "diagnosis/score": ("diagnosis/test_score_tables.py", "diagnosis/test_known_values.py"),
+    "diagnosis/criteria": ("diagnosis/test_criteria.py", "diagnosis/test_known_values.py"),
     "diagnosis/stepwise": ("diagnosis/test_stepwise_tables.py",),
-    "diagnosis/backward_elimination": (
-        "diagnosis/test_elimination_tables.py",
-        "diagnosis/test_rival_guesses.py",
-    ),
+    "diagnosis/backward_elimination": ("diagnosis/test_elimination_tables.py",),
 }
 """By module below rsea_ros: files below test."""

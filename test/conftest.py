@@ -65,8 +65,8 @@ WAITING = (
 """Files that wait for nodes, wires and clocks: the first worker takes them, one after the other."""
 
 COMPUTING = (
-    "diagnosis/test_hidden_effects", "test_realdata", "diagnosis/test_two_causes", "diagnosis/test_puzzle",
-    "report/", "diagnosis/test_detents", "cli/test_diagnose",
+    "diagnosis/test_hidden_effects", "test_realdata",
+    "report/", "cli/test_diagnose",
     "test_inputs", "identification/test_identify", "model/test_pure_torque",
     "cli/test_nothing_lost", "cli/test_output_names", "cli/test_bad_", "test_launcher",
     "laws/test_hidden_laws", "diagnosis/test_joint", "fleet/test_task",

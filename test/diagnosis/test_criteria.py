@@ -1,158 +1,242 @@
-"""The acceptance rule as a table: scores in, decision out; no fit."""
+"""The criteria at their limits: scores whose ratios are exact in binary and lie exactly on a limit."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from pathlib import Path
 
-import numpy as np
 import pytest
+from scripted_scores import Model, model, score
 
 from rsea_ros.diagnosis.criteria import (
     break_tie,
     costs_priors_less,
+    is_acceptable,
+    is_at_floor,
     is_equally_good,
     is_far_from_floor,
     is_nearly_as_good,
     preference,
     refusal,
+    takes_most,
+    verdict_of,
+    worst_ratio,
 )
-from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
-
-BLOCKS, SAMPLES = 40, 100.0
-
-
-def score(missed=0.0, spread=0.0, **ratios):
-    """Return a score with the same residual over the noise in all blocks, or alternating by `spread`."""
-    wave = 1.0 + spread * np.resize([1.0, -1.0], BLOCKS)
-    sums = {n: SAMPLES * r**2 * wave for n, r in ratios.items()}
-    return Score(sums, {n: np.full(BLOCKS, SAMPLES) for n in ratios}, missed)
+from rsea_ros.records.record import Fault
 
 
-@dataclass(frozen=True)
-class Model:
-    """The part of a candidate that the criteria use."""
-
-    validation: Score
-    causes: tuple[str, ...] = ()
-    parameters: int = 6
-    size: int = 0
-    prior_cost: float = 0.0
-    is_at_bound: bool = False
+def settings(**acceptance):
+    return replace(DEFAULT, acceptance=replace(DEFAULT.acceptance, **acceptance))
 
 
-def model(*causes, size=1, parameters=None, prior_cost=0.0, at_bound=False, **ratios):
-    count = 6 + len(causes) if parameters is None else parameters
-    return Model(score(**ratios), causes, count, size * len(causes), prior_cost, at_bound)
+PAGE = Path(__file__).parents[2] / "docs" / "settings.md"
+HALF = settings(matters=0.5)
+RULE = settings(fall=0.5, fall_in_doubt=0.5, room=0.25)
+A, B, C = "coulomb_friction", "backlash", "hard_stop"
 
 
 @pytest.mark.parametrize(
-    ("now", "before", "extra", "sure", "matters"),
+    ("now", "before", "matters"),
     [
-        (score(ft=1.0), score(ft=2.0), 1, True, True),
-        (score(ft=2.0), score(ft=1.0), 1, False, False),
-        (score(ft=1.97), score(ft=2.0), 1, True, False),  # 1.5 % of one channel does not matter
-        (score(ft=1.95), score(ft=2.0), 1, True, True),
-        (score(ft=1.97, missed=0.1), score(ft=2.0, missed=0.5), 1, True, True),  # a response no longer missed
-        (score(ft=1.97, missed=0.25), score(ft=2.0, missed=0.5), 1, True, False),  # half of it is not enough
-        (score(ft=1.9, position=1.0), score(ft=2.0, position=1.0), 1, True, True),  # one channel is enough
-        (score(ft=1.0, position=1.0), score(ft=1.0, position=1.0), 0, False, False),
-        (score(ft=1.5, spread=1.0), score(ft=1.6, spread=-1.0), 1, False, True),  # better in half the blocks
+        (score(ft=1.0), score(ft=2.0), False),  # by half, and more than half is asked
+        (score(ft=0.96875), score(ft=2.0), True),
+        (score(ft=2.0, missed=0.25), score(ft=2.0, missed=0.5), False),
+        (score(ft=2.0, missed=0.24), score(ft=2.0, missed=0.5), True),
+        (score(ft=2.0, missed=0.0), score(ft=2.0, missed=0.0), False),  # none was missed
     ],
 )
-def test_a_model_is_preferred_when_it_is_surely_better_and_that_matters(now, before, extra, sure, matters):
-    choice = preference(now, before, extra)
-    assert (choice.sure, choice.matters, choice.better) == (sure, matters, sure and matters)
+def test_a_gain_exactly_at_the_limit_does_not_matter(now, before, matters):
+    assert preference(now, before, rule=HALF.acceptance).matters is matters
 
 
-def test_each_parameter_must_bring_what_a_useless_one_gains():
-    now, before = score(ft=0.99), score(ft=1.0)
-    gained = float((before.loss(before) - now.loss(before)).sum())
-    assert preference(now, before, int(gained / 2.0)).sure
-    assert not preference(now, before, int(gained / 2.0) + 1).sure
+def test_better_means_sure_and_large_enough_to_matter():
+    for now, better in ((1.9, False), (0.9, True), (4.0, False)):
+        assert preference(score(ft=now), score(ft=2.0), rule=HALF.acceptance).better is better
+    in_half_the_blocks = preference(score(ft=1.5, spread=1.0), score(ft=1.6, spread=-1.0), 1)
+    assert (in_half_the_blocks.sure, in_half_the_blocks.matters) == (False, True)
 
 
-FRICTION, GAP = "coulomb_friction", "backlash"
+def test_models_with_as_many_parameters_pay_nothing():
+    now, before = score(ft=0.9999), score(ft=1.0)  # gains 0.8 of a loss of 4000
+    assert preference(now, before).sure
+    assert not preference(now, before, 1).sure
 
 
 @pytest.mark.parametrize(
     ("candidate", "current", "reason"),
     [
-        (model(GAP, ft=1.0), model(ft=20.0), None),
-        (model(GAP, ft=1.0, at_bound=True), model(ft=20.0), "at_bound"),
-        (model(GAP, ft=20.0), model(ft=20.0), "not_sure"),
-        (model(GAP, ft=19.8), model(ft=20.0), "too_small"),  # sure, but 1 %
-        (model(GAP, ft=19.1), model(ft=20.0), "too_small"),  # 4.5 % of a channel
-        (model(GAP, ft=18.9), model(ft=20.0), None),
-        (model(GAP, ft=1.02), model(ft=1.08), None),  # all that was left
-        (model(GAP, ft=1.05), model(ft=1.1), "too_small"),
-        # one channel is enough for one more cause
-        (model(GAP, ft=20.0, position=1.0), model(ft=20.0, position=4.0), None),
-        # two at once must take 30 % of the worst channel
-        (model(FRICTION, GAP, ft=14.5), model(ft=20.0), "too_small"),
-        (model(FRICTION, GAP, ft=13.5), model(ft=20.0), None),
-        # another in the place of one too
-        (model(GAP, ft=14.5), model(FRICTION, ft=20.0), "too_small"),
-        (model(GAP, ft=13.5), model(FRICTION, ft=20.0), None),
-        # and a third that leaves much, not one that leaves little
-        (model(FRICTION, GAP, "hard_stop", ft=14.5), model(FRICTION, GAP, ft=20.0), "too_small"),
-        (model(FRICTION, GAP, "hard_stop", ft=4.9), model(FRICTION, GAP, ft=5.5), None),
-        (model(FRICTION, GAP, "hard_stop", ft=5.0), model(FRICTION, GAP, ft=5.6), "too_small"),
+        (model(A, ft=10.0), model(ft=20.0), "too_small"),  # half of a channel, and more is asked
+        (model(A, ft=9.9375), model(ft=20.0), None),
+        (model(A, B, ft=10.0), model(ft=20.0), "too_small"),  # half of the worst, for two at once
+        (model(A, B, ft=9.9375), model(ft=20.0), None),
+        (model(A, B, ft=9.0, position=16.0), model(ft=20.0, position=16.0), "too_small"),  # not of the worst
+        (model(A, B, ft=9.0, position=16.0), model(A, ft=20.0, position=16.0), None),  # one more: of any
+        (model(B, ft=9.0, position=16.0), model(A, ft=20.0, position=16.0), "too_small"),  # a replacement
+        (model(A, B, C, ft=9.0, position=16.0), model(A, B, ft=20.0, position=16.0), "too_small"),
+        (model(A, B, C, ft=1.0, position=4.9), model(A, B, ft=20.0, position=4.9), None),  # leaves little
+        (model(A, ft=40.0), model(ft=20.0), "not_sure"),
+        (model(A, ft=1.0, at_bound=True), model(ft=20.0), "at_bound"),
+        (model(A, ft=20.0, position=1.0), model(ft=20.0, position=4.0), None),  # one channel is enough
     ],
 )
-def test_a_candidate_is_refused_for_a_reason(candidate, current, reason):
-    assert refusal(candidate, current) == reason
+def test_a_candidate_must_take_away_enough(candidate, current, reason):
+    assert refusal(candidate, current, RULE) == reason
+    assert is_acceptable(candidate, current, RULE) is (reason is None)
 
 
-def test_of_equal_models_the_simplest_is_accepted_and_those_as_simple_are_its_rivals():
-    current = score(ft=20.0)
-    simple = model(FRICTION, ft=1.0, prior_cost=3.0)
-    likelier = model(GAP, ft=1.0, prior_cost=1.0)
-    larger = model("stribeck_friction", size=3, parameters=9, ft=1.0)
-    worse = model("hard_stop", ft=1.5)
-    assert break_tie([simple, larger, likelier, worse], current) == (likelier, (simple,))
-    assert break_tie([larger], current) == (larger, ())
-    assert break_tie([], current) == (None, ())
+def test_a_model_at_the_noise_is_enough_whatever_it_gains():
+    rule = replace(DEFAULT, floor=replace(DEFAULT.floor, only_noise=1.0))
+    assert refusal(model(A, ft=0.96875), model(ft=1.03125), rule) is None
+    assert refusal(model(A, ft=1.0), model(ft=1.046875), rule) == "too_small"
 
 
-@pytest.mark.parametrize(("prior_cost", "accepted"), [(1.0, "ft_bias"), (1.9, "ft_bias"), (2.1, "ft_drift")])
+def test_a_cause_pays_for_its_own_parameters_alone():
+    """It gains a loss of 8 over 40 samples: more than the price of one parameter, less than that of all."""
+    now, before = score(samples=1.0, ft=1.2), score(samples=1.0, ft=1.5)
+    gained = float((before.loss(before) - now.loss(before)).sum())
+    assert 2.0 * 1 < gained < 2.0 * 13
+    assert refusal(Model(now, (A,), parameters=7), Model(before, parameters=6)) is None
+
+
+def test_among_equally_simple_models_loss_and_prior_count_alike():
+    best = model(A, ft=1.0, prior_cost=1.5)
+    other = model(B, ft=1.000125, prior_cost=1.0)  # loses 1.0 more
+    assert break_tie([other, best], score(ft=9.0)) == (best, (other,))
+
+
+@pytest.mark.parametrize(("prior_cost", "accepted"), [(1.9, "ft_bias"), (2.1, "ft_drift")])
 def test_of_models_as_simple_an_optional_unknown_is_paid_for(prior_cost, accepted):
-    current = score(ft=20.0)
-    bias = model("ft_bias", parameters=7, prior_cost=prior_cost, ft=1.0)
-    settling = model("ft_drift", parameters=8, ft=1.0)
-    assert break_tie([settling, bias], current)[0].causes == (accepted,)
+    bias, settling = model("ft_bias", prior_cost=prior_cost, ft=1.0), model("ft_drift", parameters=8, ft=1.0)
+    assert break_tie([settling, bias], score(ft=20.0))[0].causes == (accepted,)
+    assert break_tie([], score(ft=20.0)) == (None, ())
 
 
-def test_far_from_the_floor_a_simpler_model_may_leave_a_tenth_more_for_each_number_it_saves():
-    best = model("stribeck_friction", size=3, ft=20.0)
-    assert is_nearly_as_good(model(FRICTION, ft=23.9), best)
-    assert not is_nearly_as_good(model(FRICTION, ft=24.1), best)
-    assert not is_nearly_as_good(model(FRICTION, ft=4.9), model("stribeck_friction", size=3, ft=4.8))
+def test_rivals_of_the_accepted_are_no_larger_than_it():
+    small, large = model(A, ft=1.0, prior_cost=1.0), model(B, size=2, ft=1.0)
+    assert break_tie([large, small], score(ft=9.0)) == (small, ())
 
 
-def test_a_tenth_more_loss_is_equally_good():
-    assert is_equally_good(model(GAP, ft=2.09), model(FRICTION, ft=2.0))
-    assert not is_equally_good(model(GAP, ft=2.11), model(FRICTION, ft=2.0))
+def test_a_surely_worse_model_is_no_rival_near_the_floor():
+    best, worse = model(A, size=3, ft=1.0), model(B, ft=1.5)
+    assert break_tie([worse, best], score(ft=9.0)) == (best, ())
 
 
-def test_priors_decide_from_a_difference_of_one():
-    other = model(FRICTION, ft=1.0, prior_cost=2.0)
-    assert costs_priors_less(model(GAP, ft=1.0, prior_cost=0.9), other)
-    assert not costs_priors_less(model(GAP, ft=1.0, prior_cost=1.1), other)
+@pytest.mark.parametrize(
+    ("simpler", "best", "nearly"),
+    [
+        (model(A, ft=11.9375), model(B, size=3, ft=8.0), True),  # two numbers saved: half as much again
+        (model(A, ft=12.0), model(B, size=3, ft=8.0), False),
+        (model(A, size=2, ft=9.9375), model(B, size=3, ft=8.0), True),
+        (model(A, size=2, ft=10.0), model(B, size=3, ft=8.0), False),
+        (model(A, ft=4.0), model(B, size=3, ft=4.0), False),  # near the floor
+    ],
+)
+def test_a_simpler_model_is_nearly_as_good_within_its_allowance(simpler, best, nearly):
+    assert is_nearly_as_good(simpler, best, RULE) is nearly
 
 
-def test_far_is_five_times_the_noise_in_the_worst_channel():
-    assert is_far_from_floor(model(ft=1.0, position=5.0))
-    assert not is_far_from_floor(model(ft=1.0, position=4.99))
+@pytest.mark.parametrize(("ratio", "equal"), [(4.0, True), (4.96875, True), (5.0, False), (40.0, False)])
+def test_models_are_equally_good_within_the_allowance(ratio, equal):
+    """25/16 of the loss are a quarter more of the residual."""
+    assert is_equally_good(model(A, ft=ratio), model(B, ft=4.0), settings(room=0.5625)) is equal
 
 
-def test_the_settings_steer_the_decision():
-    strict = replace(DEFAULT, acceptance=replace(DEFAULT.acceptance, fall=0.96))
-    assert refusal(model(GAP, ft=2.0), model(ft=20.0)) is None
-    assert refusal(model(GAP, ft=2.0), model(ft=20.0), strict) == "too_small"
+@pytest.mark.parametrize(
+    ("prior_cost", "ratio", "less"),
+    [
+        (1.0, 1.0, False),  # less by 1, and more is asked
+        (0.96875, 1.0, True),
+        (0.5, 1.0001, False),  # it loses 0.8 more
+        (0.1, 1.0001, True),
+        (1.5, 0.9999, True),  # and 0.8 less
+    ],
+)
+def test_priors_decide_between_equal_models(prior_cost, ratio, less):
+    other = model(A, ft=1.0, prior_cost=2.0)
+    assert costs_priors_less(model(B, ft=ratio, prior_cost=prior_cost), other) is less
 
 
-def test_every_setting_has_meaning_unit_and_reason():
+@pytest.mark.parametrize(("ratio", "far"), [(4.96875, False), (5.0, True), (6.0, True)])
+def test_the_worst_channel_says_how_far_the_floor_is(ratio, far):
+    far_model = model(ft=ratio, position=1.0)
+    assert worst_ratio(far_model) == ratio
+    assert is_far_from_floor(far_model) is far
+
+
+FINE, BAD = score(ft=1.0, position=1.0), score(ft=1.0, position=9.0)
+DEAD = Fault("dead_channel", "ft", 1.0)
+LOST = Fault("frozen_samples", "ft", 0.1)
+
+
+@pytest.mark.parametrize(
+    ("scores", "statuses", "faults", "verdict"),
+    [
+        ([FINE], [], [], "nothing_wrong"),
+        ([FINE], [], [LOST], "nothing_wrong"),
+        ([FINE], [], [DEAD], "unexplained"),
+        ([BAD], [], [], "unexplained"),
+        ([BAD], [], [DEAD], "unexplained"),
+        ([BAD, FINE], [None], [], "unexplained"),
+        ([FINE, BAD], [None], [], "nothing_wrong"),
+        ([BAD, FINE], ["confirmed"], [], "explained"),
+        ([BAD, FINE], ["confirmed"], [DEAD], "explained"),
+        ([BAD, FINE], ["leading"], [], "partly_explained"),
+        ([BAD, FINE], ["one_of"], [], "partly_explained"),
+        ([BAD, BAD], ["confirmed"], [], "partly_explained"),
+        ([BAD, BAD, FINE], ["confirmed", "confirmed"], [], "explained"),
+        ([BAD, FINE, BAD], ["confirmed", "confirmed"], [], "partly_explained"),
+        ([BAD, BAD, FINE], ["leading", "confirmed"], [], "partly_explained"),
+        ([BAD, BAD, FINE], [None, "confirmed"], [], "partly_explained"),
+    ],
+)
+def test_the_verdict_follows_from_scores_statuses_and_faults(scores, statuses, faults, verdict):
+    assert verdict_of(scores, statuses, faults=faults) == verdict
+
+
+@pytest.mark.parametrize(
+    ("ratios", "reached"),
+    [
+        ({"ft": 1.0, "position": 1.0}, True),
+        ({"ft": 1.03125, "position": 1.0}, False),
+        ({"ft": 0.5, "position": 1.03125}, False),
+    ],
+)
+def test_every_channel_must_reach_the_floor(ratios, reached):
+    assert is_at_floor(score(**ratios), replace(DEFAULT.floor, reached=1.0)) is reached
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "most"),
+    [
+        ({"ft": 1.0}, {"ft": 1.0}, False),  # nothing misfits
+        ({"ft": 1.5}, {"ft": 0.5}, False),
+        ({"ft": 1.5625}, {"ft": 0.75}, True),
+        ({"ft": 4.0}, {"ft": 1.96875}, True),
+        ({"ft": 4.0}, {"ft": 2.0}, False),  # half is left
+        ({"ft": 4.0}, {"ft": 3.9}, False),
+        ({"ft": 4.0, "position": 4.0}, {"ft": 1.9, "position": 3.0}, False),  # of one channel only
+        ({"ft": 4.0, "position": 2.0}, {"ft": 1.4, "position": 2.0}, True),  # all of one, the other as it was
+        ({"ft": 4.0, "position": 2.0}, {"ft": 1.4, "position": 2.125}, True),
+        ({"ft": 4.0, "position": 2.0}, {"ft": 1.4, "position": 2.15}, False),  # the other worse
+        ({"ft": 4.0, "position": 2.0}, {"ft": 1.5, "position": 2.0}, False),  # not all of it
+        ({"ft": 4.0, "position": 2.0}, {"ft": 3.5, "position": 2.0}, False),
+        ({"ft": 3.0, "position": 2.0}, {"ft": 1.4, "position": 2.0}, False),  # it did not misfit much
+        ({"ft": 4.0, "position": 1.0}, {"ft": 1.4, "position": 1.4}, True),  # at its noise before
+    ],
+)
+def test_causes_take_most_where_every_misfit_halves_or_one_large_one_vanishes(before, after, most):
+    assert takes_most(score(**before), score(**after), settings(matters=0.0625)) is most
+
+
+def test_every_setting_has_meaning_unit_and_reason_and_its_curve_on_the_page_that_it_points_to():
     settings = list(DEFAULT.numbers())
     assert len({s.name for s in settings}) == len(settings) > 35
     assert all(s.meaning and s.unit and s.reason for s in settings)
+    sections = PAGE.read_text(encoding="utf-8").split("\n## ")[1:]
+    curves = {section.split("\n")[0]: section for section in sections}
+    pointing = {s.name: s for s in settings if "docs/settings.md" in s.reason}
+    assert curves.keys() == pointing.keys() and len(curves) == 10
+    for name, setting in pointing.items():
+        assert f"| **{setting.value:g}** |" in curves[name], name
+        assert ("Flat:" in curves[name]) == setting.reason.startswith("flat"), name

@@ -40,8 +40,7 @@ def test_coarse_steps_are_reported_and_nothing_is_masked(good):
     assert not checked.masked["ft"].any()
 
 
-@pytest.mark.parametrize("name", ["ft", "position", "velocity"])
-@pytest.mark.parametrize("value", [0.0, np.nan])
+@pytest.mark.parametrize(("name", "value"), [("ft", 0.0), ("position", np.nan)])
 def test_a_dead_sensor_is_reported_and_the_others_are_used(good, name, value):
     dead = good.with_channels(**{name: Channel(good[name].t, np.full(len(good[name]), value))})
     diagnosis = diagnose([dead], load_rig("paper_high_impedance"))

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import rsea_ros as rsea
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.report.diagnosis.files import diagnosis_json
 
 RATE, SECONDS = 280.0, 12.0
@@ -22,7 +24,9 @@ def diagnosed():
     chirp = np.sin(2.0 * np.pi * (0.2 * t + 29.8 / (2.0 * SECONDS) * t**2))
     command = 10.0 * chirp + 2.0 * np.random.default_rng(0).standard_normal(len(t))
     true = rig.with_values({"chassis.inertia": 4e-3}).with_effect("backlash", gap=6e-3)
-    return rsea.diagnose(rsea.simulate(true, command, RATE), rig)
+    tried = ("backlash", "hard_stop", "coulomb_friction", "command_delay", "torque_constant_error")
+    settings = DiagnosisSettings(without=tuple(n for n in catalogue() if n not in tried))
+    return rsea.diagnose(rsea.simulate(true, command, RATE), rig, settings=settings)
 
 
 def test_the_cause_is_confirmed_though_the_chassis_was_a_guess(diagnosed):

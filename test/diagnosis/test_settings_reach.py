@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 
 from rsea_ros.checks.faults import check
-from rsea_ros.diagnosis import candidate
-from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate, with_noise_reestimated
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.naming.flexible import flexible, rows_of
-from rsea_ros.diagnosis.score import gain_of
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.fit import add_effect
-from rsea_ros.identification.settings import IntervalSettings, NoiseSettings
+from rsea_ros.identification.settings import IntervalSettings
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig
@@ -44,22 +41,6 @@ def with_friction(checked):
     return add_effect(problem, start_vector(problem.unknowns), effect, effect.typical)
 
 
-def test_the_least_noise_that_is_believed(checked):
-    stated = RIG.sensors["ft"].noise
-    case = nominal_problem([checked], RIG, steer("noise", filtered=3.0)).cases[0]
-    assert case.noise["ft"] == pytest.approx(3.0 * stated)
-
-
-def test_the_noise_of_a_candidate(checked, monkeypatch):
-    settings = replace(DEFAULT, noise=NoiseSettings(above=1.5))
-    problem = nominal_problem([checked], RIG, settings)
-    model = fit_candidate(FitSetup(problem.cases, settings, iterations=0), problem)
-    rules = []
-    monkeypatch.setattr(candidate, "reestimate_noise", lambda c, out, ratio, rule: rules.append(rule) or c)
-    with_noise_reestimated(model)
-    assert rules == [settings.noise]
-
-
 def test_the_correction_of_an_interval_for_few_blocks(checked):
     problem = nominal_problem([checked], RIG)
     solution = solve(problem, iterations=2)
@@ -68,12 +49,6 @@ def test_the_correction_of_an_interval_for_few_blocks(checked):
         for most in (1.0, 100.0)
     )
     assert np.all(many >= few) and np.any(many > 2.0 * few)
-
-
-@pytest.mark.parametrize(("least", "acts"), [(1e-5, True), (1e6, False)])
-def test_the_contribution_below_which_a_cause_changes_nothing(with_friction, least, acts):
-    rows = rows_of(*with_friction, "coulomb_friction", steer("evidence", least_contribution=least))
-    assert (rows is not None) == acts
 
 
 def test_the_knots_of_the_flexible_law(with_friction):
@@ -90,8 +65,3 @@ def test_the_lags_of_the_flexible_law(checked):
     short = steer("evidence", lags=(1,))
     gains = [flexible(*late, "command_delay", rows, s).gain for s in (DEFAULT, short)]
     assert gains[0] > gains[1]
-
-
-def test_the_draws_of_a_gain():
-    after = np.random.default_rng(1).chisquare(3, 40)
-    assert gain_of(after, np.full(40, 9.0), 10) != gain_of(after, np.full(40, 9.0))

@@ -25,27 +25,8 @@ def with_stated_noise(case, rig):
     return replace(case, noise=noise)
 
 
-@pytest.mark.parametrize("kind", ["multisine", "white_noise", "chirp"])
-def test_the_right_model_leaves_only_noise_in_every_piece(kind):
-    """A piece begins at the measured state, and its run-up is not compared."""
-    rig = load_rig("paper_high_impedance")
-    command = excitation(kind, ExcitationSettings(rate=RATE, duration=60.0, seed=3, amplitude=40.0))
-    record = synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=3)
-    case = case_from(record, rig)
-    problem = Problem((case,), rig, (), MEASURED)
-    pieces = short_pieces_of(case, problem.outputs(np.zeros(0))[0])
-    assert len(pieces) > 5
-    for piece in pieces:
-        (out,) = Problem((piece,), rig, (), MEASURED).outputs(np.zeros(0))
-        for name, values in out.items():
-            mask = piece.mask[name]
-            left = (piece.measured[name] - values)[mask] / piece.noise[name]
-            assert mask.sum() > 100
-            assert np.abs(left).max() < 6.0, (piece.start, name)
-
-
 @pytest.mark.parametrize("jitter", [0.0, 0.1], ids=["on_the_grid", "jittered"])
-@pytest.mark.parametrize("rate", [250.0, 280.0, 500.0, 1000.0])
+@pytest.mark.parametrize("rate", [250.0, 1000.0])
 def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_too(rate, jitter):
     """Pieces that began within a hold had a motor torque off by a change of the command: 2.5e7 for 2.5e4."""
     rig = load_rig("paper_high_impedance")
@@ -65,7 +46,7 @@ def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.1], ids=["on_the_grid", "jittered"])
-@pytest.mark.parametrize(("times", "kept"), [(0.2, 0.2), (1.0, 1.0), (1.5, 1.5), (2.0, 1.0), (4.0, 1.0)])
+@pytest.mark.parametrize(("times", "kept"), [(0.2, 0.2), (1.5, 1.5), (4.0, 1.0)])
 def test_pieces_sample_a_channel_about_as_often_as_commands_at_most(times, kept, jitter):
     """Joint states at four times the rate of the commands took twice as long and added no information."""
     rig = load_rig("paper_high_impedance")

@@ -30,7 +30,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import MEASURED
 
 RIG = load_rig("paper_high_impedance")
-SHOWN = ("torque_saturation", "coulomb_friction", "lugre_friction", "spring_hysteresis", "base_compliance")
+SHOWN = ("coulomb_friction", "spring_hysteresis")
 
 
 @functools.cache
@@ -45,7 +45,7 @@ def screen_effect(name: str, times: float):
     return screen(current, effect, initial_guesses(effect, view), DEFAULT.forward)
 
 
-@pytest.mark.parametrize("times", [4.0**-5, 16.0])
+@pytest.mark.parametrize("times", [4.0**-5])
 @pytest.mark.parametrize("name", SHOWN)
 def test_screening_is_the_same_on_a_similar_machine(name: str, times: float):
     one, other = screen_effect(name, 1.0), screen_effect(name, times)

@@ -1,4 +1,4 @@
-"""Effects that the rig states belong to the nominal model: they act, are fitted, and are never causes."""
+"""Effects that the rig states act, are fitted, and are never causes; the channel and rate of a verdict."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
+from rsea_ros.report.diagnosis.files import diagnosis_json
 from rsea_ros.report.diagnosis.terminal import terminal_lines
 
 RATE, DURATION = 280.0, 8.0
@@ -65,3 +66,29 @@ def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
     assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())
     dropped = {r.name: r for r in diagnosis.rejected}["backlash"]
     assert dropped.reason == "leaves_too_much" and dropped.gain_holdout > 0.5
+
+FRICTION_ALONE = DiagnosisSettings(max_causes=1, without=tuple(set(catalogue()) - {"coulomb_friction"}))
+
+
+@pytest.mark.parametrize("name", ["ft", "velocity"])
+def test_a_record_with_one_sensor_is_diagnosed_on_it(name):
+    """Velocity was missing from the list of main channels."""
+    rig = load_rig("paper_high_impedance")
+    command = excitation("multisine", ExcitationSettings(rate=280.0, duration=8.0, period=4.0))
+    bench = rig.with_effect("coulomb_friction", torque=3.0)
+    record = synthesize(bench, Channel(np.arange(len(command)) / 280.0, command), seed=3)
+    alone = type(record)({n: record[n] for n in ("command", name)})
+    diagnosis = diagnose([alone], rig, settings=FRICTION_ALONE)
+    assert diagnosis.channel == name == diagnosis_json(diagnosis)["channel"]
+    assert [(cause.name, cause.channel) for cause in diagnosis.causes] == [("coulomb_friction", name)]
+
+
+def test_the_rate_is_that_of_the_samples_without_their_copies():
+    """Every message was logged twice."""
+    rig = load_rig("paper_high_impedance")
+    t = np.arange(8 * 280) / 280.0
+    once = synthesize(rig, Channel(t, 8.0 * np.sin(2.0 * np.pi * 2.0 * t)))
+    twice = once.with_channels(
+        **{n: Channel(np.repeat(c.t, 2), np.repeat(c.y, 2)) for n, c in once.channels.items()}
+    )
+    assert diagnose([twice], rig, settings=FRICTION_ALONE).rate == pytest.approx(280.0)

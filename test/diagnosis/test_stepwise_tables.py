@@ -207,13 +207,6 @@ def test_a_more_detailed_effect_replaces_a_cause_where_it_gains_enough(world, be
         assert setup.weights.ratio("ft") == before and setup.cases == search.fits.cases
 
 
-def test_a_place_is_offered_only_to_more_detailed_effects_that_are_not_in_the_model(world):
-    search = world(script({f"{STRIBECK}+{LUGRE}": 20.0, DELAY: 20.0}))
-    assert replacement(search, STRIBECK, LUGRE) is None
-    assert replacement(search, DELAY, effects=[effect_named(LAG)]) is None
-    assert search.runs == search.fits.log == []
-
-
 @pytest.mark.parametrize("first", [None, (STRIBECK, GAP)])
 def test_the_next_place_is_tried_where_one_brings_nothing(world, first):
     """Delay has no rival here; Stribeck friction in place of friction gains too little; a stop helps."""

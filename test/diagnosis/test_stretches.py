@@ -125,19 +125,6 @@ def test_the_samples_of_a_problem_do_not_grow_with_the_record(seconds):
     assert rows <= 32.0 * RATE + 16
 
 
-def test_several_records_share_the_time_by_their_lengths(drifting):
-    _, case = drifting
-    used = in_stretches(Problem((case, case), RIG, (), MEASURED), SHORT, serial)
-    assert [simulated_time(c, SHORT) for c in used.cases] == pytest.approx([16.0, 16.0], abs=0.1)
-
-
-def test_a_fast_record_is_used_for_a_shorter_time(drifting):
-    _, case = drifting
-    few = replace(SHORT, stretches=replace(SHORT.stretches, samples=round(18.0 * RATE)))
-    (used,) = in_stretches(problem_of(case), few, serial).cases
-    assert simulated_time(used, few) == pytest.approx(16.0, abs=0.1)
-
-
 def test_a_swinging_load_has_run_ups_in_which_it_forgets_its_start():
     """Between two swinging ends 4 s left 30 times the noise of the encoder in every stretch."""
     rig = load_rig("two_moving_outputs")
@@ -151,12 +138,6 @@ def test_a_swinging_load_has_run_ups_in_which_it_forgets_its_start():
     left = (cut.measured["position"] - out["position"])[cut.mask["position"]] / cut.noise["position"]
     assert len(cut.drive.spans) > 1
     assert float(np.sqrt(np.mean(left**2))) < 1.1
-
-
-def test_a_short_record_is_left_as_it_is(drifting):
-    _, case = drifting
-    problem = problem_of(case)
-    assert in_stretches(problem, DiagnosisSettings(), serial) is problem
 
 
 def test_joins_of_stretches_do_not_pass_for_noise(drifting):
