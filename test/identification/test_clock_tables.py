@@ -70,11 +70,6 @@ def test_a_clock_is_asked_for_by_its_standard_deviations(jacobian, doubt, residu
     assert clocks._score(fit, columns, [0], [FT], blocks) == pytest.approx(z, abs=1e-9)
 
 
-def test_a_clock_without_sensitivity_is_not_asked_for():
-    fit = solution((1, 2, 3, 4), (1, 0, 0, 0))
-    assert clocks._score(fit, np.zeros((4, 1)), [0], [FT], ONE_BLOCK) == 0.0
-
-
 @pytest.mark.parametrize(
     ("doubt", "z"),
     [
@@ -184,13 +179,6 @@ def test_clocks_are_asked_for_one_after_the_other(world, z, taken):
     world.z = z
     asked = world.asked()
     assert [u.name for u in asked.clocks] == taken == world.taken
-
-
-def test_every_clock_may_be_asked_for(world, monkeypatch):
-    monkeypatch.setattr(clocks, "_score", lambda *rest: 4.0)
-    asked = world.asked()
-    assert [u.name for u in asked.clocks] == [u.name for u in LEFT]
-    assert asked.cost == {}
 
 
 @pytest.mark.parametrize(

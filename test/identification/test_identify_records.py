@@ -41,16 +41,6 @@ def case() -> tuple[Rig, Rig, Record]:
     return nominal, true, record_bench(true, 7, 10.0)
 
 
-def test_the_ft_sensor_stamped_half_a_sample_later_gives_the_same_parameters(case):
-    nominal, true, record = case
-    later = resample(true, record, {"ft": record["ft"].t + 0.5 * PERIOD}, 8)
-    on_grid, off_grid = identify([record], nominal), identify([later], nominal)
-    for a, b in zip(on_grid.parameters, off_grid.parameters, strict=True):
-        sd = np.hypot(a.ci95[1] - a.ci95[0], b.ci95[1] - b.ci95[0]) / (2.0 * 1.96)
-        assert abs(a.value - b.value) < 4.0 * sd, a.name
-    agree(off_grid, true)
-
-
 def test_stamps_count_and_not_positions_in_the_record(case):
     """A sensor read half a sample later but stamped as if not is late: the residual shows it."""
     nominal, true, record = case
@@ -70,23 +60,6 @@ def test_jittered_stamps_leave_no_bias(case, deviation):
     result = identify([resample(true, record, stamps, 10)], nominal)
     agree(result, true, sigmas=6.0)
     assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=2e-4)
-
-
-def test_missing_samples_leave_no_bias(case):
-    nominal, true, record = case
-    rng = np.random.default_rng(11)
-    keep = {
-        n: np.sort(rng.permutation(len(record[n]))[: int(0.9 * len(record[n]))]) for n in ("ft", "position")
-    }
-    keep["ft"] = keep["ft"][(keep["ft"] < 1000) | (keep["ft"] > 1300)]
-    thinned = record.with_channels(**{n: Channel(record[n].t[k], record[n].y[k]) for n, k in keep.items()})
-    agree(identify([thinned], nominal), true)
-
-
-def test_sensors_of_other_rates_leave_no_bias(case):
-    nominal, true, record = case
-    stamps = {"ft": np.arange(0.003, 9.9, 1.0 / 1000.0), "position": np.arange(0.01, 9.9, 1.0 / 100.0)}
-    agree(identify([resample(true, record, stamps, 12)], nominal), true)
 
 
 def test_several_bags_narrow_the_intervals(case):
@@ -161,22 +134,6 @@ def test_a_constant_torque_is_refused_in_words(torque):
         identify([Record(channels, source="held")], load_rig("paper_high_impedance"))
 
 
-def test_stamps_that_scatter_about_the_clock_of_a_sensor_are_put_on_it(case):
-    """Errors in time are errors in variables: read at the stamps, the damping came out 3 half-widths high."""
-    nominal, true, record = case
-    rng = np.random.default_rng(9)
-    scattered = {
-        n: Channel(c.t + rng.uniform(-3e-4, 3e-4, len(c)), c.y)
-        for n, c in record.channels.items()
-        if n != "command"
-    }
-    result = identify([record.with_channels(**scattered)], nominal)
-    assert result.verdict == "adequate"
-    first = remark_sentences(result.remarks)[0]
-    assert first.startswith("Stamps scatter about an even clock: ft by 0.17 ms RMS")
-    agree(result, true)
-
-
 def test_the_doubt_of_an_even_clock_is_in_the_intervals(case):
     """The clock's zero is known to 3 µs, which move the dampings by two half-widths: one in five missed."""
     nominal, _, record = case
@@ -205,17 +162,6 @@ def test_stamps_of_commands_that_scatter_are_put_on_an_even_clock(case, clocks):
     result = identify([record.with_channels(**scattered)], nominal)
     assert result.verdict == "adequate"
     assert "command by 0.17 ms RMS" in remark_sentences(result.remarks)[0]
-    agree(result, true)
-
-
-def test_commands_that_did_act_at_scattered_stamps_stay(case):
-    nominal, true, record = case
-    rng = np.random.default_rng(13)
-    command = record["command"]
-    late = Channel(command.t + rng.uniform(0.0, 6e-4, len(command)), command.y)
-    stamps = {n: record[n].t for n in ("ft", "position", "velocity")}
-    result = identify([resample(true, record.with_channels(command=late), stamps, 13)], nominal)
-    assert result.remarks == ()
     agree(result, true)
 
 

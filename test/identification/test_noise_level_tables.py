@@ -112,15 +112,6 @@ def test_a_misfit_of_one_channel_leaves_no_other_coloured(world):
     assert known.noise == {"ft": 1.0, "position": 1.0} and known.coloured == {"ft", "position"}
 
 
-def test_a_channel_at_its_noise_is_not_tested(world):
-    world.white, world.noises = {4096: (0.5, True), 2048: (1.0, True)}, {"ft"}
-    known = world.known(
-        case({"ft": 9.0, "position": 1.0}, ft=alternate(1.0), position=alternate(1.0, 2048))
-    )
-    assert known.noise == {"ft": 1.0, "position": 1.0} and known.coloured == {"ft"}
-    assert [channel for channel, _ in world.asked] == ["ft"]
-
-
 @pytest.mark.parametrize(("more", "ratio"), [({}, 1.0), ({"ratio": 502.0}, 502.0)])
 def test_the_gear_ratio_reaches_the_search_for_ripple(world, more, ratio):
     world.white = {4096: (0.5, True)}

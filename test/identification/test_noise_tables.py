@@ -1,17 +1,25 @@
-"""The noise floor of a channel as tables: signals of known noise in, the floor out; coarse steps."""
+"""The noise floor of a channel as tables, and of simulated benches; a misfit never raises it."""
 
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 import pytest
+from benches import bench, record_bench
 from scipy.signal import lfilter
 
+from rsea_ros import simulate
 from rsea_ros.identification import noise
+from rsea_ros.identification.identify import identify
 from rsea_ros.identification.noise import least_noise, noise_floor, step_of, top_of_band
+from rsea_ros.identification.noise_level import reestimate_noise
+from rsea_ros.identification.problem import case_from, simulate_cases
 from rsea_ros.identification.settings import NOISE
-from rsea_ros.model.rig import Sensor
+from rsea_ros.identification.unknowns import Clocks
+from rsea_ros.model.rig import EffectSetting, Sensor
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 
 RATE = 256.0
@@ -42,7 +50,6 @@ def white(size, rms=1.0, seed=0):
 def alternate(size, amplitude=1.0):
     """Values of one size whose signs alternate: all of their power lies at the Nyquist frequency."""
     return amplitude * (-1.0) ** np.arange(size)
-
 
 SECOND = 4.0 / math.sqrt(6.0)
 """What second differences make of alternating values of size 1."""
@@ -94,15 +101,6 @@ def test_fine_values_have_a_least_noise(stated, least):
 def test_steps_coarser_than_the_rig_says_have_their_own_noise(quantum, least):
     coarse = math.sqrt(12.0) * np.round(white(4000))
     assert least_noise(coarse, sensor(0.0, quantum)) == pytest.approx(least)
-
-
-def test_fine_steps_count_half_as_the_rig_states_them():
-    coarse = np.round(white(4000))
-    assert least_noise(coarse, sensor(0.0, 1.0)) == 0.5
-
-
-def test_a_channel_that_stands_still_has_positive_noise():
-    assert least_noise(np.zeros(100), sensor()) > 0.0
 
 
 @pytest.mark.parametrize("rms", [0.1, 1.0, 30.0])
@@ -171,7 +169,6 @@ def test_the_top_of_the_band_is_62_to_98_percent_and_a_line_at_least(count, firs
 def test_flat_is_up_to_twice_the_power_in_one_half(power, flat):
     assert noise._is_flat(power, NOISE) is flat
 
-
 LOG = lfilter([0.25, 0.5, 0.25], [1.0], white(2**14))
 """As of a smoothed log: at 0.8 of the Nyquist frequency 0.095 of its noise is left."""
 
@@ -208,12 +205,6 @@ def test_a_channel_slower_than_the_command_has_the_noise_that_is_stated(rate, st
     assert noise_floor(record(white(2**13), rate=rate), "ft", stated) == pytest.approx(floor, rel=0.05)
 
 
-def test_steps_and_noise_that_are_stated_add_up():
-    """5, 12 and 13: a step of 5 sqrt(12) has an RMS of 5."""
-    slow = record(white(2**13), rate=100.0)
-    assert noise_floor(slow, "ft", sensor(12.0, 5.0 * math.sqrt(12.0))) == pytest.approx(13.0, rel=1e-9)
-
-
 @pytest.mark.parametrize("gain", [0.0, 0.5, 20.0])
 def test_a_linear_response_to_the_command_is_not_noise(gain):
     command = white(2**15, seed=5)
@@ -229,23 +220,10 @@ def test_few_segments_do_not_make_noise_smaller():
     assert 0.98 < np.mean(floors) / np.mean(alone) < 1.05
 
 
-def test_values_that_are_not_finite_do_not_count():
-    y, command = white(2**13), white(2**13, seed=7)
-    y[100:200] = np.nan
-    command[50] = np.nan
-    assert noise_floor(record(y, command), "ft", sensor()) == pytest.approx(1.0, rel=0.05)
-
-
-def test_a_channel_that_only_repeats_the_command_has_nearly_no_noise():
-    command = white(2**13)
-    assert noise_floor(record(np.roll(command, 1), command), "ft", sensor()) < 0.02
-
-
 def test_the_command_in_force_at_an_instant_is_the_last_one_before_it():
     command = Channel(np.arange(4.0), np.array([1.0, 2.0, np.nan, 4.0]))
     at = np.array([-1.0, 0.0, 0.9, 1.0, 2.5, 3.0, 9.0])
     assert noise._held_before(command, at).tolist() == [1.0, 1.0, 1.0, 2.0, 0.0, 4.0, 4.0]
-
 
 GRID = np.resize(np.arange(-3.0, 4.0), 100)
 
@@ -296,3 +274,78 @@ def test_a_jump_at_a_seam_is_no_noise():
     joined = y + 1000.0 * (np.arange(4096) >= 2100)
     assert top_of_band(joined, [2100])[0] == pytest.approx(top_of_band(y)[0], rel=0.05)
     assert top_of_band(joined)[0] > 1.2 * top_of_band(y)[0]
+
+RMS = {"ft": 0.1, "position": 4e-5}
+
+
+def with_coloured_noise(record, memory, channels=("ft", "position"), seed=0):
+    """Return a record with more noise of first order, `memory` from sample to sample."""
+    rng = np.random.default_rng(seed)
+    added = {}
+    for n in channels:
+        white = rng.normal(size=len(record[n]) + 1000)
+        noise = RMS[n] * np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], white)[1000:]
+        added[n] = Channel(record[n].t.copy(), record[n].y + noise)
+    return record.with_channels(**added)
+
+
+@pytest.mark.parametrize("memory", [0.9, 0.97])
+@pytest.mark.parametrize("channels", [("ft",), ("position",), ("ft", "position")])
+def test_coloured_noise_of_a_clean_bench_is_noise(memory, channels):
+    nominal, true = bench("paper_high_impedance", 3)
+    result = identify([with_coloured_noise(record_bench(true, 3, 20.0), memory, channels)], nominal)
+    assert result.verdict == "adequate"
+    for n in channels:
+        assert 0.8 < result.times_noise[n] < 1.25
+        assert result.noise_rms[n] == pytest.approx(RMS[n], rel=0.5)
+    assert set(result.coloured) == set(channels)
+
+
+@pytest.mark.parametrize("duration", [8.0, 14.0, 20.0])
+def test_white_noise_of_a_short_record_is_not_called_coloured(duration):
+    rig = load_rig("paper_high_impedance")
+    for seed in range(15):
+        case = case_from(record_bench(rig, seed, duration), rig)
+        known = reestimate_noise(case, simulate_cases((case,), rig, Clocks({}, {}))[0])
+        assert known.coloured == frozenset(), seed
+
+
+def test_a_broadband_misfit_is_not_taken_for_coloured_noise():
+    nominal, true = bench("paper_high_impedance", 4)
+    stiction = EffectSetting("coulomb_friction", {"torque": 1.0, "creep_velocity": 0.02})
+    result = identify([with_coloured_noise(record_bench(true.with_effects(stiction), 4, 20.0), 0.9)], nominal)
+    assert result.verdict == "misfit"
+    assert result.coloured == ()
+
+
+def test_states_slower_than_the_commands_have_the_noise_of_their_sensors():
+    nominal, true = bench("paper_high_impedance", 6)
+    record = record_bench(true, 6, 20.0)
+    full = identify([record], nominal)
+    thin = np.searchsorted(record["position"].t, np.arange(0.02, 19.9, 0.01))
+    slow = {
+        n: Channel(record[n].t[thin], record[n].y[thin]) for n in ("position", "velocity", "motor_torque")
+    }
+    result = identify([record.with_channels(**slow)], nominal)
+    assert result.verdict == "adequate"
+    for n in slow:
+        assert result.noise_rms[n] == pytest.approx(full.noise_rms[n], rel=0.3), n
+
+
+@pytest.mark.parametrize("size", [64, 80])
+def test_a_short_channel_does_not_show_whether_its_noise_is_flat(size):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rms, flat = top_of_band(np.random.default_rng(0).normal(size=size))
+    assert 0.2 < rms < 5.0
+    assert not flat
+
+
+@pytest.mark.parametrize("rest", [2.0, 6.0])
+def test_a_recording_that_begins_before_the_first_command_fits_as_well(rest):
+    """1.15 and 1.37 times the noise: read off the whole channel, the rest before included."""
+    rig = load_rig("paper_high_impedance")
+    torque = 15.0 * np.random.default_rng(1).standard_normal(1400)
+    run = simulate(rig, np.concatenate([np.zeros(int(280 * rest)), torque]), rate=280.0, seed=3)
+    run = run.with_channels(command=run["command"].between(rest - 1e-9, np.inf))
+    assert max(identify([run], rig).times_noise.values()) < 1.08

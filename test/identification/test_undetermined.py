@@ -1,4 +1,4 @@
-"""A value that the data do not determine keeps the whole doubt of its bounds."""
+"""Values that the data do not determine keep the whole doubt of their bounds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rsea_ros.identification import confidence
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
-from rsea_ros.identification.result import Remark
+from rsea_ros.identification.result import Remark, shares_from_data
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -50,3 +50,10 @@ def test_no_variance_of_indistinguishable_unknowns_is_negative(monkeypatch, solu
     monkeypatch.setattr(confidence, "central_jacobian", lambda *_: matrix)
     doubt = confidence.confidence_of(replace(solution, jacobian=matrix))
     assert np.all(np.diag(doubt.covariance) > 0.0)
+
+
+def test_values_of_which_only_a_combination_is_determined_are_not_and_nothing_is_singular():
+    """Beside 1e28 the little that stands in for no information is lost: LinAlgError, told as a bug."""
+    together = np.array([1e14, 1e14, 1.0])
+    assert (shares_from_data(np.outer(together, together), np.ones(3)) < 1e-6).all()
+    assert (shares_from_data(1e6 * np.eye(3), np.ones(3)) > 0.99).all()
