@@ -22,6 +22,7 @@ def reasons(selection):
     """The trials: cause, reason, rival."""
     return [(t.name, t.reason, t.rival) for t in selection.trials]
 
+
 NEEDED = {"": 9.0, FRICTION: 4.0, GAP: 3.0, f"{FRICTION}+{GAP}": 1.0}
 
 
@@ -88,6 +89,7 @@ def test_a_cause_pays_for_its_own_parameters_alone(monkeypatch, world):
     assert 2.0 * (both.parameters - without.parameters) < 5.7 < 2.0 * (both.parameters + without.parameters)
     assert scripted_run.models.is_needed(both, without)
     assert not scripted_run.models.is_needed(without, both)
+
 
 SIMPLER = {"": 9.0, STRIBECK: 1.0, FRICTION: 1.0, "spring_hysteresis": 4.0}
 
@@ -197,6 +199,7 @@ def test_a_time_within_the_clocks_error_goes_though_it_is_needed(world, monkeypa
     left = world(script({"": 9.0, GAP: 3.0, LAG: 4.0, f"{GAP}+{LAG}": 1.0})).eliminate(GAP, LAG)
     assert left.last.causes == (GAP,)
     assert reasons(left) == [(LAG, "at_bound", "")]
+
 
 FRICTION, STRIBECK, GAP = "coulomb_friction", "stribeck_friction", "backlash"
 STOP, CUBIC, BASE = "hard_stop", "nonlinear_spring", "base_compliance"

@@ -68,6 +68,7 @@ def test_a_held_out_record_without_a_fitted_channel_is_refused():
     with pytest.raises(IdentificationError, match=r"has only position; expected one of .* fitted to: ft$"):
         diagnose([fitted], RIG, other)
 
+
 RATE = 280.0
 GAP = {"gap": 4e-3}
 

@@ -67,6 +67,7 @@ def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
     dropped = {r.name: r for r in diagnosis.rejected}["backlash"]
     assert dropped.reason == "leaves_too_much" and dropped.gain_holdout > 0.5
 
+
 FRICTION_ALONE = DiagnosisSettings(max_causes=1, without=tuple(set(catalogue()) - {"coulomb_friction"}))
 
 

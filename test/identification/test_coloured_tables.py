@@ -18,6 +18,7 @@ from rsea_ros.identification.noise_level import is_noise
 def passes(y, **more):
     return is_noise(case(y, **more), {"ft": np.zeros(len(y))}, "ft")
 
+
 FINE = {"_lasting_share": 0.0, "_slow": 0.0, "off": 0.0, "_unsteady": 0.0, "_kurtosis": 0.0, "_shared": 0.0}
 
 
@@ -94,6 +95,7 @@ def test_noise_of_first_order_passes(memory, rate):
     y = lfilter([1.0], [1.0, -memory], white(9000, seed=3))[1000:]
     assert passes(y, rate=rate)
 
+
 T = np.arange(8192) / RATE
 
 
@@ -111,6 +113,7 @@ T = np.arange(8192) / RATE
 def test_a_misfit_in_noise_does_not_pass(misfit):
     assert not passes(white(8192, seed=4) + misfit)
     assert passes(white(8192, seed=4))
+
 
 ALTERNATING = np.resize([1.0, -1.0], 10_000)
 
@@ -226,6 +229,7 @@ def test_coherence_is_corrected_for_chance():
     """Of 16 segments, 31 half overlapping, one in 29 of the power agrees by chance, in no band more."""
     one_band = [share(white(8192, seed=k), white(8192, seed=1000 + k)) for k in range(40)]
     assert -0.01 < np.mean(one_band) < 0.05  # the worst of four bands
+
 
 NOT_SHARED = -(1.056 / 4) / (1.0 - 1.056 / 4)
 """Of four segments: what no coherence at all comes to, less what chance makes of it."""

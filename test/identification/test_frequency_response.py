@@ -143,6 +143,7 @@ def test_closed_form_is_the_sum_over_images(offset: float) -> None:
     images = np.array([np.sum(turned / (2j * np.pi * at) ** p, axis=1) for p in (1, 2, 3, 4)])
     assert sampled_integrators(x, offset) == pytest.approx(images, rel=2e-5)
 
+
 T = np.arange(1246) / 50.0
 
 
@@ -155,6 +156,7 @@ def test_a_slow_command_that_does_repeat_has_its_period():
     periods = find_periods(0.5 + 0.15 * np.cos(2 * np.pi * 0.15 * T))
     assert periods is not None
     assert (periods.length, periods.count) == (333, 3)
+
 
 CIRCLE = np.sqrt(-np.log(0.05))
 SEEDS = range(6)

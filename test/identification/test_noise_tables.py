@@ -51,6 +51,7 @@ def alternate(size, amplitude=1.0):
     """Values of one size whose signs alternate: all of their power lies at the Nyquist frequency."""
     return amplitude * (-1.0) ** np.arange(size)
 
+
 SECOND = 4.0 / math.sqrt(6.0)
 """What second differences make of alternating values of size 1."""
 
@@ -169,6 +170,7 @@ def test_the_top_of_the_band_is_62_to_98_percent_and_a_line_at_least(count, firs
 def test_flat_is_up_to_twice_the_power_in_one_half(power, flat):
     assert noise._is_flat(power, NOISE) is flat
 
+
 LOG = lfilter([0.25, 0.5, 0.25], [1.0], white(2**14))
 """As of a smoothed log: at 0.8 of the Nyquist frequency 0.095 of its noise is left."""
 
@@ -225,6 +227,7 @@ def test_the_command_in_force_at_an_instant_is_the_last_one_before_it():
     at = np.array([-1.0, 0.0, 0.9, 1.0, 2.5, 3.0, 9.0])
     assert noise._held_before(command, at).tolist() == [1.0, 1.0, 1.0, 2.0, 0.0, 4.0, 4.0]
 
+
 GRID = np.resize(np.arange(-3.0, 4.0), 100)
 
 
@@ -274,6 +277,7 @@ def test_a_jump_at_a_seam_is_no_noise():
     joined = y + 1000.0 * (np.arange(4096) >= 2100)
     assert top_of_band(joined, [2100])[0] == pytest.approx(top_of_band(y)[0], rel=0.05)
     assert top_of_band(joined)[0] > 1.2 * top_of_band(y)[0]
+
 
 RMS = {"ft": 0.1, "position": 4e-5}
 

@@ -71,6 +71,7 @@ def test_a_quick_run_and_a_free_output_give_no_statics():
     moving = load_rig("paper_moving_output")
     assert statics_of(ramps(moving), moving) is None
 
+
 LOST = 108
 LOSSES = (Fault("lost_cycles", "/rsea/driver", float("nan"), "lost_cycles on /diagnostics", LOST, "cycles"),)
 

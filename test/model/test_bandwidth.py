@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from control import TransferFunction
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import (
@@ -44,10 +43,6 @@ def test_undamped_band_at_sqrt_2_is_eq_7_with_the_exact_factor():
     )
 
 
-def test_band_without_an_edge_is_infinite():
-    assert flat_band(TransferFunction([1.0], [1.0]), 3.0, 10.0) == math.inf
-
-
 @pytest.mark.parametrize(("db", "deg"), [(0.0, 10.0), (3.0, 0.0), (3.0, 91.0), (math.nan, 10.0)])
 def test_impossible_tolerances_are_refused(db, deg):
     with pytest.raises(ParameterError, match="tolerances"):
@@ -77,24 +72,6 @@ def test_the_rotors_spin_narrows_the_band_as_the_docs_say(rig, inertia, eq_7, wi
     assert inner_inertia(rig) == pytest.approx(inertia, rel=1e-4)
     assert pure_torque_bandwidth(k_s, rig["chassis.inertia"]) == pytest.approx(eq_7, abs=5e-3)
     assert float(undamped_band(k_s, inner_inertia(rig))) == pytest.approx(with_spin, abs=5e-3)
-
-
-def test_the_exact_bands_are_those_of_the_physics_page():
-    bands = [flat_band(end_to_end(rig, "element")) for rig in (PLATFORM, PROTOTYPE)]
-    assert bands == pytest.approx([103.1, 19.9], abs=0.05)
-    bands = [flat_band(end_to_end(rig), 3.0, 10.0) for rig in (PLATFORM, PROTOTYPE)]
-    assert bands == pytest.approx([45.5, 19.9], abs=0.05)
-    printed = [
-        eq_6_distal_per_proximal(1530.456, 0.004, 3.0),
-        eq_6_distal_per_proximal(260.0, 6.169e-4, 0.02),
-    ]
-    assert [flat_band(function) for function in printed] == pytest.approx([112.1, 55.9], abs=0.05)
-    assert flat_band(printed[0], 3.0, 10.0) == pytest.approx(14.0, abs=0.05)
-
-
-def test_a_star_train_turns_the_rotor_backward():
-    star = replace(PLATFORM, train="star")
-    assert inner_inertia(star) == pytest.approx(0.004 - 0.953 * 501 / 502**2)
 
 
 def test_end_to_end_does_not_depend_on_the_motor_or_the_ends():

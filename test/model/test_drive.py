@@ -7,11 +7,11 @@ import pytest
 import slow
 from random_rigs import WITH_SPRING
 
-from rsea_ros.errors import ChannelError, IdentificationError
+from rsea_ros.errors import IdentificationError
 from rsea_ros.model.drive import LONGEST_STEP, coarser, drive_from, steps_per_sample
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import simulate, simulate_drive, synthesize
+from rsea_ros.model.simulation import simulate, simulate_drive
 from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0
@@ -58,14 +58,6 @@ def test_jittered_stamps_cost_a_fifth_of_the_noise(name):
     assert rms.max() < 0.2 and largest.max() < 1.0
 
 
-def test_stamps_rounded_to_microseconds_are_on_the_grid():
-    stamps = np.round(np.arange(400) / RATE, 7)
-    drive = drive_from(record_of(stamps, white(400), stamps + np.round(1 / RATE, 7)))
-    np.testing.assert_array_equal(drive.at["ft"], 8.0 * np.arange(1, 401))
-    np.testing.assert_array_equal(drive.command[:3200], np.repeat(white(400), 8))
-    assert not drive.impulse["ft"].any()
-
-
 def test_coarse_stamps_make_no_period_too_many_or_too_few():
     """Stamps of 64-bit seconds since 1970 are 2^-22 s apart: the median interval is 2e-5 off."""
     stamps = np.round(np.arange(44_800) / RATE * 2**22) / 2**22
@@ -85,16 +77,6 @@ def test_after_a_dropped_command_the_last_one_is_held():
     whole = simulate(rig, record_of(stamps, filled, wanted))
     for channel in SIGNALS:
         np.testing.assert_allclose(dropped[channel], whole[channel], atol=1e-9 * np.abs(whole[channel]).max())
-
-
-def test_sensors_at_other_rates_are_read_at_their_own_stamps():
-    stamps = np.arange(400) / RATE
-    slow_ft = np.arange(5, 1300) / 1000.0
-    channels = {"command": Channel(stamps, white(400)), "ft": Channel(slow_ft, np.zeros(len(slow_ft)))}
-    rig = load_rig("paper_high_impedance")
-    ours = simulate(rig, Record(channels))["ft"]
-    exact = slow.respond(rig, stamps, white(400), slow_ft)[2]
-    assert np.abs(ours - exact).max() < 0.1 * rig.sensors["ft"].noise
 
 
 def test_the_first_and_the_last_state_go_on_outside_the_record():
@@ -123,12 +105,6 @@ def test_an_encoder_that_starts_elsewhere_leaves_the_spring_alone():
     assert abs(ours["ft"][0]) == pytest.approx(1.4, rel=0.02)
 
 
-def test_a_measured_current_is_the_held_command():
-    rig = load_rig("paper_high_impedance")
-    command = Channel(np.arange(50) / RATE, white(50))
-    np.testing.assert_array_equal(synthesize(rig, command, noise=False)["motor_torque"].y, command.y)
-
-
 @pytest.mark.parametrize("rate", [50.0, 280.0, 1000.0, 5000.0])
 def test_step_is_a_whole_fraction_of_the_period(rate):
     n = steps_per_sample(1 / rate)
@@ -145,11 +121,6 @@ def test_step_is_a_whole_fraction_of_the_period(rate):
 def test_unusable_commands_are_refused(command, message):
     with pytest.raises(IdentificationError, match=message):
         drive_from(Record({"command": command}, source="bag"))
-
-
-def test_a_record_without_a_command_is_refused():
-    with pytest.raises(ChannelError, match="no channel 'command'"):
-        drive_from(Record({"ft": Channel(np.arange(20.0), np.zeros(20))}, source="bag"))
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.31])
@@ -185,21 +156,6 @@ def test_a_coarser_drive_has_four_times_the_error_of_friction():
     )
     assert fine < rough < 8.0 * fine
     assert rough < 0.2 * rig.sensors["position"].noise
-
-
-def test_a_command_that_changes_with_every_step_is_left_as_it_is():
-    stamps = np.arange(300) / 4000.0
-    drive = drive_from(record_of(stamps, white(300), stamps))
-    assert coarser(drive) is drive
-
-
-@pytest.mark.parametrize("unit", [1e3, 1e6])
-def test_stamps_in_another_unit_than_seconds_are_refused(unit):
-    """Stamps in µs asked for 10^11 steps: a MemoryError, told as a bug of rsea."""
-    t = unit * np.arange(16800) / RATE
-    record = record_of(t, white(16800), t)
-    with pytest.raises(IdentificationError, match="are the stamps in s, not in ms or µs"):
-        simulate(load_rig("paper_high_impedance"), record)
 
 
 @pytest.mark.parametrize("name", ["position", "velocity"])

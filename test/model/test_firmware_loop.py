@@ -69,16 +69,6 @@ def test_the_closed_loop_is_that_of_scipy(controller, outside):
         np.testing.assert_allclose(ours[channel], expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
-def test_without_a_controller_the_reference_does_nothing():
-    record = record_of(np.zeros(len(T)))
-    open_loop = simulate(load_rig("bare_drive"), record)
-    channels = {n: c for n, c in record.channels.items() if n != "reference"}
-    np.testing.assert_array_equal(
-        open_loop["position"],
-        simulate(load_rig("bare_drive"), replace(record, channels=channels))["position"],
-    )
-
-
 def test_without_a_measured_motor_torque_nothing_but_the_loop_acts():
     record = record_of(np.sin(T))
     same = record.with_channels(motor_torque=record["command"])

@@ -66,7 +66,7 @@ CASES = {
     "sine in the band": tones(4.0, 20.0),
     "sine beyond": tones(4.0, 62.0),
     "two tones, one beyond": tones(4.0, 10.0, 75.0),
-    **{f"flat to {top:g} Hz": noise(6.0, top) for top in (20.0, 60.0, 80.0, 100.0, 140.0)},
+    **{f"flat to {top:g} Hz": noise(6.0, top) for top in (20.0, 80.0, 100.0)},
 }
 
 
@@ -82,14 +82,6 @@ def test_the_verdict_is_that_of_the_true_error(name):
     right = verdicts == np.where(true <= SETTINGS.tolerance, PURE, BEYOND)
     assert right[clear].mean() >= 0.95 if clear.any() else True
     assert np.count_nonzero(np.diff(verdicts[settled])) <= settled.sum() / RATE
-
-
-def test_torque_flat_to_100_hz_is_not_pure():
-    """The measure by shares of the spectrum called it pure 65 % of the time, at 48 % of error."""
-    distal, proximal = ends(PLATFORM, noise(6.0, 100.0))
-    verdicts, shares = verdicts_of(ErrorFlag(PLATFORM), distal, proximal)
-    assert np.median(shares[1000:]) == pytest.approx(0.48, abs=0.03)
-    assert np.all(verdicts[500:] == BEYOND)
 
 
 @pytest.mark.parametrize("rig", [PLATFORM, KNEE], ids=lambda rig: rig.name)
@@ -128,7 +120,7 @@ def test_the_interval_of_the_edge_follows_from_damping_rotor_and_train():
 
 @pytest.mark.parametrize(
     ("damping", "error_hz", "band_hz"),
-    [(1.0, 44.8, 44.7), (2.0, 45.9, 47.9), (3.0, 47.8, 57.0), (4.5, 52.4, 75.2), (6.0, 59.0, 89.3)],
+    [(1.0, 44.8, 44.7), (3.0, 47.8, 57.0), (6.0, 59.0, 89.3)],
 )
 def test_the_edges_move_with_the_damping(damping, error_hz, band_hz):
     """The error's edge solves J w^2 = 0.3 |K_s + i b_s w|; the other, of ±3 dB and 30°, is 45 to 89 Hz."""
@@ -143,12 +135,6 @@ def test_the_interval_has_no_end_where_the_spin_may_cancel_the_chassis():
     """J_sc + n J_r is zero for a J_m of 1.05 times the rig's: T_d is T_p there, at every frequency."""
     cancelled = KNEE.with_values({"chassis.inertia": 1.05 * 1.2 / 160})
     assert edge_of(replace(cancelled, other_trains=()), 0.3).high > 1e4
-
-
-def test_a_rig_that_leaves_the_damping_out_has_an_edge():
-    stated = {n: q for n, q in KNEE.quantities.items() if n != "spring.damping"}
-    edge = edge_of(replace(KNEE, quantities=stated), 0.3)
-    assert edge.low < edge.hz < edge.high
 
 
 def test_without_torque_the_flag_says_so_and_restarts():
@@ -175,24 +161,6 @@ def test_a_torque_too_small_to_judge_keeps_the_verdict():
     assert math.isnan(flag.share)
 
 
-def test_stamps_that_go_back_a_second_start_another_run():
-    distal, proximal = ends(PLATFORM, tones(3.0, 70.0))
-    flag = ErrorFlag(PLATFORM)
-    assert verdicts_of(flag, distal, proximal)[0][-1] == BEYOND
-    again = verdicts_of(flag, *ends(PLATFORM, tones(1.0, 20.0)))[0]
-    assert again[0] in (NOTHING, PURE)
-    assert np.all(again[50:] == PURE)
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_values_that_are_not_finite_are_left_out(bad):
-    distal, proximal = ends(PLATFORM, tones(2.0, 20.0))
-    distal[700:760] = bad
-    verdicts, shares = verdicts_of(ErrorFlag(PLATFORM), distal, proximal)
-    assert np.all(verdicts[200:] == PURE)
-    assert np.isfinite(shares[200:]).all()
-
-
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 @pytest.mark.parametrize("heard", [False, True])
 def test_a_threshold_that_is_no_number_is_not_pure(bad, heard):
@@ -204,18 +172,6 @@ def test_a_threshold_that_is_no_number_is_not_pure(bad, heard):
         verdict = flag.take(k / RATE, TorqueEstimate(d, p, 0.0, 0.007, sigma, 0.007), heard=heard)
         assert verdict == (NOTHING if k == 800 else PURE if k > 200 else verdict)
     assert flag.verdict == "pure", "it comes back with the numbers"
-
-
-def test_a_long_run_sums_as_exactly_as_a_short_one():
-    """The ring goes round several times."""
-    distal, proximal = ends(PLATFORM, tap := tones(20.0, 30.0))
-    distal[:8000] *= 1e4
-    proximal[:8000] *= 1e4
-    shares = verdicts_of(ErrorFlag(PLATFORM), distal, proximal)[1]
-    assert shares[-1] == pytest.approx(
-        true_share(distal[-600:], proximal[-600:], SETTINGS.window)[-1], rel=1e-6
-    )
-    assert len(tap) > 8192
 
 
 @pytest.mark.parametrize("change", [{"tolerance": 0.0}, {"window": math.nan}, {"hysteresis": 0.6}])

@@ -1,7 +1,8 @@
-"""Rig files survive a round trip; nonsense is one line with file, field, value and expectation."""
+"""Rigs and their files: values by name, impossible structures, round trips."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,8 @@ from hypothesis import given, settings
 from random_rigs import RIG_NAMES, rigs
 
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.model.rig import EffectSetting, PositionLoop, Quantity
+from rsea_ros.errors import RigError
+from rsea_ros.model.rig import FIELDS, EffectSetting, PositionLoop, Quantity, Rig, unit_of
 from rsea_ros.model.rig_document import tables
 from rsea_ros.model.rig_file import (
     load_rig,
@@ -21,14 +23,6 @@ from rsea_ros.model.rig_file import (
     rig_to_document,
     save_rig,
 )
-
-
-@pytest.mark.parametrize("name", RIG_NAMES)
-def test_shipped_rigs_survive_a_round_trip(name, tmp_path):
-    rig = load_rig(name)
-    save_rig(rig, tmp_path / "model.yaml")
-    assert load_rig(tmp_path / "model.yaml") == rig
-    assert [p.name for p in tmp_path.iterdir()] == ["model.yaml"]
 
 
 def test_every_shipped_rig_is_tested():
@@ -78,3 +72,73 @@ def test_every_effect_survives_a_file_up_to_its_bounds(name, which, tmp_path):
     rig = replace(load_rig("paper_high_impedance"), effects=(EffectSetting(name, values),))
     save_rig(rig, tmp_path / "model.yaml")
     assert load_rig(tmp_path / "model.yaml") == rig
+
+
+PAPER = load_rig("paper_high_impedance")
+
+
+def test_with_values_keeps_spread_and_source():
+    changed = PAPER.with_values({"spring.stiffness": 1600.0})
+    assert changed["spring.stiffness"] == 1600.0 and PAPER["spring.stiffness"] == 1530.456
+    assert changed.spread("spring.stiffness") == PAPER.spread("spring.stiffness") > 0
+    assert changed.quantities["spring.stiffness"].source == "Table 2 (measured)"
+
+
+def test_values_with_a_spread_that_are_not_known_are_free():
+    assert set(PAPER.free()) == {
+        "rotor.reflected_inertia",
+        "rotor.reflected_damping",
+        "spring.stiffness",
+        "spring.damping",
+    }
+
+
+NONSENSE = [
+    (name, value) for name, f in FIELDS.items() for value in (math.nan, -1.0, -math.inf) if not value >= f.low
+]
+
+
+def test_units_are_si():
+    assert {unit_of(name) for name in FIELDS} == {
+        "kg m^2", "N m s/rad", "N m/rad", "N m", "1", "rad", "rad/s", "1/s", "s", "N m/rad/s",
+    }
+
+
+@pytest.mark.parametrize(("name", "value"), NONSENSE)
+def test_every_field_refuses_nonsense(name, value):
+    with pytest.raises(RigError, match=rf"^paper_high_impedance: {name} = \S+ .*expected"):
+        PAPER.with_values({name: value})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"rigid_spring": True},
+            "spring rigid and spring_end clamped, expected one of them: nothing could move",
+        ),
+        ({"train": "worm"}, "gear.train = 'worm', expected one of planetary, star, harmonic_"),
+        ({"proximal": "left"}, "proximal = 'left', expected one of housing_end, spring_end"),
+        ({"clamped": frozenset({"left"})}, "clamped end 'left', expected one of housing_end, spring_end"),
+        (
+            {"clamped": frozenset({"housing_end"})},
+            r"spring_end.inertia is missing, expected a value in kg·m²",
+        ),
+        (
+            {"clamped": frozenset({"spring_end"})},
+            r"housing_end.inertia is missing, expected a value in kg·m²",
+        ),
+    ],
+)
+def test_structures_that_cannot_be_are_refused(changes, message):
+    with pytest.raises(RigError, match=f"^rig paper_high_impedance: {message}"):
+        replace(PAPER, **changes)
+
+
+def test_an_unknown_field_is_refused():
+    with pytest.raises(
+        RigError, match=r"rotor\.mass: no such rig field, expected one of rotor.reflected_inertia"
+    ):
+        Rig("r", {"rotor.mass": Quantity(1.0)})
+    with pytest.raises(RigError, match=r"rotor\.mass: no such rig field"):
+        PAPER["rotor.mass"]

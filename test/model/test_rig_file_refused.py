@@ -15,7 +15,6 @@ from rsea_ros.model.rig_file import (
 )
 
 BASE = yaml.safe_load(rig_path("paper_high_impedance").read_text())
-MOVING = yaml.safe_load(rig_path("paper_moving_output").read_text())
 
 
 def change(path, value, base=BASE):
@@ -41,27 +40,18 @@ NONSENSE = [
         "rotor.reflected_inertia = -0.953 kg·m², expected a finite value > 0 kg·m²",
     ),
     ((*INERTIA, "value"), 0, "rotor.reflected_inertia = 0 kg·m², expected a finite value > 0"),
-    ((*INERTIA, "value"), float("nan"), "rotor.reflected_inertia = nan, expected a number (kg·m²)"),
-    ((*INERTIA, "value"), float("inf"), "rotor.reflected_inertia = inf kg·m², expected a finite value"),
     ((*INERTIA, "value"), "heavy", "rotor.reflected_inertia = 'heavy', expected a number (kg·m²)"),
-    ((*INERTIA, "value"), True, "rotor.reflected_inertia = True, expected a number (kg·m²)"),
-    ((*INERTIA, "value"), DELETE, "rotor.reflected_inertia = None, expected a number (kg·m²)"),
     ((*INERTIA, "value"), 10**400, "rotor.reflected_inertia = "),
     ((*INERTIA, "unit"), "g cm^2", "rotor.reflected_inertia.unit = 'g cm^2', expected 'kg m^2'"),
-    ((*INERTIA, "unit"), DELETE, "rotor.reflected_inertia.unit = None, expected 'kg m^2'"),
     (
         (*INERTIA, "spread"),
         -0.1,
         "rotor.reflected_inertia.spread = -0.1, expected a relative one-sigma spread",
     ),
-    ((*INERTIA, "spread"), float("inf"), "rotor.reflected_inertia.spread = inf, expected a relative"),
     ((*INERTIA, "colour"), "red", "rotor.reflected_inertia: unknown key 'colour', expected one of ci95"),
     ((*INERTIA, "source"), 7, "rotor.reflected_inertia.source = 7, expected text"),
     ((*INERTIA, "ci95"), [0.9], "rotor.reflected_inertia.ci95 = [0.9], expected [low, high] in kg·m²"),
-    ((*INERTIA, "ci95"), 0.9, "rotor.reflected_inertia.ci95 = 0.9, expected [low, high] in kg·m²"),
-    ((*INERTIA, "ci95"), ["a", "b"], "rotor.reflected_inertia.ci95 = 'a', expected a number (kg·m²)"),
     (INERTIA, 0.953, "rotor.reflected_inertia = 0.953, expected {value: …, unit: kg m^2}"),
-    (INERTIA, None, "rotor.reflected_inertia = None, expected {value: …, unit: kg m^2}"),
     (INERTIA, DELETE, "rotor.reflected_inertia is missing, expected a value in kg·m²"),
     (
         ("rotor", "mass"),
@@ -69,12 +59,9 @@ NONSENSE = [
         "rotor: unknown key 'mass', expected one of reflected_damping, reflected_inertia",
     ),
     (("rotor",), None, "rotor = None, expected a mapping"),
-    (("rotor",), [1], "rotor = [1], expected a mapping"),
-    (("wheels",), {}, "rig: unknown key 'wheels', expected one of about"),
     ((7,), {}, "rig: unknown key 7, expected one of about"),
     (("gear", "ratio", "value"), 0.5, "gear.ratio = 0.5, expected a finite value >= 1"),
     (("gear", "train"), "worm", "gear.train = 'worm', expected one of planetary, star, harmonic_"),
-    (("gear", "train"), ["star"], "gear.train = ['star'], expected"),
     (("gear", "or"), "star", "gear.or = 'star', expected a list of trains"),
     (("gear", "or"), ["worm"], "gear.or has 'worm', expected one of planetary, star, harmonic_"),
     (
@@ -87,10 +74,8 @@ NONSENSE = [
         float("inf"),
         "spring.stiffness = inf, expected a value in N·m/rad or `rigid: true`",
     ),
-    (("rotor", "reflected_inertia", "value"), float("inf"), "= inf kg·m², expected a finite value > 0"),
     (("spring", "rigid"), "yes", "spring.rigid = 'yes', expected true or false"),
     (("spring", "rigid"), True, "spring rigid and spring_end clamped, expected one of them"),
-    (("spring_end", "clamped"), 1, "spring_end.clamped = 1, expected true or false"),
     (("spring_end", "clamped"), False, "spring_end.inertia is missing, expected a value in kg·m²"),
     (("proximal",), "left", "proximal = 'left', expected one of housing_end, spring_end"),
     (("name",), 5, "name = 5, expected text"),
@@ -100,12 +85,9 @@ NONSENSE = [
         ["spring_end.inertia"],
         "known: 'spring_end.inertia', expected a value that this rig states",
     ),
-    (("known",), [["gear.ratio"]], "known: ['gear.ratio'], expected a value that this rig states"),
     (("sensors", "sound"), {}, "sensors: unknown key 'sound', expected one of command"),
-    (("sensors",), None, "sensors = None, expected a mapping"),
     (("sensors", "ft", "unit"), "lbf ft", "sensors.ft.unit = 'lbf ft', expected 'N m'"),
     (("sensors", "ft", "noise"), -1, "sensors.ft = -1, 0 N·m, expected finite values >= 0"),
-    (("sensors", "ft", "noise"), "low", "sensors.ft.noise = 'low', expected a number (N·m)"),
     (("sensors", "ft", "bits"), 16, "sensors.ft: unknown key 'bits', expected one of clock, clock_rate"),
     (("controller",), 3, "controller = 3, expected a mapping"),
     (("controller",), {"k_v": 1.0}, "controller.k_p = None, expected a number (1/s)"),
@@ -114,11 +96,8 @@ NONSENSE = [
         {"k_p": 1.0, "k_v": -1.0},
         "controller.k_v = -1 N·m·s/rad, expected a finite value >= 0",
     ),
-    (("controller",), {"k_p": 1, "k_v": 1, "limit": -5}, "controller.limit = -5 N·m, expected a value > 0"),
     (("controller",), {"k_p": 1.0, "k_v": 1.0, "k_i": 1.0}, "controller: unknown key 'k_i'"),
     (("effects",), {"name": "x"}, "effects = {'name': 'x'}, expected a list"),
-    (("effects",), [3], "effects[0] = 3, expected a mapping"),
-    (("effects",), [{"name": 4}], "effects[0].name = 4, expected text"),
     (
         ("effects",),
         [{"name": "coulomb_friction", "parameters": {"torque": "big"}}],
@@ -138,15 +117,6 @@ def test_nonsense_is_refused_in_one_line_that_names_it(path, value, message, tmp
         load_rig(file)
     text = str(error.value)
     assert text.startswith(f"{file}: ") and message in text and "\n" not in text
-
-
-def test_a_known_field_must_be_stated(tmp_path):
-    file = tmp_path / "bad.yaml"
-    file.write_text(yaml.safe_dump(change(("known",), ["spring_end.inertia"], MOVING)))
-    with pytest.raises(
-        RigError, match=r"known: 'spring_end.inertia', expected a value that this rig states: "
-    ):
-        load_rig(file)
 
 
 @pytest.mark.parametrize(

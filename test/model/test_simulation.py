@@ -1,17 +1,22 @@
-"""The simulation against independent computations of the same numbers, on rigs of every structure."""
+"""The simulation, whole or a sample at a time, against independent computations of the same numbers."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 import slow
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_rigs import RIG_NAMES, WITH_SPRING, rigs
+from random_rigs import RIG_NAMES, rigs
 from scipy.linalg import expm
 from scipy.signal import lsim
 
 from rsea_ros.model import outputs
+from rsea_ros.model.plant import Plant
+from rsea_ros.model.prediction_errors import in_phase, predict
+from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import build, run, simulate, synthesize
 from rsea_ros.model.transfer import frequency_response
@@ -142,15 +147,6 @@ def test_a_large_swing_of_the_pendulum_is_that_of_scipy():
         assert np.abs(ours[channel] - values).max() < 0.1 * rig.sensors[channel].noise
 
 
-@pytest.mark.parametrize("name", WITH_SPRING)
-def test_two_simulations_are_the_same_to_the_bit(name):
-    rig = load_rig(name)
-    command = Channel(np.arange(100) / 280.0, np.random.default_rng(0).standard_normal(100))
-    first, second = (synthesize(rig, command, seed=3) for _ in range(2))
-    for channel in SIGNALS:
-        np.testing.assert_array_equal(first[channel].y, second[channel].y)
-
-
 def test_sensors_round_and_are_noisy_as_the_rig_says():
     rig = load_rig("paper_high_impedance")
     command = Channel(np.arange(20000) / 280.0, np.zeros(20000))
@@ -167,6 +163,49 @@ def test_sensors_round_and_are_noisy_as_the_rig_says():
         assert np.std(y) == pytest.approx(expected, rel=0.05)
 
 
-def test_a_rig_without_a_spring_has_no_torque_to_measure():
-    command = Channel(np.arange(50) / 280.0, np.zeros(50))
-    assert "ft" not in synthesize(load_rig("bare_drive"), command)
+FRICTION = EffectSetting("coulomb_friction", {"torque": 0.5})
+
+
+def record_of(plant, command):
+    """Return position, velocity, motor torque and ft of each step of a plant, shape (n, 4)."""
+    samples = [plant.step(u) for u in command]
+    return np.array([[s.position, s.velocity, s.motor_torque, s.ft] for s in samples])
+
+
+@pytest.mark.parametrize("name", RIG_NAMES)
+@pytest.mark.parametrize("effects", [(), (FRICTION,)], ids=["nominal", "friction"])
+@pytest.mark.parametrize("rate", [280.0, 1000.0])
+def test_stepping_is_simulating(name, effects, rate):
+    """To the last bits: only the rounding of the stamps differs."""
+    rig = load_rig(name).with_effects(*effects)
+    command = np.random.default_rng(0).standard_normal(300)
+    stepped = record_of(Plant(rig, rate, noise=False), command)
+    whole = synthesize(rig, Channel(np.arange(300) / rate, command), noise=False)
+    for i, channel in enumerate(("position", "velocity", "motor_torque", "ft")):
+        if channel in whole:
+            expected = whole[channel].y
+            np.testing.assert_allclose(stepped[:, i], expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+
+
+def test_reset_begins_again():
+    plant = Plant(load_rig("paper_high_impedance"), 280.0, noise=False)
+    command = np.random.default_rng(1).standard_normal(50)
+    first = record_of(plant, command)
+    plant.reset()
+    np.testing.assert_array_equal(record_of(plant, command), first)
+
+
+def hum(phase: float) -> Rig:
+    parameters = {"amplitude": 0.2, "frequency": 50.02, "phase": phase}
+    return load_rig("paper_high_impedance").with_effects(EffectSetting("mains_interference", parameters))
+
+
+@pytest.mark.parametrize("phase", [-2.9, 0.4, 2.0])
+def test_the_mains_are_predicted_whenever_the_record_began(phase):
+    command = 10.0 * np.random.default_rng(3).standard_normal(2800)
+    record = synthesize(hum(phase), Channel(np.arange(2800) / 280.0, command), seed=5)
+    phased = in_phase(hum(1.0), record).effects[0].parameters
+    assert math.remainder(phased["phase"] - phase, 2.0 * math.pi) == pytest.approx(0.0, abs=0.03)
+    assert phased["amplitude"] == 0.2
+    noise = load_rig("paper_high_impedance").sensors["ft"].noise
+    assert predict(hum(1.0), record)["ft"].rms_error == pytest.approx(noise, rel=0.05)

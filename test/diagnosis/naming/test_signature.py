@@ -72,6 +72,7 @@ def test_a_residual_that_wanders_is_carried_from_block_to_block_and_noise_is_not
     assert abs(signature(drift).carried) < 2.6
     assert signature(replace(drift, residual=drift.residual + walk)).carried > 2.6
 
+
 RIG = load_rig("paper_high_impedance")
 
 
@@ -90,6 +91,7 @@ def test_a_stop_beyond_the_travel_has_no_evidence(problem, angle, acts):
     larger, theta = add_effect(problem, start_vector(problem.unknowns), stop, start)
     rows = rows_of(larger, theta, "hard_stop", DEFAULT)
     assert (rows is not None) == acts
+
 
 LOSS = np.random.default_rng(3).chisquare(50, size=30)
 

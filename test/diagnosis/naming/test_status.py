@@ -167,6 +167,7 @@ def test_a_cause_of_open_size_leads_at_most(monkeypatch, status, interval, after
     assert {name: n.status for name, n in named.items()} == {"coulomb_friction": after, "backlash": None}
     assert named["coulomb_friction"].probability == 0.99
 
+
 FLOOR = DEFAULT.floor.reached
 RATIOS = st.fixed_dictionaries({n: st.floats(0.3, 300.0) for n in ("ft", "position", "motor_torque")})
 NEAR = st.fixed_dictionaries({n: st.floats(0.9, 1.3) for n in ("ft", "position", "motor_torque")})

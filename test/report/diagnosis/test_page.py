@@ -42,6 +42,7 @@ def test_browser_draws_the_figures_without_an_error(
     assert "T = -torque · sign(ω)" in document
     assert "bench &amp; &lt;friends&gt;" in document and "<friends>" not in document
 
+
 VERDICTS: dict[str, Callable[[Diagnosis], Diagnosis]] = {
     "nothing_wrong": lambda d: replace(
         d, verdict="nothing_wrong", causes=(), rejected=(), residual_rms=d.extended_residual_rms

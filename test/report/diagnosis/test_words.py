@@ -163,6 +163,7 @@ def test_a_drift_that_never_settles_has_no_time_constant(diagnosed, seconds, sho
     (line,) = [row for row in rows if row.startswith("cause")]
     assert ("time constant" in line) == ("time_constant" in shown)
 
+
 RUN = {"kind": "multisine"}
 SAID = {
     "separates": (
@@ -193,6 +194,7 @@ SAID = {
 def test_every_reason_has_a_sentence(reason):
     experiment, sentence = SAID[reason]
     assert next_run(experiment) == sentence
+
 
 DELAY = Cause(
     "command_delay",
