@@ -65,11 +65,6 @@ def test_a_motor_that_is_off_for_a_while_is_said(start):
     assert standstill_findings(RUN) == []
 
 
-def test_a_rest_of_the_command_is_no_standstill_of_the_motor():
-    resting = synthesize(RIG, Channel(T, np.where(T < 4.0, U, 0.0)))
-    assert standstill_findings(resting) == []
-
-
 def test_a_sensor_that_is_not_recorded_then_does_not_stand_still():
     short = Record({"command": RUN["command"], "ft": RUN["ft"].between(0.0, 2.0)})
     assert standstill_findings(short) == []

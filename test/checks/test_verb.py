@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_run
 
+import rsea_ros as rsea
 from msg_adapters import write_record
+from rsea_ros.checks.carried import with_check_faults
+from rsea_ros.checks.check import check_record
 from rsea_ros.cli.main import main
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel
 
 
@@ -45,15 +49,6 @@ def test_a_good_bag_is_green_and_says_its_rig(bag, capsys):
     assert "checked against default rig paper_high_impedance: 0 red, 0 amber" in printed
 
 
-def test_several_bags_as_json_and_a_status(bag, good, capsys):
-    assert main(["check", bag(), bag(ft=turn_ft(good)), "--json", "--fail-on", "red"]) == 1
-    said = json.loads(capsys.readouterr().out)
-    assert (said["schema"], said["rig"], said["light"]) == (1, "paper_high_impedance", "red")
-    assert [record["light"] for record in said["records"]] == ["green", "red"]
-    (sign,) = (f for f in said["records"][1]["findings"] if f["kind"] == "sign")
-    assert sign["remedy"] == "--axis -torque.z"
-
-
 def test_the_suggested_axis_corrects_the_bag(bag, good, capsys):
     assert main(["check", bag(ft=turn_ft(good)), "--axis=-torque.z", "--fail-on", "red"]) == 0
 
@@ -70,7 +65,7 @@ def test_a_window_cuts_the_record(bag, options, capsys):
     assert record["light"] != "red"
 
 
-@pytest.mark.parametrize("verb", [["check"], ["identify"], ["diagnose"], ["predict", "paper_high_impedance"]])
+@pytest.mark.parametrize("verb", [["check"], ["predict", "paper_high_impedance"]])
 @pytest.mark.parametrize(
     ("options", "what"),
     [
@@ -103,3 +98,25 @@ def test_identify_questions_the_rig(bag, tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "compared with rig prototype_knee:"
     assert "is this the right rig?" in " ".join(" ".join(lines[1:4]).split())
+
+SENTENCE = "a rig without a spring makes no use of velocity, ft"
+
+
+@pytest.fixture(scope="module")
+def run():
+    record = rsea.simulate("bare_drive", 15.0 * np.random.default_rng(4).standard_normal(1680), 280.0, seed=4)
+    return record.with_channels(ft=Channel(record["command"].t, np.sin(record["command"].t)))
+
+
+def test_the_check_and_the_record_of_a_fit_say_it(run):
+    rig = load_rig("bare_drive")
+    assert SENTENCE in check_record(run, rig).of("topics")[0].detail
+    assert with_check_faults(run, rig, masks=False).notes == (SENTENCE,)
+    assert check_record(run, load_rig("paper_high_impedance")).of("topics")[0].detail.count("no use") == 0
+
+
+def test_identify_says_it_once(run, tmp_path, capsys):
+    write_record(run, tmp_path / "bag")
+    words = ["identify", str(tmp_path / "bag"), "--rig", "bare_drive", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    assert capsys.readouterr().out.count(SENTENCE) == 1

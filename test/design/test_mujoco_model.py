@@ -11,20 +11,15 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 
-from rsea_ros.cli.main import main
-from rsea_ros.design import mesh
-from rsea_ros.design import mujoco_model as mjcf_module
 from rsea_ros.design.mujoco_model import mjcf
 from rsea_ros.documents.units import STANDARD_GRAVITY
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.train import TRAINS
 from rsea_ros.paper.rival_models import lumped_rig
 
 sys.path.append(str(Path(__file__).parents[1] / "model"))
 from random_rigs import rigs
-from rolling import rotor_speed
 
 S = 2j * np.pi * np.array([0.3, 2.0, 11.0, 70.0])
 
@@ -96,32 +91,6 @@ def test_the_xml_holds_the_rigs_equations_of_motion(rig):
     np.testing.assert_allclose(characteristic(*actual), expected, rtol=1e-6)
 
 
-def test_the_xml_has_the_inertias_of_the_knee():
-    root = ElementTree.fromstring(mjcf(load_rig("prototype_knee")))
-    actual = {body.get("name"): floats(body.find("inertial"), "diaginertia")[2] for body in root.iter("body")}
-    assert actual == pytest.approx({"housing": 0.25, "rotor": 1.2 / 160**2, "chassis": 6.169e-4})
-
-
-@pytest.mark.parametrize("train", [t for t in TRAINS if t != "lumped"])
-def test_the_bodies_turn_as_the_teeth_do(train):
-    """The hinges' tie and the chain of bearings alone make the rotor's speed, as rolling contacts do."""
-    rig = replace(load_rig("prototype_knee"), train=train)
-    root = ElementTree.fromstring(mjcf(rig))
-    bodies, joints, absolute = chains(root)
-    _, _, _, _, (tie,) = matrices(mjcf(rig))
-    of = {body.get("name"): row for body, row in zip(bodies, absolute, strict=True)}
-    for housing, output in ((0.0, 1.0), (1.0, 0.0), (0.3, -2.0)):
-        speeds = np.linalg.solve([of["housing"], of["chassis"], tie], [housing, output, 0.0])
-        expected = rotor_speed(train, rig["gear.ratio"], housing, output)
-        assert of["rotor"] @ speeds == pytest.approx(expected, rel=1e-9)
-    assert len(joints) == 3
-
-
-def test_the_export_knows_no_formula_of_the_train():
-    for module in (mjcf_module, mesh):
-        assert not {"train_ratio", "rotor_turns", "spin_inertia"} & set(vars(module))
-
-
 def test_a_rig_that_mujoco_cannot_represent_is_refused():
     with pytest.raises(RigError, match="a rigid spring cannot be exported"):
         mjcf(load_rig("bare_drive"))
@@ -130,13 +99,3 @@ def test_a_rig_that_mujoco_cannot_represent_is_refused():
     light = replace(load_rig("paper_moving_output")).with_values({"chassis.inertia": 0.0})
     with pytest.raises(RigError, match="chassis has inertia 0 kg·m²"):
         mjcf(light)
-
-
-def test_export_writes_the_file(tmp_path, capsys):
-    out = tmp_path / "knee.xml"
-    assert main(["export", "--mjcf", "prototype_knee", "--out", str(out), "--no-play"]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert said.startswith(f"{out}: MJCF for MuJoCo 4, of prototype_knee")
-    assert ElementTree.parse(out).getroot().get("model") == "prototype_knee"
-    assert main(["export", "--mjcf", "no_such_rig"]) == 2
-    assert capsys.readouterr().err.startswith("rsea export: rig 'no_such_rig' not found")

@@ -14,13 +14,18 @@ from rsea_ros.experiment.joint_weighing import cases_of, problem_of, weights_of
 from rsea_ros.experiment.proposal import DesignRequest, at_ends, ends_of, peaks
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_shape import (
+    KINDS,
+    LEAD,
     RunLimits,
     Shape,
     at_rest_around,
     command_of,
     largest_share,
+    limits_from,
     of_command,
     of_response,
+    read_run,
+    run_text,
 )
 from rsea_ros.experiment.separation import SURE, Refit, chances_decided, refit
 from rsea_ros.experiment.stored_models import hypotheses_from, model_of
@@ -123,17 +128,6 @@ def test_fewer_runs_are_asked_for_by_a_price_on_each():
     assert propose(pair, replace(asked, per_run=5.0)).duration > propose(pair, asked).duration
 
 
-def test_the_longest_run_is_taken_where_none_decides():
-    pair = possible(command_delay={"delay": 3e-3}, current_loop_lag={"time_constant": 3e-3})
-    hopeless = propose(pair, replace(BRIEF, limits=replace(LIMITS, torque=0.01)))
-    assert hopeless.duration == pytest.approx(BRIEF.longest) and hopeless.decided < 0.02
-
-
-def test_a_run_too_short_for_its_shapes_is_refused():
-    with pytest.raises(ParameterError, match="expected at least 10 samples"):
-        DesignRequest(LIMITS, shortest=0.01, longest=0.02)
-
-
 def test_the_chance_of_a_decision_follows_the_odds_before_and_the_separation():
     pair = possible(coulomb_friction={"torque": 0.3}, backlash={"gap": 4e-4})
     even = [replace(h, probability=0.5) for h in pair]
@@ -177,8 +171,62 @@ def test_a_bound_by_sines_does_not_cover_all_runs_on_a_nonlinear_cause():
     proofs = [proofs_of(p, n, ASKED, noise)[0] for p, n in zip(pairs, names, strict=True)]
     assert [p.covers_all for p in proofs] == [False, True]
 
+RATE = 280.0
 
-def test_a_joint_that_positions_command_is_refused():
-    joint = load_rig("pd_joint")
-    with pytest.raises(ParameterError, match="positions command it"):
-        propose(hypotheses_from([model_of(joint)]), ASKED)
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("slew", [np.inf, 400.0])
+def test_a_run_begins_and_ends_at_rest_and_keeps_its_slew(kind, slew):
+    command = command_of(Shape(kind, 10.0, bias=2.0), 2.0, RATE, slew)
+    asked = of_command(command, RATE)
+    assert not command[: round(LEAD * RATE)].any() and command[-1] == 0.0
+    assert 1.0 < asked["torque"] <= 12.0 + 1e-9
+    assert asked["slew"] <= slew * (1.0 + 1e-6)
+
+
+def test_the_multisine_has_a_low_crest():
+    run = np.trim_zeros(command_of(Shape("multisine", 1.0, low=0.5, high=60.0), 4.0, RATE))
+    middle = run[100:-100]
+    assert np.max(np.abs(middle)) / middle.std() < 2.2  # a random multisine has about 3.5
+
+
+def test_a_run_survives_its_file(tmp_path):
+    command = command_of(Shape("steps", 5.0), 1.0, RATE)
+    (tmp_path / "run.csv").write_text(run_text(command, RATE))
+    again, rate = read_run(tmp_path / "run.csv")
+    assert again == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time,torque\n0,1\n", "expected t,command"),
+        ("t,command\n0,1\n", "10 lines or more"),
+        ("t,command\n" + "".join(f"{k * k},0\n" for k in range(20)), "an even rate"),
+        ("t,command\n0,one\n", "two numbers a line"),
+    ],
+)
+def test_a_file_of_another_form_is_refused(tmp_path, text, message):
+    (tmp_path / "run.csv").write_text(text)
+    with pytest.raises(ParameterError, match=message):
+        read_run(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("velocity=1", "no torque"),
+        ("torque=ten", "expected a number in N·m"),
+        ("torque=1,torque=2", "given twice"),
+        ("torque=1,speed=2", "expected one of torque"),
+        ("torque=-1", "expected > 0"),
+    ],
+)
+def test_senseless_limits_are_refused(text, message):
+    with pytest.raises(ParameterError, match=message):
+        limits_from(text)
+
+
+def test_the_largest_share_counts():
+    assert largest_share({"torque": 5.0, "velocity": 3.0}, RunLimits(torque=10.0, velocity=2.0)) == 1.5
+    assert largest_share({"torque": 5.0, "travel": np.nan}, RunLimits(torque=10.0, travel=1.0)) == np.inf

@@ -1,9 +1,13 @@
-"""Findings on the sensors themselves: frozen, missing, not a number; none on a good record."""
+"""Findings on the sensors themselves, and the table of codes in the docs."""
+
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rsea_ros.health.health_finding import Sensors, sensor_findings
+from rsea_ros.health.health_finding import NAMES, TABLE, Sensors, sensor_findings
+from rsea_ros.health.hypotheses import hypotheses_of
 from rsea_ros.health.monitor import Monitor
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.observer.log import events_of
@@ -81,3 +85,15 @@ def test_after_a_clock_was_set_the_watch_restarts_and_reports_it():
     monitor.take(t - 3600.0, kind, values)
     assert monitor.jumps == 1 and monitor.late == 0 and monitor.looks >= 3
     assert [f.code for f in monitor.findings()] == ["RSEA_BAD_DATA"]
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "health.md"
+
+
+def test_the_docs_have_the_table():
+    page = PAGE.read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(RSEA_\w+)` \| (.*?) \| (.*?) ?\|$", page, re.MULTILINE)
+    assert rows == [tuple(code) for code in TABLE]
+
+
+def test_every_hypothesis_has_a_code_of_the_table():
+    assert {h.code for h in hypotheses_of(load_rig("paper_high_impedance"), 1.0 / 280.0)} <= set(NAMES)

@@ -94,7 +94,7 @@ def test_the_gain_is_measured_on_blocks_that_took_part_in_nothing(learn_of):
     assert result.share > 0.95
 
 
-@pytest.mark.parametrize(("gain", "ci95"), [(0.12, (-0.01, 0.3)), (0.01, (0.005, 0.015))])
+@pytest.mark.parametrize(("gain", "ci95"), [(0.12, (-0.01, 0.3))])
 def test_a_law_that_is_not_surely_better_is_not_written(monkeypatch, gain, ci95):
     monkeypatch.setattr(rsea_ros.laws.learn, "gain_on_tests", lambda *_: (gain, ci95))
     bench = drawn_bench(np.random.default_rng(3)).with_values(quadratic_drag=12.0)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rsea_ros.design.motor_gear_units import unit_named
 from rsea_ros.model import outputs
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.train import TRAINS
 from rsea_ros.model.transfer import frequency_response
+from rsea_ros.paper.bands import HZ, arrangements, limits
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims, last_digit
 from rsea_ros.paper.findings import findings
 from rsea_ros.paper.findings_bench import clamp_error
-from rsea_ros.paper.rival_models import largest_gap, readings, resonance_hz
+from rsea_ros.paper.rival_models import draw, largest_gap, readings, resonance_hz
 
 
 @pytest.mark.parametrize(("text", "step"), [("3.14", 0.01), ("7", 1.0), ("6.169e-4", 1e-7), ("1e8", 1e8)])
@@ -116,3 +120,44 @@ def test_the_catalogue_and_the_paper_leave_the_same_trains_open():
 
 def test_the_papers_1e8_is_as_good_as_a_clamp():
     assert clamp_error() < 1e-6
+
+LIMITS = limits(load_rig("paper_moving_output"))
+
+
+@pytest.mark.parametrize("held", ["T-RSEA", "RT-RSEA"])
+@pytest.mark.parametrize("index", range(len(TRAINS)), ids=TRAINS)
+def test_the_table_has_the_right_transfer_functions(index, held):
+    rig = load_rig("paper_high_impedance")
+    row = arrangements(rig)[index]
+    rig = replace(rig, train=row.train, proximal="housing_end" if held == "T-RSEA" else "spring_end")
+    s = 2j * np.pi * HZ
+    den = row.outer * s**2 + (23.088 + 3.0) * s + 1530.456
+    expected = [(3.0 * s + 1530.456) / den, (row.inner * s**2 + 3.0 * s + 1530.456) / den]
+    torques = [outputs.distal(rig), outputs.proximal(rig)]
+    for torque, value in zip(torques, expected if held == "T-RSEA" else expected[::-1], strict=True):
+        np.testing.assert_allclose(frequency_response(rig, torque, HZ), value, rtol=1e-9)
+
+
+@pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: limit.what)
+def test_every_limit_is_reached(limit):
+    if len(limit.values) == 1:
+        assert limit.errors[0] < 1e-12
+        return
+    assert limit.errors[-1] < 3e-3
+    order = np.log10(limit.errors[-2] / limit.errors[-1]) / np.log10(limit.values[-1] / limit.values[-2])
+    assert order == pytest.approx(1.0, abs=0.15)
+
+
+def test_the_bench_differs_from_what_the_rig_states():
+    rig = load_rig("paper_moving_output")
+    bench = draw(rig, 1)
+    assert all(bench[n] != rig[n] for n in rig.free())
+    assert all(bench[n] == rig[n] for n in rig.known)
+
+
+def test_the_pendulum_is_on_the_distal_end():
+    """Distal and proximal were exchanged against section 3.2.2: "(distal link) was left free to rotate"."""
+    rig = load_rig("paper_moving_output")
+    assert rig.clamped == {"spring_end"} and rig["housing_end.stiffness"] > 0.0
+    distal, moving = outputs.distal(rig), outputs.end_torque(rig, "housing_end")
+    assert np.array_equal(distal.c, moving.c) and np.array_equal(distal.d, moving.d)
