@@ -20,6 +20,8 @@ from rsea_ros.report.fleet.page import write_fleet_report
 
 RIG = "paper_high_impedance"
 KNOWN = "coulomb_friction stribeck_friction lugre_friction spring_hysteresis"
+PLAY = ("backlash", "hard_stop", "ft_sensor_lag", "current_loop_lag", "command_delay", "coulomb_friction")
+BUT_PLAY = " ".join(n for n in catalogue() if n not in PLAY)
 
 VERBS: dict[str, tuple[str, ...]] = {
     "bag": (f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 16 --seed 5 --out bag",),
@@ -42,7 +44,7 @@ VERBS: dict[str, tuple[str, ...]] = {
     "rigs": ("rig new mine", *(f"rig check {name}" for name in rig_names())),
     "imported": ("import spoiled.csv --map map.yaml --out imported",),
     "spoiled": ("check imported --rig pendulum", "check imported", "identify imported --json"),
-    "spoiled_diagnosis": ("diagnose imported --json --max-causes 2",),
+    "spoiled_diagnosis": (f"diagnose imported --json --max-causes 2 --without {BUT_PLAY}",),
     "fleet": (
         "fleet run bag left --map joints.yaml --serial --out months",
         "fleet run bag left --map joints.yaml --serial --out months",
