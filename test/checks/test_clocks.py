@@ -93,6 +93,7 @@ def check_drifting(effects, ppm):
     command = 12.0 * np.random.default_rng(3).standard_normal(8400)
     return check_record(late(rsea.simulate(rig, command, 280.0, seed=3), 0.0, 1e-6 * ppm, "ft"), RIG)
 
+
 MISFITS = {
     "none": {},
     "friction": {"coulomb_friction": {"torque": 2.0}},

@@ -42,6 +42,7 @@ def with_channel(channel, y):
 def kinds(record):
     return {(f.kind, f.channel) for f in check_record(record, RIG).faults}
 
+
 RNG = np.random.default_rng(0)
 DEAD = {
     "zero": np.zeros(N),
@@ -115,6 +116,7 @@ def test_where_the_driver_had_a_fault_it_is_named_before_the_dead_sensors():
     with pytest.raises(IdentificationError, match="driver latched a fault, no_reply: 3 cycles; ") as refused:
         with_check_faults(record, RIG, masks=True)
     assert str(refused.value).count("noise that has nothing to do with the other") == 1
+
 
 RATE, LENGTH = 280.0, 12.0
 

@@ -127,6 +127,7 @@ def test_amperes_are_reported_with_the_measured_factor_not_that_of_a_unit_near_i
     assert "no unit" in result.detail
     assert float(result.remedy.split()[1].rstrip("`")) == pytest.approx(6.826, rel=0.1)
 
+
 PERIOD = 1.0 / 280.0
 
 
@@ -165,6 +166,7 @@ def test_a_mode_at_the_other_sensor_is_no_average(frequency, participation, high
 def test_a_lag_is_no_average(time_constant):
     f = np.linspace(0.5, 130.0, 40)
     assert _average(f, 1.0 / (1.0 + 2j * np.pi * f * time_constant), np.full(40, 0.02), PERIOD) == (1, False)
+
 
 JUDGED = ("sign", "scale", "dead_channel", "frozen_samples", "clock_offset", "contradiction")
 

@@ -99,6 +99,7 @@ def test_identify_questions_the_rig(bag, tmp_path, capsys):
     assert lines[0] == "compared with rig prototype_knee:"
     assert "is this the right rig?" in " ".join(" ".join(lines[1:4]).split())
 
+
 SENTENCE = "a rig without a spring makes no use of velocity, ft"
 
 

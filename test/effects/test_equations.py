@@ -55,6 +55,7 @@ def test_the_simulation_obeys_the_equation_of_every_effect(effect: Effect):
         if name in changed:
             assert error < 0.005 * rms(true[name] - nominal[name]), (name, error)
 
+
 MASS, DAMPING, HEAVY = 0.5, 0.4, 6.0
 
 
@@ -93,6 +94,7 @@ def payload(t, x, u, p):
     torque = K_S * (q - y) + B_S * (w - v)
     fall = (torque - DAMPING * v - (HEAVY + p["torque"]) * math.sin(y)) / MASS
     return [w, (u - B_M * w - torque) / J, v, fall], torque
+
 
 VARIANTS = {
     "ft_drift": (2, settling_sensor, {"drift": 2.0, "time_constant": 0.4}),
@@ -145,6 +147,7 @@ def test_a_drift_far_longer_than_the_record_is_a_straight_line():
         for tau in (np.inf, 299.0 * 2.0)
     )
     assert rms(straight - slow) < 1e-3
+
 
 GAMMAS = (-1.711, -1.5, -0.4, 0.3, 0.5, 0.9)
 """Hardening as in the Bouc-Wen benchmark, straight loading, faster and slower unloading, straight."""
@@ -238,6 +241,7 @@ def test_a_gear_at_rest_takes_few_steps(monkeypatch):
     for share in (-0.9, -0.3, 0.0, 0.1, 0.7):
         _implicit_mean.py_func(math.atanh(0.99 * share), 1e6 * share, 1e6)
     assert len(rounds) <= 5 * 9
+
 
 RATE, NEAR = 280.0, 1e-4
 FREE = load_rig("paper_moving_output")

@@ -171,6 +171,7 @@ def test_a_bound_by_sines_does_not_cover_all_runs_on_a_nonlinear_cause():
     proofs = [proofs_of(p, n, ASKED, noise)[0] for p, n in zip(pairs, names, strict=True)]
     assert [p.covers_all for p in proofs] == [False, True]
 
+
 RATE = 280.0
 
 

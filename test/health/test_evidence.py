@@ -75,6 +75,7 @@ def test_the_score_of_a_right_model_is_as_large_as_its_information_says():
     z = np.array([c[i] / np.sqrt(a[i, i]) for c, a in computed])
     assert np.mean(z**2) < 2.0 and abs(np.mean(z)) < 1.0
 
+
 INNER, OUTER = np.array([1.0, 0.5]), np.array([2.0, 1.5])
 NONE = np.ones(2)
 EVERY = 3.0

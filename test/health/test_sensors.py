@@ -86,6 +86,7 @@ def test_after_a_clock_was_set_the_watch_restarts_and_reports_it():
     assert monitor.jumps == 1 and monitor.late == 0 and monitor.looks >= 3
     assert [f.code for f in monitor.findings()] == ["RSEA_BAD_DATA"]
 
+
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "health.md"
 
 

@@ -97,6 +97,7 @@ def test_faults_touch_the_share_that_they_say():
     assert "ft" not in faulty["missing_topic"]
     assert t[-1] == record["ft"].t[-1]
 
+
 OF_THE_MODEL = {
     "base_compliance": {"damping_ratio": Bench().plant.base_zeta},
     "mains_interference": {"phase": 0.0},
@@ -123,6 +124,7 @@ def test_both_implementations_agree(effect):
 
 def _rms(y):
     return float(np.sqrt(np.mean(y[84:] ** 2)))
+
 
 RIG = load_rig("paper_high_impedance")
 BARE = RIG.with_values({"chassis.inertia": 0.0})

@@ -101,6 +101,7 @@ def _response(plant, s):
     square = s * np.eye(used.size) - a[np.ix_(used, used)]
     return c[used] @ np.linalg.solve(square, b[used])
 
+
 PASSIVE = {
     "coulomb_friction": {"torque": 2.0},
     "stribeck_friction": {"coulomb_torque": 1.0, "stribeck_torque": 1.0, "stribeck_velocity": 0.05},

@@ -121,6 +121,7 @@ def test_the_catalogue_and_the_paper_leave_the_same_trains_open():
 def test_the_papers_1e8_is_as_good_as_a_clamp():
     assert clamp_error() < 1e-6
 
+
 LIMITS = limits(load_rig("paper_moving_output"))
 
 
