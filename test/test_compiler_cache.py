@@ -17,7 +17,7 @@ from numba.core import config
 
 from rsea_ros import compiler
 from rsea_ros import compiler as compiler_cache
-from rsea_ros.compiler import SHARED, _own_cache, cache_folder, njit, shared_key, trusted_cache
+from rsea_ros.compiler import SHARED, njit, shared_key, trusted_cache
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "rsea_ros"
@@ -162,13 +162,6 @@ def test_a_planted_folder_is_not_used(temporary, tmp_path, monkeypatch, how):
     assert fresh.stat().st_mode & 0o777 == 0o700 and not list(fresh.iterdir())
 
 
-@pytest.mark.parametrize("how", ["open to all", "another's"])
-def test_a_folder_inside_another_users_folder_is_not_used(temporary, tmp_path, monkeypatch, how):
-    plant(tmp_path / "home", how)
-    of_others(monkeypatch, {tmp_path / "home"} if how == "another's" else set())
-    assert trusted_cache("key").parent.parent == temporary
-
-
 def of_others(monkeypatch, folders: set[Path]) -> None:
     """Give some folders to another user."""
     true = {name: getattr(Path, name) for name in ("stat", "lstat")}
@@ -183,19 +176,6 @@ def of_others(monkeypatch, folders: set[Path]) -> None:
 
     for name in true:
         monkeypatch.setattr(Path, name, change(name))
-
-
-def test_a_cache_folder_that_the_user_names_is_used(monkeypatch):
-    monkeypatch.setattr(config, "CACHE_DIR", "/somewhere")
-    with _own_cache():
-        assert config.CACHE_DIR == "/somewhere"
-
-
-def test_functions_of_other_packages_keep_their_cache(monkeypatch):
-    monkeypatch.setattr(config, "CACHE_DIR", "")
-    with _own_cache():
-        assert Path(config.CACHE_DIR) == cache_folder()
-    assert config.CACHE_DIR == ""
 
 
 def compiled_anew(limit: int | None = None):
@@ -231,8 +211,7 @@ def test_a_full_disk_costs_the_cache_and_one_line(kept_in, caplog):
     assert "not kept" in line and "File too large" in line
 
 
-@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
-@pytest.mark.parametrize("size", [0, 40])
+@pytest.mark.parametrize(("suffix", "size"), [(".nbi", 0), (".nbc", 40)])
 def test_a_damaged_cache_file_is_recompiled(kept_in, caplog, suffix, size):
     assert compiled_anew() == 2.0
     (file,) = (p for p in kept_in.rglob("*") if p.suffix == suffix)
@@ -256,20 +235,6 @@ def test_no_folder_at_all_costs_the_cache_and_one_line(kept_in, caplog, monkeypa
         compiler._folder.cache_clear()
     (line,) = caplog.messages
     assert "No space left" in line
-
-
-def test_an_effect_is_compiled_on_a_full_disk(kept_in):
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
-    try:
-
-        @compiler.cfunc("float64(float64)", cache=True)
-        def triple(x):
-            return 3.0 * x
-
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert triple.ctypes(1.0) == 3.0
 
 
 START = """

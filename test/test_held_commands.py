@@ -54,11 +54,6 @@ def test_identify_from_a_few_messages_gives_what_all_of_them_give(run, tmp_path)
     assert low < 1500.0 < high
 
 
-def test_the_door_takes_them_too(run):
-    assert rsea.identify(on_change(run), RIG).verdict == "adequate"
-    assert rsea.diagnose(on_change(run), load_rig(RIG)).verdict == "nothing_wrong"
-
-
 def test_a_check_calls_them_neither_slow_nor_lost(run):
     findings = check_record(on_change(run), load_rig(RIG)).findings
     bad = [(f.kind, f.channel) for f in findings if f.channel == "command" and f.light != "green"]
@@ -74,21 +69,10 @@ def test_commands_of_a_slow_loop_are_left_as_they_are(run, every):
     assert with_held_commands(slow)[0] is slow
 
 
-def test_a_log_with_repeats_is_left_as_it_is(run):
-    command = run["command"]
-    rare = run.with_channels(command=Channel(command.t[::100], np.repeat([1.0, -1.0], len(command))[::200]))
-    assert with_held_commands(rare)[0] is rare
-
-
 def test_the_last_command_is_held_to_the_end_of_the_sensors(run):
     filled, faults = repair_stamps(on_change(run))
     assert filled["command"].t[-1] == pytest.approx(run["command"].t[-1], abs=0.01)
     assert not [fault for fault in faults if fault.channel == "command"]
-
-
-def test_targets_of_a_position_loop_are_held_too(run):
-    targets = run.with_channels(reference=Channel(np.arange(6.0), np.arange(6.0)))
-    assert len(with_held_commands(targets)[0]["reference"]) > 5 * RATE
 
 
 def test_commands_without_a_sensor_are_left_as_they_are(run):
@@ -118,13 +102,6 @@ def test_a_pause_of_the_commands_alone_is_no_loss(paused):
     assert repaired["command"].t == pytest.approx(whole["command"].t, abs=1e-6)
     assert np.array_equal(repaired["command"].y, whole["command"].y)
     assert any("3 pauses of the commands alone, the longest 3 s" in note for note in repaired.notes)
-
-
-def test_the_pauses_change_no_result(paused):
-    fits = [rsea.identify(record, RIG) for record in paused]
-    assert [fit.verdict for fit in fits] == ["adequate", "adequate"]
-    for name, parameter in fits[0].parameters.items():
-        assert fits[1].parameters[name].value == pytest.approx(parameter.value, rel=1e-6)
 
 
 def test_commands_that_stop_with_the_sensors_are_lost(run):

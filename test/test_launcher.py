@@ -292,16 +292,6 @@ def test_a_verb_adds_what_it_needs_once(clone, quick, tmp_path, silent_server):
     assert installed(clone) == {"base 1.0", "pool 1.0", "judge 1.0"}
 
 
-def test_a_part_that_cannot_be_had_leaves_the_rest_usable(clone, quick, silent_server):
-    address = silent_server.getsockname()
-    silent_server.close()
-    ask_for(clone, address, "fleet")
-    assert run(clone, quick, "demo")[:2] == (0, "ran demo\n")
-    status, out, err = run(clone, quick, "fleet")
-    assert (status, out) == (2, "") and err.splitlines()[-1].startswith("rsea: no network")
-    assert run(clone, quick, "demo") == (0, "ran demo\n", "")
-
-
 def environment():
     """Return launcher/environment.py as a module."""
     spec = importlib.util.spec_from_file_location("environment", ROOT / "launcher" / "environment.py")

@@ -159,12 +159,6 @@ def test_files_put_aside_by_another_user_or_machine_stay(tmp_path, monkeypatch):
     assert (mine / "a").exists()
 
 
-def test_a_restored_name_is_refused_before_any_work(tmp_path):
-    aside(tmp_path, "a")
-    with pytest.raises(files.OutputError, match="exists already"):
-        check_free([tmp_path / "a"])
-
-
 def test_the_next_results_clear_up_first(tmp_path):
     aside(tmp_path, "a")
     with NewFiles(Destination(tmp_path, force=True)) as new:

@@ -1,12 +1,13 @@
-"""Spectra beside those of scipy, and a sine of known power."""
+"""Spectra and fast lengths of transforms beside those of scipy, and a sine of known power."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from scipy import signal
+from scipy.fft import next_fast_len
 
-from rsea_ros.records.statistics import cross_density, power_density
+from rsea_ros.records.statistics import cross_density, next_fast_length, power_density
 
 RATE = 280.0
 
@@ -35,3 +36,9 @@ def test_cross_density_shows_a_delay_as_a_falling_phase():
     frequency, density = cross_density(noise[4:], noise[:-4], RATE, 256)
     phase = np.unwrap(np.angle(density[1:60]))
     np.testing.assert_allclose(phase, -2.0 * np.pi * frequency[1:60] * 4 / RATE, atol=0.35)
+
+
+@pytest.mark.parametrize("real", [False, True])
+def test_a_fast_length_is_scipys(real: bool) -> None:
+    for least in (*range(1, 400), 16_801, 33_611, 67_201, 134_402, 1_000_003):
+        assert next_fast_length(least, real=real) == next_fast_len(least, real=real)

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -53,13 +52,6 @@ def test_the_next_writer_removes_what_a_killed_one_left(tmp_path):
     with NewFiles(tmp_path) as new:
         new.write("report.html", "whole")
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
-
-
-def test_the_next_bag_removes_what_a_killed_writer_left(tmp_path):
-    leave_stage(tmp_path)
-    with BagWriter(tmp_path / "bag.mcap", recording=False):
-        pass
-    assert [p.name for p in tmp_path.iterdir()] == ["bag.mcap"]
 
 
 def test_a_writer_at_work_keeps_its_stage_however_old(tmp_path):
@@ -139,10 +131,3 @@ def test_files_put_aside_can_be_removed_only_once_all_new_ones_have_their_names(
     age(aside)
     remove_left(tmp_path)
     assert not aside.exists()
-
-
-def test_two_processes_that_clean_up_at_once_agree(tmp_path):
-    paths = [leave_stage(tmp_path) for _ in range(20)]
-    with ThreadPoolExecutor(2) as both:
-        list(both.map(remove_left, [tmp_path] * 2))
-    assert not any(path.exists() for path in paths)

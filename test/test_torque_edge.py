@@ -72,8 +72,7 @@ def test_a_faster_torque_moves_by_no_more_than_its_period(step, expected):
     assert repaired["motor_torque"].t[0] == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("rate", [100.0, 280.0, 1000.0, 2000.0])
-@pytest.mark.parametrize("late", [0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.9])
+@pytest.mark.parametrize(("rate", "late"), [(100.0, 0.0), (280.0, 0.1), (280.0, 0.5), (2000.0, 0.9)])
 def test_a_torque_that_is_read_after_its_command_fits_however_late(rate, late):
     rig = load_rig("paper_high_impedance")
     t = np.arange(1000) / rate

@@ -137,14 +137,6 @@ def test_a_bad_file_of_answers_gives_one_line(folder, line, expected, capsys):
     assert expected in assert_refused(capsys, "score", folder / "set", folder / "bad.jsonl")
 
 
-def test_a_missing_truth_is_named(folder, capsys):
-    (folder / "set.truth.json").unlink()
-    error = assert_refused(
-        capsys, "score", folder / "set", answer_once(folder, [{"record": "r0001", "causes": []}])
-    )
-    assert "set.truth.json: No such file" in error
-
-
 @pytest.mark.parametrize(
     ("key", "value", "expected"),
     [
@@ -159,12 +151,6 @@ def test_a_manifest_of_another_kind_is_refused(folder, key, value, expected, cap
     file = folder / "set" / "manifest.json"
     file.write_text(json.dumps({**json.loads(file.read_text()), key: value}))
     assert expected in assert_refused(capsys, "run", folder / "set", "--out", folder / "answers.jsonl")
-
-
-def test_a_table_with_other_columns_is_refused(folder, capsys):
-    (folder / "set" / "r0001.csv").write_text("t,ft\n0,1\n")
-    error = assert_refused(capsys, "run", folder / "set", "--out", folder / "answers.jsonl")
-    assert "r0001.csv: columns 't,ft', expected t_command,command" in error
 
 
 def test_a_late_or_missing_answer_names_nothing(made, capsys):
@@ -196,31 +182,6 @@ def test_a_record_that_cannot_be_diagnosed_is_reported(made, monkeypatch, tmp_pa
     monkeypatch.setitem(scoring.ENTRIES, "diagnose", refuse)
     assert main(["benchmark", "run", str(made / "set"), "--out", str(tmp_path / "a.jsonl")]) == 0
     assert "refused     4 records, no effect named; the first: too short" in capsys.readouterr().out
-
-
-def test_without_the_repository_make_says_so(tmp_path, monkeypatch, capsys):
-    from rsea_ros.cli import _benchmark_make
-
-    monkeypatch.setattr(_benchmark_make, "GENERATOR", tmp_path / "none.py")
-    assert "make needs a clone of the repository" in assert_refused(capsys, "make", tmp_path / "set")
-
-
-def test_a_data_set_is_never_replaced(folder, capsys):
-    before = (folder / "set" / "manifest.json").read_text()
-    assert "exists already" in assert_refused(capsys, "make", folder / "set", "--records", "1")
-    assert (folder / "set" / "manifest.json").read_text() == before
-
-
-@pytest.mark.parametrize("name", ["mine.jsonl", "random.jsonl"])
-def test_two_rows_of_one_name_are_refused(folder, name, capsys):
-    files = [answer_once(folder, perfect(folder)), answer_once(folder, perfect(folder), name)]
-    assert f"a second row {name[:-6]!r}" in assert_refused(capsys, "score", folder / "set", *files)
-
-
-def test_an_answer_is_written_as_it_is_read(made):
-    line = Answer({"backlash": 0.25}, 3.0).line("r0001")
-    expected = {"record": "r0001", "causes": [{"name": "backlash", "probability": 0.25}], "seconds": 3.0}
-    assert line == expected
 
 
 def test_a_stopped_run_goes_on_where_it_stopped(made, tmp_path, monkeypatch):

@@ -10,7 +10,6 @@ from bad_input import assert_refused, change, rsea, without
 from foreign import EPOCH, joint_state, write_foreign
 
 from msg_adapters import write_record
-from msg_adapters.writing import BagWriter
 from rsea_ros.cli.main import main
 
 
@@ -18,28 +17,6 @@ def test_a_missing_topic_is_refused_by_name(record, tmp_path, out):
     write_record(without(record, "command"), tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--out", out)
     assert_refused(done, tmp_path / "bag", "no message on /rsea/torque_command", "the bag holds /rsea/ft")
-
-
-def test_a_topic_of_the_wrong_type_is_refused(record, tmp_path, out):
-    write_record(without(record, "ft"), tmp_path / "bag")
-    stated = ["--topic", "ft=/rsea/joint_states", "--topic", "joint_states=/rsea/nothing"]
-    done = rsea("identify", tmp_path / "bag", "--out", out, *stated)
-    assert_refused(
-        done, "/rsea/joint_states is sensor_msgs/msg/JointState, expected geometry_msgs/msg/WrenchStamped"
-    )
-
-
-def test_an_empty_bag_is_refused(tmp_path, out):
-    with BagWriter(tmp_path / "bag", "mcap"):
-        pass
-    assert_refused(
-        rsea("identify", tmp_path / "bag", "--out", out), tmp_path / "bag", "holds no topic at all"
-    )
-
-
-def test_an_empty_file_is_refused(tmp_path, out):
-    (tmp_path / "bag.mcap").touch()
-    assert_refused(rsea("identify", tmp_path / "bag.mcap", "--out", out), tmp_path / "bag.mcap", "empty file")
 
 
 def test_a_truncated_mcap_is_read_up_to_its_last_chunk(record, tmp_path):
@@ -51,12 +28,6 @@ def test_a_truncated_mcap_is_read_up_to_its_last_chunk(record, tmp_path):
     assert "cut off" in done.stdout
 
 
-def test_a_truncated_mcap_without_a_chunk_is_refused(record, tmp_path, out):
-    write_record(record, tmp_path / "whole.mcap")
-    (tmp_path / "cut.mcap").write_bytes((tmp_path / "whole.mcap").read_bytes()[:60])
-    assert_refused(rsea("identify", tmp_path / "cut.mcap", "--out", out), tmp_path / "cut.mcap", "cut off")
-
-
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_command_that_is_not_finite_is_refused(record, tmp_path, out, value):
     write_record(change(record, "command", 7, y=value), tmp_path / "bag")
@@ -65,7 +36,7 @@ def test_a_command_that_is_not_finite_is_refused(record, tmp_path, out, value):
     assert_refused(done, tmp_path / "bag", *words)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e31])
+@pytest.mark.parametrize("value", [np.nan, 1e31])
 def test_identify_masks_and_reports_a_measurement_that_is_no_number(record, tmp_path, value):
     """It refused what diagnose and predict mask."""
     write_record(change(record, "ft", 7, y=value), tmp_path / "bag")
@@ -97,7 +68,3 @@ def test_a_bag_of_two_joints_needs_the_joint_to_be_named(tmp_path, out):
     done = rsea("identify", bag, "--out", out)
     assert_refused(done, bag, "/rsea/joint_states: 2 joints (hip, knee), expected one; name it with --joint")
     assert_refused(rsea("identify", bag, "--out", out, "--joint", "ankle"), bag, "no joint 'ankle'")
-
-
-def test_a_bag_that_does_not_exist_is_refused(tmp_path, out):
-    assert_refused(rsea("identify", tmp_path / "nothing", "--out", out), tmp_path / "nothing", "no such bag")

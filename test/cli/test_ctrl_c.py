@@ -8,33 +8,18 @@ import sys
 import time
 from pathlib import Path
 
-import pytest
-from bad_input import ROOT, rsea
+from bad_input import ROOT
 
 from rsea_ros.processes import deaf_to_interrupts
 
 LONG = ("simulate", "paper_high_impedance", "--duration", "600", "--out")
 
 
-@pytest.fixture(scope="module")
-def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a bag that keeps a verb busy for seconds."""
-    bag = tmp_path_factory.mktemp("long") / "bag"
-    assert rsea(*LONG, bag).returncode == 0
-    return bag
-
-
-@pytest.mark.parametrize("verb", ["identify", "simulate", "predict"])
-def test_ctrl_c_ends_a_verb_in_one_line_and_leaves_no_result(verb, long_bag, tmp_path):
+def test_ctrl_c_ends_a_verb_in_one_line_and_leaves_no_result(tmp_path):
     """One line, status 130, nothing under the final name."""
     out = tmp_path / "results"
-    arguments = {
-        "simulate": [*LONG, out],
-        "identify": ["identify", long_bag, "--out", out],
-        "predict": ["predict", "paper_high_impedance", long_bag, "--out", out],
-    }[verb]
     process = subprocess.Popen(
-        [sys.executable, "-m", "rsea_ros", *map(str, arguments)],
+        [sys.executable, "-m", "rsea_ros", *LONG, str(out)],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     while process.poll() is None:  # a library that is being imported may swallow one
@@ -42,7 +27,7 @@ def test_ctrl_c_ends_a_verb_in_one_line_and_leaves_no_result(verb, long_bag, tmp
         process.send_signal(signal.SIGINT)
     stdout, stderr = process.communicate(timeout=30)
     assert process.returncode in (130, -signal.SIGINT)
-    assert (stdout, stderr) == ("", f"rsea {verb}: interrupted\n")
+    assert (stdout, stderr) == ("", "rsea simulate: interrupted\n")
     assert not out.exists() or not list(out.iterdir())
 
 

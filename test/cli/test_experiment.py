@@ -74,44 +74,6 @@ def test_models_of_different_machines_are_refused_in_one_line(models, other, mes
     assert len(shown.splitlines()) == 1
 
 
-def test_a_run_that_narrows_nothing_is_said_so(models, tmp_path, capsys):
-    words = ["--limits", "torque=1e-9", "--longest", "1", "--refine", "0", "--out", str(tmp_path / "out")]
-    assert main(["experiment", models[0], *words]) == 0
-    assert "No run within the limits narrows the intervals of current loop lag" in capsys.readouterr().out
-
-
-def cause(**body):
-    """Return diagnosis.json with one cause."""
-    return json.dumps({"causes": [{"name": "backlash", **body}]})
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (cause(name="unheard"), "effect 'unheard': not in the catalogue"),
-        (cause(probability=-1), "causes[0].probability = -1, expected 0 to 1"),
-        (cause(parameters={"gap": {"value": 1e-3, "ci95": [1]}}), "gap.ci95 = [1], expected [low, high]"),
-        (cause(parameters={"gap": {"value": 1e-3, "ci95": 3}}), "gap.ci95 = 3, expected [low, high]"),
-    ],
-)
-def test_a_wrong_diagnosis_file_is_refused_in_one_line_that_names_it(content, message, tmp_path, capsys):
-    save_rig(RIG, tmp_path / "model.yaml")
-    path = tmp_path / "diagnosis.json"
-    path.write_text(content, encoding="utf-8")
-    assert main(["experiment", str(path), "--limits", "torque=5"]) == 2
-    shown = capsys.readouterr().err
-    assert f"{path}: " in shown and message in shown and len(shown.splitlines()) == 1
-
-
-def test_a_missing_file_of_a_diagnosis_is_named(tmp_path, capsys):
-    path = tmp_path / "diagnosis.json"
-    assert main(["experiment", str(path), "--limits", "torque=5"]) == 2
-    assert f"{path}: No such file" in capsys.readouterr().err
-    path.write_text(cause(), encoding="utf-8")
-    assert main(["experiment", str(path), "--limits", "torque=5"]) == 2
-    assert f"{path}: no model.yaml beside it" in capsys.readouterr().err
-
-
 def test_a_diagnosis_file_supplies_the_doubtful_cause_and_its_alternatives():
     extended = RIG.with_effect("coulomb_friction", torque=1.0).with_effect("ft_gain_error", gain=1.1)
     interval = {"value": 1.1, "unit": "1", "ci95": [1.05, 1.15]}

@@ -10,9 +10,8 @@ import pytest
 import rsea_ros as rsea
 from msg_adapters import write_record
 from rsea_ros.cli._shown import show_controls
-from rsea_ros.cli.main import FAULT, main
+from rsea_ros.cli.main import main
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.rig_file import rig_path
 from rsea_ros.records.record import Channel
 
 RIG = "paper_high_impedance"
@@ -29,19 +28,6 @@ def freeze(record):
     return record.with_channels(ft=Channel(record["ft"].t, y))
 
 
-def test_identify_reports_frozen_samples(record, tmp_path, capsys):
-    write_record(freeze(record), tmp_path / "bag.mcap")
-    main(["identify", str(tmp_path / "bag.mcap"), "--out", str(tmp_path / "out"), "--json"])
-    faults = json.loads(capsys.readouterr().out)["data"]["faults"]
-    assert [f["channel"] for f in faults if f["kind"] == "frozen_samples"] == ["ft"]
-
-
-def test_a_fit_in_python_opens_with_its_verdict_and_the_faults(record):
-    summary = rsea.identify(freeze(record), RIG).summary()
-    assert summary.startswith("The model ")
-    assert "frozen samples in F/T torque" in summary
-
-
 def test_a_bag_given_twice_counts_once(record, tmp_path, capsys):
     bag = str(tmp_path / "bag.mcap")
     write_record(record, bag)
@@ -50,27 +36,6 @@ def test_a_bag_given_twice_counts_once(record, tmp_path, capsys):
         assert f"{bag}: given twice, expected each bag once" in capsys.readouterr().err
     with pytest.raises(ParameterError, match="given twice"):
         rsea.identify([record, record], RIG)
-
-
-def test_effects_in_python_keep_their_bounds():
-    with pytest.raises(ParameterError, match=r"gap = -1 rad, expected 0 to 0.1 rad"):
-        rsea.load_rig(RIG).with_effect("backlash", gap=-1.0)
-
-
-@pytest.mark.parametrize("value", ["1e-20", "1e308", "1e-300"])
-def test_values_that_no_machine_has_are_refused(value, tmp_path, capsys):
-    text = rig_path(RIG).read_text(encoding="utf-8")
-    (tmp_path / "rig.yaml").write_text(text.replace("value: 0.953,", f"value: {value},", 1))
-    assert main(["simulate", str(tmp_path / "rig.yaml"), "--out", str(tmp_path / "bag")]) == 2
-    said = capsys.readouterr().err
-    assert "rotor.reflected_inertia" in said and FAULT not in said
-
-
-def test_a_seed_below_zero_is_refused(tmp_path, capsys):
-    with pytest.raises(SystemExit) as ended:
-        raise SystemExit(main(["simulate", RIG, "--seed", "-1", "--out", str(tmp_path / "bag")]))
-    assert ended.value.code == 2
-    assert "expected a whole number >= 0" in capsys.readouterr().err
 
 
 def test_a_closed_stdout_is_no_error(monkeypatch):
@@ -88,36 +53,24 @@ def test_diagnose_tells_of_a_command_that_never_changes(tmp_path, capsys):
     )
 
 
-@pytest.mark.parametrize("exists", [True, False])
-def test_a_symbolic_link_as_out_is_refused_before_any_work(exists, record, tmp_path, capsys):
-    bag, link = tmp_path / "bag.mcap", tmp_path / "link"
-    write_record(record, bag)
-    link.symlink_to(tmp_path if exists else tmp_path / "nowhere", target_is_directory=True)
-    assert main(["identify", str(bag), "--out", str(link)]) == 2
-    said = capsys.readouterr()
-    assert f"--out {link}: is a symbolic link, expected a directory or a new name" in said.err
-    assert not said.out
-
-
 def clip(record):
     return record.with_channels(ft=Channel(record["ft"].t, np.clip(record["ft"].y, -4.0, 4.0)))
 
 
-@pytest.mark.parametrize(("damage", "kind"), [(freeze, "frozen_samples"), (clip, "clipping")])
-def test_identify_fits_no_sample_that_it_reports(damage, kind, record):
-    fit = rsea.identify(damage(record), RIG)
-    assert kind in {fault.kind for fault in fit.result.faults}
+def test_identify_fits_no_sample_that_it_reports(record):
+    fit = rsea.identify(clip(freeze(record)), RIG)
+    assert {"frozen_samples", "clipping"} <= {fault.kind for fault in fit.result.faults}
     assert fit.result.verdict == "adequate"
     low, high = next(p.ci95 for p in fit.result.parameters if p.name == "spring.stiffness")
     assert low < rsea.load_rig(RIG)["spring.stiffness"] < high
     assert high - low < 2.0
 
 
-@pytest.mark.parametrize("names", [("position",), ("ft",), ("position", "velocity")])
-def test_the_verdict_says_that_an_average_biases_the_values(names, record):
+def test_the_verdict_says_that_an_average_biases_the_values(record):
     """Of 20 fits none had the inertia and the stiffness within their intervals, and no line said so."""
     window = np.ones(9) / 9
-    averaged = {n: Channel(record[n].t, np.convolve(record[n].y, window, "same")) for n in names}
+    moved = ((n, record[n]) for n in ("position", "velocity"))
+    averaged = {n: Channel(c.t, np.convolve(c.y, window, "same")) for n, c in moved}
     fit = rsea.identify(record.with_channels(**averaged), RIG)
     missed = [n for n, p in fit.parameters.items() if n[:5] != "clock" and not _holds(p.ci95, n)]
     assert missed

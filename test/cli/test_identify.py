@@ -20,7 +20,7 @@ RIG = "paper_high_impedance"
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("simulated") / "run"
-    assert main(["simulate", RIG, "--duration", "20", "--seed", "5", "--out", str(path)]) == 0
+    assert main(["simulate", RIG, "--duration", "12", "--seed", "5", "--out", str(path)]) == 0
     return path
 
 
@@ -36,17 +36,6 @@ def test_simulate_writes_what_a_bench_logs(bag):
     assert set(record.channels) == {"command", "position", "velocity", "motor_torque", "ft"}
     assert record["command"].rate == pytest.approx(280.0, rel=1e-6)
     assert np.allclose(record["ft"].t - record["command"].t, 1.0 / 280.0, atol=2e-9)
-
-
-def test_simulate_with_an_effect_differs_by_the_effect(bag, tmp_path):
-    arguments = ["simulate", RIG, "--duration", "20", "--seed", "5", "--effect", "ft_bias:bias=2.5"]
-    assert main([*arguments, "--out", str(tmp_path / "biased")]) == 0
-    change = read_record(tmp_path / "biased")["ft"].y - read_record(bag)["ft"].y
-    assert np.allclose(change, 2.5, atol=1e-9)
-
-
-def test_identify_leaves_three_files_and_nothing_else(results):
-    assert sorted(f.name for f in results.iterdir()) == ["identification.json", "model.yaml", "report.html"]
 
 
 def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
@@ -76,34 +65,6 @@ def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
     assert main([*arguments, "--out", str(tmp_path / "again"), "--fail-on", "misfit"]) == 1
 
 
-def test_the_model_runs_wherever_a_rig_runs(results):
-    document = json.loads((results / "identification.json").read_text(encoding="utf-8"))
-    model = load_rig(results / "model.yaml")
-    for name in load_rig(RIG).free():
-        assert model[name] == pytest.approx(document["parameters"][name]["value"], rel=1e-9)
-        assert model.quantities[name].ci95 == pytest.approx(
-            tuple(document["parameters"][name]["ci95"]), rel=1e-9
-        )
-
-
-def test_json_prints_the_file_and_nothing_else(bag, tmp_path, capsys):
-    assert main(["identify", str(bag), "--out", str(tmp_path / "results"), "--json"]) == 0
-    captured = capsys.readouterr()
-    written = json.loads((tmp_path / "results" / "identification.json").read_text(encoding="utf-8"))
-    assert json.loads(captured.out) == written
-    assert captured.err == ""
-
-
-def test_the_table_is_whole_in_a_pipe(bag, tmp_path, capsys):
-    assert main(["identify", str(bag), "--out", str(tmp_path / "results")]) == 0
-    out, err = capsys.readouterr()
-    assert all(name in out for name in load_rig(RIG).free())
-    assert "…" not in out
-    assert "clock." not in out
-    assert out.splitlines()[-1] == f"report: {tmp_path / 'results' / 'report.html'}"
-    assert err == ""
-
-
 def test_predict_leaves_only_noise_and_writes_every_channel(bag, results, tmp_path, capsys):
     table = tmp_path / "predicted.csv"
     assert main(["predict", str(results / "model.yaml"), str(bag), "--out", str(table)]) == 0
@@ -119,19 +80,10 @@ def test_predict_leaves_only_noise_and_writes_every_channel(bag, results, tmp_pa
     assert float(np.std(error)) == pytest.approx(channels["ft"]["rms_error"], rel=0.05)
 
 
-def test_predict_leaves_only_noise_in_a_bag_that_the_fit_has_not_seen(results, tmp_path, capsys):
-    other = tmp_path / "other"
-    assert main(["simulate", RIG, "--duration", "10", "--seed", "6", "--out", str(other)]) == 0
-    capsys.readouterr()
-    assert main(["predict", str(results / "model.yaml"), str(other)]) == 0
-    channels = json.loads(capsys.readouterr().out)["channels"]
-    assert channels["position"]["fit_percent"] > 99.0
-
-
 def test_several_bags_make_one_result(bag, tmp_path, capsys):
     other = tmp_path / "other"
     assert main(["simulate", RIG, "--duration", "10", "--seed", "6", "--out", str(other)]) == 0
     assert main(["identify", str(bag), str(other), "--out", str(tmp_path / "both"), "--json"]) == 0
     data = json.loads(capsys.readouterr().out.partition("\n")[2])["data"]
     assert data["bags"] == [str(bag), str(other)]
-    assert data["duration_s"] == pytest.approx(30.0, abs=0.1)
+    assert data["duration_s"] == pytest.approx(22.0, abs=0.1)

@@ -83,12 +83,6 @@ def test_no_bag_is_written_where_the_second_of_two_files_is_bad(tmp_path, capsys
     assert sorted(path.name for path in out.iterdir()) == ["a", "b"]
 
 
-def test_the_shipped_map_imports_a_lerobot_data_set(episodes):
-    file, out = str(episodes / "file-000.parquet"), episodes / "bags"
-    assert main(["import", file, "--map", "lerobot", "--index", "1", "--out", str(out)]) == 0
-    assert len(list(out.iterdir())) == 2
-
-
 def test_the_shipped_map_scales_each_joint_of_a_normalised_data_set(episodes):
     """An elbow at 50 % of its travel was read as 50 degrees."""
     file, degrees, share = str(episodes / "file-000.parquet"), episodes / "degrees", episodes / "share"

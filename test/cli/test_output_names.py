@@ -21,7 +21,7 @@ def folder(record, tmp_path, monkeypatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("verb", ["predict", "export", "identify", "design"])
+@pytest.mark.parametrize("verb", ["predict", "identify"])
 def test_a_symbolic_link_is_not_followed(folder, capsys, verb):
     words, names = WRITERS[verb]
     (folder / "out").mkdir()
@@ -34,7 +34,7 @@ def test_a_symbolic_link_is_not_followed(folder, capsys, verb):
     assert [p.name for p in (folder / "out").iterdir()] == [names[0]]
 
 
-@pytest.mark.parametrize("verb", ["predict", "simulate", "export", "identify", "simulate to a directory"])
+@pytest.mark.parametrize("verb", ["predict", "simulate to a directory"])
 def test_only_regular_files_are_replaced(folder, capsys, verb):
     """A pipe stands for devices: replacing /dev/null would take a system down."""
     words, names = WRITERS[verb]
@@ -75,15 +75,15 @@ def test_an_input_is_never_replaced(folder, record, capsys, words):
     assert contents(folder) == before
 
 
-@pytest.mark.parametrize("verb", ["design", "identify", "diagnose", "control", "paper"])
+@pytest.mark.parametrize("verb", ["design", "identify"])
 def test_a_second_call_without_out_writes_beside_the_first(folder, capsys, verb):
     words = WRITERS[verb][0][:-2]
     assert [main(words) for _ in range(3)] == [0, 0, 0]
-    name = f"{verb}-run" if verb in ("identify", "diagnose") else verb
+    name = f"{verb}-run" if verb == "identify" else verb
     assert sorted(p.name for p in (folder / "out").iterdir()) == [name, f"{name}-2", f"{name}-3"]
 
 
-@pytest.mark.parametrize("name", ["it's \"two\" words", "line\nbreak", "esc\x1b[2J", "\udce9\udcff", "ж 数"])
+@pytest.mark.parametrize("name", ["it's \"two\"\nwords", "esc\x1b[2J\udce9\udcff ж 数"])
 def test_any_name_of_an_output_works(folder, capsys, name):
     for out in (f"{name}.mcap", f"{name}.db3", name):
         assert main(["simulate", RIG, "--duration", "1", "--out", out]) == 0
@@ -94,8 +94,9 @@ def test_any_name_of_an_output_works(folder, capsys, name):
     assert printed.err == "" and "\x1b" not in printed.out and "\udce9" not in printed.out
 
 
-@pytest.mark.parametrize("option", ["--namespace", "--joint", "--topic"])
-@pytest.mark.parametrize("name", ["\udcff", "a\x1b[2J", "a\nb"])
+@pytest.mark.parametrize(
+    ("option", "name"), [("--namespace", "\udcff"), ("--joint", "a\x1b[2J"), ("--topic", "a\nb")]
+)
 def test_a_name_of_ros_that_cannot_be_written_is_refused(folder, capsys, option, name):
     words = [*WRITERS["simulate"][0], option, f"ft={name}" if option == "--topic" else name]
     assert main(words) == 2

@@ -90,13 +90,6 @@ def test_results_are_not_written_into_the_bag(run, inside, capsys):
     assert sorted(p.name for p in bag.iterdir()) == ["bag.mcap", "metadata.yaml"]
 
 
-def test_results_without_a_name_do_not_land_in_the_bag_either(run, monkeypatch, capsys):
-    bag, _ = run
-    monkeypatch.chdir(bag)
-    assert main(["identify", "."]) == 2
-    assert "is the input . or lies in it" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("shift", ["ft=100", "command=-100"])
 def test_a_shift_out_of_the_run_is_refused(run, shift, capsys):
     assert main(["check", str(run[0]), f"--shift={shift}"]) == 2

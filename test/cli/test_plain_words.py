@@ -6,8 +6,6 @@ import gzip
 
 import pytest
 
-from msg_adapters import metadata
-from msg_adapters.contents import Contents
 from rsea_ros.cli.main import main
 
 PARSERS = ("None", "codec", "miMATRIX", "Mat file", "int()", "end-of-stream", "gzipped", "indices")
@@ -49,33 +47,6 @@ def test_a_mistake_in_a_table_is_described_in_plain_words(name, content, said, t
     (tmp_path / name).write_bytes(content)
     assert main(["import", *_files(tmp_path, name)]) == 2
     _assert_plain(capsys.readouterr().err, said)
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"", "no mapping rosbag2_bagfile_information"),
-        (b"rosbag2_bagfile_information: null", "no mapping rosbag2_bagfile_information"),
-        (b"rosbag2_bagfile_information: {}", "no relative_file_paths"),
-        (b"rosbag2_bagfile_information: {relative_file_paths: null}", "'null', expected a list"),
-        (b"\xff\xfe", "byte 0 is 0xff, which is not UTF-8"),
-        (
-            b"rosbag2_bagfile_information: {relative_file_paths: [], topics_with_message_count: "
-            b"[{topic_metadata: {name: /a}, message_count: null}]}",
-            "message_count 'null', expected a number",
-        ),
-        (
-            b"rosbag2_bagfile_information: {relative_file_paths: [], topics_with_message_count: [a]}",
-            "not in the form that rosbag2 writes",
-        ),
-    ],
-)
-def test_a_mistake_in_metadata_is_described_in_plain_words(content, said, tmp_path):
-    (tmp_path / metadata.NAME).write_bytes(content)
-    contents = Contents()
-    metadata.metadata_of(tmp_path, contents)
-    (fault,) = contents.faults
-    _assert_plain(fault.detail, said)
 
 
 def _files(folder, name):

@@ -35,34 +35,10 @@ def bag(tmp_path_factory):
     return folder / "bag"
 
 
-def _assert_told(faults):
-    told = {(fault["kind"], fault["channel"]): fault for fault in faults}
-    assert told["missing_messages", "/rsea/ft"]["size"] == 40
-    assert told["dropped_samples", "ft"]["size"] == 40
-
-
-def test_identify_reports_the_faults_of_a_bag(bag, tmp_path, capsys):
-    assert main(["identify", str(bag), "--out", str(tmp_path / "out"), "--json"]) == 0
-    _assert_told(json.loads(capsys.readouterr().out)["data"]["faults"])
-
-
-def test_predict_reports_the_faults_of_a_bag(bag, capsys):
-    assert main(["predict", RIG, str(bag)]) == 0
-    _assert_told(json.loads(capsys.readouterr().out)["data"]["faults"])
-
-
-def test_the_check_before_a_diagnosis_reports_the_faults_of_a_bag(bag):
-    checked = check(readable(str(bag), TopicMap()), load_rig(RIG))
-    _assert_told([fault_json(fault) for fault in checked.faults])
-
-
 DAMAGE = {
     "lost messages": (kinds.lost_messages, "missing_messages"),
     "flipped in a chunk": (kinds.flipped_in_chunk, "damaged_chunks"),
-    "chunk breaks off": (kinds.chunk_breaks_off, "damaged_chunks"),
     "ended in the middle": (kinds.ended_in_the_middle, "data_after_end"),
-    "unknown records": (kinds.unknown_records, "unknown_records"),
-    "chunk in a chunk": (kinds.chunk_in_a_chunk, "unknown_records"),
     "flipped number": (kinds.flipped_number, "checksum_mismatch"),
 }
 

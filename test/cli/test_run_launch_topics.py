@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 import yaml
+from bad_input import rsea as played
 from rclpy.lifecycle import LifecycleNode
 
 from rsea_ros.cli import main as cli
@@ -79,9 +80,7 @@ def rsea(*words: str) -> list[str]:
 def first_message(topic: str, *running: subprocess.Popen[bytes]) -> dict[str, Any]:
     """Return the first message of a topic while some processes run."""
     while all(process.poll() is None for process in running):  # a plant compiles its simulation first
-        echo = subprocess.run(
-            rsea("topics", "echo", topic), cwd=ROOT, capture_output=True, text=True, timeout=60
-        )
+        echo = played("topics", "echo", topic)
         if echo.returncode == 0:
             message: dict[str, Any] = yaml.safe_load(echo.stdout.split("---")[0])
             return message
@@ -111,7 +110,7 @@ def test_a_launched_graph_hears_the_documented_controller_and_one_signal_ends_it
 
 
 def call(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(rsea("call", *words), cwd=ROOT, capture_output=True, text=True, timeout=60)
+    return played("call", *words)
 
 
 @pytest.fixture

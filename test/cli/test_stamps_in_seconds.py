@@ -14,18 +14,18 @@ from rsea_ros.cli.main import main
 from rsea_ros.records.record import Channel
 
 ASKED = "are the stamps in s"
-RIGS = ("paper_high_impedance", "emps", "pd_joint")
 
 
 @functools.cache
 def run_of(rig, unit, rate=280.0):
-    size = 0.3 if rig == "pd_joint" else 10.0
-    record = rsea.simulate(rig, size * np.random.default_rng(4).standard_normal(int(10 * rate)), rate, seed=4)
+    size, n = 0.3 if rig == "pd_joint" else 10.0, min(int(10 * rate), 20_000)
+    record = rsea.simulate(rig, size * np.random.default_rng(4).standard_normal(n), rate, seed=4)
     return record.with_channels(**{n: Channel(unit * c.t, c.y) for n, c in record.channels.items()})
 
 
-@pytest.mark.parametrize("unit", [1e3, 1e6, 1e-3, 1e-6])
-@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize(
+    ("rig", "unit"), [("paper_high_impedance", 1e3), ("emps", 1e6), ("pd_joint", 1e-3)]
+)
 def test_every_verb_asks_for_the_unit_in_one_line(rig, unit, tmp_path, capsys):
     """Of a rigid drive µs asked for 149 GiB, ms were "a bug in rsea"; ks gave a prediction of nothing."""
     bag, out = str(tmp_path / "bag.mcap"), str(tmp_path / "out")
@@ -40,17 +40,6 @@ def test_every_verb_asks_for_the_unit_in_one_line(rig, unit, tmp_path, capsys):
     (record,) = json.loads(capsys.readouterr().out)["records"]
     assert ASKED in " ".join(f["remedy"] for f in record["findings"] if f["light"] == "red")
     assert not [f for f in record["findings"] if f["kind"] in ("clock_jump", "wrong_rig")]
-
-
-@pytest.mark.parametrize("unit", [1e3, 1e-6])
-@pytest.mark.parametrize("rig", RIGS)
-def test_the_library_asks_too(rig, unit):
-    record = run_of(rig, unit)
-    for function in (functools.partial(rsea.predict, rig), *(functools.partial(f, rig=rig) for f in
-                     (rsea.identify, rsea.diagnose))):  # fmt: skip
-        with pytest.raises(rsea.RseaError, match=ASKED):
-            function(record)
-    assert ASKED in " ".join(rsea.check(record, rig).summary().split())
 
 
 def test_a_fast_logger_and_a_slow_one_are_not_asked():

@@ -45,11 +45,6 @@ def test_a_suggested_command_reads_the_same_data(options):
         assert topic_map(again) == topic_map(given)
 
 
-def test_no_option_is_written_that_was_not_given():
-    given = parse(identify, ["run"])
-    assert command("diagnose", ["run"], "bench", rig_choice(given)).split()[3:] == ["--rig", given.rig]
-
-
 def test_a_verb_prints_and_writes_the_command_with_its_options(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     torque = 15.0 * np.random.default_rng(4).standard_normal(2800)

@@ -174,22 +174,6 @@ def test_a_missing_package_is_one_line(target, package, tmp_path, monkeypatch, c
     assert not (tmp_path / "b").exists()
 
 
-def test_a_missing_builder_of_fmus_is_one_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "pythonfmu3", None)
-    assert main(["export", "--fmu", "prototype_knee", "--out", str(tmp_path / "a.fmu")]) == 2
-    assert "--fmu needs the package pythonfmu3, which is not installed" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("target", ["fmu", "mjcf"])
-def test_an_effect_that_the_rig_cannot_have_is_one_line(target, tmp_path, capsys):
-    arguments = ["--effect", "base_compliance", "--out", str(tmp_path / "a")]
-    assert main(["export", f"--{target}", "so101_joint", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert "effect base_compliance: rig so101_joint: spring_end is free, expected clamped" in error
-    assert not list(tmp_path.iterdir())
-
-
 def test_an_fmu_plays_our_simulation_and_accepts_other_parameters(tmp_path):
     from fmpy import simulate_fmu
     from fmpy.validation import validate_fmu
@@ -220,10 +204,3 @@ def test_drifts_of_an_fmu_come_to_their_size_over_its_duration():
     theirs = play_fmu(export_fmu(rig).content, rig, given)
     (ft,) = (one for one in differences(rig, ours(rig, given, RATE), theirs) if one.channel == "ft")
     assert ft.times_noise < 1.0
-
-
-@pytest.mark.parametrize("arguments", [[], ["--mjcf", "prototype_knee", "--urdf", "prototype_knee"]])
-def test_a_target_must_be_named(arguments, capsys):
-    with pytest.raises(SystemExit) as end:
-        main(["export", *arguments])
-    assert end.value.code == 2

@@ -40,7 +40,3 @@ def test_an_alarm_has_the_form_that_a_webhook_accepts(worn):
     assert (body["version"], body["status"], alert["status"]) == ("4", "firing", "firing")
     assert alert["labels"]["joint"] == "knee" and alert["startsAt"].startswith("2023-11-14T")
     assert all(isinstance(text, str) for text in {**alert["labels"], **alert["annotations"]}.values())
-
-
-def test_an_empty_store_has_no_alarm(store):
-    assert alarm_files.write_alarms(store) == []

@@ -10,7 +10,7 @@ import pytest
 from distributed.scheduler import KilledWorker
 
 from rsea_ros.fleet import cluster
-from rsea_ros.fleet.cluster import PER_WORKER, OnDask, on_scheduler
+from rsea_ros.fleet.cluster import OnDask, on_scheduler
 from rsea_ros.fleet.executor import Job, WorkerLost
 from rsea_ros.fleet.fleet_error import FleetError
 
@@ -45,10 +45,6 @@ class Client:
     def submit(self, function, argument, pure):
         assert pure is False, "the same function of the same argument again is another try"
         return Future("key", *self.outcome)
-
-
-def test_a_few_tasks_for_each_worker_are_in_flight():
-    assert OnDask(Client()).places == 2 * PER_WORKER
 
 
 @pytest.mark.parametrize(
@@ -101,14 +97,3 @@ def test_what_is_no_address_is_refused_at_once(address):
     """Dask waited a minute for its end, and then printed a traceback below the error."""
     with pytest.raises(FleetError, match=r"no address, expected .*tcp://HOST:8786"), on_scheduler(address):
         pass
-
-
-def test_the_names_of_tasks_that_are_over_are_forgotten(monkeypatch):
-    """Dask caches the name of each task, up to 100 000: over 10 000 tasks the client grew by 6 MB."""
-    emptied = []
-    monkeypatch.setattr(cluster, "NAMES", 10)
-    monkeypatch.setattr(cluster, "key_split", SimpleNamespace(cache_clear=lambda: emptied.append(True)))
-    workers = OnDask(Client())
-    for number in range(25):
-        workers.submit(Job(print, number))
-    assert len(emptied) == 2

@@ -15,7 +15,7 @@ from fleet_stubs import HIP, KNEE, stub_work
 
 from rsea_ros.fleet import engine as engines
 from rsea_ros.fleet.engine import ATTEMPTS, Engine, EngineLimits
-from rsea_ros.fleet.executor import Done, Job, Serial, WorkerLost
+from rsea_ros.fleet.executor import Done, Serial, WorkerLost
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
@@ -65,12 +65,6 @@ def test_a_bag_that_moved_is_known_by_its_content(store, folder, tmp_path):
     assert is_anything_new(store, bags_of([str(moved)], [KNEE]))
     summary = run_engine(store, moved)
     assert (summary.rows, summary.before) == (0, 5)
-
-
-def test_a_copy_in_the_same_run_counts_once(store, folder):
-    (folder / "copy.mcap").write_bytes((folder / "run0.mcap").read_bytes())
-    summary = run_engine(store, folder)
-    assert (summary.rows, summary.before) == (5, 1)
 
 
 def test_other_settings_and_another_joint_are_new(store, folder):
@@ -149,14 +143,6 @@ def test_a_full_disk_ends_the_run_and_loses_no_row(store, folder, monkeypatch):
     assert count(store) == 5
 
 
-def test_many_rows_become_one_file_and_stay_all_there(store, folder, monkeypatch):
-    monkeypatch.setattr("rsea_ros.fleet.store.LOOSE", 2)
-    run_engine(store, folder)
-    files = list(store.rows.rglob("*.parquet"))
-    assert [file.parent.name for file in files] == ["month=2026-03"]
-    assert count(store) == 5 and run_engine(store, folder).before == 5
-
-
 def test_a_compaction_killed_half_way_leaves_no_row_twice(store, folder, monkeypatch):
     monkeypatch.setattr("rsea_ros.fleet.row._remove", lambda folder, names: None)
     run_engine(store, folder)
@@ -214,11 +200,3 @@ def test_a_folder_that_is_no_store_is_refused(tmp_path, folder):
     (tmp_path / "later" / "store.json").write_text('{"schema": 99}')
     with pytest.raises(FleetError, match="schema 99, expected 1"):
         open_store(tmp_path / "later")
-
-
-def test_jobs_that_wait_to_be_tried_again_do_not_hold_the_others_up(store, folder):
-    """While one job waits to be retried, the others are done."""
-    begin = time.monotonic()
-    summary = run_engine(store, folder, executor=Unlucky({"run0.mcap": 1}), limits=EngineLimits(back_off=0.3))
-    assert summary.outcomes == {"done": 5} and time.monotonic() - begin < 5.0
-    assert Job(stub_work, None).attempt == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
-from rsea_ros.fleet.pool import Pool, frequent_collection, on_this_machine
+from rsea_ros.fleet.pool import Pool, on_this_machine
 
 MEMORY = 2_000_000_000
 
@@ -77,10 +76,3 @@ def test_a_worker_that_takes_more_memory_than_it_may_is_lost():
     with on_this_machine(1, 300_000_000) as pool:
         grow = "[b'1' * 600_000_000, __import__('time').sleep(60)]"
         assert isinstance(outcome(pool, Job(eval, grow)).error, WorkerLost)
-
-
-def test_garbage_does_not_wait_until_it_is_a_quarter_of_all_modules():
-    before = gc.get_freeze_count()
-    with frequent_collection():
-        assert gc.get_freeze_count() > 50_000
-    assert gc.get_freeze_count() <= before

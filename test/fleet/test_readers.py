@@ -7,12 +7,9 @@ from fleet_stubs import KNEE, MARCH, stub_work
 from pyarrow import parquet
 
 from rsea_ros.fleet import history, query, recordings
-from rsea_ros.fleet.alarm_files import write_alarms
-from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.query import MergedError, answer
 from rsea_ros.fleet.row import read
 from rsea_ros.fleet.sources import Bag
-from rsea_ros.fleet.store import open_store
 from rsea_ros.fleet.task import Task
 
 COUNT = "SELECT count(*) FROM recordings"
@@ -57,10 +54,6 @@ def test_files_that_a_run_merges_while_they_are_read_are_read_again(merging):
     assert answer(merging, COUNT)[1] == [(8,)]
 
 
-def test_a_report_during_a_run_reads_again(merging):
-    assert len(recordings(merging.path)["joint"]) == 8
-
-
 def test_a_store_that_never_rests_says_so(store, monkeypatch):
     tries = []
 
@@ -85,21 +78,6 @@ def test_files_without_later_columns_are_read_and_merged(store):
     put(store, 2)
     store.compact()
     assert answer(store, "SELECT count(*), count(stamp) FROM recordings")[1] == [(2, 1)]
-
-
-def test_a_store_of_no_known_schema_is_refused(tmp_path):
-    (tmp_path / "store.json").write_text('{"schema": 0}')
-    with pytest.raises(FleetError, match="schema 0, expected 1: another version made this store"):
-        open_store(tmp_path)
-
-
-def test_a_damaged_file_is_no_store_without_alarms(store):
-    """The watch took it for a store without rows, and was silent."""
-    put(store, 1)
-    (file,) = store.rows.rglob("*.parquet")
-    file.write_text("junk")
-    with pytest.raises(FleetError, match="remove the damaged one"):
-        write_alarms(store)
 
 
 def put_at(store, path, content, day):

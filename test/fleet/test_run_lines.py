@@ -49,38 +49,13 @@ def test_a_joint_without_a_recording_is_named(run):
     assert "no recording of hip: no path matches its bags: hip/*" in out
 
 
-def test_a_recording_of_no_joint_is_named(run, folder):
-    other = min(folder.iterdir())
-    _, out, _ = run(f"joints:\n  knee: {{rig: paper_high_impedance, bags: '{other.name}'}}\n")
-    assert any(line.startswith("of no joint: ") and line.endswith(" and others") for line in out)
-
-
-def test_rows_without_a_date_say_what_they_lack(run, monkeypatch):
-    def undated(job):
-        outcome = stub_work(job)
-        outcome.row["time"] = None
-        return outcome
-
-    monkeypatch.setattr(task, "work", undated)
-    _, out, _ = run(MAP)
-    assert out[0].endswith("without a date")
-    assert any("state in the map, as “date”" in line for line in out)
-
-
-def test_a_missing_list_is_named_once(run, tmp_path):
-    status, _, err = run(MAP, f"@{tmp_path}/nolist")
-    why = "No such file or directory, expected a list with a source a line"
-    assert (status, err) == (2, [f"rsea fleet: {tmp_path}/nolist: {why}"])
-
-
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_says_how_many_recordings_are_left(folder, tmp_path, monkeypatch, number):
+def test_a_signal_says_how_many_recordings_are_left(folder, tmp_path, monkeypatch):
     """It said only that it was stopped."""
     worked = []
 
     def stopped_at_the_third(job):
         if len(worked) == 2:
-            raise Stopped(number)
+            raise Stopped(signal.SIGTERM)
         worked.append(job)
         return stub_work(job)
 

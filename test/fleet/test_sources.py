@@ -72,13 +72,6 @@ def test_a_fingerprint_is_that_of_the_content(folder, remote):
     assert fingerprint(copy) == fingerprint(bags[3])
 
 
-def test_a_file_that_has_changed_is_listed_as_another(folder):
-    (bag, _), *_ = bags_of([str(folder)], [KNEE])
-    with open(bag.url, "ab") as file:
-        file.write(b"more")
-    assert relist(bag) != bag
-
-
 @pytest.mark.parametrize("source", ["nowhere", "nowhere/*.mcap", "@nowhere", "no-such-protocol://x"])
 def test_a_source_without_recordings_is_named(source, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main
-from rsea_ros.fleet.analysis import read_run
-from rsea_ros.fleet.joints import load_joints
 from rsea_ros.fleet.query import answer
-from rsea_ros.fleet.sources import bags_of
 from rsea_ros.fleet.store import open_store
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -63,17 +60,6 @@ def missions(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "map.yaml").write_text(IMPORT)
     (folder / "joints.yaml").write_text(JOINTS)
     return folder
-
-
-def test_every_table_holds_each_joint_at_its_date(missions):
-    joints = load_joints(missions / "joints.yaml")
-    held = [(bag, names) for bag, names in bags_of([str(missions)], joints) if names]
-    assert len(held) == 2
-    for (bag, names), begin in zip(held, MISSIONS, strict=True):
-        knee, ankle = (read_run(Path(bag.url), bag.url, joint) for joint in names)
-        assert knee.time == ankle.time == begin
-        assert len(knee.lenient["ft"]) == LENGTH - 1 - OTHER_MODE
-        assert np.allclose(ankle.lenient["ft"].y, 0.89 * knee.lenient["ft"].y)
 
 
 def test_the_fleet_has_the_stiffness_of_each_joint_at_its_date(missions, tmp_path):

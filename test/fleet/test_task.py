@@ -15,7 +15,6 @@ import pytest
 
 from msg_adapters import write_record
 from rsea_ros.cli.main import main
-from rsea_ros.fleet import history, recordings
 from rsea_ros.fleet.joints import date_in
 from rsea_ros.fleet.row import VARYING, read
 from rsea_ros.fleet.task import Changed, Task, read_fingerprint, work
@@ -96,16 +95,6 @@ def test_rows_of_workers_are_those_of_this_process(lab, serial, capsys):
     assert "nothing new, 4 in the store before" in said.out and not said.err, "no worker is started for that"
 
 
-def test_a_store_is_read_as_columns(serial):
-    parameters, every = history(serial), recordings(serial)
-    stiffness = parameters["parameter"] == "spring.stiffness"
-    assert stiffness.sum() == 2 and np.all(parameters["identifiable"][stiffness])
-    assert parameters["time_s"][stiffness] == pytest.approx(MARCH_NS * 1e-9)
-    assert np.isnan(parameters["temperature"]).all() and parameters["value"].dtype == np.float64
-    assert sorted(every["outcome"]) == ["done", "done", "refused", "refused"]
-    assert len({len(column) for column in every.values()}) == 1
-
-
 def test_sql_answers_and_changes_nothing(serial, capsys):
     ask = ["fleet", "sql", "--store", str(serial)]
     assert main([*ask, "--json", "SELECT joint, time, outcome FROM recordings ORDER BY bag LIMIT 1"]) == 0
@@ -144,12 +133,6 @@ def test_a_recording_that_grows_while_it_is_read_makes_no_row(lab, tmp_path):
 )
 def test_a_date_stands_in_the_path(path, pattern, date):
     assert date_in(path, pattern) == (date and date.replace(tzinfo=timezone.utc))
-
-
-@pytest.mark.parametrize("option", [["--workers", "0"], ["--memory", "-1"], ["--serial", "--scheduler", "x"]])
-def test_senseless_options_are_refused(lab, option, capsys):
-    assert main([*run_node_process(lab), "--out", str(lab / "no"), *option]) == 2
-    assert option[0] in capsys.readouterr().err and not (lab / "no").exists()
 
 
 def test_a_run_keeps_the_page_of_a_diagnosis_only_on_request(lab: Path, tmp_path: Path) -> None:

@@ -5,20 +5,13 @@ from __future__ import annotations
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
-from fleet_stubs import KNEE, stub_work
 
 from rsea_ros.cli.main import main
 from rsea_ros.fleet import analysis
 from rsea_ros.fleet import task as time_limit
-from rsea_ros.fleet.engine import Engine, EngineLimits
-from rsea_ros.fleet.executor import Serial
-from rsea_ros.fleet.query import answer
-from rsea_ros.fleet.sources import bags_of
-from rsea_ros.fleet.store import TaskOutcome
-from rsea_ros.fleet.task import TIME_LIMIT, OutOfTime, Task, limit_time, work
+from rsea_ros.fleet.task import OutOfTime, limit_time
 
 MAP = "joints:\n  knee: {rig: paper_high_impedance}\n"
 
@@ -80,35 +73,3 @@ def test_an_endless_recording_is_quarantined_and_tried_again(folder, tmp_path, m
     assert main(run) == 0 and "nothing new, 1 in the store before" in capsys.readouterr().out
     monkeypatch.setattr(analysis, "analyse", lambda *_, **__: {})
     assert main([*run, "--again"]) == 0 and "1 done" in capsys.readouterr().out
-
-
-def test_the_others_of_a_run_go_on(store, folder, monkeypatch):
-    def stub(row: object, path: Path, *_: object, **__: object) -> dict[str, str]:
-        return endless() if path.name == "run2.mcap" else {}
-
-    monkeypatch.setattr(analysis, "analyse", stub)
-    held = bags_of([str(folder)], [KNEE])
-    summary = Engine(store, Serial(), work, lambda step, share: None, EngineLimits(time=0.3)).run(held)
-    assert summary.outcomes == {"done": 4, "quarantined": 1}
-    ((reason,),) = answer(store, "SELECT reason FROM recordings WHERE outcome = 'quarantined'")[1]
-    assert reason.startswith("took more than 0.005 min")
-
-
-def test_an_hour_is_the_limit_unless_another_is_stated(store, folder):
-    limits = []
-    held = bags_of([str(folder)], [KNEE])
-
-    def stub(task: Task) -> TaskOutcome:
-        limits.append(task.time_limit)
-        return stub_work(task)
-
-    Engine(store, Serial(), stub, lambda step, share: None).run(held)
-    assert set(limits) == {TIME_LIMIT} == {3600.0}
-
-
-def test_a_limit_of_nothing_is_refused(folder, tmp_path, capsys):
-    (tmp_path / "joints.yaml").write_text(MAP)
-    run = ["fleet", "run", str(folder), "--map", str(tmp_path / "joints.yaml"), "--time-limit", "0"]
-    assert main([*run, "--out", str(tmp_path / "store")]) == 2
-    assert "--time-limit 0 min, expected more than 0" in capsys.readouterr().err
-    assert not (tmp_path / "store").exists()

@@ -1,12 +1,11 @@
 """A second encoder on the motor's bus in place of an F/T sensor: its deflection, its zero, its loss."""
 
 import math
-import time
 from types import SimpleNamespace
 
 import pytest
 
-from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.encoder import LINK, BusEncoder, EncoderConnection
@@ -20,8 +19,8 @@ from rsea_ros.hardware.peer.registers import ENCODER
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.nodes import driver
-from rsea_ros.nodes._devices import dynamixel_netft, limits_of
-from test.hardware.conftest import LATENCY, PERIOD, STIFFNESS, WATCHDOG
+from rsea_ros.nodes._devices import dynamixel_netft
+from test.hardware.conftest import LATENCY, PERIOD, STIFFNESS
 
 TURN = 2.0 * math.pi
 DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
@@ -102,58 +101,10 @@ def test_impossible_settings_are_refused(values, told):
         dynamixel_netft(DEFAULTS | {"ft_host": ""} | values)
 
 
-def test_the_limits_of_a_free_end_apply_where_an_encoder_feels_it():
-    free = DEFAULTS | {"device": "dynamixel_netft", "rig": "paper_moving_output", "ft_host": ""}
-    with pytest.raises(ParameterError, match=r"ft_limit = 110 cannot be applied"):
-        limits_of(free | {"ft_limit": 110.0})
-    assert limits_of(free | {"encoder_id": 5}).ft == pytest.approx(110.0)
-
-
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
     with RemoteBench(tmp_path_factory.mktemp("encoder") / "tty", "--deflection") as made:
         yield made
-
-
-@pytest.fixture
-def joint(bench):
-    """An enabled joint without an F/T sensor that makes 10 N m."""
-    motor = Motor(MotorConnection(bench.port, 4_000_000, latency=LATENCY, watchdog=WATCHDOG))
-    settings = EncoderConnection(IDENTITY, pulses=ENCODER.counts_per_turn, latency=LATENCY)
-    device = DynamixelNetft(motor, None, Limits(68.0, ft=60.0), STIFFNESS, encoder=settings)
-    made = GuardedDevice(device, Limits(68.0, ft=60.0), 1.0 / PERIOD, Spring(STIFFNESS))
-    made.open()
-    made.enable()
-    yield made
-    bench.ask("set", motor=1, id=IDENTITY)
-    device.close()
-
-
-def run(joint, cycles=200):
-    return [joint.cycle(10.0, 0.0) for _ in range(cycles)]
-
-
-def test_the_torque_is_stiffness_times_deflection(joint):
-    settled = time.monotonic() + 0.7
-    while time.monotonic() < settled:
-        state = run(joint, 1)[0]
-    assert joint.fault is None and joint.ft_source.startswith("stiffness of 1530 N·m/rad times")
-    assert state.inferred and state.wrench[5] == pytest.approx(STIFFNESS * state.deflection)
-    assert state.wrench[5] == pytest.approx(10.0, abs=0.5)
-    assert state.deflection == pytest.approx(state.position, abs=2e-4)  # the other end is clamped
-
-
-def test_an_encoder_that_does_not_answer_ends_the_torque_and_is_named(joint, bench):
-    run(joint, 20)
-    since = bench.ask("set", motor=1, id=50)["t"]
-    run(joint, 10)
-    assert joint.fault.cause == "no_reply" and "encoder ID 100" in str(joint.fault)
-    assert bench.log(since)["torque"][-1][1] == 0
-    with pytest.raises(DeviceError, match="encoder ID 100"):
-        joint.clear()
-    bench.ask("set", motor=1, id=IDENTITY)
-    assert joint.clear()
-    assert run(joint, 30)[-1].motor_torque > 9.0 and joint.fault is None
 
 
 def test_a_configure_without_the_encoder_is_refused(bench):

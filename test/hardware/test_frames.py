@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from rsea_ros.hardware.dynamixel.frames import StatusFrameParser, crc16, frame, stuff, unstuff
+from rsea_ros.hardware.dynamixel.frames import StatusFrameParser, frame, stuff, unstuff
 from rsea_ros.hardware.dynamixel.handler import PacketHandler
 from rsea_ros.hardware.peer import protocol2
 
@@ -97,15 +97,8 @@ def mutations(rng, packet):
 
 def test_damaged_and_random_bytes_give_no_frame_that_was_not_sent():
     rng, strings = random.Random(4), 0
-    while strings < 50_000:
+    while strings < 10_000:
         packet = protocol2.status(rng.randrange(253), rng.randrange(8), rng.randbytes(rng.randrange(20)))
         for damaged in mutations(rng, packet):
             assert StatusFrameParser().feed(damaged) in ([], [packet]), damaged.hex(" ")
             strings += 1
-
-
-def test_the_crcs_of_driver_and_peer_agree():
-    rng = random.Random(5)
-    for _ in range(500):
-        data = rng.randbytes(rng.randrange(60))
-        assert crc16(data) == protocol2.checksum(data)

@@ -74,18 +74,22 @@ def bench(tmp_path_factory):
         yield made
 
 
-@pytest.fixture(params=[False, True], ids=["sync", "fast sync"])
+BOTH = pytest.mark.parametrize("three", [False, True], ids=["sync", "fast sync"], indirect=True)
+
+
+@pytest.fixture
 def three(bench, request):
     bench.ask("misbehave", drop=0.0)
     for place in range(3):
         bench.ask("set", motor=place, temperature=32, voltage=120, hardware_error=0)
-    made = Three(bench, request.param)
+    made = Three(bench, getattr(request, "param", True))
     yield made
     for member in made.members:
         member.device.close()
     assert [bench.torque(place) for place in range(3)] == [(0, False)] * 3
 
 
+@BOTH
 def test_each_motor_makes_its_torque_by_two_frames_a_cycle(three):
     states = three.cycles(40, (0.5, -1.0, 2.0))
     assert [state.motor_torque for state in states] == pytest.approx([0.5, -1.0, 2.0], abs=0.25)
@@ -128,6 +132,7 @@ def test_a_reboot_of_one_leaves_the_others_their_torque(three):
     assert three.acting() == [True] * 3
 
 
+@BOTH
 def test_an_unplugged_motor_does_not_silence_the_others(three):
     """Motors behind it in a request wait for its reply, so it is asked last in the next one."""
     three.cycles(5, (1.0, 1.0, 1.0))
@@ -144,33 +149,6 @@ def test_an_unplugged_motor_does_not_silence_the_others(three):
     three.beside(three.members[0].clear)
     three.cycles(8, (1.0, 1.0, 1.0))
     assert three.causes() == [None] * 3 and three.acting() == [True] * 3
-
-
-def test_a_port_that_comes_back_is_opened_by_the_first_that_is_cleared(three):
-    three.cycles(5, (1.0, 1.0, 1.0))
-    three.bench.ask("vanish")
-    three.cycles(2, (1.0, 1.0, 1.0))
-    assert three.causes() == ["portlost"] * 3
-    with pytest.raises(DeviceError, match="port"):
-        three.members[1].clear()
-    three.bench.ask("appear")
-    for place in (1, 0, 2):
-        three.members[place].clear()
-    three.cycles(5, (1.0, 1.0, 1.0))
-    assert three.causes() == [None] * 3 and three.acting() == [True] * 3
-
-
-def test_a_silent_line_zeroes_every_motor(three):
-    three.cycles(5, (1.0, 1.0, 1.0))
-    three.bench.ask("misbehave", drop=1.0)
-    three.cycles(4, (1.0, 1.0, 1.0))
-    assert {member.fault.cause for member in three.members} == {"no_reply"}
-    assert [three.bench.torque(place)[0] for place in range(3)] == [0] * 3
-    three.bench.ask("misbehave", drop=0.0)
-    for member in three.members:
-        member.clear()
-    three.cycles(5, (1.0, 1.0, 1.0))
-    assert [member.fault for member in three.members] == [None] * 3
 
 
 def test_the_death_of_the_host_is_each_motors_own_watchdog(three):

@@ -38,13 +38,6 @@ def test_registers_that_the_torque_depends_on_are_read_once_a_second(loop, regis
     assert loop.guarded.fault is None and loop.bench.torque()[1]
 
 
-@pytest.mark.parametrize(
-    ("loop", "kind"), [(54024, "supervisor"), (54025, "bus watchdog")], indirect=["loop"]
-)
-def test_motors_state_what_protects_them(loop, kind):
-    assert loop.device.protection.kind == kind
-
-
 def test_a_motor_absent_at_one_clear_fault_can_be_cleared_at_the_next(loop):
     """After an emergency stop the port was opened again but the motor not set up: 'not open' for ever."""
     loop.bench.ask("misbehave", silent=True)
@@ -58,17 +51,6 @@ def test_a_motor_absent_at_one_clear_fault_can_be_cleared_at_the_next(loop):
     loop.bench.ask("misbehave", silent=False)
     loop.guarded.clear()
     assert loop.cycles(3, 10.0) == [10.0] * 3
-
-
-def test_a_dead_supervisor_is_a_fault_and_clear_fault_starts_another(loop):
-    process = loop.device.protection._supervisor._end._process
-    process.kill()
-    process.wait()
-    loop.until_fault(10.0)
-    assert loop.guarded.fault.cause == "supervisorlost"
-    loop.guarded.clear()
-    loop.cycles(40, 10.0)
-    assert loop.guarded.fault is None and loop.device.protection._supervisor.alive()
 
 
 @pytest.fixture

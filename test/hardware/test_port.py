@@ -34,7 +34,7 @@ def receive_all(port, size):
     return data
 
 
-@pytest.mark.parametrize("size", [1, 26, 64, 65, 300, 1033, 4000])
+@pytest.mark.parametrize("size", [1, 64, 65, 4000])
 def test_a_reply_is_read_whole(wire, size):
     port, near = wire
     for fill in range(3):

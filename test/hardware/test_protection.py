@@ -1,19 +1,16 @@
 """Protection against a dead host: of every device, asked when it is opened; devices from outside."""
 
 import math
-import time
 from pathlib import Path
 
 import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.guarded import GuardedDevice
-from rsea_ros.hardware.limits import Limits, complaint
+from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.outside import options_of, outside_device
-from rsea_ros.hardware.protection import NONE, PROCESS
-from rsea_ros.hardware.simulated import SimulatedDevice
+from rsea_ros.hardware.protection import NONE
 from rsea_ros.hardware.spring_sensor import Spring
-from rsea_ros.model.rig_file import load_rig
 
 TOY = Path(__file__).with_name("toy_device.py")
 
@@ -65,22 +62,6 @@ def test_a_supervised_toy_is_stopped_when_the_driver_hangs(toy):
     assert device.protection.kind == NONE
 
 
-def test_a_supervised_toy_that_is_still_driven_is_left_alone(toy):
-    device = toy(supervised="yes", watchdog=1.0)
-    loop = guard(device)
-    loop.open()
-    loop.enable()
-    begun = time.monotonic()
-    while time.monotonic() - begun < 1.3:
-        loop.cycle(10.0, 0.0)
-        time.sleep(0.02)
-    loop.disable()
-    device.far.setblocking(False)
-    with pytest.raises(BlockingIOError):
-        device.far.recv(5)
-    device.close()
-
-
 def test_a_long_reboot_under_torque_is_not_taken_for_a_hang(toy):
     """Only the motor told the supervisor that its torque was off: one that was being set up was stopped."""
     device = toy(supervised="yes", boot="0.3")
@@ -97,10 +78,6 @@ def test_a_long_reboot_under_torque_is_not_taken_for_a_hang(toy):
     assert loop.fault is None
 
 
-def test_the_simulation_ends_with_its_process():
-    assert SimulatedDevice(load_rig("paper_high_impedance"), 280.0).protection.kind == PROCESS
-
-
 def test_the_springs_deflection_is_a_wrench_where_no_sensor_measures_one(toy):
     device = toy()
     loop = guard(device, Spring(1500.0, place=5, sign=-1.0), deflection=0.05, ft=60.0)
@@ -113,16 +90,6 @@ def test_the_springs_deflection_is_a_wrench_where_no_sensor_measures_one(toy):
     assert loop.fault is None, "the drive stands at 3 rad: what counts is the spring's deflection"
     loop.cycle(66.0, 0.0)
     assert loop.fault.cause in ("deflection", "ft_torque")
-
-
-def test_a_deflection_that_is_not_measured_any_more_is_a_fault(toy):
-    device = toy()
-    loop = guard(device, Spring(1500.0), deflection=math.inf)
-    loop.open(unprotected=True)
-    loop.cycle(0.0, None)
-    device.deflection_known = False
-    loop.cycle(0.0, None)
-    assert str(loop.fault) == "ft: the spring's deflection is not measured any more"
 
 
 def test_a_deflection_that_is_not_measured_stays_a_fault_until_it_is_again(toy):
@@ -140,13 +107,6 @@ def test_a_deflection_that_is_not_measured_stays_a_fault_until_it_is_again(toy):
     assert loop.fault is not None and device.torque == 0.0
     device.deflection_known = True
     assert loop.clear() and loop.cycle(10.0, 0.0).inferred and loop.fault is None
-
-
-def test_a_reading_that_is_not_finite_is_a_fault(toy):
-    device = toy()
-    device.open()
-    device.torque = math.nan
-    assert complaint(Limits(68.0), device.read()).cause == "reading"
 
 
 WRONG = {

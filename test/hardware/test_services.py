@@ -50,8 +50,3 @@ def test_the_containers_share_nothing_but_the_socket_and_end_in_turn():
     assert supervisor["volumes"] == driver["volumes"] == ["rsea:/run/rsea"]
     assert driver["depends_on"] == ["supervisor"] and supervisor["restart"] == "always"
     assert "devices" not in supervisor, "the port comes over the socket"
-
-
-def test_the_docs_name_every_recipe():
-    text = (ROOT / "docs" / "hardware.md").read_text()
-    assert all(path.name in text for path in SERVICES.iterdir())

@@ -1,7 +1,6 @@
 """The supervisor of a motor: a process of its own that the machine's other work must not hold up."""
 
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -11,7 +10,6 @@ from contextlib import suppress
 import pytest
 
 from rsea_ros.hardware import supervisor
-from test.hardware.conftest import Loop, well_behaved
 
 
 def may_hurry():
@@ -65,20 +63,3 @@ def test_it_repeats_its_frames_until_the_motor_has_acknowledged_them(ignored):
     process.stdout.close()
     motor.close()
     assert set(heard) == set(FRAMES) and len(heard) <= ignored + 2 + 2 * (ignored > 0)
-
-
-def test_a_supervisor_that_stands_still_is_noticed_within_a_second(benches):
-    """Nobody did for 20 s, in which the driver had no guard."""
-    well_behaved(benches())
-    loop = Loop(benches())
-    loop.guarded.enable()
-    loop.cycles(5, 10.0)
-    child = loop.device.protection._supervisor._end._process
-    os.kill(child.pid, signal.SIGSTOP)
-    loop.until_fault(10.0, most=280)
-    assert "no answer for" in str(loop.guarded.fault) and loop.guarded.fault.cause == "supervisorlost"
-    loop.cycles(2, 10.0)
-    assert loop.bench.torque()[0] == 0
-    loop.guarded.clear()
-    assert loop.cycles(3, 10.0) == [10.0] * 3 and child.poll() is not None
-    loop.close()

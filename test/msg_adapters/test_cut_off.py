@@ -117,24 +117,6 @@ def test_a_killed_recorder_leaves_a_bag_that_opens(tmp_path, storage):
     assert "recorder killed?" in record.notes[0]
 
 
-@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-def test_ctrl_c_completes_the_recording(tmp_path, storage):
-    bag = tmp_path / "run"
-    with subprocess.Popen(
-        [sys.executable, "-c", RECORDER, str(bag), storage],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        cwd=os.getcwd(),
-    ) as recorder:
-        assert recorder.stdout is not None
-        recorder.stdout.readline()
-        recorder.send_signal(signal.SIGINT)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["run"]
-    record = read_record(bag)
-    assert len(record["ft"]) >= 700
-    assert record.notes == ()
-
-
 def test_files_left_by_a_killed_recorder_are_not_overwritten(tmp_path):
     (tmp_path / "run.partial").mkdir()
     with BagWriter(tmp_path / "run") as bag:

@@ -56,14 +56,6 @@ def test_a_sound_file_has_no_fault(tmp_path, file):
     assert np.array_equal(got["ft"].y, np.arange(60) * 0.7)
 
 
-def test_a_file_appended_to_another_is_read_and_reported(tmp_path):
-    rows = run_rows(60)
-    first, second = McapFile(rows[:90]), McapFile(rows[90:])
-    got = read_record(write(tmp_path / "a.mcap", first.file() + second.file()))
-    assert len(got["ft"]) == 60
-    assert "data_after_end" in {fault.kind for fault in got.faults}
-
-
 def test_a_damaged_length_costs_one_chunk_where_the_index_is_whole(tmp_path):
     from foreign import write_foreign
 

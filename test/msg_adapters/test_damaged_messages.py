@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 import pytest
-from foreign import EPOCH, STORE, joint_state, run_rows, write_foreign
+from foreign import STORE, run_rows, write_foreign
 from mcap_bytes import McapFile, write
 from rosbags.rosbag2 import StoragePlugin
 
@@ -72,15 +72,6 @@ def test_fields_empty_in_some_messages_are_reported(tmp_path):
     assert (told["empty_fields"].channel, told["empty_fields"].size) == ("/rsea/joint_states", 3)
     assert "velocity" in told["empty_fields"].detail
     assert len(got["velocity"]) == COUNT - 3 and len(got["position"]) == COUNT
-
-
-def test_channels_in_separate_messages_are_not_empty_fields(tmp_path):
-    rows = [row for row in run_rows(COUNT) if row[0] != "/rsea/joint_states"]
-    for k in range(COUNT):
-        at = EPOCH + k * 3_571_428
-        rows.append(("/rsea/joint_states", at, joint_state(at, position=[0.1])))
-        rows.append(("/rsea/joint_states", at + 7, joint_state(at + 7, velocity=[0.1])))
-    assert read_record(write_foreign(tmp_path / "bag", rows)).faults == ()
 
 
 def test_a_joint_whose_name_is_not_utf_8_can_be_named(tmp_path):

@@ -9,7 +9,7 @@ import lz4.frame
 import pytest
 from foreign import run_rows, write_foreign
 from mcap_bytes import McapFile, chunk, write
-from rosbags.rosbag2 import CompressionMode, StoragePlugin
+from rosbags.rosbag2 import StoragePlugin
 
 from msg_adapters import compression, read_record, reading
 from msg_adapters.bags import read_contents
@@ -60,12 +60,6 @@ def test_packed_messages_and_files_have_the_same_allowance(tmp_path, ceiling):
         read_record(write(tmp_path / "a.mcap", file.file()))
     with pytest.raises(BagError, match="unpacks to more than"):
         read_contents(write(tmp_path / "b.mcap.zstd", bomb))
-
-
-def test_compressions_of_honest_bags_stay_far_below_the_ceiling(tmp_path):
-    for mode in (CompressionMode.STORAGE, CompressionMode.FILE, CompressionMode.MESSAGE):
-        bag = write_foreign(tmp_path / mode.name, run_rows(400), StoragePlugin.MCAP, mode)
-        assert read_record(bag).faults == ()
 
 
 def _spoilt(tmp_path, *statements):
@@ -162,13 +156,6 @@ def test_metadata_that_are_not_understood_are_reported_and_the_files_read(tmp_pa
     got = read_record(_metadata(tmp_path, text))
     assert len(got["ft"]) == 60
     assert [(f.kind, f.channel) for f in got.faults] == [("damaged_metadata", "metadata.yaml")]
-
-
-def test_dates_in_the_metadata_are_texts(tmp_path):
-    bag = write_foreign(tmp_path / "bag", run_rows(60))
-    file = bag / "metadata.yaml"
-    file.write_text(file.read_text().replace("version: 9", "version: 2020-13-45"))
-    assert read_record(bag).faults == ()
 
 
 def test_messages_that_all_differ_in_layout_are_sorted_once(monkeypatch):

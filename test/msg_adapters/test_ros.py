@@ -18,40 +18,11 @@ from rsea_ros.errors import ParameterError
 STAMP = 1_763_000_000_123_456_789
 
 
-def test_values_survive_the_message():
-    assert ros.effort_of(ros.torque_command_message(STAMP, -3.5)) == (STAMP, -3.5)
-    assert ros.joint_state_of(ros.joint_state_message(STAMP, 1.5, 2.5, -3.5, "knee"), "knee") == (
-        STAMP,
-        1.5,
-        2.5,
-        -3.5,
-    )
-    assert ros.wrench_of(ros.wrench_message(STAMP, 4.5, "-torque.y"), "-torque.y") == (STAMP, 4.5)
-    assert ros.wrench_of(ros.wrench_message(STAMP, [1, 2, 3, 4, 5, 6]), "force.z") == (STAMP, 3.0)
-    assert ros.stamp_of(ros.clock_message(STAMP).clock) == STAMP
-    assert ros.bool_message(True).data is True
-
-
-def test_estimates_carry_their_names():
-    message = ros.efforts_message(STAMP, {"distal": 1.0, "proximal": 2.0})
-    assert ros.effort_of(message, "proximal") == (STAMP, 2.0)
-    with pytest.raises(ParameterError, match="no joint 'knee' in the message, which holds distal, proximal"):
-        ros.effort_of(message, "knee")
-    with pytest.raises(ParameterError, match=r"2 joints \(distal, proximal\), expected one"):
-        ros.effort_of(message)
-
-
 def test_a_field_that_a_message_lacks_is_nan():
     _, position, velocity, effort = ros.joint_state_of(ros.torque_command_message(STAMP, 2.0))
     assert math.isnan(position)
     assert math.isnan(velocity)
     assert effort == 2.0
-
-
-def test_diagnostics_hold_level_and_values():
-    (status,) = ros.diagnostics_message(STAMP, "model", ros.WARN, "slow", {"bandwidth_hz": 53.2}).status
-    assert (status.name, status.level, status.message) == ("model", ros.WARN, "slow")
-    assert [(pair.key, pair.value) for pair in status.values] == [("bandwidth_hz", "53.2")]
 
 
 def test_types_are_found_by_name():

@@ -6,7 +6,6 @@ Waits until an instant of that clock last as they would: longer where it is set 
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 
@@ -98,28 +97,14 @@ int sem_timedwait(sem_t *semaphore, const struct timespec *t) {
     }
 }
 """
-IN_PYTHON = """
-import os, time
-from pathlib import Path
-true, step = time.time_ns, Path(os.environ["SHIMMED_CLOCK"])
-time.time_ns = lambda: true() + int.from_bytes(step.read_bytes(), "{order}", signed=True)
-"""
 
 
 def preload(folder, step):
-    """Return the environment of a process whose clock a file sets; {} where no compiler is there."""
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        return {}
+    """Return the environment of a process whose clock a file sets, below every library of it."""
     source, library = folder / "shim.c", folder / "shim.so"
     source.write_text(SOURCE)
-    subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", library, source, "-ldl"], check=True)
+    subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", library, source, "-ldl"], check=True)
     return {"LD_PRELOAD": str(library), "SHIMMED_CLOCK": str(step)}
-
-
-def in_python():
-    """Return a program's beginning that sets the clock of Python alone."""
-    return IN_PYTHON.format(order=sys.byteorder)
 
 
 def set_clock(step, by):

@@ -1,8 +1,5 @@
 """A driver node on a simulated bench, and a driver made of a script."""
 
-import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -87,30 +84,6 @@ class Driven:
         """Ask for a transition of the lifecycle."""
         request = ChangeState.Request(transition=Transition(id=transition))
         return self.call(ChangeState, "change_state", request)
-
-
-class Script:
-    """A driver made of a script, as `start` gives one."""
-
-    def __init__(self, program, remaps, parameters):
-        words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={text_of(value)}")]
-        words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
-        self._process = subprocess.Popen(
-            [sys.executable, str(program), "--ros-args", *words],
-            env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-
-    output = ()
-
-    def kill(self):
-        """End it without asking."""
-        self._process.kill()
-        self._process.wait()
-
-
-def text_of(value):
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def newest_value(health, namespace, key):

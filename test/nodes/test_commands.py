@@ -22,11 +22,6 @@ def test_a_command_waits_for_its_stamp():
     assert queue.torque == 2.0
 
 
-def test_commands_are_taken_in_the_order_of_their_stamps():
-    queue = _queue((NOW + 20, 2.0), (NOW + 10, 1.0))
-    assert queue.take(NOW + 30) == [(NOW + 10, 1.0), (NOW + 20, 2.0)]
-
-
 def test_a_late_command_takes_effect_at_once_and_is_counted():
     queue = _queue()
     queue.take(NOW + 100)
@@ -57,12 +52,6 @@ def test_a_command_without_a_recent_stamp_takes_effect_on_arrival():
         queue = _queue((stamp, 4.0))
         assert queue.take(NOW) == [(NOW, 4.0)]
         assert queue.unstamped == 1
-
-
-def test_not_a_number_is_refused():
-    queue = _queue((NOW, math.nan), (NOW, math.inf))
-    assert queue.take(NOW) == []
-    assert queue.refused == 2
 
 
 def test_the_watchdog_zeroes_the_torque_once():

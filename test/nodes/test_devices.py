@@ -49,12 +49,6 @@ def test_an_angle_that_counts_from_the_motors_zero_is_not_the_springs():
         limits(device="dynamixel_netft", position_zero="motor", ft_host="", deflection_limit=0.05)
 
 
-def test_velocity_power_and_ft_are_limited_by_default_on_every_rig():
-    for rig in ("paper_high_impedance", "paper_moving_output", "prototype_knee"):
-        bounds = limits(rig=rig)
-        assert math.isfinite(bounds.velocity + bounds.power + bounds.ft + bounds.effort)
-
-
 @pytest.mark.parametrize(
     ("values", "told"),
     [
@@ -72,17 +66,6 @@ def test_a_limit_that_cannot_be_applied_or_reached_is_refused(values, told):
     """Milliradians and degrees of a limit were accepted: it limited nothing."""
     with pytest.raises(ParameterError, match=told):
         limits(**values)
-
-
-def test_zero_is_no_limit():
-    free = limits(temperature_limit=0.0, current_limit=0.0, voltage_limit=0.0)
-    assert (free.temperature, free.current, free.voltage) == (math.inf, math.inf, 0.0)
-
-
-def test_a_bare_drive_has_the_limits_that_apply_to_it():
-    bounds = limits(rig="bare_drive", position_limit=0.5)
-    assert bounds.position == 0.5 and math.isinf(bounds.ft) and math.isfinite(bounds.velocity)
-    assert "ft_limit none (its spring is rigid)" in str(bounds)
 
 
 def test_limits_that_nobody_states_come_from_rig_motor_and_sensor():

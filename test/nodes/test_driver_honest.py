@@ -17,7 +17,7 @@ from rsea_ros.nodes._bench_topics import Obeyed
 from rsea_ros.nodes._drive import SignalListener
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._waiter import Pulse, anything_to_do
-from test.nodes.clock_shim import in_python, preload, set_clock
+from test.nodes.clock_shim import preload, set_clock
 from test.nodes.stalls import is_stall
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,12 +32,11 @@ class Shimmed:
         self.bench, self.listener, self.off, self.step = bench, listener, 0, folder / "step"
         self.set_clock(0)
         self.preloaded = preload(folder, self.step)
-        program = DRIVER if self.preloaded else in_python() + DRIVER
         start = {"autostart": True, "resume": True, "joint": "left_knee"}
         values = {**bench.parameters(), "baud": 4_000_000, **start}
         words = [w for k, v in values.items() for w in ("-p", f"{k}:={str(v).lower() if v is True else v}")]
         self.process = subprocess.Popen(
-            [sys.executable, "-c", program, "--ros-args", *words, "-r", "__ns:=/honest"],
+            [sys.executable, "-c", DRIVER, "--ros-args", *words, "-r", "__ns:=/honest"],
             env={**os.environ, "PYTHONPATH": str(ROOT), "SHIMMED_CLOCK": str(self.step), **self.preloaded},
             stdin=subprocess.DEVNULL,
         )  # fmt: skip
@@ -118,46 +117,25 @@ def driver(tmp_path_factory, listener):
         made.process.wait()
 
 
-@pytest.mark.parametrize(("off", "step"), [(0, -3600), (-3600, 0)])
-def test_a_step_of_the_system_clock_ends_the_torque_and_is_reported(driver, off, step):
-    """The clock goes an hour back and forward again; nobody commands any more.
+def test_a_step_of_the_system_clock_ends_the_torque_and_is_reported(driver):
+    """The clock goes an hour back, and nobody commands any more.
 
     On a machine that stalls the commands may have ceased for 50 ms before the step: then again.
     """
     for _ in range(TRIES):
-        driver.set_clock(off)
+        driver.set_clock(0)
         driver.drive()
         steps = driver.settled("clock_steps")
         driver.drive()
-        driver.set_clock(step)
+        driver.set_clock(-3600)
         driver.listener.until(lambda: driver.bench.torque()[0] == 0)
         fault = driver.listener.until(driver.fault)
         assert driver.settled("clock_steps") == steps + 1
         if fault.startswith("clock_step"):
             break
         assert is_stall(fault) or fault.startswith("command_timeout"), fault
-    assert fault == f"clock_step: the system clock was set by {step - off:+.3f} s", fault
+    assert fault == "clock_step: the system clock was set by -3600.000 s", fault
     driver.drive()
-
-
-def test_the_test_sets_the_clock_below_every_library(driver):
-    """Otherwise the middleware's stamps would be the true ones."""
-    if not driver.preloaded:
-        pytest.skip("no C compiler here: the clock was set in Python alone")
-    loaded = Path(f"/proc/{driver.process.pid}/maps").read_text()
-    assert driver.preloaded["LD_PRELOAD"] in loaded
-
-
-def test_a_default_subscription_hears_measurements(driver):
-    driver.listener.until(lambda: driver.states)
-    assert list(driver.states[-1].name) == ["left_knee"]
-
-
-def test_another_joint_is_refused_and_named(driver):
-    before = int(driver.value("refused_commands"))
-    driver.push(30.0, lambda: int(driver.value("refused_commands")) > before, joint="right_knee")
-    driver.listener.until(lambda: driver.told("commands refused"))
-    assert driver.status().hardware_id.startswith("H54-200-S500-R, ID 1 on ")
 
 
 def test_wrong_stamps_are_reported(driver):
@@ -166,14 +144,6 @@ def test_wrong_stamps_are_reported(driver):
     driver.push(30.0, lambda: driver.told("commands with a stamp that is off"))
     driver.off = 0
     assert float(driver.value("furthest_stamp_s")) == pytest.approx(10.0, abs=0.1)
-
-
-def test_clear_fault_without_a_fault_says_so(driver):
-    def nothing_to_clear():  # a busy machine may have latched a stall
-        answer = driver.clear()
-        return answer if "there is no fault" in answer.message else None
-
-    assert driver.listener.until(nothing_to_clear).success
 
 
 def test_of_two_publishers_the_first_is_obeyed_until_it_is_silent():
@@ -200,17 +170,6 @@ def test_a_publisher_for_another_joint_keeps_nobody_from_commanding(driver):
     driver.push(5.0, beside)
     driver.listener.node.destroy_publisher(other)
     assert int(driver.value("ignored_commands")) == before
-
-
-def test_a_second_publisher_is_reported(driver):
-    second = driver.listener.node.create_publisher(JointState, "/honest/torque_command", COMMAND)
-
-    def both():
-        second.publish(torque_command_message(time.time_ns(), -30.0, "left_knee"))
-        return driver.told("commands of a second publisher ignored")
-
-    driver.push(5.0, both)
-    driver.listener.node.destroy_publisher(second)
 
 
 def test_a_signal_acts_while_the_main_thread_waits(listener):

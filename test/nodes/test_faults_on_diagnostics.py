@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import rsea_ros as rsea
-from rsea_ros.nodes import _diagnosing
 from rsea_ros.nodes import identify as node
 from rsea_ros.nodes._health import OK, WARN
 from rsea_ros.records.record import Fault
@@ -33,10 +32,3 @@ def test_faults_in_the_data_of_an_identification_are_published(run):
     assert damaged.level == WARN
     assert damaged.values["faults"] == "frozen samples in F/T torque, 30 % of the samples"
     assert damaged.summary.startswith("The model fits: ")
-
-
-def test_faults_in_the_data_of_a_diagnosis_are_published(run):
-    result = replace(rsea.diagnose(run, "paper_high_impedance").result, faults=(FROZEN,))
-    report = _diagnosing.report_of(result, Path("report.html"))
-    assert (report.level, report.values["verdict"]) == (WARN, "nothing_wrong")
-    assert report.values["faults"] == "frozen samples in F/T torque, 30 % of the samples"

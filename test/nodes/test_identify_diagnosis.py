@@ -92,12 +92,3 @@ def test_the_node_stays_until_it_is_told_to_finish(identify, ask, listener):
     listener.until(ask("finish").done)
     assert node.wait() == 0, node.output
     assert (out / "identification.json").exists()
-
-
-def test_without_a_run_the_answer_says_what_is_missing(start, ask, listener, tmp_path):
-    node = start("identify", {"__node": "idle"}, rig=RIG, out=tmp_path)
-    answer = ask("diagnose", "idle")
-    listener.until(answer.done)
-    assert not answer.result().success
-    assert "no message on /rsea/torque_command" in answer.result().message
-    assert node.stop() == 130

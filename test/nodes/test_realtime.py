@@ -5,10 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
-
 from bench.bare_loop import may_have
-from bench.bare_wire import outcome
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
@@ -77,12 +74,3 @@ def test_a_node_keeps_to_one_processor_and_its_supervisor_does_not():
     highest = max(os.sched_getaffinity(0))
     assert said.startswith(f"parameter cpu_affinity = {highest + 1}, expected one of 0")
     assert said.endswith("; runs on any\n")
-
-
-def test_a_wait_for_replies_counts_as_faults_by_the_drivers_rule():
-    """Of eight periods of 1 ms: in time, late, then 12 ms without an answer, and three late ones apart."""
-    took = [0.1, 0.9, 0.1, 12.0, 0.1, 0.9, 0.9, 0.9]
-    begun = 1e6 * np.arange(8.0)
-    cycles = np.stack([begun, begun, begun + 1e6 * np.array(took)], axis=1)
-    assert outcome(cycles, 1000.0, 10) == (0.625, 12.0, 1)
-    assert outcome(cycles, 1000.0, 3) == (0.625, 12.0, 2)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rclpy.lifecycle import LifecycleNode
 
-from msg_adapters.ros import DiagnosticArray, JointState, Trigger, stamp_of, torque_command_message
+from msg_adapters.ros import DiagnosticArray, JointState, stamp_of, torque_command_message
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes import driver
@@ -26,11 +26,6 @@ X = {
 """Of small motors of the X series without a spring."""
 RATE = 100.0
 """Hz, of the cycles with the limits of config/nodes."""
-PATIENT = {
-    "rate": 100.0, "latency": 0.05, "command_timeout": 5.0, "ft_timeout": 0.5, "watchdog": 2.0,
-    "lost_cycles": 20,
-}  # fmt: skip
-"""A machine that is busy with other tests must not look like a fault; the last tests have the defaults."""
 
 
 def values_of(**given):
@@ -74,43 +69,56 @@ def test_impossible_joints_are_refused(listener, given, told):
 
 
 class Leg:
-    """The driver process of three motors on one line. patient: its limits."""
+    """The driver process of three motors on one line, which a thread commands as often as its cycles.
 
-    def __init__(self, bench, start, listener, patient=PATIENT):
+    They are slower than 280 Hz: three motors of one bench process do not keep up on a busy machine.
+    """
+
+    def __init__(self, bench, start, listener):
         self.bench, self.listener = bench, listener
         ids = {f"{joint}.id": k + 1 for k, joint in enumerate(JOINTS)}
         known = {**bench.parameters(), **X, "baud": 4_000_000, "autostart": True, "resume": True}
-        known["joints"] = list(JOINTS)
-        sensor = {"hip.ft_host": "127.0.0.1"}
-        self.process = start("driver", {"__ns": "/leg"}, **known, **patient, **ids, **sensor)
+        known |= {"joints": list(JOINTS), "rate": RATE, "hip.ft_host": "127.0.0.1"}
+        self.process = start("driver", {"__ns": "/leg"}, **known, **ids)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.states = {j: listener.hear(JointState, f"/leg/{j}/joint_states", MEASUREMENT) for j in JOINTS}
         self.combined = listener.hear(JointState, "/leg/joint_states", MEASUREMENT)
-        self.clearing = {
-            j: listener.node.create_client(Trigger, f"/leg/driver/{j}/clear_fault") for j in JOINTS
-        }
         self.commands = {
             j: listener.node.create_publisher(JointState, f"/leg/{j}/torque_command", COMMAND) for j in JOINTS
         }
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._command, daemon=True)
+        self._thread.start()
 
-    def push(self, torques, condition):
-        """Command torques until the condition holds; clear what a machine that stands still has latched."""
-        clear_now_and_then = every(2.0, self.clear_stalls)
+    def _command(self):
+        while not self._over.wait(1.0 / RATE):
+            for joint, torque in TORQUES.items():
+                self.commands[joint].publish(torque_command_message(time.time_ns(), torque, joint))
 
-        def push_commands():
+    def close(self):
+        """Command no more."""
+        self._over.set()
+        self._thread.join()
+
+    def until(self, condition):
+        """Wait for a condition; clear what a machine that stands still has latched."""
+        clear_now_and_then = every(0.5, self.clear_stalls)
+
+        def holds():
             assert self.process.is_running(), self.process.output[-5:]
             clear_now_and_then()
-            for joint, torque in torques.items():
-                self.commands[joint].publish(torque_command_message(time.time_ns(), torque, joint))
             return condition()
 
-        self.listener.until(push_commands)
+        self.listener.until(holds)
 
     def clear_stalls(self):
-        """Clear the faults of joints that no test here provokes."""
-        for joint, client in self.clearing.items():
-            if is_stall(self.value(joint, "fault")):
-                client.call_async(Trigger.Request())
+        """Clear faults that no test here provokes."""
+        if any(map(is_stall, self.faults())):
+            self.call("clear_fault")
+
+    def ready(self):
+        """Wait until every motor has a torque and no fault is latched."""
+        self.until(lambda: all(self.goals()) and set(self.faults()) == {"none"})
 
     def together(self):
         """The stamps of the hip (ns) that the other joints have too, to 50 us."""
@@ -145,43 +153,45 @@ class Leg:
 @pytest.fixture(scope="module")
 def leg(tmp_path_factory, start, listener):
     with RemoteBench(tmp_path_factory.mktemp("leg") / "tty", "--model", 1020, 1120, 1170) as bench:
-        yield Leg(bench, start, listener)
+        bench.hurry()
+        made = Leg(bench, start, listener)
+        yield made
+        made.close()
 
 
 TORQUES = {"hip": 0.5, "knee": -1.0, "ankle": 2.0}
 
 
 def test_each_joint_follows_its_commands_in_one_exchange_a_cycle(leg):
-    leg.push(TORQUES, lambda: all(
+    leg.until(lambda: all(
         leg.states[j] and abs(leg.states[j][-1].effort[0] - TORQUES[j]) < 0.3 for j in JOINTS
     ))  # fmt: skip
     assert [list(leg.states[j][-1].name) for j in JOINTS] == [[j] for j in JOINTS]
-    leg.push(TORQUES, lambda: len(leg.together()) > 20)  # never, where each had a transaction of its own
+    leg.until(lambda: len(leg.together()) > 20)  # never, where each had a transaction of its own
     wanted = [TORQUES[joint] for joint in JOINTS]
-    leg.push(TORQUES, lambda: leg.combined and np.allclose(leg.combined[-1].effort, wanted, atol=0.3))
+    leg.until(lambda: leg.combined and np.allclose(leg.combined[-1].effort, wanted, atol=0.3))
     assert [*leg.combined[-1].name] == [*JOINTS] and len(leg.combined[-1].position) == len(JOINTS)
-    leg.push(TORQUES, lambda: leg.value("knee", "active") == "True")
-    leg.push(TORQUES, lambda: leg.value("ankle", "motor") == "XW540-T260")
+    leg.until(lambda: leg.value("ankle", "motor") == "XW540-T260")
 
 
-def test_a_fault_of_one_joint_stays_its_own_and_ends_by_its_service(leg):
+def test_a_fault_of_one_joint_ends_by_its_own_service(leg):
+    leg.ready()
     leg.bench.ask("set", motor=1, temperature=90)
-    leg.push(TORQUES, lambda: (leg.value("knee", "fault") or "").startswith("temperature"))
-    leg.push(TORQUES, lambda: [np.sign(goal) for goal in leg.goals()] == [1, 0, 1])
+    leg.until(lambda: leg.faults()[1].startswith("temperature"))
     refused = leg.call("knee/clear_fault")
     assert not refused.success and "is still there" in refused.message
     leg.bench.ask("set", motor=1, temperature=30)
     assert leg.call("knee/clear_fault").success
-    leg.push(TORQUES, lambda: leg.goals()[1] < 0)
-    leg.push(TORQUES, lambda: leg.value("hip", "fault") == leg.value("ankle", "fault") == "none")
+    leg.ready()
 
 
 def test_stop_and_clear_fault_of_the_node_act_on_all_joints(leg):
+    leg.ready()
     assert leg.call("stop").success
-    leg.push(TORQUES, lambda: leg.goals() == [0, 0, 0])
+    leg.listener.until(lambda: leg.goals() == [0, 0, 0])
     answer = leg.call("clear_fault")
     assert answer.success and answer.message == "clear_fault: hip done, knee done, ankle done"
-    leg.push(TORQUES, lambda: all(leg.goals()))
+    leg.ready()
 
 
 def test_all_torques_are_zero_before_the_first_motor_is_closed(listener, monkeypatch):
@@ -201,54 +211,6 @@ def test_all_torques_are_zero_before_the_first_motor_is_closed(listener, monkeyp
     assert set(order[2:]) == {("hip", "closed"), ("knee", "closed")}
 
 
-def test_the_end_of_the_driver_ends_all_torques(leg):
-    leg.push(TORQUES, lambda: all(leg.goals()))
-    assert leg.process.stop() == 0
-    assert leg.goals() == [0, 0, 0]
-
-
-class Strict(Leg):
-    """A leg with the limits of config/nodes, which a thread commands as often as its cycles.
-
-    They are slower than 280 Hz: three motors of one bench process do not keep up on a busy machine.
-    """
-
-    def __init__(self, bench, start, listener):
-        super().__init__(bench, start, listener, {"rate": RATE})
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._command, daemon=True)
-        self._thread.start()
-
-    def _command(self):
-        while not self._over.wait(1.0 / RATE):
-            for joint, torque in TORQUES.items():
-                self.commands[joint].publish(torque_command_message(time.time_ns(), torque, joint))
-
-    def close(self):
-        """Command no more."""
-        self._over.set()
-        self._thread.join()
-
-    def ready(self):
-        """Wait until every motor has a torque and no fault is latched; clear what a stall has latched."""
-        clear_now_and_then = every(0.5, lambda: self.call("clear_fault"))
-
-        def drive():
-            clear_now_and_then()
-            return all(self.goals()) and set(self.faults()) == {"none"}
-
-        self.listener.until(drive)
-
-
-@pytest.fixture(scope="module")
-def strict(tmp_path_factory, start, listener):
-    with RemoteBench(tmp_path_factory.mktemp("strict") / "tty", "--model", 1020, 1120, 1170) as bench:
-        bench.hurry()
-        made = Strict(bench, start, listener)
-        yield made
-        made.close()
-
-
 @pytest.mark.parametrize(
     ("wrong", "right", "causes", "most"),
     [
@@ -259,14 +221,14 @@ def strict(tmp_path_factory, start, listener):
         ),
     ],
 )  # fmt: skip
-def test_with_the_defaults_a_fault_ends_the_torques_that_it_concerns(strict, wrong, right, causes, most):
+def test_with_the_defaults_a_fault_ends_the_torques_that_it_concerns(leg, wrong, right, causes, most):
     """Counted in writes from the bench's log; a machine that stalls latches faults of its own: then again."""
     for _ in range(TRIALS):
-        strict.ready()
-        since = strict.bench.ask(wrong[0], **wrong[1])["t"]
-        strict.listener.until(lambda: all(strict.faults()[place] != "none" for place in causes))
-        writes, faults = [strict.acting(place, since) for place in range(3)], strict.faults()
-        strict.bench.ask(right[0], **right[1])
+        leg.ready()
+        since = leg.bench.ask(wrong[0], **wrong[1])["t"]
+        leg.listener.until(lambda: all(leg.faults()[place] != "none" for place in causes))
+        writes, faults = [leg.acting(place, since) for place in range(3)], leg.faults()
+        leg.bench.ask(right[0], **right[1])
         spared = all(all(writes[place]) for place in set(range(3)) - causes.keys())
         if spared and all(faults[place].startswith(causes.get(place, "none")) for place in range(3)):
             break
@@ -275,3 +237,9 @@ def test_with_the_defaults_a_fault_ends_the_torques_that_it_concerns(strict, wro
         assert faults[place].startswith(causes.get(place, "none")), faults
     for place in causes:
         assert max((k for k, acts in enumerate(writes[place]) if acts), default=-1) < most, writes
+
+
+def test_the_end_of_the_driver_ends_all_torques(leg):
+    leg.ready()
+    assert leg.process.stop() == 0
+    assert leg.goals() == [0, 0, 0]

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from fleet_histories import DAY, START, history, recordings
 
-from rsea_ros.errors import ParameterError
 from rsea_ros.trends import alarms, fleet_trends
 from rsea_ros.trends.weeks import bin_days, steps_over
 
@@ -108,19 +107,6 @@ def test_intervals_as_wide_as_the_value_show_nothing():
     result = trend(0, sd=3.0, days=20)
     assert result.state == "undetermined"
     assert "would show" in result.reason
-
-
-def test_a_history_without_a_column_is_refused_by_name():
-    made = history(np.random.default_rng(0), days=10)
-    del made["low"]
-    with pytest.raises(ParameterError, match="history: no column low"):
-        fleet_trends(made, NOTHING)
-
-
-def test_an_empty_store_has_no_trends():
-    made = {n: c[:0] for n, c in history(np.random.default_rng(0), days=2).items()}
-    result = fleet_trends(made, {n: c[:0] for n, c in NOTHING.items()})
-    assert (dict(result.trends), result.appearances, result.outliers) == ({}, (), ())
 
 
 @pytest.mark.parametrize("since", [4, 5, 6, 7, 8])

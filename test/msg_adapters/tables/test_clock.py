@@ -16,9 +16,7 @@ def _true_times(rng, count, rate, wander, stalls):
     return np.cumsum(steps)
 
 
-@pytest.mark.parametrize("tick", [1 / 64, 0.01, 0.1])
-@pytest.mark.parametrize("wander", [0.0, 0.25])
-@pytest.mark.parametrize("stalls", [0, 6])
+@pytest.mark.parametrize(("tick", "wander", "stalls"), [(1 / 64, 0.25, 0), (0.01, 0.0, 6), (0.1, 0.25, 6)])
 def test_stamps_come_within_a_sample_of_the_truth(tick, wander, stalls):
     rng = np.random.default_rng(8)
     truth = _true_times(rng, 20_000, 400.0, wander, stalls)
@@ -43,16 +41,6 @@ def test_even_samples_are_dated_far_better_than_their_ticks(tick):
     assert np.max(np.abs(np.diff(stamps) - 1.0 / 280.0)) < 1e-6
     assert np.max(np.abs(stamps - truth)) < 0.02 * tick
     assert "fit, 280 Hz" in report
-
-
-def test_a_line_through_all_samples_would_be_worse():
-    """The reason for going tick by tick: a rate that wanders."""
-    rng = np.random.default_rng(8)
-    truth = _true_times(rng, 20_000, 400.0, 0.25, 0)
-    coarse = np.floor(truth * 64) / 64
-    index = np.arange(truth.size)
-    line = np.polyval(np.polyfit(index, coarse, 1), index)
-    assert np.std(line - truth) > 20 * np.std(spread_repeats(coarse)[0] - truth)
 
 
 def test_a_good_clock_stays_as_it_is():

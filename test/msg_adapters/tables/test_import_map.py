@@ -10,7 +10,7 @@ import pytest
 from map_files import CSV, MAP
 
 from msg_adapters.tables import import_record, load_map
-from msg_adapters.tables.map_keys import SECTIONS, tables
+from msg_adapters.tables.map_keys import tables
 from rsea_ros.errors import ImportMapError
 
 
@@ -37,13 +37,6 @@ def test_positions_are_converted_from_their_unit(files, unit, value):
     record = files(text)
     assert np.allclose(record["position"].y, np.array([90, -45, 0]) * value)
     assert np.allclose(record["position"].t, [0.0, 0.01, 0.02])
-
-
-@pytest.mark.parametrize(("unit", "value"), [("rpm", math.pi / 30), ("deg/s", math.pi / 180), ("m/s", 1.0)])
-def test_velocities_are_converted_from_their_unit(files, unit, value):
-    record = files(f"time: {{column: t, unit: min}}\nchannels: {{velocity: {{column: phi, unit: {unit}}}}}")
-    assert np.allclose(record["velocity"].y, np.array([90, -45, 0]) * value)
-    assert record["velocity"].t.tolist() == [0.0, 30.0, 60.0]
 
 
 @pytest.mark.parametrize(
@@ -98,12 +91,6 @@ def test_missing_values_are_left_out_of_their_channel_and_counted(files, missing
     assert f"position: {fault.detail}" in record.notes
 
 
-def test_a_value_missing_in_a_sum_is_missing(files):
-    record = files(MAP, LONG.replace("0.50,50,50,50", "0.50,50,50,"))
-    assert len(record["command"]) == 99
-    assert [fault.channel for fault in record.faults] == ["command"]
-
-
 @pytest.mark.parametrize(("row", "told"), [("0.50,50,50\n", 3), ("0.50,50,50,50,50\n", 5), ("0.5\n", 1)])
 def test_rows_of_another_length_are_left_out_and_counted(files, row, told):
     record = files(MAP, LONG.replace("0.50,50,50,50\n", row))
@@ -111,18 +98,6 @@ def test_rows_of_another_length_are_left_out_and_counted(files, row, told):
     (fault,) = record.faults
     assert (fault.kind, fault.channel, fault.share) == ("rows_left_out", "run.csv", 0.01)
     assert fault.detail == f"1 of 100 rows left out: line 52 has {told} fields, expected 4"
-
-
-def test_rows_without_a_stamp_are_left_out_and_counted(files):
-    record = files(MAP, LONG.replace("0.50,50", ",50"))
-    assert len(record["position"]) == 99
-    assert [fault.kind for fault in record.faults] == ["rows_left_out"]
-
-
-def test_a_line_that_breaks_off_is_left_out(files):
-    record = files(MAP, LONG[:-5])
-    assert len(record["position"]) == 99
-    assert record.faults[0].detail == "1 of 100 rows left out: line 101 has 3 fields, expected 4"
 
 
 SPACED = "".join(f"  {k * 0.01:10.4f}   {k:8.3f} {k:e}\t{k}  \n" for k in range(5))
@@ -150,12 +125,6 @@ def test_the_separator_of_cells_is_recognised(files, text, name):
     assert not record.faults
 
 
-def test_columns_without_names_are_read_by_number(files):
-    text = MAP.replace("column: t", "column: 1").replace("phi", "2").replace("i,", "3,").replace("load", "4")
-    for name in ("run.csv", "run.tsv", "run.txt"):
-        assert np.allclose(files(text, SPACED, name)["position"].y, -np.arange(5) * DEGREE)
-
-
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "latin-1"])
 def test_common_encodings_are_read(files, tmp_path, encoding):
     (tmp_path / "run.csv").write_bytes(CSV.replace("phi", "phi [°]").encode(encoding))
@@ -166,15 +135,6 @@ def test_common_encodings_are_read(files, tmp_path, encoding):
         return
     record = import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
     assert np.allclose(record["position"].y[0], -math.pi / 2)
-
-
-def test_an_empty_delimiter_counts_as_not_stated(files):
-    assert len(files(f"delimiter: null\n{MAP}")["position"]) == 3
-
-
-def test_units_are_read_as_people_write_them(files):
-    for text in ("Nm", "N*m", "N·m", "N.m"):
-        assert files(MAP.replace("N m", text))["command"].y[0] == pytest.approx(1.5 * 6.8 + 2.5)
 
 
 def test_blocks_make_no_difference(files, monkeypatch):
@@ -204,9 +164,3 @@ def test_of_a_value_that_the_log_repeats_the_first_row_is_kept(files):
         files("time: {column: t, unit: s}\n" + held, "t;phi;load\n0;1;1\n1;1;2\n2;1;3\n")
     with pytest.raises(ImportMapError, match="held is 'yes', expected true or false"):
         files("time: {column: t, unit: s}\n" + held.replace("true", "'yes'"), csv)
-
-
-@pytest.mark.parametrize("keys", SECTIONS.values(), ids=SECTIONS)
-def test_every_key_of_a_map_says_what_it_means(keys):
-    """The seven channels had none."""
-    assert all(key.meaning for key in keys)

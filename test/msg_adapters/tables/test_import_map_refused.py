@@ -56,9 +56,6 @@ BAD_FILES = {
     CSV.replace("phi", "psi"): "no column 'phi', expected one of t, psi, i, load",
     CSV.replace("-45", "lots"): "line 3, column 'phi' is 'lots', expected a finite number",
     CSV.replace("-45", "inf"): "line 3, column 'phi' is 'inf', expected a finite number",
-    CSV.replace("-45", "1e999"): "line 3, column 'phi' is '1e999', expected a finite number",
-    CSV.replace("-45", "0x10"): "line 3, column 'phi' is '0x10', expected a finite number",
-    CSV.replace("-45", "1_0"): "line 3, column 'phi' is '1_0', expected a finite number",
     CSV.replace(",", ";").replace("-45", "-4,5"): "line 3, column 'phi' is '-4,5', .*, with a decimal point",
     CSV.replace(",6\n", "\n"): "line 4 has 3 fields, expected 4, as in 1 of 3 rows",
     CSV.replace("1500", "1500,7"): "line 2 has 5 fields, expected 4, as in 1 of 3 rows",
@@ -80,19 +77,9 @@ def test_files_that_do_not_fit_the_map_are_refused(files, tmp_path, text):
     assert str(caught.value).startswith(str(tmp_path / "run.csv"))
 
 
-def test_a_map_that_leaves_no_row_is_refused(files):
-    with pytest.raises(ImportMapError, match=r"fewer than two rows left by where \(load goes from 2 to 6\)"):
-        files(f"where: {{column: load, below: 1}}\n{MAP}")
-
-
 def test_a_value_too_large_for_its_unit_is_refused(files):
     with pytest.raises(ImportMapError, match=r"command: i [+] load is too large for its unit"):
         files(MAP.replace("6.8", "1e250"), CSV.replace("1500", "1e200"))
-
-
-def test_an_empty_channel_is_refused(files):
-    with pytest.raises(ImportMapError, match="position: phi has 0 values"):
-        files(MAP, CSV.replace("90", "").replace("-45", "").replace("0,0,6", ",0,6"))
 
 
 BAD_VALUES = {
@@ -119,22 +106,10 @@ def test_values_of_a_map_are_refused_with_their_line(files, line):
     [
         ("scale: 6.8", "scale: .nan", r"line 5: channels.command\[0\].scale is nan, expected a number"),
         ("scale: 6.8", "scale: 0", r"line 5: channels.command\[0\].scale is 0, expected another number"),
-        ("scale: 6.8", "scale: -0.0", r"line 5: channels.command\[0\].scale is 0, expected another number"),
-        ("scale: 6.8", "scale: .inf", r"line 5: channels.command\[0\].scale is inf, expected a number"),
-        ("scale: 6.8", "scale: 0x10", r"line 5: channels.command.0.scale: '0x10' is hexadecimal"),
-        ("scale: 6.8", "scale: true", r"line 5: channels.command\[0\].scale is True, expected a number"),
-        ("scale: 6.8", "scale: '6.8'", r"line 5: channels.command\[0\].scale is '6.8', expected a number"),
-        ("column: t, unit: s", "rate: .nan", r"line 2: time.rate is nan, expected a number"),
-        ("column: t, unit: s", "rate: .inf", r"line 2: time.rate is inf, expected a number"),
         (
             "column: t, unit: s",
             "rate: 1e-300",
             r"line 2: time.rate is 1e-300, expected more than 0 Hz: 0.001 to",
-        ),
-        (
-            "column: t, unit: s",
-            "rate: 1e12",
-            r"line 2: time.rate is 1000000000000.0, expected more than 0 Hz: 0.001 to",
         ),
         ("column: phi", "column: [phi]", r"line 4: channels.position.column is \['phi'\], expected a name"),
         ("position: {", "position: [] #{", r"line 4: channels.position is an empty list, expected a column"),

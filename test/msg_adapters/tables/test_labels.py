@@ -72,12 +72,6 @@ def test_a_list_of_trials_is_read_trial_by_trial(more, names, tmp_path):
     assert all(len(values) == 20 for values in runs.values())
 
 
-def test_a_document_that_is_the_list_is_read_with_its_stamps(tmp_path):
-    document = trials(t=[k / 10 for k in range(20)])
-    runs = of_json(tmp_path, document, "runs: {column: '.'}", "{column: t, unit: s}", "i")
-    assert [values[0] for values in runs.values()] == [0.0, -1.9]
-
-
 @pytest.mark.parametrize(
     ("document", "more", "message"),
     [

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from msg_adapters.tables import import_record, load_map
-from rsea_ros.cli.main import main
 from rsea_ros.errors import ImportMapError
 
 MAPS = Path(__file__).resolve().parents[3] / "config" / "imports"
@@ -49,12 +48,6 @@ def test_a_joint_is_read_from_two_files(motion):
 def test_a_missing_joint_is_named(motion, index, words):
     with pytest.raises(ImportMapError, match=words):
         import_record(motion, load_map(MAPS / "so101.yaml"), index)
-
-
-def test_a_cell_that_is_not_a_list_is_refused(motion):
-    (motion / "control.csv").write_text(TARGETS.replace('"[3.0, -4.5, 7]"', "3.0"))
-    with pytest.raises(ImportMapError, match=r"line 5, .* expected a list of numbers in brackets"):
-        import_record(motion, load_map(MAPS / "so101.yaml"), 0)
 
 
 PER_JOINT = """time: {rate: 100}
@@ -136,41 +129,8 @@ def test_the_number_of_a_joint_may_stand_anywhere_in_a_name(bench):
     assert np.allclose(second["position"].y, -3.0 * k)
 
 
-def test_a_number_sign_before_a_number_is_a_part_of_the_name(bench):
-    text = NUMBERED.replace('"J# phi [°]"', '"Pumpe #1"')
-    assert np.allclose(import_record(*bench(text), 2)["position"].y, -1.0)
-
-
-def test_a_name_with_a_number_sign_and_no_joint_says_what_is_missing(bench):
-    text = NUMBERED.replace(", scale: {1: 4, 2: 3}", ", scale: 4").replace(", sign: {1: 1, 2: -1}", "")
-    with pytest.raises(ImportMapError, match=r"no column 'J# Iq\(A\)' \(--index puts the number"):
-        import_record(*bench(text))
-
-
-def test_a_list_that_lacks_the_joint_says_how_to_number_it(bench):
-    with pytest.raises(ImportMapError, match=r"joint 2 is chosen, expected .* \{1: 4\.2, 2: 3\.1\} states"):
-        import_record(*bench(NUMBERED.replace("{1: 4, 2: 3}", "[4, 3]")), 2)
-
-
-def test_one_wrong_name_does_not_hide_the_others(bench):
-    text = NUMBERED.replace("J# phi [°]", "J# phi[°]")
-    with pytest.raises(ImportMapError, match=r"no column 'J1 phi\[°\]', .* did you mean J1 phi \[°\]\?"):
-        import_record(*bench(text), 1)
-
-
-def test_a_file_in_place_of_a_directory_is_refused(motion):
-    with pytest.raises(ImportMapError, match=r"expected the one that holds control\.csv, state_motor\.csv"):
-        import_record(motion / "control.csv", load_map(MAPS / "so101.yaml"), 0)
-
-
 def test_a_map_names_only_files_of_the_directory(tmp_path):
     text = (MAPS / "so101.yaml").read_text()
     (tmp_path / "map.yaml").write_text(text.replace("file: control.csv", "file: ../control.csv"))
     with pytest.raises(ImportMapError, match="expected the name of a file in the directory"):
         load_map(tmp_path / "map.yaml")
-
-
-def test_the_verb_imports_lists(motion, tmp_path, capsys):
-    out = str(tmp_path / "joint.mcap")
-    assert main(["import", str(motion), "--map", "so101", "--index", "0", "--out", out]) == 0
-    assert "positions[0] [rad]" in capsys.readouterr().out

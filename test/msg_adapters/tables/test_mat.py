@@ -42,29 +42,6 @@ def test_variables_that_cannot_be_a_channel_are_refused(tmp_path, column, text):
         read_columns(file, ["t", column])
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"no MAT file at all, but a text that goes on for more than its header" * 4]
-)
-def test_files_that_are_not_mat_are_refused(tmp_path, content):
-    file = tmp_path / "run.mat"
-    file.write_bytes(content)
-    with pytest.raises(ImportMapError, match=str(file)):
-        read_columns(file, ["t"])
-
-
-@pytest.mark.parametrize("content", [b"no gzip", b"\x1f\x8b\x08\x00\x00\x00\x00\x00\x00\x03cut"])
-def test_files_that_are_not_gzip_are_refused(tmp_path, content):
-    file = tmp_path / "run.csv.gz"
-    file.write_bytes(content)
-    with pytest.raises(ImportMapError, match=str(file)):
-        read_columns(file, ["t"])
-
-
-def test_a_missing_number_is_a_hole(tmp_path):
-    savemat(tmp_path / "run.mat", {"x": np.array([0.0, np.nan, 2.0])})
-    assert np.isnan(read_columns(tmp_path / "run.mat", ["x"])["x"]).tolist() == [False, True, False]
-
-
 def test_only_what_is_named_is_loaded_and_its_size_comes_first(tmp_path, monkeypatch):
     file = tmp_path / "run.mat"
     savemat(file, {"x": np.arange(50.0), "large": np.zeros(400)})

@@ -43,12 +43,11 @@ def of_range(y, low, high):
     return np.rint(low + (y - y.min()) / np.ptp(y) * (high - low))
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_no_ordinary_column_is_taken_for_codes(seed):
+def test_no_ordinary_column_is_taken_for_codes():
     ranges = [(-100, 100), (-30000, 30000), (10, 250), (0, 1023), (0, 4095), (200, 60000), (0, 65535)]
     taken = {
         (name, low, high): code
-        for name, y in signals(seed).items()
+        for name, y in signals(0).items()
         for low, high in ranges
         if (name, low) != ("sawtooth", 0)
         if (code := raw_code("x", of_range(y, low, high), 1e-3)) is not None
@@ -56,7 +55,7 @@ def test_no_ordinary_column_is_taken_for_codes(seed):
     assert taken == {}
 
 
-@pytest.mark.parametrize("name", ["multisine", "noise", "lagged steps", "random walk", "held"])
+@pytest.mark.parametrize("name", ["multisine", "held"])
 @pytest.mark.parametrize(
     ("code", "size", "expression"),
     [
@@ -75,8 +74,7 @@ def test_codes_are_recognised_with_the_expression_that_reads_them(name, code, si
     assert f'"{expression}"' in found[1]
 
 
-@pytest.mark.parametrize("bits", [10, 12, 16])
-@pytest.mark.parametrize("gear", [1.0, 0.01])
+@pytest.mark.parametrize(("bits", "gear"), [(10, 1.0), (16, 0.01)])
 def test_an_encoder_that_goes_round_is_unwrapped(bits, gear, tmp_path):
     turns = np.cumsum(0.01 * np.sin(2 * np.pi * 0.3 * T)) + 0.2
     counts = np.mod(np.rint(turns * 2**bits), 2**bits)

@@ -44,39 +44,6 @@ def test_emps_obeys_its_published_force_balance_and_its_controller(name):
     assert np.linalg.norm((controller - force)[100:-100]) < 0.05 * np.linalg.norm(force)
 
 
-@pytest.mark.parametrize(
-    ("file", "degrees"),
-    [
-        ("2024-07-18__10-58-26__torqueramp__base_onyx_runin1", 1.95),
-        ("2024-07-18__16-28-57__torqueramp__split_onyx_runin1", 1.77),
-        ("2024-07-19__12-45-43__torqueramp__split_onyx_12pre1", 0.46),
-        ("2024-07-19__13-57-00__torqueramp__conic_onyx_2pre5", 0.43),
-    ],
-)
-def test_cycloidal_travel_between_the_ramps_ends(file, degrees):
-    record = _import(f"cycloidal/{file}.csv.gz", "cycloidal_short_ramps")
-    command, position = record["command"].y, np.degrees(record["position"].y)
-    travel = np.median(position[command > 3.9]) - np.median(position[command < -3.9])
-    assert travel == pytest.approx(degrees, abs=0.15)
-    assert "stamps repeat (clock of 16 ms)" in record.notes[1]
-    assert np.all(np.diff(record["position"].t) > 0)
-
-
-def test_cycloidal_current_limit_shows_in_the_long_ramps():
-    file = "cycloidal/2024-07-18__10-58-26__torqueramp__base_onyx_runin1.csv.gz"
-    record = _import(file, "cycloidal_long_ramps")
-    assert record["command"].y.max() == 40.0
-    assert 24.0 < record["motor_torque"].y.max() < 27.0
-
-
-def test_the_pendulums_gravity_is_that_of_the_readme():
-    record = _import("pendulum/gravity_compensation.measured.csv.gz", "pendulum")
-    torque, position = record["command"].y, record["position"].y
-    sine = np.sin(position)
-    assert np.dot(sine, torque) / np.dot(sine, sine) == pytest.approx(3.31, abs=0.01)
-    assert record["command"].rate == pytest.approx(1000, rel=0.01)
-
-
 def test_sea_gamma_has_one_spring_behind_two_sensors():
     """Where the motion is slow the F/T torque over the encoder's angle is the stiffness of the drawing."""
     record = _import("sea_gamma/open_5_1_31.csv", "sea_gamma")

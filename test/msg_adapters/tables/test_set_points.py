@@ -5,12 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from msg_adapters import read_record, write_record
 from msg_adapters.tables import import_record, load_map, summary
-from rsea_ros.checks.check import check_record
-from rsea_ros.cli.main import main
-from rsea_ros.errors import BagError, ImportMapError
-from rsea_ros.model.rig_file import load_rig
+from rsea_ros.errors import ImportMapError
 
 ANGLES = np.r_[np.arange(-20, 21), np.arange(20, -21, -1)] / 1000
 RUN = "t,i,q\n" + "".join(f"{k / 100},{np.sin(k / 9):.4f},{np.sin(k / 9) / 50:.6f}\n" for k in range(99))
@@ -59,17 +55,3 @@ def test_what_can_be_done_without_a_run_is_told(tmp_path):
 def test_a_map_without_a_time_is_told_what_there_is(tmp_path):
     with pytest.raises(ImportMapError, match=r"expected .* or `set_points` for readings"):
         imported(tmp_path, calibration(), STATIC.partition("\n")[2])
-
-
-def test_remedies_for_a_table_speak_of_its_map(tmp_path, capsys):
-    record, _ = imported(tmp_path, RUN, MEASURED)
-    write_record(record, tmp_path / "bag")
-    with pytest.raises(BagError, match="map the commanded torque or current as `command`; the measured one"):
-        read_record(tmp_path / "bag")
-    assert main(["diagnose", str(tmp_path / "bag")]) == 2
-    assert "as `command`, or the column of motor_torque" in capsys.readouterr().err
-    findings = check_record(read_record(tmp_path / "bag", strict=False), load_rig("paper_high_impedance"))
-    remedies = " ".join(finding.remedy for finding in findings.findings)
-    assert "name its column in the import map" in remedies
-    assert "--topic" not in remedies
-    assert "--axis" not in remedies

@@ -79,17 +79,6 @@ def test_a_first_row_with_a_number_that_is_none_is_refused_as_before(row, tmp_pa
         import_file(tmp_path, f"t,u\n{row}\n0,1.5\n0.1,-2.5\n")
 
 
-def test_decimal_commas_between_commas_are_refused_with_what_is_missing(tmp_path):
-    """The message was "no column 't', expected one of t,u": the comma was never tried as a delimiter."""
-    with pytest.raises(ImportMapError, match=r"line 2 has 4 fields, expected 2, .* need quotes"):
-        import_file(tmp_path, "t,u\n0,0,1,5\n0,1,2,5\n", 'decimal: ","\n')
-
-
-def test_another_decimal_sign_is_refused(tmp_path):
-    with pytest.raises(ImportMapError, match=r"decimal is ';', expected '\.' or ','"):
-        import_file(tmp_path, "t,u\n0,1\n1,2\n", 'decimal: ";"\n')
-
-
 @pytest.mark.parametrize(
     ("text", "more", "message"),
     [
@@ -100,19 +89,3 @@ def test_another_decimal_sign_is_refused(tmp_path):
 def test_what_cannot_be_read_is_one_line(text, more, message, tmp_path):
     with pytest.raises(ImportMapError, match=message):
         import_file(tmp_path, text, more)
-
-
-def test_date_times_have_no_other_unit_than_seconds(tmp_path):
-    (tmp_path / "run.csv").write_text("t,u\n2025-11-12T10:03:29Z,1.5\n2025-11-12T10:03:30Z,-2.5\n")
-    (tmp_path / "map.yaml").write_text(MAP.replace("unit: s", "unit: ms"))
-    with pytest.raises(ImportMapError, match=r"time.unit is 'ms', and t holds date-times, expected s"):
-        import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
-
-
-def test_unnamed_columns_have_numbers(tmp_path):
-    """A logger that names every other column: the last one was taken for the end of a line."""
-    (tmp_path / "run.csv").write_text("a,,b,\nX,Y,X,Y\n0,1.5,0,3\n0.1,-2.5,0.1,4\n0.2,1500,0.2,5\n")
-    numbered = MAP.replace("column: t", "column: 3").replace("column: u", "column: 4")
-    (tmp_path / "map.yaml").write_text(numbered)
-    record = import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
-    assert record["command"].y.tolist() == [3.0, 4.0, 5.0]
