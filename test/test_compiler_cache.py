@@ -17,7 +17,7 @@ from numba.core import config
 
 from rsea_ros import compiler
 from rsea_ros import compiler as compiler_cache
-from rsea_ros.compiler import SHARED, njit, shared_key, trusted_cache
+from rsea_ros.compiler import SHARED, _own_cache, cache_folder, njit, shared_key, trusted_cache
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "rsea_ros"
@@ -267,3 +267,23 @@ def test_one_process_compiles_at_a_time_and_nobody_waits_for_one_that_hangs(tmp_
     assert others.take(str(tmp_path)) and not mine.take(str(tmp_path))
     others.give_back()
     assert not mine.take(str(tmp_path / "nowhere"))
+
+
+def test_functions_of_other_packages_keep_their_cache(monkeypatch):
+    monkeypatch.setattr(config, "CACHE_DIR", "")
+    with _own_cache():
+        assert Path(config.CACHE_DIR) == cache_folder()
+    assert config.CACHE_DIR == ""
+
+
+def test_a_cache_folder_that_the_user_names_is_used(monkeypatch):
+    monkeypatch.setattr(config, "CACHE_DIR", "/somewhere")
+    with _own_cache():
+        assert config.CACHE_DIR == "/somewhere"
+
+
+@pytest.mark.parametrize("how", ["open to all", "another's"])
+def test_a_folder_inside_another_users_folder_is_not_used(temporary, tmp_path, monkeypatch, how):
+    plant(tmp_path / "home", how)
+    of_others(monkeypatch, {tmp_path / "home"} if how == "another's" else set())
+    assert trusted_cache("key").parent.parent == temporary

@@ -119,3 +119,14 @@ def test_commands_lost_one_by_one_are_lost_beside_a_pause(paused):
     _, faults = repair_stamps(silent.with_channels(command=Channel(t, y)))
     (lost,) = [f.size for f in faults if (f.kind, f.channel) == ("dropped_samples", "command")]
     assert lost == pytest.approx(np.count_nonzero(~keep), abs=2)
+
+
+def test_a_log_with_repeats_is_left_as_it_is(run):
+    command = run["command"]
+    rare = run.with_channels(command=Channel(command.t[::100], np.repeat([1.0, -1.0], len(command))[::200]))
+    assert with_held_commands(rare)[0] is rare
+
+
+def test_targets_of_a_position_loop_are_held_too(run):
+    targets = run.with_channels(reference=Channel(np.arange(6.0), np.arange(6.0)))
+    assert len(with_held_commands(targets)[0]["reference"]) > 5 * RATE

@@ -131,3 +131,10 @@ def test_files_put_aside_can_be_removed_only_once_all_new_ones_have_their_names(
     age(aside)
     remove_left(tmp_path)
     assert not aside.exists()
+
+
+def test_the_next_bag_removes_what_a_killed_writer_left(tmp_path):
+    leave_stage(tmp_path)
+    with BagWriter(tmp_path / "bag.mcap", recording=False):
+        pass
+    assert [p.name for p in tmp_path.iterdir()] == ["bag.mcap"]

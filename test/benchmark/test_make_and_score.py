@@ -203,3 +203,9 @@ def test_a_stopped_run_goes_on_where_it_stopped(made, tmp_path, monkeypatch):
     lines = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
     assert [line["record"] for line in lines] == list(read_dataset(made / "set").hashes)
     assert all(set(line) == {"record", "causes", "seconds"} for line in lines)
+
+
+@pytest.mark.parametrize("name", ["mine.jsonl", "random.jsonl"])
+def test_two_rows_of_one_name_are_refused(folder, name, capsys):
+    files = [answer_once(folder, perfect(folder)), answer_once(folder, perfect(folder), name)]
+    assert f"a second row {name[:-6]!r}" in assert_refused(capsys, "score", folder / "set", *files)

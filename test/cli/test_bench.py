@@ -74,3 +74,15 @@ def test_a_file_with_the_name_of_the_port_is_not_removed(tmp_path, capsys):
     assert errors.count("\n") == 1
     assert "thesis.tex: exists already, expected a new name" in errors
     assert (tmp_path / "thesis.tex").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--ft-rate", 9000), "rsea bench: --ft-rate 9000 Hz, expected 1 to 7000 Hz\n"),
+        (("--return-delay", 300), "rsea bench: --return-delay 300, expected 0 to 254 (unit 2 µs)\n"),
+    ],
+)
+def test_impossible_options_are_refused(words, message, capsys):
+    assert main(["bench", *map(str, words)]) == 2
+    assert capsys.readouterr() == ("", message)

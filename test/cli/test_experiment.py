@@ -95,3 +95,26 @@ def test_a_diagnosis_file_supplies_the_doubtful_cause_and_its_alternatives():
     assert (ours.name, ours.probability) == ("ft_gain_error", 0.6)
     assert ours.intervals == {"ft_gain_error.gain": (1.05, 1.15)}
     assert [e.name for e in other.rig.effects] == ["coulomb_friction", "torque_constant_error"]
+
+
+def cause(**body):
+    """Return diagnosis.json with one cause."""
+    return json.dumps({"causes": [{"name": "backlash", **body}]})
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (cause(name="unheard"), "effect 'unheard': not in the catalogue"),
+        (cause(probability=-1), "causes[0].probability = -1, expected 0 to 1"),
+        (cause(parameters={"gap": {"value": 1e-3, "ci95": [1]}}), "gap.ci95 = [1], expected [low, high]"),
+        (cause(parameters={"gap": {"value": 1e-3, "ci95": 3}}), "gap.ci95 = 3, expected [low, high]"),
+    ],
+)
+def test_a_wrong_diagnosis_file_is_refused_in_one_line_that_names_it(content, message, tmp_path, capsys):
+    save_rig(RIG, tmp_path / "model.yaml")
+    path = tmp_path / "diagnosis.json"
+    path.write_text(content, encoding="utf-8")
+    assert main(["experiment", str(path), "--limits", "torque=5"]) == 2
+    shown = capsys.readouterr().err
+    assert f"{path}: " in shown and message in shown and len(shown.splitlines()) == 1

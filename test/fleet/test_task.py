@@ -145,3 +145,12 @@ def test_a_run_keeps_the_page_of_a_diagnosis_only_on_request(lab: Path, tmp_path
     assert not list((tmp_path / "without").rglob("report.html"))
     assert main(["fleet", "report", str(tmp_path / "with"), "--out", str(tmp_path / "pages")]) == 0
     assert "/report.html" in (tmp_path / "pages" / "joint-knee.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "option",
+    [["--workers", "0"], ["--memory", "-1"], ["--serial", "--scheduler", "x"], ["--time-limit", "0"]],
+)
+def test_senseless_options_are_refused(lab, option, capsys):
+    assert main([*run_node_process(lab), "--out", str(lab / "no"), *option]) == 2
+    assert option[0] in capsys.readouterr().err and not (lab / "no").exists()

@@ -249,3 +249,14 @@ def test_every_door_dates_stamps_that_repeat():
     repeats = {f.channel for f in fit.result.faults if f.kind == "duplicate_stamps"}
     assert repeats == {"ft", "position", "velocity"}
     assert rsea.diagnose(record, rig).verdict == "nothing_wrong"
+
+
+@pytest.mark.parametrize("most", [0, -1])
+def test_a_diagnosis_may_have_no_fewer_than_one_cause(most):
+    with pytest.raises(ParameterError, match="max_causes"):
+        rsea.DiagnosisSettings(max_causes=most)
+
+
+def test_an_unknown_name_is_refused_with_the_known_ones():
+    with pytest.raises(AttributeError, match=r"no attribute 'simulat'; it offers .*simulate"):
+        _ = rsea.simulat

@@ -54,3 +54,13 @@ def test_a_disk_that_fails_under_a_recording_is_reported_and_the_rest_is_kept(tm
             cut.now = 1.1 * k
             bag.write("/a", "std_msgs/msg/Bool", k, BOOL)
     assert len(list(iterate(bag.partial))) >= 1
+
+
+def test_a_recording_without_new_messages_is_flushed(tmp_path, monkeypatch):
+    cut = PowerCut(monkeypatch, McapStorage)
+    with pytest.raises(RuntimeError), BagWriter(tmp_path / "bag") as bag:
+        bag.write("/a", "std_msgs/msg/Bool", 5, BOOL)
+        cut.now = 1.1
+        bag.keep_up()
+        assert len(list(iterate(bag.partial))) == 1
+        raise RuntimeError

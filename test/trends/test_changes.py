@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from fleet_histories import DAY, START, history, recordings
 
+from rsea_ros.errors import ParameterError
 from rsea_ros.trends import alarms, fleet_trends
 from rsea_ros.trends.weeks import bin_days, steps_over
 
@@ -156,3 +157,16 @@ def test_a_wild_recording_is_left_out_of_a_ramp_and_at_either_end(wild):
     made["value"][wild] *= 1.5
     (result,) = fleet_trends(made, NOTHING).trends.values()
     assert len(result.by_day.time_s) == 39
+
+
+def test_a_history_without_a_column_is_refused_by_name():
+    made = history(np.random.default_rng(0), days=10)
+    del made["low"]
+    with pytest.raises(ParameterError, match="history: no column low"):
+        fleet_trends(made, NOTHING)
+
+
+def test_an_empty_store_has_no_trends():
+    made = {n: c[:0] for n, c in history(np.random.default_rng(0), days=2).items()}
+    result = fleet_trends(made, {n: c[:0] for n, c in NOTHING.items()})
+    assert (dict(result.trends), result.appearances, result.outliers) == ({}, (), ())

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.io import savemat
 
-from msg_adapters.tables import npz_file
+from msg_adapters.tables import json_file, npz_file
 from msg_adapters.tables.column_files import read_columns
 from rsea_ros.errors import ImportMapError
 
@@ -235,3 +235,10 @@ def test_a_zarr_group_is_refused_with_the_line_that_converts_it(tmp_path, header
     (tmp_path / header).write_text("{}")
     with pytest.raises(ImportMapError, match=r"is a zarr group, .* NPZ by python -c 'import .*\(\)\)\)'$"):
         read_columns(tmp_path, ["t"])
+
+
+def test_json_beyond_a_size_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "run.json").write_text(json.dumps({"t": T.tolist()}))
+    monkeypatch.setattr(json_file, "LARGEST_FILE", 20)
+    with pytest.raises(ImportMapError, match="bytes of JSON, expected fewer than 20"):
+        read_columns(tmp_path / "run.json", ["t"])

@@ -100,3 +100,8 @@ def test_a_file_that_breaks_off_is_cut_off(tmp_path, compressed):
     cut.write_bytes(whole.read_bytes()[:-1000])
     with pytest.raises(ImportMapError, match="cut off"):
         read_columns(cut, ["t", "w"])
+
+
+def test_a_missing_number_is_a_hole(tmp_path):
+    savemat(tmp_path / "run.mat", {"x": np.array([0.0, np.nan, 2.0])})
+    assert np.isnan(read_columns(tmp_path / "run.mat", ["x"])["x"]).tolist() == [False, True, False]

@@ -89,3 +89,10 @@ def test_a_first_row_with_a_number_that_is_none_is_refused_as_before(row, tmp_pa
 def test_what_cannot_be_read_is_one_line(text, more, message, tmp_path):
     with pytest.raises(ImportMapError, match=message):
         import_file(tmp_path, text, more)
+
+
+def test_date_times_have_no_other_unit_than_seconds(tmp_path):
+    (tmp_path / "run.csv").write_text("t,u\n2025-11-12T10:03:29Z,1.5\n2025-11-12T10:03:30Z,-2.5\n")
+    (tmp_path / "map.yaml").write_text(MAP.replace("unit: s", "unit: ms"))
+    with pytest.raises(ImportMapError, match=r"time.unit is 'ms', and t holds date-times, expected s"):
+        import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
