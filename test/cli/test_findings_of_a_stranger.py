@@ -101,3 +101,13 @@ def test_a_prediction_tells_of_a_turned_sign_and_of_a_zero_that_is_off(record, t
 
 def _holds(interval, name):
     return interval[0] < rsea.load_rig(RIG)[name] < interval[1]
+
+
+def test_a_symbolic_link_as_out_is_refused_before_any_work(record, tmp_path, capsys):
+    bag, link = tmp_path / "bag.mcap", tmp_path / "link"
+    write_record(record, bag)
+    link.symlink_to(tmp_path, target_is_directory=True)
+    assert main(["identify", str(bag), "--out", str(link)]) == 2
+    said = capsys.readouterr()
+    assert f"--out {link}: is a symbolic link, expected a directory or a new name" in said.err
+    assert not said.out

@@ -98,14 +98,13 @@ def test_every_transition_out_of_active_writes_zero(spied, way):
 
 def test_after_an_exception_the_device_is_closed_at_zero_torque_and_can_be_configured_again(spied, listener):
     spy, program, node = spied
+    assert program.joints[0].report().values["lifted_limits"] == "temperature, current, voltage"
     spy.fault = ZeroDivisionError("a mistake in the program")
     listener.until(lambda: not spy.opened)
     assert spy.written[-1] == 0.0
     program.is_finished()
     assert node._state_machine.current_state[1] == "unconfigured"
-    report = program.joints[0].report()
-    assert report[1] == "a mistake in the program"
-    assert report.values["lifted_limits"] == "temperature, current, voltage"
+    assert program.joints[0].report()[1] == "a mistake in the program"
     spy.fault = None
     node.trigger_configure()
     assert node._state_machine.current_state[1] == "inactive" and spy.opened

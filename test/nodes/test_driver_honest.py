@@ -135,6 +135,7 @@ def test_a_step_of_the_system_clock_ends_the_torque_and_is_reported(driver):
             break
         assert is_stall(fault) or fault.startswith("command_timeout"), fault
     assert fault == "clock_step: the system clock was set by -3600.000 s", fault
+    driver.set_clock(0)
     driver.drive()
 
 
