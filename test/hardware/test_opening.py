@@ -43,7 +43,7 @@ def test_a_sensor_without_a_stream_is_refused_and_the_motor_left_off(benches, de
     monkeypatch.setattr("rsea_ros.hardware.netft.sensor.FIRST", 0.3)
     bench = benches()
     bench.ask("misbehave", ft_silent=True)
-    with pytest.raises(RseaError, match="no record within 0.3 s, expected a stream"):
+    with pytest.raises(RseaError, match=r"no record within 0\.3 s, expected a stream"):
         device().open()
     bench.ask("misbehave", ft_silent=False)
     assert bench.torque() == (0, False)

@@ -117,3 +117,8 @@ def test_a_command_beyond_ten_times_the_limit_is_refused_as_nan_is():
     assert queue.refused == 4 and queue.take(10) == []
     queue.add(0, 600.0, 11)
     assert queue.take(20)[-1][1] == 600.0
+
+
+def test_commands_are_taken_in_the_order_of_their_stamps():
+    queue = _queue((NOW + 20, 2.0), (NOW + 10, 1.0))
+    assert queue.take(NOW + 30) == [(NOW + 10, 1.0), (NOW + 20, 2.0)]
