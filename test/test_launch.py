@@ -79,11 +79,6 @@ def test_a_launch_file_is_the_graph_behind_its_first_node(describe, name, first)
     assert include.options["launch_arguments"] == [("first", first)]
 
 
-def test_no_launch_file_is_untested():
-    assert {path.name.removesuffix(".launch.py") for path in LAUNCH.glob("*.py")} == {"graph", *FIRST}
-    assert yaml.safe_load((LAUNCH / "graph.yaml").read_text())["graphs"] == FIRST
-
-
 def test_the_graph_declares_every_argument_that_it_uses(describe):
     parts = describe("graph")
     assert configurations(parts) == set(defaults(parts))

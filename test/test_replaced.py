@@ -12,7 +12,7 @@ import pytest
 
 from rsea_ros.outputs import files
 from rsea_ros.outputs.files import LEFT_AFTER, OLD, make_locked, make_stage, name_of, put_back, remove_left
-from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
+from rsea_ros.outputs.new_files import check_free
 
 CALLS = ("link", "rename", "fsync", "unlink", "rmdir")
 
@@ -157,13 +157,6 @@ def test_files_put_aside_by_another_user_or_machine_stay(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     put_back(tmp_path)
     assert (mine / "a").exists()
-
-
-def test_the_next_results_clear_up_first(tmp_path):
-    aside(tmp_path, "a")
-    with NewFiles(Destination(tmp_path, force=True)) as new:
-        new.write("b", "new")
-    assert texts(tmp_path) == {"a": "old", "b": "new"}
 
 
 def test_a_file_that_cannot_be_put_back_stays_and_stops_nobody(tmp_path, monkeypatch):

@@ -127,14 +127,6 @@ def test_a_sensor_that_was_silent_for_long_keeps_its_place():
     assert np.array_equal(repaired["ft"].t, silent)
 
 
-def test_two_clocks_of_three_that_jump_alike_are_found():
-    t = np.arange(COUNT) * PERIOD
-    years = np.where(np.arange(COUNT) < 900, 0.0, 1e8)
-    repaired, faults = repair_stamps(_record(t + years, position=t + 1e-3 + years))
-    assert {(f.kind, f.channel) for f in faults} == {("clock_jump", "ft"), ("clock_jump", "position")}
-    assert repaired.stop < 2 * COUNT * PERIOD
-
-
 def test_a_log_polled_at_two_intervals_lost_nothing():
     """A host that polled after 4 or after 10 ms was told that 30 % of its samples were dropped."""
     rng = np.random.default_rng(5)

@@ -23,7 +23,6 @@ from rsea_ros.cli.call import offer_of
 from rsea_ros.cli.run import node_names, ros_arguments
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes import _caller, _visitor
-from rsea_ros.nodes import _visitor as _listener
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -155,28 +154,6 @@ def test_a_driver_is_activated_stopped_and_cleared_by_calls(tmp_path):
         driver.send_signal(signal.SIGTERM)
         status = driver.wait(20)
     assert status == 0
-
-
-class SlowGraph:
-    """A node that discovers the topics of others only after some looks."""
-
-    def __init__(self, looks: int) -> None:
-        self.left = looks
-
-    def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
-        self.left -= 1
-        return [("/rsea/ft", ["geometry_msgs/msg/WrenchStamped"])] if self.left < 0 else [("/rosout", [])]
-
-    def count_publishers(self, name: str) -> int:
-        return 1
-
-    count_subscribers = count_publishers
-
-
-@pytest.mark.parametrize(("looks", "seen"), [(3, 1), (10_000, 0)])
-def test_topics_that_are_discovered_late_are_listed(looks, seen, monkeypatch):
-    monkeypatch.setattr(_listener, "DISCOVERY", 0.5)
-    assert len(_listener.Listener(SlowGraph(looks)).topics(0.0)) == seen
 
 
 def test_a_visitor_does_not_propose_itself(visitor, monkeypatch):

@@ -168,14 +168,6 @@ def test_a_stream_that_falls_silent_is_requested_again(streamed):
     assert receiver.sequence.counts["lost"] == 0
 
 
-def test_a_new_stream_after_which_only_the_sensors_own_counter_has_moved_on_is_followed():
-    sequence = Sequence()
-    assert sequence.accept(decode(datagram(1)))
-    sequence.begin()
-    records = [decode(datagram(k))._replace(ft_sequence=(1 << 22) + k) for k in range(1, 9)]
-    assert [sequence.accept(r) for r in records][-1]
-
-
 def test_a_tare_collects_while_the_cycle_reads(streamed):
     """Tare and cycle took from one queue, and the second of them raised IndexError."""
     receiver, sensor, client = streamed

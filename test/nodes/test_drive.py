@@ -40,17 +40,6 @@ def test_after_a_clock_step_only_clear_fault_restores_the_torque(world, step):
     assert world.guarded.fault is None and not world.monitor.violations
 
 
-@pytest.mark.parametrize("step", [-HOUR, HOUR])
-def test_a_clock_step_without_torque_is_counted_and_is_no_fault(step):
-    world = World()
-    world.activate()
-    world.cycles(5)
-    world.off += step
-    world.cycles(2)
-    assert world.guarded.fault is None and world.anchor.values()["clock_steps"] == 1
-    assert world.cycles(20, 10.0)[-1] == 10.0
-
-
 @pytest.mark.parametrize("step", [-SECOND // 5, -SECOND // 20, SECOND // 20])
 @pytest.mark.parametrize("ahead", [0.0, 0.1])
 def test_a_command_from_before_a_clock_step_never_acts(step, ahead):
@@ -177,12 +166,6 @@ def test_after_autostart_the_first_command_is_zero_or_a_fault(first):
 def test_a_halt_ends_the_torque_in_the_next_cycle(world):
     world.guarded.interlock.halted = True
     assert world.cycles(3, 10.0) == [0.0] * 3
-
-
-def test_a_motor_that_has_lost_its_torque_is_a_fault(world):
-    world.motor.on = False
-    world.cycles(40, 10.0)
-    assert world.guarded.fault.cause == "effort" and world.motor.goal == 0.0
 
 
 SEEDS = range(3)

@@ -2,7 +2,6 @@
 
 
 import pytest
-from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import JointState, torque_command_message
 from rsea_ros.hardware.device import State
@@ -108,28 +107,3 @@ def test_after_an_exception_the_device_is_closed_at_zero_torque_and_can_be_confi
     spy.fault = None
     node.trigger_configure()
     assert node._state_machine.current_state[1] == "inactive" and spy.opened
-
-
-def test_two_actuators_each_follow_only_their_own_commands(listener, monkeypatch):
-    """A command for left_knee moved whatever listened."""
-    spies = {name: Spy() for name in ("left", "right")}
-    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"][:-5]]})
-    values = {parameter.name: parameter.default for parameter in driver.TABLE} | {
-        "rate": 200.0, "autostart": True, "resume": True, "command_timeout": 5.0, "effort_limit": 0.0,
-    }  # fmt: skip
-    made, topic = [], {}
-    for name in spies:
-        node = LifecycleNode("driver", namespace=name)
-        made.append((driver.DriverNode(node, values | {"joint": f"{name}_knee"}), node))
-        topic[name] = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
-
-    def pushed():
-        for name in spies:
-            topic[name].publish(torque_command_message(0, 5.0, "left_knee"))
-        return spies["left"].written[-1:] == [5.0] and made[1][0].joints[0].topics.commands.refused > 3
-
-    listener.until(pushed)
-    assert not any(spies["right"].written)
-    for program, node in made:
-        program.close()
-        node.destroy_node()

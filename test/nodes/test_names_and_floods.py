@@ -7,13 +7,12 @@ import pytest
 from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
 
-from msg_adapters.ros import JointState, Trigger, WrenchStamped, stamp_of, torque_command_message
+from msg_adapters.ros import JointState, Trigger, WrenchStamped, torque_command_message
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import MOST, NAMES, BenchTopics
-from rsea_ros.nodes._model_health import Flags
-from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from test.nodes.test_driver import Spy
 
 VALUES = {parameter.name: parameter.default for parameter in driver.TABLE} | {
@@ -70,14 +69,6 @@ def test_a_cycle_takes_a_bounded_number_of_commands_and_the_newest_acts(listener
     assert bench.commands.torque == 999.0
     bench.close()
     listener.node.destroy_publisher(publisher)
-
-
-def test_the_flag_has_a_stamped_companion(listener):
-    flags = Flags(listener.node)
-    heard = listener.hear(JointState, "pure_torque_stamped", LATCHED)
-    flags.show(5 * 10**9 + 7, True)
-    listener.until(lambda: heard and heard[-1].effort[0] == 1.0)
-    assert stamp_of(heard[-1].header.stamp) == 5 * 10**9 + 7
 
 
 class Slow(Spy):

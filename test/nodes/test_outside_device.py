@@ -57,9 +57,3 @@ def test_the_deflection_is_published_also_as_an_ft_marked_as_such(drive, listene
     assert str(values["dead_host_protection"]) == "none"
     assert values["ft_source"] == "stiffness of 1530 N·m/rad times measured deflection"
     assert "toy" in values
-
-
-def test_a_supervised_device_is_configured_with_its_options(drive):
-    program, node = drive(device_options="supervised=yes")
-    assert node._state_machine.current_state[1] == "active"
-    assert str(program.joints[0].report().values["dead_host_protection"]) == "supervisor, 0.1 s"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from msg_adapters.tables import load_map
-from msg_adapters.tables.expression import FUNCTIONS, parse
+from msg_adapters.tables.expression import parse
 from msg_adapters.tables.importing import import_record
 from rsea_ros.errors import ImportMapError
 
@@ -77,22 +77,6 @@ def test_what_is_no_real_finite_number_is_refused(text):
     with pytest.raises(ValueError, match=r"(no real number|is -?inf) at sample \d+"):
         value(text)
     assert time.process_time() - began < 1.0
-
-
-def test_random_texts_are_refused_or_computed():
-    """Random hostile texts made of the allowed words give numbers or one line."""
-    rng = np.random.default_rng(0)
-    words = [*FUNCTIONS, *COLUMNS, "(", ")", ",", "+", "*", "**", "1e9", "-", ".", "[", "]", "__", "'", "0"]
-    computed = 0
-    for _ in range(4000):
-        text = "".join(rng.choice(words, rng.integers(1, 9)))
-        try:
-            computed += value(text).shape == T.shape
-        except KeyError:
-            assert set(parse(text).columns) - set(COLUMNS)  # import reads the columns first
-        except ValueError as error:
-            assert "\n" not in str(error)
-    assert computed >= 10
 
 
 MAP = """

@@ -71,11 +71,6 @@ def test_separators_comments_and_missing_names_are_read(files):
     assert np.allclose(files(numbered, CSV.partition("\n")[2])["position"].y[0], -math.pi / 2)
 
 
-def test_a_dated_clock_keeps_its_date(files):
-    csv = CSV.replace("\n0.", "\n1763000000.").replace("\n1.0", "\n1763000001.0")
-    assert files(MAP, csv).epoch_ns == 1_763_000_000_000_000_000
-
-
 LONG = "t,phi,i,load\n" + "".join(f"{k * 0.01:.2f},{k},{k},{k}\n" for k in range(100))
 DEGREE = math.pi / 180
 
