@@ -14,7 +14,7 @@ from tornado.websocket import websocket_connect
 from rsea_ros.errors import RseaError
 from rsea_ros.watch.command import PATIENCE
 from rsea_ros.watch.desk import MOST_PAGES, MOST_WAITING, Desk
-from rsea_ros.watch.handlers import same_origin
+from rsea_ros.watch.handlers import Access, same_origin
 from rsea_ros.watch.runs import Runs
 from rsea_ros.watch.server import Server
 from test.watch.browser import hang_up
@@ -171,3 +171,13 @@ def test_a_slow_page_misses_frames_and_nobody_waits(tmp_path):
     assert got == []
     others = [type("Page", (), {"waiting": 0, "send": got.append})() for _ in range(MOST_PAGES)]
     assert [desk.enter(each) for each in others] == [True] * (MOST_PAGES - 1) + [False]
+
+
+def test_a_token_is_new_at_every_start_and_long():
+    assert Access("a").token != Access("a").token
+    assert len(Access("a").token) >= 22
+
+
+@pytest.mark.parametrize("path", ["/report/../x", "/report/none/identify", "/page/index.html", "/..%2fa.py"])
+def test_only_pages_that_were_made_are_served(server, path):
+    assert status(server, path, Cookie=cookie(server))[0] == 404
