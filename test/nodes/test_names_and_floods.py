@@ -7,12 +7,13 @@ import pytest
 from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
 
-from msg_adapters.ros import JointState, Trigger, WrenchStamped, torque_command_message
+from msg_adapters.ros import JointState, Trigger, WrenchStamped, stamp_of, torque_command_message
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import MOST, NAMES, BenchTopics
-from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from rsea_ros.nodes._model_health import Flags
+from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
 from test.nodes.test_driver import Spy
 
 VALUES = {parameter.name: parameter.default for parameter in driver.TABLE} | {
@@ -120,3 +121,11 @@ def test_a_lost_reply_raises_the_level_and_is_named(slow, listener):
     listener.until(lambda: program.joints[0].guarded.cycles["failed_reads"] == 1)
     report = program.joints[0].report()
     assert "1 reads lost" in report.summary and report.level == b"\x01"
+
+
+def test_the_flag_has_a_stamped_companion(listener):
+    flags = Flags(listener.node)
+    heard = listener.hear(JointState, "pure_torque_stamped", LATCHED)
+    flags.show(5 * 10**9 + 7, True)
+    listener.until(lambda: heard and heard[-1].effort[0] == 1.0)
+    assert stamp_of(heard[-1].header.stamp) == 5 * 10**9 + 7
