@@ -184,3 +184,11 @@ def test_a_tare_collects_while_the_cycle_reads(streamed):
     _until_heard(receiver, sent)
     taken += len(receiver.take())
     assert taken == sent and len(decoded) > 1
+
+
+def test_a_new_stream_after_which_only_the_sensors_own_counter_has_moved_on_is_followed():
+    sequence = Sequence()
+    assert sequence.accept(decode(datagram(1)))
+    sequence.begin()
+    records = [decode(datagram(k))._replace(ft_sequence=(1 << 22) + k) for k in range(1, 9)]
+    assert [sequence.accept(r) for r in records][-1]
