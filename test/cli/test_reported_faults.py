@@ -9,7 +9,7 @@ import mcap_damage_kinds as kinds
 import pytest
 from mcap_bytes import McapFile, write
 
-from msg_adapters import BagWriter, TopicMap, iterate
+from msg_adapters import TopicMap, iterate
 from rsea_ros.checks.faults import check
 from rsea_ros.cli.diagnose import readable
 from rsea_ros.cli.main import main
@@ -17,22 +17,6 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.result_files import fault_json
 
 RIG = "paper_high_impedance"
-
-
-@pytest.fixture(scope="module")
-def bag(tmp_path_factory):
-    """Return a bag with a gap of 40 wrenches and with fewer messages than its metadata count."""
-    folder = tmp_path_factory.mktemp("told")
-    assert main(["simulate", RIG, "--out", str(folder / "clean"), "--duration", "8"]) == 0
-    wrenches = 0
-    with BagWriter(folder / "bag") as writer:
-        for topic, kind, log_time, raw in iterate(folder / "clean"):
-            wrenches += topic == "/rsea/ft"
-            if topic != "/rsea/ft" or not 900 <= wrenches < 940:
-                writer.write(topic, kind, log_time, raw)
-    metadata = (folder / "clean" / "metadata.yaml").read_text().replace("clean.mcap", "bag.mcap")
-    (folder / "bag" / "metadata.yaml").write_text(metadata)
-    return folder / "bag"
 
 
 DAMAGE = {
