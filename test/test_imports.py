@@ -130,14 +130,8 @@ def test_a_module_imports_only_what_its_layer_may():
         ("rsea_ros/model/rig.py", "from rsea_ros.identification import identify"),
         ("rsea_ros/model/rig.py", "def f():\n    import rclpy"),
         ("rsea_ros/effects/backlash.py", "from ..model import rig"),
-        ("rsea_ros/effects/backlash.py", "from rsea_ros import model"),
-        ("rsea_ros/identification/fit.py", "import plotly.graph_objects as go"),
-        ("rsea_ros/hardware/dynamixel.py", "from rsea_ros.model.plant import Plant"),
         ("rsea_ros/nodes/plant.py", "from sensor_msgs.msg import JointState"),
-        ("rsea_ros/cli/identify.py", "from rosbags.highlevel import AnyReader"),
-        ("rsea_ros/cli/identify.py", "import plotly"),
         ("msg_adapters/bags.py", "from rsea_ros.model.rig import Rig"),
-        ("msg_adapters/ros.py", "import rclpy"),
     ],
 )
 def test_an_offence_is_found(place, source):
@@ -150,7 +144,6 @@ def test_an_offence_is_found(place, source):
         ("rsea_ros/model/rig.py", "import numpy as np\nfrom rsea_ros.effects.effect import Effect"),
         ("rsea_ros/hardware/simulated.py", "from rsea_ros.model.plant import Plant"),
         ("rsea_ros/nodes/plant.py", "import rclpy\nfrom msg_adapters.ros import JointState"),
-        ("msg_adapters/ros.py", "from sensor_msgs.msg import JointState"),
         ("rsea_ros/report/figures/bode.py", "import numpy\nfrom ...identification import result"),
     ],
 )

@@ -65,7 +65,7 @@ def misfires(monkeypatch, words: list[str], misfire: Callable[[str], None]) -> I
             return
 
 
-@pytest.mark.parametrize("verb", ["simulate to a directory", "fleet", "paper"])
+@pytest.mark.parametrize("verb", ["simulate to a directory", "identify"])
 def test_an_error_at_any_step_leaves_what_was_there(folder, monkeypatch, capsys, verb):
     words, names = WRITERS[verb]
     (folder / "out").mkdir()

@@ -78,22 +78,14 @@ def assert_refused(file, column, text):
     [
         (".csv", "5", "no column '5', expected one of 1, 2, 3, 4"),
         (".mat", "q", r"variable 'q' is double \(6, 3\), .* a column of the matrix, q\(:,1\) to q\(:,3\)"),
-        (".mat", "q(:,4)", r"variable 'q\(:,4\)' is double \(6, 3\)"),
-        (".mat", "log.w", "no column 'log.w', expected one of log.q, log.t"),
         (".mat", "log", r"variable 'log' is struct \(1, 1\), expected a vector"),
-        (".mat", "q.x", "'q.x'"),
-        (".npz", "w", "no column 'w', expected one of t, q, side"),
         (".npz", "q", r"array 'q' is float64 \(6, 3\), expected a vector .* q\[0\]"),
         (".npz", "q[3]", r"array 'q' is float64 \(6, 3\), no 'q\[3\]'"),
-        (".npz", "t[0]", r"array 't\[0\]' is float64 \(6,\), expected a matrix"),
-        (".parquet", "w", "no column 'w', expected one of t, q"),
         (".parquet", "q", r"column 'q' is fixed_size_list.*expected one number of it: q\[0\]"),
         (".parquet", "q[3]", r"column 'q\[3\]' has a list of 3 numbers, expected more than 3"),
         (".parquet", "t[0]", r"column 't\[0\]' is double, expected lists"),
-        (".json", "w", "no column 'w', expected one of t, q, side"),
         (".json", "q", r"sample 1, column 'q' is \[0.0, 1.0, 2.0\], expected a finite number: q\[0\]"),
         (".json", "q[3]", r"sample 1, column 'q\[3\]' is .* expected a list of more than 3"),
-        (".jsonl", "w", "no column 'w', expected one of t, q"),
     ],
 )
 def test_an_unknown_column_is_named(write, suffix, column, text):
@@ -116,13 +108,10 @@ def test_records_nested_below_other_keys_are_read(tmp_path):
     [
         ('{"t": [0, 1], "t": [2, 3]}', "key 't' stands twice"),
         ('{"t": [0, 1e999]}', "sample 2, column 't' is inf, expected a finite number"),
-        ('{"t": [0, Infinity]}', "sample 2, column 't' is inf"),
         ('{"t": [0, "1"]}', "sample 2, column 't' is '1', expected a finite number"),
         ('{"t": [0, ' + "9" * 5000 + "]}", "digits"),
         ('{"t": [0, 1]', "line 1, column 13: expecting ',' delimiter, expected JSON"),
         ("[" * 100_000, "too many levels"),
-        ('{"t": 3}', "column 't' is 3, expected a list of numbers"),
-        ("[]", "no column 't'"),
         ("", "line 1, column 1: expecting value, expected JSON"),
     ],
 )
@@ -215,12 +204,9 @@ def test_a_first_line_with_a_hole_is_data_where_the_map_says_so(tmp_path, header
     [
         ("log.h5", b"\x89HDF\r\n\x1a\n", r"is an HDF5 file, expected a table: .*numpy\.savez"),
         ("log.xlsx", b"PK\x03\x04", "is a spreadsheet .* save the sheet as CSV"),
-        ("log.xls", b"\xd0\xcf\x11\xe0\xa1\xb1", "is an Excel workbook, .* save the sheet as CSV"),
-        ("log.feather", b"ARROW1\0\0", r"is an Arrow .* pyarrow\.parquet\.write_table"),
         ("log.dat", b"PAR1", r"is a Parquet file, .* call it \.parquet"),
         ("run.mcap", b"\x89MCAP0\r\n", "is a bag, .* needs no import"),
         ("log.pkl", pickle.dumps(np.arange(3), 4), "is a pickle, which may run any program"),
-        ("log.tar", bytes(257) + b"ustar", "is a tar archive, .* unpack it"),
     ],
 )
 def test_a_foreign_file_is_named_with_its_remedy(tmp_path, name, head, words):

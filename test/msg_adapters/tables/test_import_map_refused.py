@@ -15,18 +15,13 @@ from rsea_ros.errors import ImportMapError
 MAPS = Path(__file__).resolve().parents[3] / "config" / "imports"
 BAD_MAPS = {
     "{": "not YAML",
-    "channels: 3\ntime: {rate: 1}": "channels is 3, expected a mapping",
     "time: {rate: 1}\nchannels: {current: {column: i, unit: A}}": "no 'current': map it as `command`",
-    "channels: {}": "map: no 'time', expected a column with its unit",
-    "[]": r"map is \[\], expected a mapping with",
     MAP.replace("deg", "degrees"): "unit 'degrees' unknown, expected one of s, ms",
     MAP.replace("sign: -1", "sign: 2"): r"channels.position.sign is 2.0, expected 1 or -1",
     MAP.replace(
         ", scale: 6.8", ""
     ): r"channels.command\[0\]: unit 'mA' is a current, expected a torque, or a scale",
-    MAP.replace("scale: 6.8", "scale: lots"): "scale is 'lots', expected a number",
     MAP.replace("position", "angle"): "channels: unknown key 'angle', expected command",
-    MAP.replace("sign: -1", "signe: -1"): "channels.position: unknown key 'signe', expected column",
     MAP.replace(
         "unit: deg", "unit: mm"
     ): "channels mix 'mm' and 'N m', expected a linear or a rotary machine",
@@ -55,14 +50,11 @@ BAD_FILES = {
     "t,phi,i,load\n": "no rows, expected numbers below the column names",
     CSV.replace("phi", "psi"): "no column 'phi', expected one of t, psi, i, load",
     CSV.replace("-45", "lots"): "line 3, column 'phi' is 'lots', expected a finite number",
-    CSV.replace("-45", "inf"): "line 3, column 'phi' is 'inf', expected a finite number",
     CSV.replace(",", ";").replace("-45", "-4,5"): "line 3, column 'phi' is '-4,5', .*, with a decimal point",
     CSV.replace(",6\n", "\n"): "line 4 has 3 fields, expected 4, as in 1 of 3 rows",
-    CSV.replace("1500", "1500,7"): "line 2 has 5 fields, expected 4, as in 1 of 3 rows",
     CSV.replace("t,phi,i", "t,phi,phi"): r"column 'phi' stands 2 times \(2, 3\), expected once",
     CSV.split("0.5")[0]: "fewer than two rows, expected a record",
     CSV.replace("1.0,", "1e300,"): "stamps from 0 s to 1e[+]300 s, expected less than .*another unit of time",
-    CSV.replace("1.0,", "3e9,"): "stamps from 0 s to 3e[+]09 s, expected less than",
     "x" * 2_000_000: "a line of more than 1048576 characters",
     "\0" + CSV: "not a text",
     CSV.replace("1.0,", "0.2,"): r"t of row 3 goes back \(0.200000 s after 0.500000 s\)",
@@ -84,8 +76,6 @@ def test_a_value_too_large_for_its_unit_is_refused(files):
 
 BAD_VALUES = {
     "delimiter: ''": r"line 2: delimiter is '', expected one of ','",
-    "delimiter: ab": r"line 2: delimiter is 'ab', expected one of ','",
-    "delimiter: []": r"line 2: delimiter is \[\], expected one of ','",
     'delimiter: "\\n"': r"line 2: delimiter is '.*', expected one of ','",
     "where: {column: yes, from: 1}": r"line 2: where.column is True, expected a name",
     "where: {column: load, from: .nan}": None,
