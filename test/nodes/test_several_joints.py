@@ -112,8 +112,8 @@ class Leg:
         self.listener.until(holds)
 
     def clear_stalls(self):
-        """Clear faults that no test here provokes."""
-        if any(map(is_stall, self.faults())):
+        """Clear faults that no test here provokes: commands may cease, too, on a machine that stalls."""
+        if any(is_stall(fault) or fault.startswith("command_timeout") for fault in self.faults()):
             self.call("clear_fault")
 
     def ready(self):
