@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 
 import pytest
-from rclpy.qos import QoSProfile
 
 from msg_adapters.ros import DiagnosticArray, JointState, Trigger, torque_command_message
 from rsea_ros.hardware.peer.remote import RemoteBench
@@ -31,17 +30,15 @@ class Shimmed:
     def __init__(self, bench, listener, folder):
         self.bench, self.listener, self.off, self.step = bench, listener, 0, folder / "step"
         self.set_clock(0)
-        self.preloaded = preload(folder, self.step)
         start = {"autostart": True, "resume": True, "joint": "left_knee"}
         values = {**bench.parameters(), "baud": 4_000_000, **start}
         words = [w for k, v in values.items() for w in ("-p", f"{k}:={str(v).lower() if v is True else v}")]
         self.process = subprocess.Popen(
             [sys.executable, "-c", DRIVER, "--ros-args", *words, "-r", "__ns:=/honest"],
-            env={**os.environ, "PYTHONPATH": str(ROOT), "SHIMMED_CLOCK": str(self.step), **self.preloaded},
+            env={**os.environ, "PYTHONPATH": str(ROOT), **preload(folder, self.step)},
             stdin=subprocess.DEVNULL,
         )  # fmt: skip
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
-        self.states = listener.hear(JointState, "/honest/joint_states", QoSProfile(depth=10))
         self.commands = listener.node.create_publisher(JointState, "/honest/torque_command", COMMAND)
         self._clear = listener.node.create_client(Trigger, "/honest/driver/clear_fault")
         listener.until(self._clear.service_is_ready)
