@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TypeVar
@@ -39,7 +38,6 @@ def plugin_constant(variable: str, path: str, name: str, kind: type[T]) -> T:
     if not isinstance(constant, kind):
         expected = f"expected a constant of type {kind.__name__}"
         raise ParameterError(f"{variable}: {path}: no {name} in it, {expected}")
-    sys.modules[f"plugin {path}"] = module  # where its docstring is looked for
     return constant
 
 
