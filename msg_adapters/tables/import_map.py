@@ -105,16 +105,8 @@ class ImportMap:
 
 def load_map(path: str | Path) -> ImportMap:
     """Read an import map. Raises ImportMapError with file, line, field, value and expectation."""
-    try:
-        document = strict_yaml.read(Path(path))
-    except OSError as error:
-        raise ImportMapError(f"{path}: {error.strerror}, expected an import map in YAML") from None
-    except FieldError as error:
-        raise ImportMapError(f"{path}: {error}") from None
-    try:
-        return _map(Path(path), document.content)
-    except FieldError as error:
-        raise ImportMapError(f"{path}: {document.where(error.field)}{error}", error.field) from None
+    path = Path(path)
+    return strict_yaml.load(path, "an import map in YAML", ImportMapError, lambda held: _map(path, held))
 
 
 def _map(path: Path, document: object) -> ImportMap:

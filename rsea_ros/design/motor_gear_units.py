@@ -84,17 +84,10 @@ class MotorGear:
 
 def catalogue(path: Path | None = None) -> dict[str, MotorGear]:
     """Return the units by name. Raises ParameterError naming file, field, value and the expected value."""
-    path = path or _default_path()
-    try:
-        document = strict_yaml.read(path)
-    except OSError as error:
-        raise ParameterError(f"{path}: {error.strerror}, expected a catalogue in YAML") from None
-    except FieldError as error:
-        raise ParameterError(f"{path}: {error}") from None
-    try:
-        return {str(n): _unit(str(n), body) for n, body in mapping(document.content, "catalogue").items()}
-    except FieldError as error:
-        raise ParameterError(f"{path}: {document.where(error.field)}{error}") from None
+    return strict_yaml.load(
+        path or _default_path(), "a catalogue in YAML", lambda message, field: ParameterError(message),
+        lambda held: {str(n): _unit(str(n), body) for n, body in mapping(held, "catalogue").items()},
+    )  # fmt: skip
 
 
 def unit_named(name: str, path: Path | None = None) -> MotorGear:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,7 +133,12 @@ def least_for_band(requirement: Requirement, unit: MotorGear) -> float:
     low, high = 1.0, 2.0
     while not reaches(high):
         low, high = high, 2.0 * high
-    for _ in range(24):
+    return bisect(reaches, low, high, 24)
+
+
+def bisect(reaches: Callable[[float], bool], low: float, high: float, rounds: int) -> float:
+    """Return the least value between two that reaches something, the lower of which does not, in its log."""
+    for _ in range(rounds):
         middle = math.sqrt(low * high)
         low, high = (low, middle) if reaches(middle) else (middle, high)
     return high

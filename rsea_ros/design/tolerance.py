@@ -11,7 +11,7 @@ import numpy as np
 from rsea_ros.design import mechanism
 from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.design.requirement import Requirement
-from rsea_ros.design.spring_design import SpringDesign, least_stiffness, spring_design
+from rsea_ros.design.spring_design import SpringDesign, bisect, least_stiffness, spring_design
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.records.record import FloatArray
 
@@ -75,15 +75,12 @@ def robust_stiffness(requirement: Requirement, unit: MotorGear, share: float = 0
 
     inf where the motor alone fails more often. Bisection in log K_s.
     """
+
+    def reaches(k_s: float) -> bool:
+        return margins(spring_design(requirement, unit, k_s))[-1].share >= share
+
     low = least_stiffness(requirement, unit)
-    high = 100.0 * low
-    if margins(spring_design(requirement, unit, high))[-1].share < share:
-        return float("inf")
-    for _ in range(12):
-        middle = float(np.sqrt(low * high))
-        met = margins(spring_design(requirement, unit, middle))[-1].share >= share
-        low, high = (low, middle) if met else (middle, high)
-    return high
+    return bisect(reaches, low, 100.0 * low, 12) if reaches(100.0 * low) else float("inf")
 
 
 def _draws(spreads: Mapping[str, float], seed: int) -> dict[str, FloatArray]:

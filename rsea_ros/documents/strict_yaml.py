@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 import re
 import stat
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
@@ -20,6 +20,7 @@ from rsea_ros.documents.units import plain, same_unit
 from rsea_ros.documents.wording import did_you_mean, no_utf_8, quote
 from rsea_ros.errors import FieldError
 
+T = TypeVar("T")
 _DECIMAL = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
@@ -98,6 +99,23 @@ def read(path: Path) -> Document:
         return parse(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise FieldError(f"not YAML: {no_utf_8(error)}, expected text in UTF-8") from None
+
+
+def load(path: Path, expected: str, error: Callable[[str, str], Exception], build: Callable[[Any], T]) -> T:
+    """Return what `build` makes of a file's content. expected: what the file should be.
+
+    Raises `error`, made of message and field: file, line, field, value and the expected value.
+    """
+    try:
+        document = read(path)
+    except OSError as wrong:
+        raise error(f"{path}: {wrong.strerror}, expected {expected}", "") from None
+    except FieldError as wrong:
+        raise error(f"{path}: {wrong}", "") from None
+    try:
+        return build(document.content)
+    except FieldError as wrong:
+        raise error(f"{path}: {document.where(wrong.field)}{wrong}", wrong.field) from None
 
 
 def parse(text: str) -> Document:

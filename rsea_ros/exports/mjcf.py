@@ -19,7 +19,7 @@ from rsea_ros.exports.others import (
     Omitted,
     Represented,
     Unrepresentable,
-    coverage_lines,
+    coverage_comment,
     finite_sizes,
     without_null_effects,
 )
@@ -94,8 +94,7 @@ def export_mjcf(rig: Rig) -> Export:
         except Unrepresentable as reason:
             omitted.append(Omitted(setting.name, str(reason)))
     omitted += unsaid_of(rig)
-    lines = coverage_lines(represented, omitted)
-    root.insert(0, xml.Comment(" " + "\n       ".join(["rsea export", *lines]).replace("--", "- -") + " "))
+    root.insert(0, coverage_comment(represented, omitted))
     return Export("mjcf", ".xml", text(root), tuple(represented), tuple(omitted))
 
 

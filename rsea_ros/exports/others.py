@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
+from xml.etree import ElementTree as xml
 
 from rsea_ros.documents.units import plain
 from rsea_ros.effects.catalogue import effect_named
@@ -47,6 +49,12 @@ def coverage_lines(represented: Iterable[Represented], omitted: Iterable[Omitted
     """Return both lists for people, a line each."""
     lines = [f"says {one.name}: {one.how}" for one in represented]
     return [*lines, *(f"leaves out {one.name}: {one.why}" for one in omitted)]
+
+
+def coverage_comment(represented: Iterable[Represented], omitted: Iterable[Omitted]) -> Any:
+    """Return both lists as a comment of XML."""
+    lines = ["rsea export", *coverage_lines(represented, omitted)]
+    return xml.Comment(" " + "\n       ".join(lines).replace("--", "- -") + " ")
 
 
 def without_null_effects(rig: Rig) -> Rig:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 from xml.etree import ElementTree as xml
 
 from rsea_ros.documents.wording import printable
@@ -18,7 +17,7 @@ from rsea_ros.exports.others import (
     Export,
     Omitted,
     Represented,
-    coverage_lines,
+    coverage_comment,
     finite_sizes,
     without_null_effects,
 )
@@ -49,7 +48,7 @@ def export_chain(rig: Rig, language: Language) -> Export:
     chain = chain_of(rig)
     represented, omitted = _coverage(rig, chain, has_springs=language.has_springs)
     root, model = language.frame(rig.name)
-    model.insert(0, _comment(represented, omitted))
+    model.insert(0, coverage_comment(represented, omitted))
     model.extend(language.link(link) for link in chain.links)
     model.extend(language.joint(joint, rig) for joint in chain.joints)
     model.append(_block(language.block, rig))
@@ -132,11 +131,6 @@ def _block(tag: str, rig: Rig) -> xml.Element:
                 value = repr(one.parameters[p.name])
                 xml.SubElement(effect, f"{prefix}parameter", name=p.name, unit=p.unit, value=value)
     return block
-
-
-def _comment(represented: tuple[Represented, ...], omitted: tuple[Omitted, ...]) -> Any:
-    lines = ["rsea export", *coverage_lines(represented, omitted)]
-    return xml.Comment(" " + "\n       ".join(lines).replace("--", "- -") + " ")
 
 
 def _text(root: xml.Element) -> str:

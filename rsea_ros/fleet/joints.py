@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timezone
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
@@ -114,16 +115,8 @@ class MappedJoint:
 def load_joints(path: str | Path) -> tuple[MappedJoint, ...]:
     """Read a joint map. Raises JointMapError with file, line, field, value and the expected value."""
     path = Path(path)
-    try:
-        document = strict_yaml.read(path)
-    except OSError as error:
-        raise JointMapError(f"{path}: {error.strerror}, expected a joint map in YAML") from None
-    except FieldError as error:
-        raise JointMapError(f"{path}: {error}") from None
-    try:
-        return _joints(document.content, path.parent)
-    except FieldError as error:
-        raise JointMapError(f"{path}: {document.where(error.field)}{error}", error.field) from None
+    build = partial(_joints, folder=path.parent)
+    return strict_yaml.load(path, "a joint map in YAML", JointMapError, build)
 
 
 def _joints(content: Any, folder: Path) -> tuple[MappedJoint, ...]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import did_you_mean, quote
-from rsea_ros.errors import FieldError, OutputError, RigError
+from rsea_ros.errors import OutputError, RigError
 from rsea_ros.model.rig import CLOCK_DOUBT, FIELDS, Quantity, Rig, Sensor
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.records.record import UNITS
@@ -132,21 +132,14 @@ def load_rig(name_or_path: str | Path | Rig) -> Rig:
     if isinstance(name_or_path, Rig):
         return name_or_path
     path = rig_path(name_or_path)
-    try:
-        document = strict_yaml.read(path)
-    except FileNotFoundError:
-        raise RigError(f"{path}: no such file, expected a rig in YAML") from None
-    except OSError as error:
-        raise RigError(f"{path}: {error.strerror}, expected a rig in YAML that can be read") from None
-    except FieldError as error:
-        raise RigError(f"{path}: {error}") from None
-    if not isinstance(document.content, Mapping):
-        held = "nothing" if document.content is None else type(document.content).__name__
-        raise RigError(f"{path}: holds {held}, expected a mapping with the keys of a rig")
-    try:
-        return rig_from_document(document.content, default_name=path.stem)
-    except RigError as error:
-        raise RigError(f"{path}: {document.where(error.field)}{error}", error.field) from None
+
+    def build(content: Any) -> Rig:
+        if not isinstance(content, Mapping):
+            held = "nothing" if content is None else type(content).__name__
+            raise RigError(f"holds {held}, expected a mapping with the keys of a rig")
+        return rig_from_document(content, default_name=path.stem)
+
+    return strict_yaml.load(path, "a rig in YAML that can be read", RigError, build)
 
 
 def save_rig(rig: Rig, path: str | Path, *, force: bool = False) -> None:

@@ -139,7 +139,7 @@ def test_a_file_that_is_not_a_rig_is_refused(content, message, tmp_path):
 
 
 def test_a_file_that_does_not_exist_is_refused(tmp_path):
-    with pytest.raises(RigError, match=r"none\.yaml: no such file, expected a rig in YAML"):
+    with pytest.raises(RigError, match=r"none\.yaml: No such file or directory, expected a rig in YAML"):
         load_rig(tmp_path / "none.yaml")
     with pytest.raises(RigError, match=r"rig 'none' not found, expected a YAML file or one of .*bare_drive"):
         load_rig("none")
