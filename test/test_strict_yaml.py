@@ -73,10 +73,6 @@ def test_a_value_is_what_a_person_means(text, value):
     assert parse(f"a: {text}").content == {"a": value}
 
 
-def test_not_a_number_is_left_to_the_field():
-    assert str(parse("a: .nan").content["a"]) == "nan"
-
-
 PLAIN = st.recursive(
     st.none()
     | st.booleans()

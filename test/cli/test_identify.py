@@ -31,13 +31,6 @@ def results(bag: Path) -> Path:
     return out
 
 
-def test_simulate_writes_what_a_bench_logs(bag):
-    record = read_record(bag)
-    assert set(record.channels) == {"command", "position", "velocity", "motor_torque", "ft"}
-    assert record["command"].rate == pytest.approx(280.0, rel=1e-6)
-    assert np.allclose(record["ft"].t - record["command"].t, 1.0 / 280.0, atol=2e-9)
-
-
 def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
     """The verdict comes first on the terminal, and --fail-on makes it an exit status."""
     arguments = ["identify", str(bag), "--out", str(tmp_path / "out"), "--fail-on", "misfit"]

@@ -95,17 +95,6 @@ def test_the_rotor_of_the_knee_turns_as_its_train_says(train, turns):
     assert gear.find("axis").get("xyz") == "-1 0 0"  # from the chassis on to the housing
 
 
-def test_urdf_and_sdf_have_the_same_joints():
-    rig = load_rig("two_moving_outputs").with_effect("coulomb_friction").with_effect("hard_stop")
-    urdf = ElementTree.fromstring(export_urdf(rig).content)
-    _, sdf = tree(export_sdf(rig).content)
-    for one, other in zip(urdf.findall("joint"), sdf, strict=True):
-        assert one.get("name") == other.get("name")
-        assert one.find("parent").get("link") == other.find("parent").text
-        assert one.find("dynamics").get("friction") == other.findtext("axis/dynamics/friction")
-        assert one.find("dynamics").get("damping") == other.findtext("axis/dynamics/damping")
-
-
 def test_the_block_holds_every_value():
     rig = load_rig("prototype_knee").with_effect("backlash", gap=0.003)
     block = ElementTree.fromstring(export_urdf(rig).content).find("rsea")

@@ -65,13 +65,6 @@ def test_a_command_acts_from_its_instant_on(offset):
     assert np.max(np.abs(position - expected["position"])) < 0.5 * rig.sensors["position"].noise
 
 
-def test_stamps_are_the_cycle_ends_and_the_torque_is_the_held_one():
-    commands = np.arange(5.0)
-    states = _run(*_device(load_rig("paper_high_impedance")), commands, 0.0)
-    assert [s.stamp for s in states] == [_instant(k / RATE) for k in range(1, 6)]
-    assert [s.motor_torque for s in states] == list(commands)
-
-
 def test_a_stall_of_the_reader_changes_nothing():
     rig = load_rig("paper_high_impedance")
     steady, clock = _device(rig)

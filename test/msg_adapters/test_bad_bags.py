@@ -97,12 +97,6 @@ def test_repeated_stamps_are_dropped_with_a_note_or_kept(tmp_path):
     assert len(read_record(bag, strict=False)["ft"]) == 5
 
 
-def test_a_missing_joint_is_named_with_those_in_the_bag(tmp_path):
-    bag = write_foreign(tmp_path / "bag", run_rows(4))
-    with pytest.raises(BagError, match="no joint 'knee', the messages hold joint"):
-        read_record(bag, topics=TopicMap(joint="knee"))
-
-
 @pytest.mark.parametrize(
     ("name", "content", "text"),
     [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from pathlib import Path
 
 import lz4.frame
 import numpy as np
@@ -153,18 +152,3 @@ def test_all_messages_come_by_log_time_untouched(tmp_path, storage):
     expected = sorted((at, name, message.__msgtype__) for name, at, message in rows)
     assert [(at, name, kind) for name, kind, at, _ in got] == expected
     assert next(raw for name, _, _, raw in got if name == "/else").endswith(b"hello\0")
-
-
-def test_the_cases_read_as_rosbags_reads_them():
-    from rosbags.highlevel import AnyReader
-
-    case = Path(__file__).resolve().parents[2].parent / "shared" / "cases" / "03"
-    if not case.is_dir():
-        pytest.skip(f"{case} is missing")
-    record = read_record(case)
-    with AnyReader([case]) as reader:
-        expected = [
-            reader.deserialize(raw, kind.msgtype).wrench.torque.z
-            for kind, _, raw in reader.messages([c for c in reader.connections if c.topic == "/rsea/ft"])
-        ]
-    assert record["ft"].y.tolist() == expected

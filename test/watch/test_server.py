@@ -96,19 +96,6 @@ def test_a_socket_of_another_page_is_refused(server, origin):
     client.close()
 
 
-def test_a_socket_gets_frames_and_state(server):
-    async def talk():
-        page = await connect(server)
-        frame = await answer(page, "ft")
-        state = (await answer(page, "state"))["state"]
-        hang_up(page)
-        return frame, state
-
-    frame, state = asyncio.run(talk())
-    assert frame["pure"] is True and len(frame["ft"]) in (2, 4)
-    assert state["command"]["limit"] == 10.0 and state["recordings"] == []
-
-
 HOLD = {"do": "hold", "kind": "constant", "amplitude": 5.0, "frequency": 1.0}
 
 
