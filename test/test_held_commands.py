@@ -1,4 +1,4 @@
-"""Commands that are published only when they change are held until the next, as the bench held them."""
+"""Commands published only when they change are held, as the bench held them; repeated samples are counted."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import rsea_ros as rsea
 from msg_adapters import read_record, write_record
 from rsea_ros.checks.check import check_record
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.holds import with_held_commands
+from rsea_ros.records.holds import repeats_of, with_held_commands
 from rsea_ros.records.record import Channel
 from rsea_ros.records.stamps import repair_stamps
 
@@ -130,3 +130,18 @@ def test_a_log_with_repeats_is_left_as_it_is(run):
 def test_targets_of_a_position_loop_are_held_too(run):
     targets = run.with_channels(reference=Channel(np.arange(6.0), np.arange(6.0)))
     assert len(with_held_commands(targets)[0]["reference"]) > 5 * RATE
+
+
+VALUES = np.random.default_rng(2).standard_normal(400)
+
+
+@pytest.mark.parametrize("times", [1, 3, 7])
+@pytest.mark.parametrize("size", [1e-300, 1.0, 1e300])
+def test_repeats_are_counted_at_any_size(times, size):
+    assert repeats_of(size * np.repeat(VALUES, times)) == times
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf])
+def test_a_channel_with_a_value_that_is_no_number_is_left_to_the_checks(odd):
+    """inf - inf was a warning on the terminal of `predict`."""
+    assert repeats_of(np.repeat(np.where(np.arange(400) > 200, odd, VALUES), 7)) == 1

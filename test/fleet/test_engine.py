@@ -14,11 +14,12 @@ import pytest
 from fleet_stubs import HIP, KNEE, stub_work
 
 from rsea_ros.fleet import engine as engines
+from rsea_ros.fleet import row as compaction
 from rsea_ros.fleet.engine import ATTEMPTS, Engine, EngineLimits
 from rsea_ros.fleet.executor import Done, Serial, WorkerLost
 from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.query import answer
-from rsea_ros.fleet.sources import bags_of
+from rsea_ros.fleet.sources import Bag, bags_of
 from rsea_ros.fleet.store import TaskOutcome, hold_lock, open_store
 from rsea_ros.fleet.task import Changed, Task, is_anything_new
 
@@ -200,3 +201,17 @@ def test_a_folder_that_is_no_store_is_refused(tmp_path, folder):
     (tmp_path / "later" / "store.json").write_text('{"schema": 99}')
     with pytest.raises(FleetError, match="schema 99, expected 1"):
         open_store(tmp_path / "later")
+
+
+def test_new_rows_are_merged_without_reading_those_merged_before(store, monkeypatch):
+    """A merge that read its whole partition grew the memory of a run, and its time as n²."""
+    monkeypatch.setattr("rsea_ros.fleet.store.LOOSE", 4)
+    opened, read = [], compaction.read
+    monkeypatch.setattr(compaction, "read", lambda file: opened.append(file.name) or read(file))
+    for number in range(16):
+        store.put(stub_work(Task(Bag(f"/{number}", 1, ""), KNEE, f"{number:016x}", "1")))
+    assert len(opened) == len(set(opened)) == 16, "each row is read by one merge"
+    assert len(list(store.rows.rglob("*.parquet"))) == 4
+    store.compact()
+    assert len(list(store.rows.rglob("*.parquet"))) == 1
+    assert answer(store, "SELECT count(*), count(DISTINCT recording) FROM recordings")[1] == [(16, 16)]

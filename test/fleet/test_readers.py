@@ -1,4 +1,4 @@
-"""Readers of a store while a run writes, and of files that an earlier version wrote."""
+"""Readers of a store while a run writes, of files of an earlier version, and of a damaged one."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from fleet_stubs import KNEE, MARCH, stub_work
 from pyarrow import parquet
 
 from rsea_ros.fleet import history, query, recordings
+from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.query import MergedError, answer
 from rsea_ros.fleet.row import read
 from rsea_ros.fleet.sources import Bag
@@ -100,3 +101,20 @@ def test_recordings_of_other_days_under_one_name_all_count(store):
     for content, day in ((1, 5), (2, 6), (3, None), (4, None)):
         put_at(store, "/latest.mcap", content, day)
     assert answer(store, COUNT)[1] == [(4,)]
+
+
+@pytest.fixture
+def damaged(store):
+    """Return a store whose only file of rows is no Parquet file."""
+    folder = store.rows / "joint=knee" / "month=2026-01"
+    folder.mkdir(parents=True)
+    (folder / "0123.parquet").write_text("junk")
+    return store
+
+
+@pytest.mark.parametrize(
+    "read", [lambda s: s.known_rows(), lambda s: answer(s, "SELECT 1"), lambda s: history(s.path)]
+)
+def test_a_damaged_file_is_named_with_a_remedy(damaged, read):
+    with pytest.raises(FleetError, match=r"0123\.parquet.*remove the damaged one"):
+        read(damaged)

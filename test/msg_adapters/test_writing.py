@@ -255,3 +255,17 @@ def test_stamps_that_no_header_can_hold_are_refused_in_one_line(tmp_path, first,
     with pytest.raises(BagError, match=f"run: ft: stamp 0 is {value} s since 1970, expected 0 to 2147483648"):
         write_record(stamped, tmp_path / "run.mcap")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_batches_make_no_difference(tmp_path, monkeypatch):
+    rng = np.random.default_rng(4)
+    t = np.round(np.cumsum(rng.uniform(0, 0.02, 100)), 2)  # stamps repeat, and coincide with others
+    slow = t[::3].copy()
+    slow[10:12] = slow[11], slow[10]
+    channels = {"command": Channel(t, t), "ft": Channel(slow, slow), "position": Channel(t + 1.0, t)}
+    record = Record(channels, epoch_ns=10**9)
+    write_record(record, tmp_path / "whole.mcap")
+    monkeypatch.setattr("msg_adapters.records.BATCH", 7)
+    write_record(record, tmp_path / "parts.mcap")
+    assert (tmp_path / "parts.mcap").read_bytes() == (tmp_path / "whole.mcap").read_bytes()
+    assert len(list(iterate(tmp_path / "parts.mcap"))) == 100 + 34 + 100

@@ -1,4 +1,4 @@
-"""The parts of the health node in this process: inputs, memory and messages."""
+"""The parts of the health node in this process: inputs, memory, messages, and the file with the noise."""
 
 import math
 
@@ -7,9 +7,11 @@ import pytest
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.ros import ERROR, OK, WARN, JointState, WrenchStamped, joint_state_message, wrench_message
+from rsea_ros.errors import ParameterError
 from rsea_ros.health.health_finding import NAMES, HealthFinding
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._findings import FindingsPublisher, Keeper, Ring
-from rsea_ros.nodes._health_inputs import HealthInputs
+from rsea_ros.nodes._health_inputs import HealthInputs, noise_from
 from rsea_ros.nodes._qos import COMMAND
 
 EPOCH, PERIOD = 1_700_000_000_000_000_000, round(1e9 / 280.0)
@@ -115,3 +117,17 @@ def test_every_code_has_a_status_of_its_own(listener):
     assert (gap["low"], gap["high"], gap["confidence"]) == ("0.0039", "0.0041", "0.990")
     assert gap["since"].startswith("2023-11-14T22:13:22")
     assert statuses["RSEA_SENSOR_FROZEN"].level == ERROR and statuses["RSEA_DELAY"].level == OK
+
+
+@pytest.mark.parametrize(
+    ("text", "why"), [(None, "No such file or directory"), ("name: rig\n", "no JSON"), ("[1, 2]", "")]
+)
+def test_a_file_of_another_kind_is_refused_in_plain_words(tmp_path, text, why):
+    """It said `[Errno 2] …` and `Expecting value: line 1 column 1 (char 0)`."""
+    file = tmp_path / "file.json"
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(ParameterError) as caught:
+        noise_from(load_rig("paper_high_impedance"), str(file))
+    said = f": {why}" if why else ""
+    assert str(caught.value).startswith(f"parameter identification = {str(file)!r}{said}, expected an ident")
