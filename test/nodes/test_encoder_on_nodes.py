@@ -62,7 +62,7 @@ def loop(start, listener, rigs):
 @pytest.fixture(scope="module")
 def run(loop):
     """The instant (ns) within a sine at which the encoder died after it had been used."""
-    for _ in range(4):
+    for _ in range(8):
         loop.encoder.alive, link = True, {}
         loop.sine(AMPLITUDE, HZ, SECONDS, lambda t, link=link: follow(loop, t, link))
         if {"before", "at"} <= link.keys() and np.diff(commands(loop, link["at"])[0]).max() < 1.5 / RATE:
