@@ -22,7 +22,7 @@ WALL = 600.0
 MODULES = (
     "rsea_ros.cli.identify", "rsea_ros.cli.diagnose", "rsea_ros.cli.predict", "rsea_ros.cli.simulate",
     "rsea_ros.cli.control", "rsea_ros.cli.design", "rsea_ros.cli.export", "rsea_ros.cli.import_",
-    "rsea_ros.cli.check", "rsea_ros.cli._checks", "rsea_ros.checks.check", "rsea_ros.report.check",
+    "rsea_ros.cli.check", "rsea_ros.checks.check", "rsea_ros.report.check",
     "rsea_ros.identification.identify", "rsea_ros.diagnosis.diagnose",
     "rsea_ros.report.diagnosis.files", "rsea_ros.report.identification.page",
     "rsea_ros.report.diagnosis.terminal",

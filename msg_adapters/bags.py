@@ -1,28 +1,24 @@
 """Bags of all storages, opened and checked."""
 
-from __future__ import annotations
-
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from msg_adapters import mcap_file, metadata, ros1_file, sqlite_file
+from msg_adapters import metadata
 from msg_adapters.compression import ERRORS, ZSTD_MAGIC, Allowance, unpack_file, unpack_message
 from msg_adapters.contents import AND, Contents, Messages
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import BagError
 from rsea_ros.records.record import Fault, FloatArray, IntArray
 
-SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
-    ".mcap": mcap_file.scan,
-    ".db3": lambda path, contents, allowance: sqlite_file.scan(path, contents),
-    ".bag": ros1_file.scan,
-}
+SCANNERS = {".mcap": "mcap_file", ".db3": "sqlite_file", ".bag": "ros1_file"}
+"""By suffix: the module of this package whose `scan` adds the messages of a file to contents."""
 PACKED = ".zstd"
 TABLES = (".csv", ".tsv", ".txt", ".dat", ".mat", ".npz", ".npy", ".json", ".parquet", ".pq")
 """Suffixes of files that `rsea import` converts."""
@@ -139,7 +135,7 @@ def _scan(file: Path, contents: Contents) -> Contents:
         allowance = Allowance(file.stat().st_size)
         with TemporaryDirectory() if file.suffix == PACKED else nullcontext() as directory:
             plain = unpack_file(file, Path(directory)) if directory else file
-            SCANNERS[_suffix(file)](plain, part, allowance)
+            import_module(f"msg_adapters.{SCANNERS[_suffix(file)]}").scan(plain, part, allowance)
         for topic, messages in part.topics.items():
             _unpack(topic, messages, allowance, part)
     except (*ERRORS, ValueError) as error:

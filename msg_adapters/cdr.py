@@ -5,8 +5,6 @@ of that header. Messages of one topic nearly always share their layout (frame, n
 arrays), so one message is walked and the numbers of all that share its layout are cut out together.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from msg_adapters.topic_map import DYNAMIC, FLOAT, FLOATS, WRENCH
+from msg_adapters.topic_map import DYNAMIC, FLOAT, FLOATS, JOINT_STATE, WRENCH, typestore
 from rsea_ros.errors import BagError
 from rsea_ros.records.record import FloatArray, IntArray
 
@@ -222,3 +220,39 @@ def _layout_or_reason(raw: bytes, msgtype: str) -> MessageLayout | str:
         return layout_of(raw, msgtype)
     except ValueError as error:
         return str(error)
+
+
+def joint_states(
+    stamps: IntArray, name: str, position: FloatArray | None = None, velocity: FloatArray | None = None,
+    effort: FloatArray | None = None,
+) -> list[bytes]:  # fmt: skip
+    """Serialise sensor_msgs/JointState of one joint: stamps in ns (n,), rad, rad/s, N m (n,)."""
+    given = {"position": position, "velocity": velocity, "effort": effort}
+    sizes = {field: np.zeros(0 if values is None else 1) for field, values in given.items()}
+    columns = {field: values[:, None] for field, values in given.items() if values is not None}
+    return _written(JOINT_STATE, stamps, columns, "", name=[name], **sizes)
+
+
+def wrenches(stamps: IntArray, values: FloatArray, frame: str = "ft_sensor") -> list[bytes]:
+    """Serialise geometry_msgs/WrenchStamped: stamps in ns (n,), force N and torque N m (n, 6)."""
+    zero = typestore().types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
+    wrench = typestore().types["geometry_msgs/msg/Wrench"](zero, zero)
+    return _written(WRENCH, stamps, {"wrench": values}, frame, wrench=wrench)
+
+
+def _written(
+    msgtype: str, stamps: IntArray, columns: Mapping[str, FloatArray], frame: str, **content: Any
+) -> list[bytes]:
+    """Return copies of one message with stamps, ns (n,), and columns by field, (n, count), in them."""
+    types = typestore().types
+    header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](0, 0), frame)
+    raw = bytes(typestore().serialize_cdr(types[msgtype](header, **content), msgtype))
+    matrix = np.tile(np.frombuffer(raw, np.uint8), (len(stamps), 1))
+    fields = layout_of(raw, msgtype).fields
+    parts = [(fields[name][0], values.astype("<f8")) for name, values in columns.items()]
+    parts += [(STAMP, np.column_stack([stamps // 1_000_000_000, stamps % 1_000_000_000]).astype("<u4"))]
+    for first, values in parts:
+        data = np.ascontiguousarray(values).view(np.uint8)
+        matrix[:, first : first + data.shape[1]] = data
+    whole, width = matrix.tobytes(), len(raw)
+    return [whole[at : at + width] for at in range(0, len(whole), width)]

@@ -4,8 +4,6 @@ A few bytes may unpack to any number of gigabytes. So every file has an allowanc
 proportion to its size, and nothing is unpacked beyond it or beyond the declared size.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 A directory keeps it in metadata.yaml, a single MCAP file in a metadata record named `rsea`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Collection, Mapping, Sequence

@@ -3,12 +3,9 @@
 The counters count from a node's start; counts from before the recording do not belong to the run.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -147,36 +144,6 @@ _MOST_STATES = 1000
 """Nodes and keys that are followed."""
 
 
-@dataclass
-class _Counter:
-    """Last value, and its growth; a node that restarts begins at 0."""
-
-    last: int
-    grown: int
-
-    def take(self, value: int) -> None:
-        self.grown += value - self.last if value >= self.last else value
-        self.last = value
-
-
-@dataclass
-class _States:
-    counters: dict[tuple[str, str], _Counter] = field(default_factory=dict)
-    faults: dict[str, str] = field(default_factory=dict)
-    damaged: int = 0
-
-    def take(self, node: str, key: str, text: str, late: bool) -> None:
-        if key == _FAULT and text != _NONE:
-            self.faults.setdefault(node, text)
-        if key not in COUNTERS or not (text.isascii() and text.isdigit() and len(text) < 16):
-            return
-        known = self.counters.get((node, key))
-        if known is not None:
-            known.take(int(text))
-        elif len(self.counters) < _MOST_STATES:
-            self.counters[node, key] = _Counter(int(text), int(text) if late else 0)
-
-
 def is_of_the_run(node: str, namespace: str) -> bool:
     """Return whether a node of /diagnostics is one of this package's in a namespace, or in one above it.
 
@@ -189,34 +156,42 @@ def is_of_the_run(node: str, namespace: str) -> bool:
 
 
 def tell_health(contents: Contents, report: Contents, namespace: str) -> None:
-    """Add the faults that the nodes of the run have reported: this package's, in its namespace."""
+    """Add the faults that the nodes of the run have reported: this package's, in its namespace.
+
+    Of a counter its growth counts; a node that restarts begins at 0.
+    """
     messages = contents.topics.get(DIAGNOSTICS)
     if messages is None or messages.msgtype != TYPE or not messages.raw:
         return
     begin = min(min(m.log_times) for m in contents.topics.values() if m.raw)
-    states = _follow(messages, begin, namespace)
-    for (node, key), counter in states.counters.items():
-        if counter.grown:
-            kind, unit = COUNTERS[key]
-            report.tell(kind, brief(node), f"{key} on {DIAGNOSTICS}", counter.grown, unit)
-    for node, text in states.faults.items():
-        report.tell("device_fault", brief(node), brief(text))
-    if states.damaged:
-        detail = "left out: not a DiagnosticArray"
-        share = states.damaged / len(messages.raw)
-        report.tell("damaged_messages", DIAGNOSTICS, detail, states.damaged, "messages", share)
-
-
-def _follow(messages: Messages, begin: int, namespace: str) -> _States:
-    states = _States()
+    last: dict[tuple[str, str], int] = {}
+    grown: dict[tuple[str, str], int] = {}
+    faults, damaged = dict[str, str](), 0
     for log_time, raw in zip(messages.log_times, messages.raw, strict=True):
         try:
             for node, key, text in _values(raw):
-                if is_of_the_run(node, namespace):
-                    states.take(node, key, text, late=log_time - begin > _START)
+                if not is_of_the_run(node, namespace):
+                    continue
+                if key == _FAULT and text != _NONE:
+                    faults.setdefault(node, text)
+                at, is_count = (node, key), text.isascii() and text.isdigit() and len(text) < 16
+                if key not in COUNTERS or not is_count or (at not in last and len(last) >= _MOST_STATES):
+                    continue
+                value, before = int(text), last.get(at, 0 if log_time - begin > _START else int(text))
+                grown[at] = grown.get(at, 0) + (value - before if value >= before else value)
+                last[at] = value
         except ValueError:
-            states.damaged += 1
-    return states
+            damaged += 1
+    for (node, key), size in grown.items():
+        if size:
+            kind, unit = COUNTERS[key]
+            report.tell(kind, brief(node), f"{key} on {DIAGNOSTICS}", size, unit)
+    for node, text in faults.items():
+        report.tell("device_fault", brief(node), brief(text))
+    if damaged:
+        share = damaged / len(messages.raw)
+        detail = "left out: not a DiagnosticArray"
+        report.tell("damaged_messages", DIAGNOSTICS, detail, damaged, "messages", share)
 
 
 def _values(raw: bytes) -> Iterator[tuple[str, str, str]]:

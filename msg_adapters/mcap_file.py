@@ -3,8 +3,6 @@
 Damaged parts are left out and reported; the rest is read.
 """
 
-from __future__ import annotations
-
 import mmap
 import struct
 import zlib
@@ -12,32 +10,10 @@ from bisect import bisect_right
 from collections import Counter
 from pathlib import Path
 
+from msg_adapters import mcap_records as mcap
 from msg_adapters.compression import ERRORS, Allowance, unpack_chunk
 from msg_adapters.contents import NAME as REMARKS
 from msg_adapters.contents import Contents, Messages, remarks_of
-from msg_adapters.mcap_records import (
-    ATTACHMENT,
-    CHANNEL,
-    CHUNK,
-    CHUNK_HEAD,
-    DATA_END,
-    FOOTER,
-    KNOWN,
-    MAGIC,
-    MESSAGE,
-    MESSAGE_HEAD,
-    METADATA,
-    RECORD,
-    SCHEMA,
-    STATISTICS,
-    Buffer,
-    Declarations,
-    McapSummary,
-    number,
-    read_summary,
-    take_statistics,
-    text,
-)
 
 UNITS = {
     "damaged_chunks": "chunks",
@@ -47,25 +23,6 @@ UNITS = {
     "unknown_records": "records",
 }
 """Unit of the size of each kind of fault."""
-
-
-class Damage:
-    """Counts by kind of fault, with the first detail."""
-
-    def __init__(self) -> None:
-        self._count: dict[str, int] = {}
-        self._detail: dict[str, str] = {}
-
-    def add(self, kind: str, detail: str, count: int = 1) -> None:
-        """Count one more; the first detail of a kind is kept."""
-        self._count[kind] = self._count.get(kind, 0) + count
-        self._detail.setdefault(kind, detail)
-
-    def tell(self, contents: Contents, where: str) -> None:
-        """Report the damage as faults."""
-        for kind, count in self._count.items():
-            detail = f"damaged MCAP: {'first: ' if count > 1 else ''}{self._detail[kind]}"
-            contents.tell(kind, where, detail, count if kind in UNITS else None, UNITS.get(kind, ""))
 
 
 CUT_OFF = "cut off (recorder killed?), read up to its last complete message"
@@ -78,18 +35,20 @@ def scan(path: Path, contents: Contents, allowance: Allowance) -> None:
     Raises ValueError for a file that is not an MCAP.
     """
     with path.open("rb") as file:
-        if file.read(len(MAGIC)) != MAGIC:
-            raise ValueError(f"no MCAP file, expected it to start with {MAGIC!r}")
+        if file.read(len(mcap.MAGIC)) != mcap.MAGIC:
+            raise ValueError(f"no MCAP file, expected it to start with {mcap.MAGIC!r}")
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as buffer:
-            summary = read_summary(buffer)
+            summary = mcap.read_summary(buffer)
             scanner = _Scanner(contents, summary, allowance)
             complete = scanner.run(buffer)
     if not complete:
         contents.notes.append(CUT_OFF)
         contents.tell("cut_off", path.name, CUT_OFF)
     if complete and summary.damage:
-        scanner.damage.add("checksum_mismatch", summary.damage)
-    scanner.damage.tell(contents, path.name)
+        scanner.add("checksum_mismatch", summary.damage)
+    for kind, (count, first) in scanner.damage.items():
+        detail = f"damaged MCAP: {'first: ' if count > 1 else ''}{first}"
+        contents.tell(kind, path.name, detail, count if kind in UNITS else None, UNITS.get(kind, ""))
     scanner.compare(path.name)
 
 
@@ -99,10 +58,10 @@ class _Scanner:
     Schemas and channels repeated in the summary replace damaged records.
     """
 
-    def __init__(self, contents: Contents, summary: McapSummary, allowance: Allowance) -> None:
+    def __init__(self, contents: Contents, summary: mcap.McapSummary, allowance: Allowance) -> None:
         self.contents, self.summary, self.allowance = contents, summary, allowance
-        self.damage = Damage()
-        self.declared = Declarations()
+        self.damage: dict[str, tuple[int, str]] = {}
+        self.declared = mcap.Declarations()
         self.declared.types |= summary.declared.types
         self.sinks: dict[int, Messages | None] = {}
         for key, channel in summary.declared.channels.items():
@@ -111,24 +70,29 @@ class _Scanner:
         self.read: Counter[str] = Counter()
         self.ended = self.closed = False
 
-    def run(self, buffer: Buffer) -> bool:
+    def add(self, kind: str, detail: str, count: int = 1) -> None:
+        """Count damage; the first detail of a kind is kept."""
+        before, first = self.damage.get(kind, (0, detail))
+        self.damage[kind] = (before + count, first)
+
+    def run(self, buffer: mcap.Buffer) -> bool:
         """Take all records of the file; return whether the end of the data was among them."""
-        at, stop = len(MAGIC), len(buffer)
+        at, stop = len(mcap.MAGIC), len(buffer)
         while at < stop:
-            if buffer[at : at + len(MAGIC)] == MAGIC:
-                at += len(MAGIC)
+            if buffer[at : at + len(mcap.MAGIC)] == mcap.MAGIC:
+                at += len(mcap.MAGIC)
                 continue
-            opcode, size = RECORD.unpack_from(buffer, at) if at + RECORD.size <= stop else (0, 0)
-            if opcode == 0 or at + RECORD.size + size > stop:
+            opcode, size = mcap.RECORD.unpack_from(buffer, at) if at + mcap.RECORD.size <= stop else (0, 0)
+            if opcode == 0 or at + mcap.RECORD.size + size > stop:
                 following = self._next_chunk(buffer, at)
                 if following is None:
                     self._take_broken_chunk(buffer, at, opcode)
                     return self.ended
-                self.damage.add("damaged_records", f"no record at byte {at}", following - at)
+                self.add("damaged_records", f"no record at byte {at}", following - at)
                 at = following
                 continue
-            self._take(buffer, opcode, at + RECORD.size, at + RECORD.size + size)
-            at += RECORD.size + size
+            self._take(buffer, opcode, at + mcap.RECORD.size, at + mcap.RECORD.size + size)
+            at += mcap.RECORD.size + size
         return self.ended
 
     def compare(self, file: str) -> None:
@@ -144,132 +108,132 @@ class _Scanner:
             detail = f"{self.read.total()} read, {total} expected from the statistics"
             self.contents.tell("missing_messages", file, detail, abs(total - self.read.total()), "messages")
 
-    def _next_chunk(self, buffer: Buffer, at: int) -> int | None:
+    def _next_chunk(self, buffer: mcap.Buffer, at: int) -> int | None:
         """Return where the next chunk begins by the index, or None."""
         chunks = self.summary.chunks
         later = chunks[bisect_right(chunks, at) :]
-        return next((start for start in later if start < len(buffer) and buffer[start] == CHUNK), None)
+        return next((start for start in later if start < len(buffer) and buffer[start] == mcap.CHUNK), None)
 
-    def _take_broken_chunk(self, buffer: Buffer, at: int, opcode: int) -> None:
+    def _take_broken_chunk(self, buffer: mcap.Buffer, at: int, opcode: int) -> None:
         """Use the present part of an uncompressed chunk; report other remains."""
-        if opcode == CHUNK and not self.ended:
-            self._chunk(buffer, at + RECORD.size, len(buffer), complete=False)
+        if opcode == mcap.CHUNK and not self.ended:
+            self._chunk(buffer, at + mcap.RECORD.size, len(buffer), complete=False)
         elif self.ended:
             detail = f"{len(buffer) - at} bytes at byte {at} are not records"
-            self.damage.add("damaged_records", detail, len(buffer) - at)
+            self.add("damaged_records", detail, len(buffer) - at)
 
-    def _take(self, buffer: Buffer, opcode: int, first: int, stop: int) -> None:
-        """Take one record of the file itself."""
-        if self.ended and opcode in (MESSAGE, CHUNK, DATA_END):
-            self.damage.add("data_after_end", f"at byte {first - RECORD.size}, behind the end of the data")
-        if opcode == CHUNK:
+    def _take(self, buffer: mcap.Buffer, opcode: int, first: int, stop: int) -> None:
+        if self.ended and opcode in (mcap.MESSAGE, mcap.CHUNK, mcap.DATA_END):
+            at = first - mcap.RECORD.size
+            self.add("data_after_end", f"at byte {at}, behind the end of the data")
+        if opcode == mcap.CHUNK:
             self._chunk(buffer, first, stop, complete=True)
-        elif opcode in (DATA_END, FOOTER):
+        elif opcode in (mcap.DATA_END, mcap.FOOTER):
             self.ended = True
             self._check_data(buffer, opcode, first, stop)
-        elif opcode == METADATA:
+        elif opcode == mcap.METADATA:
             self._metadata(buffer, first, stop)
-        elif opcode == STATISTICS and self.summary.total is None:
+        elif opcode == mcap.STATISTICS and self.summary.total is None:
             self._statistics(buffer, first, stop)
-        elif opcode == ATTACHMENT:
-            checksum = number(buffer, stop - 4, 4, stop) if stop - first > 4 else 0
+        elif opcode == mcap.ATTACHMENT:
+            checksum = mcap.number(buffer, stop - 4, 4, stop) if stop - first > 4 else 0
             if checksum and zlib.crc32(buffer[first : stop - 4]) != checksum:
-                where = f"of the attachment at byte {first - RECORD.size}"
-                self.damage.add("checksum_mismatch", f"the checksum {where} does not fit its content")
+                where = f"of the attachment at byte {first - mcap.RECORD.size}"
+                self.add("checksum_mismatch", f"the checksum {where} does not fit its content")
         else:
             self._small(buffer, opcode, first, stop, 0)
 
-    def _metadata(self, buffer: Buffer, first: int, stop: int) -> None:
-        """Read the remarks of this project's writer."""
+    def _metadata(self, buffer: mcap.Buffer, first: int, stop: int) -> None:
         try:
-            name, at = text(buffer, first, stop)
+            name, at = mcap.text(buffer, first, stop)
             if name != REMARKS:
                 return
             at, texts = at + 4, {}
             while at < stop:
-                key, at = text(buffer, at, stop)
-                texts[key], at = text(buffer, at, stop)
+                key, at = mcap.text(buffer, at, stop)
+                texts[key], at = mcap.text(buffer, at, stop)
         except ValueError as error:
-            self.damage.add("damaged_records", f"at byte {first}: {error}", stop - first)
+            self.add("damaged_records", f"at byte {first}: {error}", stop - first)
             return
         remarks = remarks_of(texts)
         self.contents.notes.extend(remarks.notes)
         self.contents.faults.extend(remarks.faults)
 
-    def _statistics(self, buffer: Buffer, first: int, stop: int) -> None:
+    def _statistics(self, buffer: mcap.Buffer, first: int, stop: int) -> None:
         """Read the statistics of a file whose footer does not lead to them."""
         try:
-            take_statistics(buffer, first, stop, self.summary)
+            mcap.take_statistics(buffer, first, stop, self.summary)
         except ValueError as error:
-            self.damage.add("damaged_records", f"at byte {first}: {error}", stop - first)
+            self.add("damaged_records", f"at byte {first}: {error}", stop - first)
 
-    def _small(self, buffer: Buffer, opcode: int, first: int, stop: int, base: int) -> None:
+    def _small(self, buffer: mcap.Buffer, opcode: int, first: int, stop: int, base: int) -> None:
         """Process a record that may also lie in a chunk, whose records begin at byte `base` of the file."""
-        if opcode == MESSAGE:
+        if opcode == mcap.MESSAGE:
             self._message(buffer, first, stop, base)
-        elif opcode in (SCHEMA, CHANNEL):
+        elif opcode in (mcap.SCHEMA, mcap.CHANNEL):
             try:
-                if opcode == SCHEMA:
+                if opcode == mcap.SCHEMA:
                     self.declared.schema(buffer, first, stop)
                 else:
                     key = self.declared.channel(buffer, first, stop)
                     self.sinks[key] = self.contents.sink(*self.declared.channels[key])
             except ValueError as error:
-                self.damage.add("damaged_records", f"at byte {base + first}: {error}", stop - first)
-        elif opcode not in KNOWN or (base and opcode != MESSAGE):
+                self.add("damaged_records", f"at byte {base + first}: {error}", stop - first)
+        elif opcode not in mcap.KNOWN or (base and opcode != mcap.MESSAGE):
             where = f"at byte {base or first}" if not base else f"in the chunk at byte {base}"
-            self.damage.add("unknown_records", f"opcode {opcode:#04x} {where}")
+            self.add("unknown_records", f"opcode {opcode:#04x} {where}")
 
-    def _message(self, buffer: Buffer, first: int, stop: int, base: int) -> None:
-        if stop - first < MESSAGE_HEAD.size:
-            self.damage.add("damaged_messages", f"of {stop - first} bytes at byte {base + first}")
+    def _message(self, buffer: mcap.Buffer, first: int, stop: int, base: int) -> None:
+        if stop - first < mcap.MESSAGE_HEAD.size:
+            self.add("damaged_messages", f"of {stop - first} bytes at byte {base + first}")
             return
-        channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(buffer, first)
+        channel, _, log_time, _ = mcap.MESSAGE_HEAD.unpack_from(buffer, first)
         if channel not in self.sinks:
-            self.damage.add("damaged_messages", f"of channel {channel}, which nothing declares")
+            self.add("damaged_messages", f"of channel {channel}, which nothing declares")
             return
         self.read[self.declared.channels[channel][0]] += 1
         sink = self.sinks[channel]
         if sink is not None:
             sink.log_times.append(log_time)
-            sink.raw.append(buffer[first + MESSAGE_HEAD.size : stop])
+            sink.raw.append(buffer[first + mcap.MESSAGE_HEAD.size : stop])
 
-    def _check_data(self, buffer: Buffer, opcode: int, first: int, stop: int) -> None:
+    def _check_data(self, buffer: mcap.Buffer, opcode: int, first: int, stop: int) -> None:
         """Compare the checksum of everything before DATA_END; some writers leave the magic out of it."""
-        checksum = number(buffer, first, 4, stop) if opcode == DATA_END and stop - first >= 4 else 0
+        checksum = mcap.number(buffer, first, 4, stop) if opcode == mcap.DATA_END and stop - first >= 4 else 0
         if not checksum:
             return
-        with memoryview(buffer) as view, view[: first - RECORD.size] as data, data[len(MAGIC) :] as rest:
+        end, magic = first - mcap.RECORD.size, len(mcap.MAGIC)
+        with memoryview(buffer) as view, view[:end] as data, data[magic:] as rest:
             if zlib.crc32(data) != checksum and zlib.crc32(rest) != checksum:
-                self.damage.add("checksum_mismatch", "the checksum of the data does not fit them")
+                self.add("checksum_mismatch", "the checksum of the data does not fit them")
 
-    def _chunk(self, buffer: Buffer, first: int, stop: int, complete: bool) -> None:
+    def _chunk(self, buffer: mcap.Buffer, first: int, stop: int, complete: bool) -> None:
         """Take the records of a chunk; of one that breaks off only where they are not compressed."""
-        where = f"chunk at byte {first - RECORD.size}"
+        where = f"chunk at byte {first - mcap.RECORD.size}"
         try:
             records = self._unpack(buffer, first, stop, complete)
         except (*ERRORS, ValueError, struct.error) as error:
             if complete:
-                self.damage.add("damaged_chunks", f"{where} left out: {error}")
+                self.add("damaged_chunks", f"{where} left out: {error}")
             return
         at = 0
-        while at + RECORD.size <= len(records):
-            opcode, size = RECORD.unpack_from(records, at)
-            end = at + RECORD.size + size
+        while at + mcap.RECORD.size <= len(records):
+            opcode, size = mcap.RECORD.unpack_from(records, at)
+            end = at + mcap.RECORD.size + size
             if end > len(records):
                 break
-            self._small(records, opcode, at + RECORD.size, end, first - RECORD.size)
+            self._small(records, opcode, at + mcap.RECORD.size, end, first - mcap.RECORD.size)
             at = end
         if complete and at < len(records):
-            self.damage.add("damaged_chunks", f"{where} breaks off after {at} of {len(records)} bytes")
+            self.add("damaged_chunks", f"{where} breaks off after {at} of {len(records)} bytes")
 
-    def _unpack(self, buffer: Buffer, first: int, stop: int, complete: bool) -> bytes:
+    def _unpack(self, buffer: mcap.Buffer, first: int, stop: int, complete: bool) -> bytes:
         """Return the records of a chunk. Raises ValueError where they contradict its header."""
-        if first + CHUNK_HEAD.size > stop:
+        if first + mcap.CHUNK_HEAD.size > stop:
             raise ValueError(f"it has {stop - first} bytes")
-        _, _, declared, checksum = CHUNK_HEAD.unpack_from(buffer, first)
-        compression, at = text(buffer, first + CHUNK_HEAD.size, stop)
-        length = number(buffer, at, 8, stop)
+        _, _, declared, checksum = mcap.CHUNK_HEAD.unpack_from(buffer, first)
+        compression, at = mcap.text(buffer, first + mcap.CHUNK_HEAD.size, stop)
+        length = mcap.number(buffer, at, 8, stop)
         if complete and at + 8 + length != stop:
             raise ValueError(f"it has {stop - at - 8} bytes, expected the {length} that it declares")
         if compression and not complete:

@@ -3,8 +3,6 @@
 A record is an opcode (1 byte), a length (8 bytes) and a content; numbers are little-endian.
 """
 
-from __future__ import annotations
-
 import mmap
 import struct
 import zlib

@@ -4,8 +4,6 @@ Format: https://mcap.dev/spec. The writer of rosbags keeps a chunk in memory unt
 ten seconds of an actuator's topics: too much to lose with a recorder that is killed.
 """
 
-from __future__ import annotations
-
 import os
 import struct
 import zlib
@@ -15,25 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from msg_adapters import mcap_records as mcap
 from msg_adapters.contents import NAME as REMARKS
-from msg_adapters.mcap_records import (
-    CHANNEL,
-    CHUNK,
-    CHUNK_HEAD,
-    CHUNK_INDEX,
-    DATA_END,
-    FOOTER,
-    FOOTER_CONTENT,
-    HEADER,
-    MAGIC,
-    MESSAGE,
-    MESSAGE_INDEX,
-    METADATA,
-    RECORD,
-    SCHEMA,
-    STATISTICS,
-    STATISTICS_HEAD,
-)
 from msg_adapters.topic_map import definition
 from rsea_ros.outputs.files import create, write_at
 from rsea_ros.records.record import IntArray
@@ -47,7 +28,7 @@ PLACE = struct.Struct("<QQ")
 
 
 class McapStorage:
-    """One MCAP file being written (see Storage)."""
+    """One MCAP file being written (see writing.STORAGES)."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -63,7 +44,7 @@ class McapStorage:
         self._counts: dict[int, int] = {}
         self._times: list[int] = []
         self._remarks = 0
-        self._put(MAGIC + _record(HEADER, _text("ros2"), _text("rsea_ros")))
+        self._put(mcap.MAGIC + _record(mcap.HEADER, _text("ros2"), _text("rsea_ros")))
 
     def add(self, topic: str, msgtype: str) -> int:
         """Declare a topic; return its key."""
@@ -71,13 +52,13 @@ class McapStorage:
             schema = self._types[msgtype] = len(self._types) + 1
             text = definition(msgtype).text
             parts = (struct.pack("<H", schema), _text(msgtype), _text("ros2msg" if text else ""), _text(text))
-            self._schemas += (record := _record(SCHEMA, *parts))
+            self._schemas += (record := _record(mcap.SCHEMA, *parts))
             self._chunk += record
         key = len(self._counts) + 1
         self._counts[key] = 0
         qos = _text("offered_qos_profiles") + _text("[]")
         head = struct.pack("<HH", key, self._types[msgtype])
-        record = _record(CHANNEL, head, _text(topic), _text("cdr"), _with_size(qos))
+        record = _record(mcap.CHANNEL, head, _text(topic), _text("cdr"), _with_size(qos))
         self._channels += record
         self._chunk += record
         return key
@@ -86,7 +67,7 @@ class McapStorage:
         """Append a serialised message."""
         self._index.setdefault(key, bytearray()).extend(PLACE.pack(log_time, len(self._chunk)))
         self._extend_span(log_time, log_time)
-        self._chunk += MESSAGE_RECORD.pack(MESSAGE, 22 + len(raw), key, 0, log_time, log_time) + raw
+        self._chunk += MESSAGE_RECORD.pack(mcap.MESSAGE, 22 + len(raw), key, 0, log_time, log_time) + raw
         if len(self._chunk) >= CHUNK_SIZE:
             self.flush()
 
@@ -107,14 +88,12 @@ class McapStorage:
             first = stop
 
     def _add_places(self, keys: IntArray, log_times: IntArray, offsets: IntArray) -> None:
-        """Note where messages stand in the chunk, each shape (n,)."""
         places = np.column_stack((log_times, offsets)).astype("<u8")
         for key in np.unique(keys):
             self._index.setdefault(int(key), bytearray()).extend(places[keys == key].tobytes())
         self._extend_span(int(log_times.min()), int(log_times.max()))
 
     def _extend_span(self, first: int, last: int) -> None:
-        """Extend the log times of the chunk."""
         known = self._span or (first, last)
         self._span = (min(known[0], first), max(known[1], last))
 
@@ -123,37 +102,37 @@ class McapStorage:
         if not self._chunk:
             return
         span = self._span or (0, 0)
-        head = CHUNK_HEAD.pack(*span, len(self._chunk), zlib.crc32(self._chunk))
+        head = mcap.CHUNK_HEAD.pack(*span, len(self._chunk), zlib.crc32(self._chunk))
         length = struct.pack("<Q", len(self._chunk))
-        chunk = _record(CHUNK, head, _text(""), length, self._chunk)
+        chunk = _record(mcap.CHUNK, head, _text(""), length, self._chunk)
         indices, offsets = b"", b""
         for key, places in sorted(self._index.items()):
             offsets += struct.pack("<HQ", key, self._end + len(chunk) + len(indices))
-            indices += _record(MESSAGE_INDEX, struct.pack("<H", key), _with_size(places))
+            indices += _record(mcap.MESSAGE_INDEX, struct.pack("<H", key), _with_size(places))
         place = struct.pack("<QQQQ", *span, self._end, len(chunk))
         sizes = (struct.pack("<Q", len(indices)), _text(""), length, length)
         self._put(chunk + indices)
-        self._chunks.append(_record(CHUNK_INDEX, place, _with_size(offsets), *sizes))
+        self._chunks.append(_record(mcap.CHUNK_INDEX, place, _with_size(offsets), *sizes))
         for key, places in self._index.items():
             self._counts[key] += len(places) // PLACE.size
         self._times += self._span or ()
         self._chunk, self._index, self._span = bytearray(), {}, None
 
-    def remark(self, texts: Mapping[str, str], metadata: str) -> None:
+    def remark(self, texts: Mapping[str, str], known: str) -> None:
         """Keep texts by name in a metadata record."""
         self.flush()
         if texts:
             self._remarks += 1
             pairs = b"".join(_text(name) + _text(text) for name, text in texts.items())
-            self._put(_record(METADATA, _text(REMARKS), _with_size(pairs)))
+            self._put(_record(mcap.METADATA, _text(REMARKS), _with_size(pairs)))
 
     def close(self) -> None:
         """Write the rest and the summary."""
         self.flush()
-        data_end = _record(DATA_END, bytes(4))
+        data_end = _record(mcap.DATA_END, bytes(4))
         summary = self._schemas + self._channels + b"".join(self._chunks) + self._statistics()
-        footer = _record(FOOTER, FOOTER_CONTENT.pack(self._end + len(data_end), 0, 0))
-        self._put(data_end + summary + footer + MAGIC)
+        footer = _record(mcap.FOOTER, mcap.FOOTER_CONTENT.pack(self._end + len(data_end), 0, 0))
+        self._put(data_end + summary + footer + mcap.MAGIC)
         self.abort()
 
     def sync(self) -> None:
@@ -171,7 +150,8 @@ class McapStorage:
         declared = (sum(self._counts.values()), len(self._types), len(self._counts))
         numbers = (*declared, 0, self._remarks, len(self._chunks))
         counts = b"".join(struct.pack("<HQ", key, count) for key, count in self._counts.items())
-        return _record(STATISTICS, STATISTICS_HEAD.pack(*numbers, min(times), max(times)), _with_size(counts))
+        head = mcap.STATISTICS_HEAD.pack(*numbers, min(times), max(times))
+        return _record(mcap.STATISTICS, head, _with_size(counts))
 
     def _put(self, data: bytes) -> None:
         """Write at the end. The end moves only when all is written, so that a second try mends the first."""
@@ -181,13 +161,13 @@ class McapStorage:
 
 def _record(opcode: int, *parts: bytes | bytearray) -> bytes:
     content = b"".join(parts)
-    return RECORD.pack(opcode, len(content)) + content
+    return mcap.RECORD.pack(opcode, len(content)) + content
 
 
 def _message_heads(keys: IntArray, log_times: IntArray, sizes: IntArray) -> list[bytes]:
     """Return what precedes each message; sizes: B, with what precedes; each shape (n,)."""
     heads = np.zeros(len(keys), MESSAGE_RECORDS)
-    columns = (MESSAGE, sizes - RECORD.size, keys, 0, log_times, log_times)
+    columns = (mcap.MESSAGE, sizes - mcap.RECORD.size, keys, 0, log_times, log_times)
     for name, column in zip(heads.dtype.names or (), columns, strict=True):
         heads[name] = column
     width, data = MESSAGE_RECORDS.itemsize, heads.tobytes()

@@ -1,7 +1,5 @@
 """metadata.yaml of a bag."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
@@ -21,12 +19,6 @@ _Loader = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 class NotUnderstood(ValueError):
     """A document of another form than expected, in words for people."""
-
-
-def load(path: Path) -> Any:
-    """Return the document of a file. Raises as `document` does, and FileNotFoundError."""
-    with path.open("rb") as file:
-        return document(path, file.read(LARGEST + 1))
 
 
 def document(path: Path, data: bytes) -> Any:
@@ -91,7 +83,8 @@ def metadata_of(bag: Path, contents: Contents) -> Known:
     """
     path = bag / NAME
     try:
-        known_content = _metadata_from(bag, load(path))
+        with path.open("rb") as opened:
+            known_content = _metadata_from(bag, document(path, opened.read(LARGEST + 1)))
     except FileNotFoundError:
         contents.notes.append(f"{bag}: without {NAME} (recorder killed?), read from its files")
         return Known()
@@ -101,9 +94,8 @@ def metadata_of(bag: Path, contents: Contents) -> Known:
         contents.notes.append(f"{path}: not understood, read from the files beside it")
         contents.tell("damaged_metadata", NAME, f"not understood ({_why(error)}), read without it")
         return Known()
-    for file in known_content.files:
-        if not file.exists():
-            raise BagError(f"{path}: names {brief(file.name)}, which is not there")
+    for missing in (file for file in known_content.files if not file.exists()):
+        raise BagError(f"{path}: names {brief(missing.name)}, which is not there")
     return known_content
 
 
@@ -131,7 +123,6 @@ def _metadata_from(bag: Path, document: Any) -> Known:
 
 
 def _why(error: Exception) -> str:
-    """Return in words why metadata were not understood."""
     match error:
         case NotUnderstood():
             return brief(str(error))

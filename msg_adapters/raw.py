@@ -4,8 +4,6 @@ rclpy makes a Python object for every part of a message: 250 us for a wrench in 
 3 ms. The layout is determined once (cdr.py); while the bytes that define it stay, numbers keep their places.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Sequence

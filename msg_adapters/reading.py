@@ -1,20 +1,11 @@
 """Bags to records: topics to channels, header stamps to seconds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from msg_adapters.bags import (
-    BagPath,
-    FieldSamples,
-    check_finite,
-    note_repeats,
-    on_the_clock_of_the_command,
-    read_contents,
-)
+from msg_adapters import bags
 from msg_adapters.cdr import VALUES, Block
 from msg_adapters.contents import Contents, Messages
 from msg_adapters.decoding import DIAGNOSTICS, Decoded, is_inferred, tell_health
@@ -36,7 +27,7 @@ LATEST = 2**62
 
 
 def read_record(
-    paths: BagPath | Sequence[BagPath], *, topics: TopicMap | None = None, strict: bool = True
+    paths: bags.BagPath | Sequence[bags.BagPath], *, topics: TopicMap | None = None, strict: bool = True
 ) -> Record:
     """Read one bag, or several files of one run, as a record; other topics are ignored.
 
@@ -49,9 +40,9 @@ def read_record(
     Raises BagError with file, topic, field, value and expectation.
     """
     topics = topics or TopicMap()
-    source = str(paths) if isinstance(paths, BagPath) else ", ".join(map(str, paths))
+    source = str(paths) if isinstance(paths, bags.BagPath) else ", ".join(map(str, paths))
     try:
-        contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
+        contents = bags.read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
         return record_from(contents, source, topics, strict=strict)
     except MemoryError:
         raise BagError(
@@ -63,7 +54,7 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
     """Make a record of serialised messages, wherever they came from; see read_record."""
     _require(source, contents, topics, strict)
     report = replace(contents, notes=list(contents.notes), faults=list(contents.faults))
-    series: dict[str, FieldSamples] = {}
+    series: dict[str, bags.FieldSamples] = {}
     roles = [role for role in ROLES if role != "ft" or not is_inferred(contents, topics)]
     if len(roles) < len(ROLES):
         made = f"{topics.topic('ft')}: no sensor's, the stiffness of a rig times {topics.topic('deflection')}"
@@ -75,16 +66,15 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
     if strict:
         for name, one in series.items():
             if name in ("command", "reference"):
-                check_finite(one)
-            note_repeats(one, report.notes)
-    series = on_the_clock_of_the_command(series, report)
+                bags.check_finite(one)
+            bags.note_repeats(one, report.notes)
+    series = bags.on_the_clock_of_the_command(series, report)
     _require_values(source, series, strict, report)
     tell_health(contents, report, topics.namespace)
     return _record(series, source, report, strict)
 
 
-def _record(series: Mapping[str, FieldSamples], source: str, report: Contents, strict: bool) -> Record:
-    """Put the series on one clock, in order."""
+def _record(series: Mapping[str, bags.FieldSamples], source: str, report: Contents, strict: bool) -> Record:
     epoch = min(int(one.stamps.min()) for one in series.values())
     channels: dict[str, Channel] = {}
     for name, one in series.items():
@@ -139,12 +129,13 @@ def _remedy(contents: Contents, roles: Sequence[str]) -> str:
 
 
 def _topics_text(contents: Contents) -> str:
-    """Return the topics of a bag with their types, for a message."""
     topics = sorted(contents.topics.items())[:_MOST_NAMED]
     return ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics) or "no topic at all"
 
 
-def _require_values(source: str, series: Mapping[str, FieldSamples], strict: bool, report: Contents) -> None:
+def _require_values(
+    source: str, series: Mapping[str, bags.FieldSamples], strict: bool, report: Contents
+) -> None:
     """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
     if strict and "command" not in series and "reference" not in series:
         raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N·m")
@@ -157,7 +148,7 @@ def _require_values(source: str, series: Mapping[str, FieldSamples], strict: boo
 
 def _series(
     source: str, role: str, messages: Messages, topics: TopicMap, report: Contents
-) -> dict[str, FieldSamples]:
+) -> dict[str, bags.FieldSamples]:
     """Decode one topic: channel -> series. A field that no message fills is left out."""
     topic = topics.topic(role)
     where = f"{source}: {topic}"
@@ -174,7 +165,7 @@ def _series(
     series = {}
     for channel, field in FIELDS[role].items():
         filled = decoded.filled[field]
-        one = FieldSamples(f"{where} {field}", stamps[filled], decoded.values[field][filled])
+        one = bags.FieldSamples(f"{where} {field}", stamps[filled], decoded.values[field][filled])
         if np.isnan(one.values).all():
             if one.values.size:
                 report.notes.append(f"{one.where}: not a number in every message, taken as not measured")
@@ -182,13 +173,12 @@ def _series(
         stray = far_apart(one.stamps)
         if stray.any():
             report.faults.append(stray_fault(stray, channel))
-            one = FieldSamples(one.where, one.stamps[~stray], one.values[~stray])
+            one = bags.FieldSamples(one.where, one.stamps[~stray], one.values[~stray])
         series[channel] = one
     return series
 
 
 def _one_joint(where: str, decoded_blocks: Sequence[Block], joint: str | None) -> None:
-    """Refuse several joints where none is named, and a missing name."""
     layouts = [block.layout for block in decoded_blocks if "wrench" not in block.layout.fields]
     names = tuple(dict.fromkeys(name for layout in layouts for name in layout.names))
     count = max([len(names), *(n for layout in layouts for _, n in layout.fields.values())])

@@ -1,7 +1,5 @@
 """Records written as bags: measured runs, and overlays of simulations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -9,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from msg_adapters import encoding
+from msg_adapters import cdr
 from msg_adapters.contents import Remarks
 from msg_adapters.topic_map import AXES, FIELDS, TYPES, TopicMap, sign_and_index
 from msg_adapters.writing import BagWriter
@@ -130,11 +128,11 @@ def _stamps(record: Record, name: str, t: FloatArray) -> IntArray:
 
 def _encode(stamps: IntArray, values: Mapping[str, FloatArray], topics: TopicMap) -> list[bytes]:
     if "wrench" not in values:
-        return encoding.joint_states(stamps, topics.joint or JOINT, **values)
+        return cdr.joint_states(stamps, topics.joint or JOINT, **values)
     wrench = np.zeros((len(stamps), len(AXES)))
     sign, index = sign_and_index(topics.axis)
     wrench[:, index] = sign * values["wrench"]
-    return encoding.wrenches(stamps, wrench)
+    return cdr.wrenches(stamps, wrench)
 
 
 def write_overlay(records: Mapping[str, Record], path: str | Path) -> None:

@@ -3,8 +3,6 @@
 Stamps are integers, ns since the epoch; values are SI. A field that a message does not hold is NaN.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 from collections.abc import Mapping, Sequence
@@ -50,8 +48,13 @@ def torque_command_message(stamp_ns: int, effort: float, joint: str = "joint") -
 
 def efforts_message(stamp_ns: int, efforts: Mapping[str, float]) -> JointState:
     """Return torques (N m) by name, as `torque_estimate` carries them."""
-    message = JointState(name=list(efforts), effort=[float(effort) for effort in efforts.values()])
+    return _state(stamp_ns, list(efforts), effort=[float(effort) for effort in efforts.values()])
+
+
+def _state(stamp_ns: int, names: list[str], frame: str = "", **values: list[float]) -> JointState:
+    message = JointState(name=names, **values)
     message.header.stamp = time_of(stamp_ns)
+    message.header.frame_id = frame
     return message
 
 
@@ -59,12 +62,8 @@ def joint_state_message(
     stamp_ns: int, position: float, velocity: float, effort: float, joint: str = "joint", frame: str = ""
 ) -> JointState:
     """Return a state: rad, rad/s, N m."""
-    message = JointState(name=[joint], position=[float(position)])
-    message.velocity = [float(velocity)]
-    message.effort = [float(effort)]
-    message.header.stamp = time_of(stamp_ns)
-    message.header.frame_id = frame
-    return message
+    values = {"position": [float(position)], "velocity": [float(velocity)], "effort": [float(effort)]}
+    return _state(stamp_ns, [joint], frame, **values)
 
 
 def joint_states_message(joints: Sequence[str]) -> JointState:
@@ -75,10 +74,7 @@ def joint_states_message(joints: Sequence[str]) -> JointState:
 
 def deflection_message(stamp_ns: int, angle: float, joint: str = "joint", frame: str = "") -> JointState:
     """Return an angle of the spring, rad, as `deflection` carries it."""
-    message = JointState(name=[joint], position=[float(angle)])
-    message.header.stamp = time_of(stamp_ns)
-    message.header.frame_id = frame
-    return message
+    return _state(stamp_ns, [joint], frame, position=[float(angle)])
 
 
 def wrench_message(
@@ -185,7 +181,6 @@ def message_text(message: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return a field as mappings, lists, numbers and text."""
     if hasattr(value, "get_fields_and_field_types"):
         return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
     if isinstance(value, bytes):

@@ -1,7 +1,5 @@
 """A bag of ROS 1 (version 2.0), read by rosbags and its messages turned into those of ROS 2."""
 
-from __future__ import annotations
-
 import bz2
 import struct
 from collections.abc import Callable
@@ -16,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from msg_adapters.compression import Allowance
 from msg_adapters.contents import Contents
+from msg_adapters.topic_map import typestore
 from rsea_ros.documents.wording import brief
 
 _PACKED: tuple[tuple[bytes, Callable[[], Any]], ...] = (
@@ -62,7 +61,7 @@ def _messages(reader: Reader, path: Path, contents: Contents) -> None:
         for connection, log_time, data in reader.messages(chosen) if chosen else ():
             read += 1
             try:
-                raw = bytes(_store(Stores.ROS2_KILTED).ros1_to_cdr(data, connection.msgtype))
+                raw = bytes(typestore().ros1_to_cdr(data, connection.msgtype))
             except (SerdeError, *_DAMAGE):
                 damaged += 1
                 continue
@@ -77,7 +76,6 @@ def _messages(reader: Reader, path: Path, contents: Contents) -> None:
 
 
 def _unpacked(packed: bytes, allowance: Allowance) -> bytes:
-    """Return a chunk, unpacked within the allowance."""
     for start, decompressor in _PACKED:
         if packed.startswith(start):
             plain: bytes = decompressor().decompress(packed, max_length=allowance.left + 1)
@@ -86,13 +84,10 @@ def _unpacked(packed: bytes, allowance: Allowance) -> bytes:
     return packed
 
 
-_store = cache(get_typestore)
-
-
 @cache
 def _is_known(msgtype: str, digest: str | None) -> bool:
     """Return whether a type, with the MD5 sum of its definition, is the same in ROS 1 Noetic and in ROS 2."""
-    old, new = _store(Stores.ROS1_NOETIC), _store(Stores.ROS2_KILTED)
+    old, new = get_typestore(Stores.ROS1_NOETIC), typestore()
     if msgtype not in old.fielddefs or old.fielddefs[msgtype] != new.fielddefs.get(msgtype):
         return False
     return old.generate_msgdef(msgtype)[1] == digest

@@ -1,24 +1,26 @@
-"""rosbag2 sqlite3 files (schema versions 1 to 4: the tables `topics` and `messages`).
+"""rosbag2 sqlite3 files, read (schema versions 1 to 4) and written (version 4, committed at each flush).
 
 A database may bring program of its own: views, triggers, generated columns. Only plain tables are read, as
 they stand, without their journals, and no more than the file can hold.
 """
 
-from __future__ import annotations
-
+import os
 import sqlite3
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from msg_adapters import metadata
+from msg_adapters.compression import Allowance
 from msg_adapters.contents import Contents, Messages
-from msg_adapters.metadata import LARGEST
+from msg_adapters.topic_map import definition
+from rsea_ros.outputs.files import create
+from rsea_ros.records.record import IntArray
 
 MAGIC = b"SQLite format 3\x00"
 TOPICS = "SELECT id, name, type FROM topics"
 MESSAGES = "SELECT topic_id, timestamp, data FROM messages"
-METADATA = f"SELECT metadata FROM metadata WHERE length(metadata) <= {LARGEST} LIMIT 1"
+METADATA = f"SELECT metadata FROM metadata WHERE length(metadata) <= {metadata.LARGEST} LIMIT 1"
 COLUMNS = {"topics": {"id", "name", "type"}, "messages": {"topic_id", "timestamp", "data"}}
 PRAGMAS = ("trusted_schema=OFF", "cell_size_check=ON", "query_only=ON")
 JOURNALS = ("-wal", "-journal")
@@ -31,8 +33,10 @@ _ROW = 4
 """Bytes that a row takes at the least."""
 
 
-def scan(path: Path, contents: Contents) -> None:
+def scan(path: Path, contents: Contents, allowance: Allowance) -> None:
     """Add all messages of a file to the contents, in the order in which they were written.
+
+    Nothing in it is packed, so that it needs no allowance.
 
     A file that breaks off gives its readable part and a note.
     Raises ValueError for a file that is not a rosbag2 database.
@@ -106,7 +110,6 @@ def _check_tables(database: sqlite3.Connection) -> None:
 
 
 def _topics(database: sqlite3.Connection, path: Path, contents: Contents) -> dict[int, Messages]:
-    """Return where the messages of each topic go, by its key."""
     sinks = {}
     for key, name, msgtype in database.execute(TOPICS):
         if isinstance(key, int) and isinstance(name, bytes) and isinstance(msgtype, bytes):
@@ -155,3 +158,85 @@ def _remarks(database: sqlite3.Connection, path: Path, contents: Contents) -> No
 
 def _text(data: bytes | str) -> str:
     return data.decode(errors="replace") if isinstance(data, bytes) else data
+
+
+_TABLES = """
+CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
+CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);
+CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
+    serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL,
+    type_description_hash TEXT NOT NULL);
+CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL,
+    encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);
+CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
+    data BLOB NOT NULL);
+CREATE INDEX timestamp_idx ON messages (timestamp ASC);
+INSERT INTO schema VALUES (4, 'rsea_ros');
+"""
+_INSERT_TOPIC = "INSERT INTO topics VALUES (NULL, ?, ?, 'cdr', '[]', ?)"
+_INSERT_DEFINITION = "INSERT INTO message_definitions VALUES (NULL, ?, 'ros2msg', ?, ?)"
+_INSERT_METADATA = f"INSERT INTO metadata VALUES (NULL, {metadata.VERSION}, ?)"
+_INSERT_MESSAGE = "INSERT INTO messages VALUES (NULL, ?, ?, ?)"
+
+
+class SqliteStorage:
+    """One sqlite3 file being written (see writing.STORAGES)."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._types: set[str] = set()
+        self._rows: list[tuple[int, int, bytes]] = []
+        os.close(create(path))
+        self._database = sqlite3.connect(path, check_same_thread=False)
+        with _system_errors():
+            self._database.executescript(_TABLES)
+
+    def add(self, topic: str, msgtype: str) -> int:
+        """Declare a topic; return its key."""
+        text, digest = definition(msgtype)
+        with _system_errors():
+            if msgtype not in self._types:
+                self._types.add(msgtype)
+                self._database.execute(_INSERT_DEFINITION, (msgtype, text, digest))
+            return int(self._database.execute(_INSERT_TOPIC, (topic, msgtype, digest)).lastrowid or 0)
+
+    def write(self, key: int, log_time: int, raw: bytes) -> None:
+        """Append a serialised message."""
+        self._rows.append((key, log_time, raw))
+
+    def write_all(self, keys: IntArray, log_times: IntArray, raws: Sequence[bytes]) -> None:
+        """Append serialised messages; keys, log_times: shape (n,)."""
+        self._rows += zip(keys.tolist(), log_times.tolist(), raws, strict=True)
+
+    def flush(self) -> None:
+        """Commit the messages. Raises OSError when the disk is full."""
+        with _system_errors():
+            self._database.executemany(_INSERT_MESSAGE, self._rows)
+            self._database.commit()
+        self._rows.clear()
+
+    def sync(self) -> None:
+        """Do nothing: a commit waits for the disk."""
+
+    def remark(self, texts: Mapping[str, str], known: str) -> None:
+        """Keep the metadata of the bag, which hold the texts too, where rosbag2 keeps them."""
+        with _system_errors():
+            self._database.execute(_INSERT_METADATA, (known,))
+
+    def close(self) -> None:
+        """Commit the rest."""
+        self.flush()
+        self._database.close()
+
+    def abort(self) -> None:
+        """Close the file; flushed data stay."""
+        self._database.close()
+
+
+@contextmanager
+def _system_errors() -> Iterator[None]:
+    """Turn an error of sqlite into the system's. Raises OSError."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise OSError(f"{error}") from error

@@ -142,12 +142,13 @@ class Definition(NamedTuple):
 @cache
 def definition(msgtype: str) -> Definition:
     """Return the definition of a message type of ROS 2 Kilted."""
-    store = _store()
+    store = typestore()
     if msgtype not in store.types:
         return Definition("", "")
     return Definition(store.generate_msgdef(msgtype, ros_version=2)[0], store.hash_rihs01(msgtype))
 
 
 @cache
-def _store() -> Typestore:
+def typestore() -> Typestore:
+    """Return the message types of ROS 2 Kilted."""
     return get_typestore(Stores.ROS2_KILTED)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from msg_adapters import metadata
 from msg_adapters.contents import Remarks
 from msg_adapters.mcap_storage import McapStorage
 from msg_adapters.metadata import Topic
-from msg_adapters.sqlite_storage import SqliteStorage
+from msg_adapters.sqlite_file import SqliteStorage
 from msg_adapters.topic_map import check_topic, definition
 from rsea_ros.errors import BagError, OutputError
 from rsea_ros.outputs import files
@@ -25,41 +24,12 @@ from rsea_ros.outputs.files import LockedFolder, make_stage
 from rsea_ros.processes import hold_signals
 from rsea_ros.records.record import IntArray
 
-
-class Storage(Protocol):
-    """One file of a bag being written; times are log times in ns. Raises OSError when the disk is full."""
-
-    path: Path
-
-    def add(self, topic: str, msgtype: str) -> int:
-        """Declare a topic; return its key."""
-
-    def write(self, key: int, log_time: int, raw: bytes) -> None:
-        """Append a serialised message."""
-
-    def write_all(self, keys: IntArray, log_times: IntArray, raws: Sequence[bytes]) -> None:
-        """Append serialised messages; keys, log_times: shape (n,)."""
-
-    def flush(self) -> None:
-        """Pass written data to the system, where they survive the end of this process."""
-
-    def sync(self) -> None:
-        """Wait until flushed data are on the disk, where they survive a power cut too."""
-
-    def remark(self, texts: Mapping[str, str], metadata: str) -> None:
-        """Keep texts by name in the file; metadata: the same in metadata.yaml of rosbag2."""
-
-    def close(self) -> None:
-        """Write the rest and the index."""
-
-    def abort(self) -> None:
-        """Close the file; flushed data stay."""
-
-
-STORAGES: Mapping[str, tuple[str, Callable[[Path], Storage]]] = {
+STORAGES: Mapping[str, tuple[str, type[McapStorage | SqliteStorage]]] = {
     "mcap": (".mcap", McapStorage),
     "sqlite3": (".db3", SqliteStorage),
 }
+"""By name: the suffix, and one file of a bag being written. Times are log times in ns; `flush` makes written
+data safe against the end of this process, `sync` against a power cut; all raise OSError on a full disk."""
 PARTS = {".mcap", ".db3", ".zstd"}
 """Suffixes of the files of a bag that is a directory, beside its metadata."""
 INTERVAL = 1.0
@@ -147,13 +117,11 @@ class BagWriter:
         return key, known
 
     def _count(self, topic: Topic, messages: int, first: int, last: int) -> None:
-        """Count what is written, log times in ns."""
         topic.count += messages
         span = self._span if self._span[1] else (first, last)
         self._span = (min(span[0], first), max(span[1], last))
 
     def _declare(self, topic: str, msgtype: str) -> tuple[int, Topic]:
-        """Return key and topic of a new one."""
         check_topic(topic)
         known = Topic(topic, msgtype, definition(msgtype).digest)
         self._topics[topic] = (self._storage.add(topic, msgtype), known)
@@ -262,7 +230,6 @@ class BagWriter:
         self._release()
 
     def _release(self) -> None:
-        """Release the lock of the stage."""
         if self._stage is not None:
             self._stage.release()
             self._stage = None

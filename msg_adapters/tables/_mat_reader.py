@@ -5,8 +5,6 @@ place is a variable, or a field of structs, `log.motor.current` or `runs(2).t`; 
 vector, one column or row where it is a matrix.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -4,8 +4,6 @@ A damaged file can end only this process. One row group of one column is held at
 time. A place is a column, or a field of one, `pose.x`; `name[2]` the third number of its lists.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Stamps of a clock that is coarser than the samples."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rsea_ros.records.record import FloatArray

@@ -1,33 +1,56 @@
 """Columns of numbers out of files, each format by the end of the file's name."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from msg_adapters.tables import json_file
-from msg_adapters.tables.child import Reader
+from msg_adapters.tables.child import read_apart
 from msg_adapters.tables.column_table import LARGEST, Table, Wanted
 from msg_adapters.tables.json_file import read_json
-from msg_adapters.tables.mat_file import HDF5, read_mat
 from msg_adapters.tables.npz_file import read_npy, read_npz
 from msg_adapters.tables.text_file import read_text
 from rsea_ros.errors import ImportMapError
 
-PARQUET, TIME = Path(__file__).with_name("_parquet_reader.py"), 90.0
-"""The reader, and s that it may take. Three columns of ten million rows take 2 s."""
+MAT, PARQUET = (Path(__file__).with_name(f"_{name}_reader.py") for name in ("mat", "parquet"))
+HDF5 = b"\x89HDF\r\n\x1a\n"
+_MAT_HEADER = 128
+"""Bytes before the first variable."""
+
+
+def read_mat(path: Path, wanted: Wanted) -> Table:
+    """Return the requested variables. Raises OSError and ValueError with variable, shape and expectation."""
+    with path.open("rb") as file:
+        head = file.read(520)
+    if head.startswith(b"MATLAB 7.3") or HDF5 in (head[:8], head[512:]):
+        raise ValueError(
+            "MAT file of version 7.3 (HDF5), expected version 7: save(…, '-v7') in MATLAB, or docs/import.md"
+        )
+    _refuse_cut_off(path)
+    return read_apart("MAT", MAT, LARGEST, path, wanted.columns)
+
+
+def _refuse_cut_off(path: Path) -> None:
+    """Raise ValueError for a file of version 5 to 7 whose last variable goes on beyond its end."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(_MAT_HEADER)
+        if not head.startswith(b"MATLAB 5.0") or head[126:128] not in (b"IM", b"MI"):
+            return
+        order: Literal["little", "big"] = "little" if head[126:128] == b"IM" else "big"
+        while tag := file.read(8):
+            end = file.tell() + int.from_bytes(tag[4:8], order)
+            if len(tag) < 8 or end > size:
+                raise ValueError(f"MAT file cut off at {size} bytes, expected {end} or more: copy it again")
+            file.seek(end)
 
 
 def read_parquet(path: Path, wanted: Wanted) -> Table:
-    """Return the requested columns, read by `_parquet_reader.py` in another process, a row group at a time.
-
-    Raises OSError and ValueError with column, type and expectation.
-    """
+    """Return the requested columns. Raises OSError and ValueError with column, type and expectation."""
     with path.open("rb") as file:
         if file.read(4) != b"PAR1":
             raise ValueError("no Parquet file (it does not begin with PAR1), expected one")
@@ -35,7 +58,7 @@ def read_parquet(path: Path, wanted: Wanted) -> Table:
         raise ValueError(
             "Parquet needs the package pyarrow, which is not installed: pip install 'rsea_ros[fleet]'"
         )
-    return Reader("Parquet", PARQUET, TIME, LARGEST).read(path, wanted.columns)
+    return read_apart("Parquet", PARQUET, LARGEST, path, wanted.columns)
 
 
 READERS: Mapping[str, Callable[[Path, Wanted], Table]] = {

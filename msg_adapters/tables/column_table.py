@@ -1,7 +1,5 @@
 """A table of columns with units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -6,8 +6,6 @@ imports are never evaluated, numbers are doubles, and an expression takes at mos
 Its values are real and finite, or holes of its columns, or it is refused (decision 0130).
 """
 
-from __future__ import annotations
-
 import ast
 import difflib
 import operator
@@ -136,7 +134,6 @@ def _column_name(node: ast.AST) -> ast.Constant | None:
 
 
 def _check(node: ast.AST, text: str, *, is_quoted: bool) -> None:
-    """Raise ValueError for a part that is not on the list."""
     if isinstance(node, ast.operator | ast.unaryop) and type(node) not in _OPERATORS:
         raise ValueError(f"has {type(node).__name__}, expected + - * / **")
     if not isinstance(node, _NODES):

@@ -23,11 +23,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from msg_adapters.tables import map_terms
 from msg_adapters.tables.child import choose_element, is_open
 from msg_adapters.tables.column_table import CHANNELS, LINEAR, unit
 from msg_adapters.tables.layout import DELIMITERS
 from msg_adapters.tables.map_keys import CHANNEL, MAP, RATES, RUNS, SET_POINTS, TIME, WHERE
-from msg_adapters.tables.map_terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import FieldError, ImportMapError
@@ -48,8 +48,8 @@ class ImportMap:
     """A checked import map. time: the column of stamps and its gain to s; or rate, Hz."""
 
     path: Path
-    channels: Mapping[str, tuple[ChannelTerm, ...]]
-    time: ChannelTerm | None
+    channels: Mapping[str, tuple[map_terms.ChannelTerm, ...]]
+    time: map_terms.ChannelTerm | None
     rate: float | None
     where: RowFilter | None = None
     delimiter: str | None = None
@@ -109,16 +109,24 @@ def load_map(path: str | Path) -> ImportMap:
     return strict_yaml.load(path, "an import map in YAML", ImportMapError, lambda held: _map(path, held))
 
 
+_Channels = dict[str, tuple[map_terms.ChannelTerm, ...]]
+_TEXT = {"header": None, "decimal": ".", "delimiter": None}
+"""Keys of a text file, and their values where they are left out."""
+
+
 def _map(path: Path, document: object) -> ImportMap:
     if isinstance(document, Mapping) and "channels" in document and "time" not in document:
         expected = f"a column with its unit, `{{rate: 1000}}` Hz, or `{SET_POINTS}` for readings at rest"
         raise FieldError(f"map: no 'time', expected {expected}", "map")
-    body = checked_keys(document, "map", MAP)
+    body = map_terms.checked_keys(document, "map", MAP)
     set_points = body["time"] == SET_POINTS
-    time = checked_keys({"rate": 1.0} if set_points else body["time"], "time", TIME)
+    time = map_terms.checked_keys({"rate": 1.0} if set_points else body["time"], "time", TIME)
     if ("rate" in time) == ("column" in time or "expression" in time):
         raise FieldError("time: expected either a column with its unit, or a rate in Hz", "time")
-    rate = _rate(time["rate"]) if "rate" in time else None
+    rate = map_terms.number(time["rate"], "time.rate") if "rate" in time else None
+    if rate is not None and not RATES[0] <= rate <= RATES[1]:
+        expected = f"more than 0 Hz: {RATES[0]:g} to {RATES[1]:g} Hz"
+        raise FieldError(f"time.rate is {rate}, expected {expected}", "time.rate")
     for name in body["channels"] if isinstance(body["channels"], Mapping) else ():
         if name not in CHANNELS and re.search(r"curr|amp|^i_?q|effort|torque", str(name), re.IGNORECASE):
             raise FieldError(
@@ -126,48 +134,29 @@ def _map(path: Path, document: object) -> ImportMap:
                 " measured; a current with `scale:`, N·m for each A",
                 f"channels.{name}",
             )
-    channels = checked_keys(body["channels"], "channels", CHANNEL)
+    channels = map_terms.checked_keys(body["channels"], "channels", CHANNEL)
+    runs = map_terms.checked_keys(body["runs"], "runs", RUNS)["column"] if "runs" in body else None
+    header, decimal, delimiter = (body.get(k, v) for k, v in _TEXT.items())
+    map_terms.expect(header, "header", header is None or isinstance(header, bool), "true or false")
+    map_terms.expect(decimal, "decimal", decimal in (".", ","), "'.' or ','")
+    known = delimiter is None or (isinstance(delimiter, str) and delimiter in DELIMITERS)
+    map_terms.expect(delimiter, "delimiter", known, f"one of {', '.join(map(repr, DELIMITERS))}")
     return ImportMap(
         path=path,
-        channels=_one_kind({name: terms_of(name, value) for name, value in channels.items()}),
-        time=None if rate else term_of("time", time, "time"),
+        channels=_one_kind({name: map_terms.terms_of(name, value) for name, value in channels.items()}),
+        time=None if rate else map_terms.term_of("time", time, "time"),
         rate=rate,
         where=_rows(body["where"]) if "where" in body else None,
-        delimiter=_delimiter(body.get("delimiter")),
-        runs=_runs(body["runs"]) if "runs" in body else None,
-        header=_header(body.get("header")),
-        decimal=_decimal(body.get("decimal", ".")),
+        delimiter=delimiter and DELIMITERS[delimiter],
+        runs=None if runs is None else map_terms.column_name(runs, "runs.column"),
+        header=header,
+        decimal=decimal,
         set_points=set_points,
         about=" ".join(str(body.get("about", "")).split()),
     )
 
 
-def _rate(value: object) -> float:
-    rate = number(value, "time.rate")
-    if not RATES[0] <= rate <= RATES[1]:
-        raise FieldError(
-            f"time.rate is {rate}, expected more than 0 Hz: {RATES[0]:g} to {RATES[1]:g} Hz", "time.rate"
-        )
-    return rate
-
-
-def _runs(value: object) -> str:
-    return column_name(checked_keys(value, "runs", RUNS)["column"], "runs.column")
-
-
-def _header(value: object) -> bool | None:
-    if value is None or isinstance(value, bool):
-        return value
-    raise FieldError(f"header is {quote(value)}, expected true or false", "header")
-
-
-def _decimal(value: object) -> str:
-    if value in (".", ","):
-        return str(value)
-    raise FieldError(f"decimal is {quote(value)}, expected '.' or ','", "decimal")
-
-
-def _one_kind(channels: dict[str, tuple[ChannelTerm, ...]]) -> dict[str, tuple[ChannelTerm, ...]]:
+def _one_kind(channels: _Channels) -> _Channels:
     """Refuse a map without channels, and one that mixes a linear with a rotary machine."""
     if not channels:
         raise FieldError(f"channels is empty, expected some of {', '.join(CHANNELS)}", "channels")
@@ -183,19 +172,12 @@ def _one_kind(channels: dict[str, tuple[ChannelTerm, ...]]) -> dict[str, tuple[C
 
 
 def _rows(value: object) -> RowFilter:
-    body = checked_keys(value, "where", WHERE)
-    limits = {key: number(body[key], f"where.{key}") for key in ("from", "below") if key in body}
+    body = map_terms.checked_keys(value, "where", WHERE)
+    limits = {key: map_terms.number(body[key], f"where.{key}") for key in ("from", "below") if key in body}
     equals = body.get("equals")
     if not limits and equals is None:
         raise FieldError("where: expected one of from, below, equals", "where")
     if equals is not None and not isinstance(equals, str):
-        equals = number(equals, "where.equals")
-    column = column_name(body["column"], "where.column")
+        equals = map_terms.number(equals, "where.equals")
+    column = map_terms.column_name(body["column"], "where.column")
     return RowFilter(column, limits.get("from"), limits.get("below"), equals)
-
-
-def _delimiter(value: object) -> str | None:
-    if value is None or (isinstance(value, str) and value in DELIMITERS):
-        return None if value is None else DELIMITERS[value]
-    known = ", ".join(repr(key) for key in DELIMITERS)
-    raise FieldError(f"delimiter is {quote(value)}, expected one of {known}", "delimiter")

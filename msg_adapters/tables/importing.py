@@ -1,7 +1,5 @@
 """Measurements of real machines to records."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -96,7 +94,6 @@ def import_records(
 
 @contextmanager
 def _name_errors(path: str | Path, mapping: ImportMap, run: float | str | None) -> Iterator[None]:
-    """Let an error name file and run. Raises ImportMapError."""
     where = f"{path}" if run is None else f"{path}: {mapping.runs} = {_text(run)}"
     try:
         yield
@@ -112,7 +109,6 @@ def _file(path: Path, name: str, mapping: ImportMap) -> Path:
 
 
 def _table(path: Path, name: str, maps: Sequence[ImportMap]) -> Table:
-    """Read the columns that all joints need from a file."""
     columns = dict.fromkeys(column for mapping in maps for column in mapping.of_file(name).columns())
     labels = frozenset(label for mapping in maps for label in mapping.labels)
     one = maps[0]
@@ -128,7 +124,6 @@ def _text(run: float | str) -> str:
 def _runs(
     path: str | Path, tables: Mapping[str, Table], mapping: ImportMap
 ) -> Sequence[float | str | None]:
-    """Return the runs in order, None where the map knows of no runs."""
     if mapping.runs is None:
         return [None]
     table = next(iter(tables.values()))
@@ -227,7 +222,8 @@ def _rows_kept(table: Table, mapping: ImportMap, run: float | str | None) -> tup
     if where is not None:
         keep &= _chosen(table, where)
     if np.count_nonzero(keep) < 2:
-        raise ImportMapError(f"fewer than two rows{_spread(table, where)}, expected a record")
+        left = "" if where is None else f" left by where{_held(table, where)}"
+        raise ImportMapError(f"fewer than two rows{left}, expected a record")
     if table.trials is not None and (count := len(np.unique(table.trials[1][keep]))) > 1:
         name = table.trials[0]
         raise ImportMapError(
@@ -253,10 +249,6 @@ def _chosen(table: Table, where: RowFilter) -> BoolArray:
     return keep & (values == float(where.equals)) if where.equals is not None else keep
 
 
-def _spread(table: Table, where: RowFilter | None) -> str:
-    return "" if where is None else f" left by where{_held(table, where)}"
-
-
 def _held(table: Table, where: RowFilter) -> str:
     """Return what is in the column of a condition, for people."""
     values = table.values(where.column)[table.given(where.column)]
@@ -269,7 +261,6 @@ def _held(table: Table, where: RowFilter) -> str:
 
 
 def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fault]:
-    """Yield the faults of the whole table."""
     name = Path(path).name
     if table.left_out:
         detail = f"{table.left_out} of {table.rows} rows left out: {table.first}"
@@ -282,7 +273,6 @@ def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fau
 def _channel(
     name: str, t: FloatArray, y: FloatArray, terms: Sequence[ChannelTerm]
 ) -> tuple[Channel, list[Fault]]:
-    """Return a channel without its missing values, and their fault."""
     columns = " + ".join(term.column for term in terms)
     if np.isinf(y).any():
         raise ImportMapError(f"{name}: {columns} is too large for its unit, expected a number below 1e308")
@@ -315,7 +305,7 @@ def _stamps(
     if mapping.time is None:
         start = int(np.argmax(keep)) if mapping.runs is not None else 0
         return (np.flatnonzero(keep) - start) / float(mapping.rate or 1.0), []
-    whole = ~np.isnan(_column_of(table, mapping.time.columns))
+    whole = np.logical_and.reduce([~np.isnan(table[column]) for column in mapping.time.columns])
     for labels in [mapping.runs] if mapping.runs is not None else []:
         whole &= table.values(labels) == table.values(labels)[np.argmax(keep)]
     if table.trials is not None:
@@ -337,11 +327,6 @@ def _stamps(
     share = float(np.mean(np.diff(t, prepend=-np.inf) == 0.0))
     faults = [Fault("coarse_stamps", path.name, share, detail)] if detail else []
     return spread[keep[dated]], faults
-
-
-def _column_of(table: Table, columns: Sequence[str]) -> FloatArray:
-    """Return a sum of columns: NaN where one of them is missing."""
-    return np.asarray(sum(table[column] for column in columns))
 
 
 def _check_range(start: float, stop: float, epoch_ns: int) -> None:

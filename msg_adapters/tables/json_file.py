@@ -5,8 +5,6 @@ A column is named by its way, `log.motor.current`, through mappings and lists of
 values hold for all its samples; the way to the list of trials (`.`: the document) numbers them, from 1.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -76,7 +74,6 @@ def _parse(text: str, line: int | None = None) -> Any:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a mapping. Raises ValueError for a key that stands twice."""
     mapping = dict(pairs)
     if len(mapping) < len(pairs):
         names = [name for name, _ in pairs]
@@ -154,7 +151,6 @@ def _cells(value: Any, way: str) -> Any:
 
 
 def _cell(record: Any, way: str) -> Any:
-    """Return a value of a record, None where it has none."""
     try:
         return _cells(record, way)
     except KeyError:

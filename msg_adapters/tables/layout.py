@@ -1,7 +1,5 @@
 """The layout of a text table, and its numerals."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """The keys of an import map, expected values and defaults. docs/import.md shows them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 from msg_adapters.tables.column_table import CHANNELS, FACTORS
@@ -84,6 +82,5 @@ def tables() -> str:
 
 
 def _functions() -> Iterator[str]:
-    """Yield a row for each function of an expression."""
     for name, (_, count, meaning) in FUNCTIONS.items():
         yield f"| `{name}({', '.join('xyz'[:count])})` | {meaning} |"

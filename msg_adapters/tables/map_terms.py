@@ -87,8 +87,10 @@ def term_of(where: str, value: object, dimension: str) -> ChannelTerm:
         )
     expression = _expression(body, where)
     column = expression.text if expression else column_name(body["column"], f"{where}.column")
-    file = _file(body.get("file", ""), f"{where}.file")
-    held = _flag(body.get("held", False), f"{where}.held")
+    file, held = body.get("file", ""), body.get("held", False)
+    is_plain = isinstance(file, str) and file == Path(file).name
+    expect(file, f"{where}.file", is_plain, "the name of a file in the directory")
+    expect(held, f"{where}.held", isinstance(held, bool), "true or false")
     joints = _gains_and_constants(body, where, factor)
     gain, constant = next(iter(joints.values()))
     by_joint = {number: both for number, both in joints.items() if number is not None}
@@ -116,30 +118,19 @@ def _gains_and_constants(
     """
     signs, scales, constants = (_numbers(body, where, name) for name in PER_JOINT)
     for sign in signs.values():
-        if sign not in (1, -1):
-            raise FieldError(f"{where}.sign is {sign}, expected 1 or -1", f"{where}.sign")
+        expect(sign, f"{where}.sign", sign in (1, -1), "1 or -1")
     if 0.0 in scales.values():
         raise FieldError(
             f"{where}.scale is 0, expected another number: the channel would be lost", f"{where}.scale"
         )
-    joints: list[int | None] = max(
-        [[None], *(list(v) for v in (signs, scales, constants) if None not in v)], key=_numbered
-    )
+    numbered = [list(values) for values in (signs, scales, constants) if None not in values]
+    joints: list[int | None] = max(numbered, key=len, default=[None])
     for name, values in zip(PER_JOINT, (signs, scales, constants), strict=True):
         if None not in values and list(values) != joints:
             key = f"{where}.{name}"
             raise FieldError(f"{key} has numbers for {_named(values)}, expected {_named(joints)}", key)
-    return {
-        joint: (_of(signs, joint) * factor * _of(scales, joint), _of(constants, joint)) for joint in joints
-    }
-
-
-def _numbered(joints: Iterable[int | None]) -> int:
-    return sum(joint is not None for joint in joints)
-
-
-def _of(values: Mapping[int | None, float], joint: int | None) -> float:
-    return values[joint] if joint in values else values[None]
+    rows = [[v.get(joint, v.get(None, 0.0)) for v in (signs, scales, constants)] for joint in joints]
+    return {joint: (a * factor * b, c) for joint, (a, b, c) in zip(joints, rows, strict=True)}
 
 
 def _named(joints: Iterable[int | None]) -> str:
@@ -168,39 +159,29 @@ def _expression(body: Mapping[str, Any], field: str) -> Expression | None:
     if "column" in body:
         return None
     text = body["expression"]
-    if not isinstance(text, str):
-        where = f"{field}.expression"
-        raise FieldError(f"{where} is {quote(text)}, expected a text in quotes", where)
+    expect(text, f"{field}.expression", isinstance(text, str), "a text in quotes")
     try:
         return parse(text)
     except ValueError as error:
         raise FieldError(f"{field}.expression {error}", f"{field}.expression") from None
 
 
-def _flag(value: object, field: str) -> bool:
-    if isinstance(value, bool):
-        return value
-    raise FieldError(f"{field} is {quote(value)}, expected true or false", field)
+def expect(value: Any, field: str, is_so: bool, expected: str) -> Any:
+    """Return a value. Raises FieldError where it is not as expected."""
+    if not is_so:
+        raise FieldError(f"{field} is {quote(value)}, expected {expected}", field)
+    return value
 
 
 def number(value: object, field: str) -> float:
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < LARGEST:
-        return float(value)
-    raise FieldError(f"{field} is {quote(value)}, expected a number", field)
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < LARGEST
+    return float(expect(value, field, is_number, "a number"))
 
 
 def column_name(value: object, field: str) -> str:
     """Return the name of a column, or its number."""
-    if isinstance(value, (str, int)) and not isinstance(value, bool):
-        return str(value).strip()
-    raise FieldError(f"{field} is {quote(value)}, expected a name; put quotes around it", field)
-
-
-def _file(value: object, field: str) -> str:
-    """Return the plain name of a file."""
-    if isinstance(value, str) and value == Path(value).name:
-        return value
-    raise FieldError(f"{field} is {quote(value)}, expected the name of a file in the directory", field)
+    is_name = isinstance(value, (str, int)) and not isinstance(value, bool)
+    return str(expect(value, field, is_name, "a name; put quotes around it")).strip()
 
 
 def checked_keys(value: object, field: str, keys: Sequence[Key]) -> Mapping[str, Any]:

@@ -1,7 +1,5 @@
 """Arrays out of NPZ and NPY files: no pickles, and the size of an array is known before it is read."""
 
-from __future__ import annotations
-
 import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
@@ -80,7 +78,6 @@ def _array(file: IO[bytes], name: str, size: int) -> Any:
 
 
 def _header(file: IO[bytes], name: str) -> tuple[Any, Any]:
-    """Return the shape and type that an array's header promises."""
     try:
         version = npy.read_magic(file)
         shape, _, dtype = _HEADERS[version](file)

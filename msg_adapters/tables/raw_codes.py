@@ -6,8 +6,6 @@ reading as a code joins what is apart: each jump of half the code's range or mor
 neighbours, or two groups of values at the ends of the range meet at zero. Decision 0242 has what that costs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -68,7 +66,6 @@ def raw_code(column: str, values: FloatArray, gain: float | None = None) -> tupl
 
 
 def _readings(name: str, x: FloatArray, gain: float | None) -> Iterator[_Reading]:
-    """Yield the codes that the range of a column allows."""
     low, high = float(x.min()), float(x.max())
     for bits in _WORDS if low >= 0.0 else ():
         if 2 ** (bits - 1) <= high < 2**bits:

@@ -1,7 +1,5 @@
 """Tables of set points: static calibrations, whose rows are readings at rest and no times."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """A text table read line by line."""
 
-from __future__ import annotations
-
 import codecs
 import gzip
 import io
@@ -16,19 +14,9 @@ from typing import IO, cast
 
 import numpy as np
 
+from msg_adapters.tables import layout as layouts
 from msg_adapters.tables.child import base_and_index, number_in
 from msg_adapters.tables.column_table import Labels, Table, Wanted, check_size
-from msg_adapters.tables.layout import (
-    BLANKS,
-    TextLayout,
-    counts,
-    has_decimal_comma,
-    index_in,
-    is_numeral,
-    layout_of,
-    numeral,
-    seconds_of,
-)
 from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.wording import brief, quote
 from rsea_ros.records.record import FloatArray
@@ -99,10 +87,10 @@ def read_text(path: Path, wanted: Wanted) -> Table:
     comments, head = _head(path)
     if not head:
         raise ValueError("empty file, expected a row of column names and rows of numbers")
-    at, layout = layout_of([line for _, line in head], comments, wanted, path)
+    at, layout = layouts.layout_of([line for _, line in head], comments, wanted, path)
     first, notes = head[at][0] + layout.headed, _preamble(head[:at])
     places = {column: base_and_index(column, layout.names) for column in wanted.columns}
-    indices = {column: index_in(base, layout.names) for column, (base, _) in places.items()}
+    indices = {column: layouts.index_in(base, layout.names) for column, (base, _) in places.items()}
     if layout.headed and head[at + 1 :] and is_row_of_texts(layout.cells(head[at + 1][1])):
         number, line = head[at + 1]
         first, notes = number + 1, (*notes, f"line {number} is taken for the units: {brief(line, _LONGEST)}")
@@ -114,7 +102,6 @@ def read_text(path: Path, wanted: Wanted) -> Table:
 
 
 def _preamble(lines: Sequence[tuple[int, str]]) -> tuple[str, ...]:
-    """Return the note of the lines above the names of the columns."""
     if not lines:
         return ()
     return (f"lines {lines[0][0]} to {lines[-1][0]} above the names of the columns are left out",)
@@ -131,7 +118,7 @@ def _head(path: Path) -> tuple[list[str], list[tuple[int, str]]]:
     comments: deque[str] = deque(maxlen=_PREAMBLE)
     head: list[tuple[int, str]] = []
     for number, line in enumerate(chain.from_iterable(blocks_of_lines(path)), 1):
-        if counts(line):
+        if layouts.counts(line):
             head.append((number, line))
         elif not head:
             comments.append(line)
@@ -141,10 +128,9 @@ def _head(path: Path) -> tuple[list[str], list[tuple[int, str]]]:
 
 
 def _numbered_blocks(path: Path) -> Iterator[list[tuple[int, str]]]:
-    """Yield lines that count, with their numbers."""
     number = 1
     for lines in blocks_of_lines(path):
-        yield [(number + i, line) for i, line in enumerate(lines) if counts(line)]
+        yield [(number + i, line) for i, line in enumerate(lines) if layouts.counts(line)]
         number += len(lines)
 
 
@@ -152,8 +138,9 @@ class _Reader:
     """Collects columns block by block."""
 
     def __init__(
-        self, layout: TextLayout, indices: dict[str, int], elements: dict[str, int | None], wanted: Wanted
-    ) -> None:
+        self, layout: layouts.TextLayout, indices: dict[str, int], elements: dict[str, int | None],
+        wanted: Wanted,
+    ) -> None:  # fmt: skip
         """elements: by column, which number of a list in its cells, None for cells of one number."""
         self._layout = layout
         self._decimal, self._labels, self._stamps = wanted.decimal, wanted.labels, wanted.stamps
@@ -190,7 +177,7 @@ class _Reader:
         labels: dict[str, Labels] = {}
         for column, parts in self._parts.items():
             texts = [cell for part in parts if part.dtype.kind == "U" for cell in part]
-            if all(is_numeral(cell) or not cell for cell in texts):
+            if all(layouts.is_numeral(cell) or not cell for cell in texts):
                 columns[column] = np.concatenate([_as_numbers(part) for part in parts])
             else:
                 labels[column] = np.concatenate([_as_texts(part) for part in parts])
@@ -203,7 +190,7 @@ class _Reader:
         layout = self._layout
         if not all(layout.fits(line) for line in lines):
             return None
-        delimiter = None if layout.delimiter == BLANKS else layout.delimiter
+        delimiter = None if layout.delimiter == layouts.BLANKS else layout.delimiter
         indices = list(self._indices.values())
         if self._decimal == "," and delimiter != ",":
             lines = [line.replace(",", ".") for line in lines]
@@ -247,18 +234,18 @@ class _Reader:
 
 
 def _value(line: int, column: str, cell: str, decimal: str) -> float:
-    number = cell if is_decimal(cell) else numeral(cell, decimal)
+    number = cell if is_decimal(cell) else layouts.numeral(cell, decimal)
     if is_decimal(number):
         return float(number)
     if cell.lower() in MISSING:
         return float("nan")
-    hint = ', with a decimal point (or `decimal: ","` in the map)' if has_decimal_comma(cell) else ""
+    hint = ', with a decimal point (or `decimal: ","` in the map)' if layouts.has_decimal_comma(cell) else ""
     raise ValueError(f"line {line}, column {column!r} is {quote(cell)}, expected a finite number{hint}")
 
 
 def _seconds(line: int, column: str, cell: str) -> float | None:
     try:
-        return seconds_of(cell)
+        return layouts.seconds_of(cell)
     except ValueError as error:
         raise ValueError(f"line {line}, column {column!r} is {quote(cell)}: {error}") from None
 

@@ -1,7 +1,5 @@
 """`rsea fleet sql`: query a store with DuckDB."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json
@@ -10,7 +8,7 @@ from collections.abc import Sequence
 from datetime import date, datetime
 from typing import Any
 
-from rsea_ros.cli._columns import columns
+from rsea_ros.cli._terminal import columns
 from rsea_ros.report.result_files import strict
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -54,7 +52,6 @@ def no_formula(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value in a form for JSON."""
     if isinstance(value, (datetime, date)):
         return value.isoformat()
     if isinstance(value, dict):
@@ -65,7 +62,6 @@ def _plain(value: Any) -> Any:
 
 
 def _text(value: Any) -> str:
-    """Return a value in full."""
     plain = _plain(value)
     if plain is None:
         return ""
@@ -73,7 +69,6 @@ def _text(value: Any) -> str:
 
 
 def _cell(value: Any) -> str:
-    """Return a value as text for a table."""
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, datetime):

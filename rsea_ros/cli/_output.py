@@ -1,17 +1,32 @@
 """Where results go, and where they come from."""
 
-from __future__ import annotations
-
 import argparse
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from rsea_ros.errors import OutputError
 from rsea_ros.model.rig_file import rig_path
 from rsea_ros.outputs.files import unused_path
 from rsea_ros.outputs.new_files import Destination, check_free
 from rsea_ros.report.result_files import Provenance, provenance_of
+
+
+class Action(NamedTuple):
+    """What a verb can do: `rsea fleet run`. help: one line. add: declares its arguments. run: as a verb's."""
+
+    help: str
+    add: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
+def add_actions(parser: argparse.ArgumentParser, actions: Mapping[str, Action]) -> None:
+    """Declare the actions of a verb; the chosen one becomes `args.action`."""
+    added = parser.add_subparsers(dest="action", required=True, metavar="|".join(actions))
+    for name, action in actions.items():
+        action.add(added.add_parser(name, help=action.help, description=action.help))
+
 
 FOUND = 1
 """Exit status for a finding listed in --fail-on."""
@@ -47,23 +62,15 @@ def print_file(path: Path) -> None:
 
 def add_fail_on(parser: argparse.ArgumentParser, findings: Sequence[str], note: str = "") -> None:
     """Declare --fail-on. findings: its possible values; the verb returns FOUND for them."""
-    parser.add_argument(
-        "--fail-on",
-        nargs="+",
-        action="extend",
-        default=[],
-        choices=findings,
-        metavar="FINDING",
-        help=f"exit status {FOUND} for any of these: {', '.join(findings)}{note}",
-    )
+    about = f"exit status {FOUND} for any of these: {', '.join(findings)}{note}"
+    add = parser.add_argument
+    add("--fail-on", nargs="+", action="extend", default=[], choices=findings, metavar="FINDING", help=about)
 
 
 def results_place(
-    args: argparse.Namespace,
-    default: str | Path,
-    names: Sequence[str],
+    args: argparse.Namespace, default: str | Path, names: Sequence[str],
     inputs: Iterable[str | Path | None] = (),
-) -> Destination:
+) -> Destination:  # fmt: skip
     """Return the folder of the results: --out, else a free name (NAME, NAME-2, …).
 
     Raises OutputError, before any work, if --out is a file or a symbolic link, holds results, or is the

@@ -1,26 +1,29 @@
-"""What verbs print and read on a terminal: lines, numbers, progress."""
+"""What verbs print and read on a terminal: lines, columns, numbers, progress; safe for any encoding."""
 
 from __future__ import annotations
 
 import argparse
+import codecs
 import math
+import os
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from io import TextIOWrapper
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rsea_ros.documents.wording import printable
-from rsea_ros.report.wrapped_lines import WIDTH, wrap
+from rsea_ros.report.words import WIDTH, wrap
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+_NARROWEST, _NARROWEST_CELL = 40, 16
+"""Columns of a line at least; of the last cell of a row: where fewer are left it is not wrapped."""
 
-_NARROWEST = 40
 
-
-def columns() -> int:
+def width() -> int:
     """Return the width of printed lines: that of the terminal up to WIDTH; WIDTH in a pipe."""
     if sys.stdout is None or not sys.stdout.isatty():
         return WIDTH
@@ -29,14 +32,23 @@ def columns() -> int:
 
 def say(text: str, indent: int = 0) -> None:
     """Print text in lines that fit, all but the first indented. A path stays whole."""
-    print(wrap(text, columns(), indent), flush=True)
+    print(wrap(text, width(), indent), flush=True)
+
+
+def columns(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows of equal length as lines with aligned cells; the last cell continues below itself."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    indent = sum(w + 2 for w in widths[:-1])
+    most = width() if width() - indent >= _NARROWEST_CELL else indent + widths[-1]
+    lines = ("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows)
+    return "\n".join(wrap(line, most, indent) if len(line) > most else line for line in lines)
 
 
 def show(table: Table) -> None:
     """Print a table as wide as lines may be; cells that may wrap do."""
     from rich.console import Console
 
-    Console(width=columns()).print(table)
+    Console(width=width()).print(table)
 
 
 def whole_number(text: str) -> int:
@@ -79,12 +91,69 @@ def progress(title: str) -> Iterator[Callable[[str, float], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[step]}"),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    name, step = TextColumn("{task.description}"), TextColumn("{task.fields[step]}")
+    console = Console(stderr=True)
+    with Progress(name, BarColumn(), TimeElapsedColumn(), step, console=console, transient=True) as bar:
         task = bar.add_task(title, total=1.0, step="")
         yield lambda step, share: bar.update(task, completed=share, step=printable(step))
+
+
+_ASCII = {
+    "·": "*", "×": "x", "±": "+-", "−": "-", "–": "-", "…": "...", "²": "^2", "³": "^3", "µ": "u",
+    "°": " deg", "→": "->", "≤": "<=", "≥": ">=", "∞": "inf", "“": '"', "”": '"', "’": "'",
+}  # fmt: skip
+
+
+class EscapedStream:
+    """A text stream that shows control characters; colours pass on a terminal."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._colours = stream.isatty()
+
+    def write(self, text: str) -> int:
+        """Write text."""
+        self._stream.write(printable(text, colours=self._colours))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def show_controls() -> Iterator[None]:
+    """In this block stdout shows control characters, and stdout and stderr accept every character."""
+    codecs.register_error("rsea", _instead)
+    replaced = open_closed_streams()
+    before = sys.stdout
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="rsea")
+    sys.stdout = EscapedStream(before)
+    try:
+        yield
+    finally:
+        sys.stdout = before
+        for name in replaced:
+            getattr(sys, name).close()
+            setattr(sys, name, None)
+
+
+def open_closed_streams() -> list[str]:
+    """Put the null device in the place of the standard streams that the parent process closed.
+
+    Otherwise the next file that is opened takes their number, and what is printed ends in that file.
+    Returns the names of those streams.
+    """
+    closed = [name for name in ("stdin", "stdout", "stderr") if getattr(sys, name) is None]
+    for name in closed:
+        setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115  closed by shown
+    return closed
+
+
+def _instead(error: UnicodeError) -> tuple[str, int]:
+    """Return the replacement for characters that an encoding lacks."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    part = error.object[error.start : error.end]
+    return "".join(_ASCII.get(c) or c.encode("ascii", "backslashreplace").decode() for c in part), error.end

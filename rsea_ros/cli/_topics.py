@@ -1,13 +1,10 @@
-"""Options that choose topics and runs."""
-
-from __future__ import annotations
+"""Options that choose runs, topics, a part of them, and the rig."""
 
 import argparse
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from msg_adapters.topic_map import AXES, ROLES, TopicMap
 from rsea_ros.errors import ParameterError
@@ -16,25 +13,25 @@ from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.records.record import Channel, Record
 
 
-def add_topic_options(parser: argparse.ArgumentParser) -> None:
-    """Declare --namespace, --topic, --joint and --axis."""
-    default = TopicMap()
-    group = parser.add_argument_group("topics of another machine")
-    group.add_argument(
-        "--namespace", default=default.namespace, help="namespace of the topics (default %(default)s)"
-    )
-    group.add_argument(
-        "--topic",
-        action="append",
-        default=[],
-        metavar="ROLE=TOPIC",
-        help=f"another topic name; ROLE: {', '.join(ROLES)}; TOPIC[2]: the third of numbers without names",
-    )
-    group.add_argument("--joint", help="name of the joint, if the messages hold several")
-    axes = ", ".join(AXES)
-    group.add_argument(
-        "--axis", default=default.axis, help=f"actuator axis of the wrench: {axes}; a leading - reverses it"
-    )
+def add_topic_options(parser: argparse.ArgumentParser, window: bool = False) -> None:
+    """Declare --namespace, --topic, --joint and --axis; with `window` those of a part of a record."""
+    default, axes = TopicMap(), ", ".join(AXES)
+    add = parser.add_argument_group("topics of another machine").add_argument
+    about = "namespace of the topics (default %(default)s)"
+    add("--namespace", default=default.namespace, help=about)
+    about = f"another topic name; ROLE: {', '.join(ROLES)}; TOPIC[2]: the third of numbers without names"
+    add("--topic", action="append", default=[], metavar="ROLE=TOPIC", help=about)
+    add("--joint", help="name of the joint, if the messages hold several")
+    about = f"actuator axis of the wrench: {axes}; a leading - reverses it"
+    add("--axis", default=default.axis, help=about)
+    if window:
+        add = parser.add_argument_group("a part of the record, s since its first stamp").add_argument
+        add("--from", dest="begin", type=float, metavar="S", help="leave out samples before S")
+        add("--to", dest="end", type=float, metavar="S", help="leave out samples after S")
+        add("--window", metavar="A:B", help="the same as --from A --to B")
+        about = "add S seconds to the stamps of a channel that another clock has stamped"
+        add("--shift", action="append", default=[], metavar="CHANNEL=S", help=about)
+        add("--keep-rows", action="store_true", help="leave no row out for its stamps")
 
 
 def topic_map(args: argparse.Namespace) -> TopicMap:
@@ -42,27 +39,14 @@ def topic_map(args: argparse.Namespace) -> TopicMap:
     return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).with_topics(args.topic)
 
 
-def topic_options(args: argparse.Namespace) -> tuple[str, ...]:
-    """Return the options of `add_topic_options` as they were given, without the defaults."""
-    default = TopicMap()
-    given = {
-        "namespace": args.namespace if args.namespace != default.namespace else None,
-        "joint": args.joint,
-        "axis": args.axis if args.axis != default.axis else None,
-    }
-    return (*_options(given), *(f"--topic={topic}" for topic in args.topic))
+def _given(args: argparse.Namespace, names: Mapping[str, str | None]) -> Iterator[str]:
+    """Yield options as they were given: in one word each, since a value may begin with a minus.
 
-
-def window_options(args: argparse.Namespace) -> tuple[str, ...]:
-    """Return the options of `add_window_options` as they were given."""
-    given = {"from": args.begin, "to": args.end, "window": args.window}
-    keep = ("--keep-rows",) if args.keep_rows else ()
-    return (*_options(given), *(f"--shift={shift}" for shift in args.shift), *keep)
-
-
-def _options(given: Mapping[str, str | float | None]) -> Iterator[str]:
-    """Yield `--name=value` for all that are not None: in one word, since a value may begin with a minus."""
-    return (f"--{name}={value}" for name, value in given.items() if value is not None)
+    names: attribute of each, and its default.
+    """
+    for name, default in names.items():
+        if (value := getattr(args, name)) is not None and value != default:
+            yield f"--{ {'begin': 'from', 'end': 'to'}.get(name, name)}={value}"
 
 
 def each_once(bags: Sequence[str]) -> Sequence[str]:
@@ -72,22 +56,6 @@ def each_once(bags: Sequence[str]) -> Sequence[str]:
         if places.count(place) > 1:
             raise ParameterError(f"{bag}: given twice, expected each bag once")
     return bags
-
-
-def add_window_options(parser: argparse.ArgumentParser) -> None:
-    """Declare --from, --to, --window, --shift and --keep-rows."""
-    group = parser.add_argument_group("a part of the record, s since its first stamp")
-    group.add_argument("--from", dest="begin", type=float, metavar="S", help="leave out samples before S")
-    group.add_argument("--to", dest="end", type=float, metavar="S", help="leave out samples after S")
-    group.add_argument("--window", metavar="A:B", help="the same as --from A --to B")
-    group.add_argument(
-        "--shift",
-        action="append",
-        default=[],
-        metavar="CHANNEL=S",
-        help="add S seconds to the stamps of a channel that another clock has stamped",
-    )
-    group.add_argument("--keep-rows", action="store_true", help="leave no row out for its stamps")
 
 
 def cut(record: Record, args: argparse.Namespace) -> Record:
@@ -164,39 +132,35 @@ RIG = "paper_high_impedance"
 """The rig of a verb that is not given one."""
 OFF_RIG = "off_rig"
 """Finding of --fail-on: a fitted value is far from the rig's."""
-_RIGS = "rig file, or the name of one in config/rigs"
 
 
-def add_runs(parser: argparse.ArgumentParser, several: str = "") -> None:
-    """Declare the bags. several: what more than one of them are."""
+class _Default(str):
+    """A rig that was not given."""
+
+    __slots__ = ()
+
+
+def add_runs(
+    parser: argparse.ArgumentParser, several: str = "",
+    rig: str = "rig file, or the name of one in config/rigs",
+) -> None:  # fmt: skip
+    """Declare the bags and --rig. several: what more than one bag are. rig: what is expected."""
     about = f"rosbag2 directory, .mcap or .db3{f'; {several}' if several else ''}"
     parser.add_argument("bags", nargs="+", metavar="BAG", help=about)
-
-
-def add_rig(parser: argparse.ArgumentParser, about: str = _RIGS) -> None:
-    """Declare --rig."""
-    parser.set_defaults(rig_is_default=True)
-    parser.add_argument("--rig", default=RIG, action=_Given, help=f"{about} (default %(default)s)")
+    parser.add_argument("--rig", default=_Default(RIG), help=f"{rig} (default %(default)s)")
 
 
 def rig_choice(args: argparse.Namespace) -> RigChoice:
     """Return how the rig and the data of a verb with --rig were chosen."""
-    return RigChoice(args.rig, args.rig_is_default, topic_options(args), window_options(args))
+    default = TopicMap()
+    names = {"namespace": default.namespace, "joint": None, "axis": default.axis}
+    topics = (*_given(args, names), *(f"--topic={topic}" for topic in args.topic))
+    keep = ("--keep-rows",) if args.keep_rows else ()
+    shifts = (f"--shift={shift}" for shift in args.shift)
+    part = (*_given(args, dict.fromkeys(("begin", "end", "window"))), *shifts, *keep)
+    return RigChoice(args.rig, isinstance(args.rig, _Default), topics, part)
 
 
 def off_rig(remarks: Iterable[Remark]) -> list[str]:
     """Return the finding that a value is far from the rig's, if one is."""
     return [OFF_RIG] if any(r.code == OFF_RIG for r in remarks) else []
-
-
-class _Given(argparse.Action):
-    """Stores the rig, and that it is not the default."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[Any] | None,
-        option_string: str | None = None,
-    ) -> None:
-        namespace.rig, namespace.rig_is_default = values, False

@@ -1,7 +1,5 @@
 """`rsea bench`: a simulated bench behind real wires, to try the driver without hardware."""
 
-from __future__ import annotations
-
 import argparse
 import gc
 import json

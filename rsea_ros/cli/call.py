@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _list(caller: Caller, nodes: Sequence[str]) -> None:
-    from rsea_ros.cli._columns import columns
+    from rsea_ros.cli._terminal import columns
 
     rows = [(node, *offer_of(caller, node)) for node in nodes]
     print(columns([("node", "state", "actions"), *rows]) if rows else "no node that can be called")

@@ -4,30 +4,22 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topic_map import AXES
-from rsea_ros.cli import _terminal as _lines
+from rsea_ros.cli import _terminal
 from rsea_ros.cli._output import FOUND
-from rsea_ros.cli._terminal import say
-from rsea_ros.cli._topics import (
-    add_rig,
-    add_runs,
-    add_topic_options,
-    add_window_options,
-    cut,
-    rig_choice,
-    topic_map,
-)
+from rsea_ros.cli._topics import add_runs, add_topic_options, cut, rig_choice, topic_map
 from rsea_ros.errors import RseaError
-from rsea_ros.records.record import Channel
+from rsea_ros.records.record import Channel, Record
 
 if TYPE_CHECKING:
     from rsea_ros.checks.finding import Findings
+    from rsea_ros.model.rig import Rig
 
 HELP = "check topics, rates, clocks, noise, sign, scale and rig of a record in seconds"
 EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
@@ -36,16 +28,11 @@ EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add_runs(parser)
-    add_rig(parser)
     add = parser.add_argument
     add("--json", action="store_true", help="print the findings as JSON (docs/check.md) and nothing else")
-    add(
-        "--fail-on",
-        choices=("red", "amber"),
-        help=f"exit status {FOUND} if a light is this one or worse",
-    )
-    add_topic_options(parser)
-    add_window_options(parser)
+    about = f"exit status {FOUND} if a light is this one or worse"
+    add("--fail-on", choices=("red", "amber"), help=about)
+    add_topic_options(parser, window=True)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -96,6 +83,38 @@ def _print(checks: list[Findings]) -> None:
     console = Console()
     for findings in checks:
         print(findings.source)
-        for line in check_lines(findings, _lines.columns()):
+        for line in check_lines(findings, _terminal.width()):
             console.print(line, highlight=False, soft_wrap=True)
-    say(summary(checks))
+    _terminal.say(summary(checks))
+
+
+def check_records(
+    records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, masks: bool
+) -> list[Record]:
+    """Return records that are to be fitted, each with the faults that were found, without dead channels.
+
+    Prints a line for each warning unless quiet. masks: see with_faults.
+    Raises IdentificationError if nothing moves, or a position is lacking that the rig is judged by.
+    """
+    from rsea_ros.checks.carried import note_unused, require_motion, with_faults
+    from rsea_ros.checks.check import check_record
+    from rsea_ros.checks.finding import unused_sentence
+    from rsea_ros.model.extent import check_pace
+    from rsea_ros.model.inverse import is_inverse, require_position
+    from rsea_ros.report.check import warnings
+
+    for record in records:
+        check_pace(record)
+        require_motion(record)
+        if is_inverse(rig):
+            require_position(record)
+    checks = [check_record(record, rig, axis) for record in records]
+    lines = dict.fromkeys(line for findings in checks for line in warnings(findings))
+    if lines and not quiet:
+        print(f"compared with rig {rig.name}:")
+    for line in () if quiet else lines:
+        _terminal.say(line, indent=2)
+    kept = [with_faults(note_unused(r, rig), f, masks=masks) for r, f in zip(records, checks, strict=True)]
+    for sentence in () if quiet else dict.fromkeys(filter(None, (unused_sentence(r, rig) for r in records))):
+        _terminal.say(sentence)
+    return kept

@@ -6,9 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._output import add_json, add_results, print_file, results_place
+from rsea_ros.cli._output import add_json, add_results, print_file, provenance, results_place
 from rsea_ros.cli._terminal import progress
 from rsea_ros.cli._topics import RIG
+from rsea_ros.errors import ParameterError
 from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report.result_files import CONTROL_JSON, REPORT
 
@@ -24,18 +25,12 @@ SLOWEST, FASTEST = 50.0, 2000.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument(
-        "rig", nargs="?", default=RIG, help="rig or model.yaml (default %(default)s)"
-    )
-    parser.add_argument(
-        "--free",
-        metavar="RIG",
-        help="rig whose ends are the lightest load (default: the rig; the paper's pendulum if it is clamped)",
-    )
-    parser.add_argument(
-        "--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ",
-        help="rates of the control loop, Hz (default 280 1000)",
-    )
+    add = parser.add_argument
+    add("rig", nargs="?", default=RIG, help="rig or model.yaml (default %(default)s)")
+    free = "rig whose ends are the lightest load (default: the rig; the paper's pendulum if it is clamped)"
+    add("--free", metavar="RIG", help=free)
+    rates = "rates of the control loop, Hz (default 280 1000)"
+    add("--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help=rates)
     add_results(parser, f"{CONTROL_JSON} and {REPORT}", "out/control")
     add_json(parser, CONTROL_JSON)
     parser.add_argument("--fail-on", choices=["missed"], help="exit status 1 if a trial misses its limit")
@@ -43,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Design the controller, run the trials, write the results."""
-    from rsea_ros.cli._output import provenance
     from rsea_ros.control.loads import lightest
     from rsea_ros.control.study import study
     from rsea_ros.model.rig_file import load_rig
@@ -52,7 +46,9 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.report.result_files import json_text
 
     place = results_place(args, "out/control", (CONTROL_JSON, REPORT), [args.rig, args.free])
-    _check_rates(args.rate)
+    for rate in args.rate:
+        if not SLOWEST <= rate <= FASTEST:
+            raise ParameterError(f"--rate {rate:g} Hz, expected {SLOWEST:g} to {FASTEST:g} Hz")
     rig = load_rig(args.rig)
     with progress("control") as report_progress:
         result = study(rig, lightest(rig, args.free or ""), args.rate, motors(rig), progress=report_progress)
@@ -84,14 +80,6 @@ def motors(rig: Rig) -> list[MotorLimits]:
                     name = f"{unit.name}, {kind.partition('_')[0]}"
                     limits.append(MotorLimits(name, unit[kind], speed, unit.sources[kind]))
     return limits
-
-
-def _check_rates(rates: list[float]) -> None:
-    from rsea_ros.errors import ParameterError
-
-    for rate in rates:
-        if not SLOWEST <= rate <= FASTEST:
-            raise ParameterError(f"--rate {rate:g} Hz, expected {SLOWEST:g} to {FASTEST:g} Hz")
 
 
 def _print(result: Study, report: Path) -> None:

@@ -1,7 +1,5 @@
 """`rsea demo`: the whole loop without hardware."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import random
@@ -16,11 +14,10 @@ import numpy as np
 
 from msg_adapters import read_record
 from msg_adapters.bags import read_contents
-from rsea_ros.cli._columns import columns
 from rsea_ros.cli._graph import need_ros, parameters_of_bench
 from rsea_ros.cli._output import path
 from rsea_ros.cli._processes import Processes
-from rsea_ros.cli._terminal import progress, say, whole_number
+from rsea_ros.cli._terminal import columns, progress, say, whole_number
 from rsea_ros.cli._topics import RIG
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.units import plain
@@ -51,20 +48,14 @@ START_UP = 60.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument(
-        "--full", action="store_true", help="use the paper's 160 s of excitation instead of 20 s"
-    )
-    parser.add_argument(
-        "--experiment", action="store_true", help="find a hidden cause by runs designed one after another"
-    )
-    parser.add_argument(
-        "--wire", action="store_true", help="put the plant behind real wires and use the driver"
-    )
-    parser.add_argument("--out", type=path, help="directory of the results (default out/demo-TIME)")
-    parser.add_argument(
-        "--seed", type=whole_number, default=1, help="seed of true values, excitation and noise (default 1)"
-    )
-    parser.add_argument("--domain", type=int, help="ROS domain, 0 to 101 (default: a random one)")
+    add = parser.add_argument
+    add("--full", action="store_true", help="use the paper's 160 s of excitation instead of 20 s")
+    add("--experiment", action="store_true", help="find a hidden cause by runs designed one after another")
+    add("--wire", action="store_true", help="put the plant behind real wires and use the driver")
+    add("--out", type=path, help="directory of the results (default out/demo-TIME)")
+    seed = "seed of true values, excitation and noise (default 1)"
+    add("--seed", type=whole_number, default=1, help=seed)
+    add("--domain", type=int, help="ROS domain, 0 to 101 (default: a random one)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,7 +66,6 @@ def run(args: argparse.Namespace) -> int:
     duration = FULL if args.full else SHORT
     out.mkdir(parents=True, exist_ok=True)
     if args.experiment:
-
         return show(out, domain, args)
     true_rig = drawn_rig(load_rig(RIG), args.seed)
     save_rig(true_rig, out / "bench.yaml")
@@ -177,16 +167,8 @@ def table(start: Rig, true: Rig, identified: Rig) -> str:
         quantity = identified.quantities[name]
         low, high = quantity.ci95 or (float("nan"), float("nan"))
         interval = f"{low:.5g} to {high:.5g}"
-        rows.append(
-            (
-                name,
-                f"{true[name]:.5g}",
-                f"{quantity.value:.5g}",
-                interval,
-                f"{start[name]:.5g}",
-                plain(identified.unit(name)),
-            )
-        )
+        values = f"{true[name]:.5g}", f"{quantity.value:.5g}", interval, f"{start[name]:.5g}"
+        rows.append((name, *values, plain(identified.unit(name))))
     return columns(rows)
 
 
@@ -223,8 +205,15 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
     print(f"{RIG}, with values up to {100.0 * SPREAD:g} % off and a cause known to the plant only")
     with Processes(out / "log", domain) as nodes:
         with source(nodes, out, args) as first:
-            log = _slow_work(nodes, out, first)
-            _session(nodes, out, log)
+            with stage(f"{first}, excite, record: 10 s of slow work at {SLOW['amplitude']:g} N·m") as tell:
+                nodes.start("record", {"out": out / "bag"})
+                nodes.start("excite", {**SLOW, "subscribers": 2})
+                nodes.wait("excite", 10.0 + START_UP, tell)
+                nodes.stop("record")
+            with stage(f"experiment: runs within {LIMITS}, without asking") as tell:
+                values = {"bag": out / "bag", "out": out, "limits": LIMITS, "ask": False, "rig": RIG}
+                nodes.start("experiment", values)
+                nodes.wait("experiment", SESSION, tell)
         lines = nodes.log("experiment").read_text(encoding="utf-8").splitlines()
         nodes.stop(first)
     for line in lines:
@@ -232,25 +221,6 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
             say(line.partition("]: ")[2], indent=2)
     print(f"hidden cause: {hidden_cause_text(true_rig)}")
     return 0
-
-
-def _slow_work(nodes: Processes, out: Path, first: str) -> Path:
-    """Record the slow daily work of a bench, which reveals little; return the bag."""
-    bag = out / "bag"
-    with stage(f"{first}, excite, record: 10 s of slow work at {SLOW['amplitude']:g} N·m") as tell:
-        nodes.start("record", {"out": bag})
-        nodes.start("excite", {**SLOW, "subscribers": 2})
-        nodes.wait("excite", 10.0 + START_UP, tell)
-        nodes.stop("record")
-    return bag
-
-
-def _session(nodes: Processes, out: Path, bag: Path) -> None:
-    """Run the experiment node; the demo consents to every run in advance."""
-    with stage(f"experiment: runs within {LIMITS}, without asking") as tell:
-        values = {"bag": bag, "out": out, "limits": LIMITS, "ask": False, "rig": RIG}
-        nodes.start("experiment", values)
-        nodes.wait("experiment", SESSION, tell)
 
 
 def hidden_cause_text(true_rig: Rig) -> str:

@@ -1,7 +1,5 @@
 """`rsea diagnose`: the causes of the simulation error, and the improvement from each."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from pathlib import Path
@@ -9,21 +7,7 @@ from typing import get_args
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.records import write_overlay
-from rsea_ros.cli import _terminal as _lines
-from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
-from rsea_ros.cli._terminal import progress
-from rsea_ros.cli._topics import (
-    OFF_RIG,
-    add_rig,
-    add_runs,
-    add_topic_options,
-    add_window_options,
-    cut,
-    each_once,
-    off_rig,
-    rig_choice,
-    topic_map,
-)
+from rsea_ros.cli import _output, _terminal, _topics
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.records.record import Record
@@ -40,60 +24,50 @@ _MUCH = 0.2
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    add_runs(parser, "several runs of one bench")
-    add_rig(parser)
+    _topics.add_runs(parser, "several runs of one bench")
     add("--holdout", metavar="BAG", help="a run for testing only (default: a quarter of the runs, in blocks)")
-    add_results(parser, ", ".join(DIAGNOSIS), "out/diagnose-BAG")
-    add(
-        "--without",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="EFFECT",
-        help="effects to leave out of the search",
-    )
+    _output.add_results(parser, ", ".join(DIAGNOSIS), "out/diagnose-BAG")
+    about = "effects to leave out of the search"
+    add("--without", nargs="+", action="extend", default=[], metavar="EFFECT", help=about)
     most = "largest number of causes (default %(default)s)"
     add("--max-causes", type=int, default=MOST_CAUSES, metavar="N", help=most)
-    add_json(parser, DIAGNOSIS_JSON)
-    add_fail_on(parser, (*get_args(Verdict), FAULTS, OFF_RIG), _FINDINGS)
-    add_topic_options(parser)
-    add_window_options(parser)
+    _output.add_json(parser, DIAGNOSIS_JSON)
+    _output.add_fail_on(parser, (*get_args(Verdict), FAULTS, _topics.OFF_RIG), _FINDINGS)
+    _topics.add_topic_options(parser, window=True)
 
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose and write the results."""
     from rsea_ros.model.rig_file import load_rig
 
-    inputs = [*args.bags, args.rig, args.holdout]
-    place = results_place(args, Path("out") / f"diagnose-{Path(args.bags[0]).stem}", DIAGNOSIS, inputs)
-    rig, topics = load_rig(args.rig), topic_map(args)
-    with progress("diagnose") as tell:
+    inputs, default = [*args.bags, args.rig, args.holdout], f"diagnose-{Path(args.bags[0]).stem}"
+    place = _output.results_place(args, Path("out") / default, DIAGNOSIS, inputs)
+    rig, topics = load_rig(args.rig), _topics.topic_map(args)
+    with _terminal.progress("diagnose") as tell:
         tell("reading", 0.0)
-        runs = each_once([*args.bags, *([args.holdout] if args.holdout else [])])
+        runs = _topics.each_once([*args.bags, *([args.holdout] if args.holdout else [])])
         records = [readable(bag, topics, args) for bag in runs]
-        from rsea_ros.cli._checks import check_records
+        from rsea_ros.cli.check import check_records
 
         raw, records = records[0], check_records(records, rig, topics.axis, quiet=args.json, masks=True)
         holdout = records.pop() if args.holdout else None
-        from rsea_ros.cli._output import provenance
         from rsea_ros.diagnosis.diagnose import (
-            diagnose,
-        )  # after the bags, so that a bad bag is refused at once
+            diagnose,  # after the bags, so that a bad one is refused at once
+        )
         from rsea_ros.effects.catalogue import effect_named
         from rsea_ros.report.diagnosis.files import write_diagnosis
 
-        without = tuple(effect_named(name).name for name in args.without)
-        settings = DiagnosisSettings(args.max_causes, without)
-        result = replace(diagnose(records, rig, holdout, tell, settings), rig_choice=rig_choice(args))
-        report = write_diagnosis(
-            result, raw, place, write_overlay, provenance("diagnose", args.bags, args.rig)
-        )
+        settings = DiagnosisSettings(args.max_causes, tuple(effect_named(name).name for name in args.without))
+        choice = _topics.rig_choice(args)
+        result = replace(diagnose(records, rig, holdout, tell, settings), rig_choice=choice)
+        origin = _output.provenance("diagnose", args.bags, args.rig)
+        report = write_diagnosis(result, raw, place, write_overlay, origin)
     if args.json:
-        print_file(report.parent / DIAGNOSIS_JSON)
+        _output.print_file(report.parent / DIAGNOSIS_JSON)
     else:
         _print(result, report)
-    findings = {result.verdict, *([FAULTS] if result.faults else []), *off_rig(result.remarks)}
-    return FOUND if findings.intersection(args.fail_on) else 0
+    findings = {result.verdict, *([FAULTS] if result.faults else []), *_topics.off_rig(result.remarks)}
+    return _output.FOUND if findings.intersection(args.fail_on) else 0
 
 
 def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None) -> Record:
@@ -105,7 +79,7 @@ def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None)
     from rsea_ros.model.extent import bound_values
 
     record = bound_values(read_record([bag], topics=topics, strict=False))
-    record = record if args is None else cut(record, args)
+    record = record if args is None else _topics.cut(record, args)
     check_diagnosable(record)
     return record
 
@@ -126,9 +100,9 @@ def _print(result: Diagnosis, report: Path) -> None:
 
     from rsea_ros.report.diagnosis.terminal import terminal_lines
     from rsea_ros.report.rig import command
-    from rsea_ros.report.wrapped_lines import command_row
+    from rsea_ros.report.words import command_row
 
-    console, width = Console(), _lines.columns()
+    console, width = Console(), _terminal.width()
     for line in terminal_lines(result, width):
         console.print(line, highlight=False, soft_wrap=True)
     print(f"report      {report}")

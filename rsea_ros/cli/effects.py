@@ -1,7 +1,5 @@
 """`rsea effects`: the catalogue of effects."""
 
-from __future__ import annotations
-
 import argparse
 
 HELP = "list the effects that a diagnosis can name: equation, parameters, units, typical sizes, source"

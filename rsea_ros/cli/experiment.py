@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
+from rsea_ros.cli import _output
 from rsea_ros.cli._terminal import positive, progress, say, whole_number
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import FieldError, ParameterError
@@ -40,16 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--rate", type=positive, default=280.0, help="commands a second, 50 to 1000 Hz (default %(default)g)")
     add("--shortest", type=positive, help="shortest duration, s (default 0.5, or the longest if less)")
     add("--longest", type=positive, default=10.0, help="longest duration of the run, s (default %(default)g)")
-    add(
-        "--refine",
-        type=whole_number,
-        default=24,
-        metavar="N",
-        help="number of shapes to compare (default %(default)s)",
-    )
-    add_results(parser, ", ".join(EXPERIMENT), "out/experiment")
-    add_json(parser, EXPERIMENT_JSON)
-    add_fail_on(parser, (NO_RUN,))
+    shapes = "number of shapes to compare (default %(default)s)"
+    add("--refine", type=whole_number, default=24, metavar="N", help=shapes)
+    _output.add_results(parser, ", ".join(EXPERIMENT), "out/experiment")
+    _output.add_json(parser, EXPERIMENT_JSON)
+    _output.add_fail_on(parser, (NO_RUN,))
     add_topic_options(parser)
 
 
@@ -60,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.experiment.run_shape import limits_from
     from rsea_ros.identification.solver import worker_pools
 
-    place = results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
+    place = _output.results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
     shortest = args.shortest or min(0.5, args.longest)
     asked = DesignRequest(limits_from(args.limits), args.rate, shortest, args.longest, refine=args.refine)
     models = [model for path in args.models for model in models_in(path)]
@@ -70,10 +65,10 @@ def run(args: argparse.Namespace) -> int:
         advice = replace(advise(hypotheses, asked, noise, pools.run, tell), excluded=excluded)
     report = write_advice(advice, place, args)
     if args.json:
-        print_file(report.parent / EXPERIMENT_JSON)
+        _output.print_file(report.parent / EXPERIMENT_JSON)
     else:
         _print(advice, report)
-    return FOUND if NO_RUN in args.fail_on and advice.proposal is None else 0
+    return _output.FOUND if NO_RUN in args.fail_on and advice.proposal is None else 0
 
 
 def models_in(path: str) -> list[ModelFile]:
@@ -123,13 +118,12 @@ def _possible(
 
 def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
-    from rsea_ros.cli._output import provenance
     from rsea_ros.experiment.run_shape import run_text
     from rsea_ros.report.experiment.page import advice_page
     from rsea_ros.report.experiment.words import advice_json
     from rsea_ros.report.result_files import json_text
 
-    source = provenance("experiment", args.bag)
+    source = _output.provenance("experiment", args.bag)
     with NewFiles(place) as new:
         if advice.proposal is not None:
             new.write(COMMANDS, run_text(advice.proposal.command, advice.proposal.rate))
@@ -140,7 +134,7 @@ def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -
 def _print(advice: Advice, report: Path) -> None:
     from rsea_ros.documents.units import plain
     from rsea_ros.report.experiment.words import limit_rows, plain_name, proof_words, verdict
-    from rsea_ros.report.wrapped_lines import LABEL
+    from rsea_ros.report.words import LABEL
 
     say(verdict(advice))
     for h in advice.hypotheses:

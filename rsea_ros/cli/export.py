@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rsea_ros.cli._output import FOUND, add_force, path
 from rsea_ros.cli._terminal import positive, say
 from rsea_ros.outputs.new_files import check_free, write_file
+from rsea_ros.report.result_files import pick
 
 if TYPE_CHECKING:
     from rsea_ros.exports.mujoco_play import Difference
@@ -30,6 +31,7 @@ TARGETS = {
     "bam": "parameters of BAM (M1 to M6), JSON",
 }
 DURATION = 2.0
+_NUMBERS = "times_noise rms signal noise unit"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -111,7 +113,6 @@ def _verification(made: Export, rig: Rig, args: argparse.Namespace) -> Verificat
 
 
 def _chirp(rig: Rig, args: argparse.Namespace) -> FloatArray:
-    """Return the command that verifies the export, N m or rad."""
     from dataclasses import replace
 
     from rsea_ros.exports.mujoco_play import RATE
@@ -153,14 +154,7 @@ def _document(made: Export, rig: Rig, out: Path, verified: Verification) -> dict
         "file": str(out),
         "says": {one.name: one.how for one in made.represented},
         "leaves_out": {one.name: one.why for one in made.omitted},
-        "loss": {name: {"channel": one.channel, **_numbers(one)} for name, one in verified.losses.items()},
+        "loss": {name: pick(one, f"channel {_NUMBERS}") for name, one in verified.losses.items()},
         "not_played": verified.not_played or None,
-        "difference": {one.channel: _numbers(one) for one in verified.differences},
+        "difference": {one.channel: pick(one, _NUMBERS) for one in verified.differences},
     }
-
-
-def _numbers(one: Difference) -> dict[str, float | str]:
-    return {
-        "times_noise": one.times_noise, "rms": one.rms, "signal": one.signal, "noise": one.noise,
-        "unit": one.unit,
-    }  # fmt: skip

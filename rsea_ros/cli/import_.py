@@ -1,7 +1,5 @@
 """`rsea import`: convert a measurement of a real machine to a bag."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
@@ -77,7 +75,6 @@ def _write_several(args: argparse.Namespace, mapping: ImportMap) -> list[str]:
 
 
 def _lines_on(imported: Imported, out: str | Path) -> Iterator[str]:
-    """Yield lines on the contents of a bag."""
     record = imported.record
     yield from summary(record, imported.mapping)
     rate = next(iter(record.channels.values())).rate

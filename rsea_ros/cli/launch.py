@@ -1,7 +1,5 @@
 """`rsea launch`: start a graph of nodes without `ros2 launch`."""
 
-from __future__ import annotations
-
 import argparse
 
 HELP = "start a graph of nodes: simulation, hardware or replay; Ctrl-C stops them all"

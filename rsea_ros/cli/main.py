@@ -1,7 +1,5 @@
 """The command `rsea`: finds the verb, runs it, turns errors into one line."""
 
-from __future__ import annotations
-
 import argparse
 import ast
 import importlib
@@ -15,13 +13,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn, Protocol, cast
 
-from rsea_ros.cli import _terminal as _lines
-from rsea_ros.cli._columns import columns
-from rsea_ros.cli._shown import show_controls
+from rsea_ros.cli import _terminal
 from rsea_ros.documents.wording import did_you_mean, printable
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.processes import Stopped, Stops
-from rsea_ros.report.wrapped_lines import wrap
+from rsea_ros.report.words import wrap
 
 COMPILER = "rsea_ros.compiler"
 
@@ -74,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = arguments[0] if arguments else "--help"
     prefix = f"rsea {name}" if name in verbs() else "rsea"
-    with show_controls(), compilation_announced(), Stops() as stops:
+    with _terminal.show_controls(), compilation_announced(), Stops() as stops:
         try:
             status = _call(name, arguments[1:])
             sys.stdout.flush()
@@ -104,7 +100,8 @@ def overview() -> str:
     """Return the help text with one line for each verb, without importing the verbs."""
     rows = [(f"  {name}", summary(path)) for name, path in verbs().items()]
     closing = "rsea VERB --help shows the arguments of a verb with units, and an example; rsea --version."
-    return "\n".join(["usage: rsea VERB …", "", columns(rows), "", wrap(closing, _lines.columns())])
+    closing = wrap(closing, _terminal.width())
+    return "\n".join(["usage: rsea VERB …", "", _terminal.columns(rows), "", closing])
 
 
 def summary(path: Path) -> str:
@@ -221,7 +218,6 @@ def _fault(error: Exception) -> str:
 
 
 def _report_stop(prefix: str, error: KeyboardInterrupt) -> int:
-    """Report that a signal stopped the work, and return its status."""
     note = f": {error.note}" if isinstance(error, Stopped) and error.note else ""
     if isinstance(error, Stopped) and error.status != INTERRUPTED:
         return _fail(prefix, f"stopped by {error}{note}", error.status)
@@ -229,7 +225,6 @@ def _report_stop(prefix: str, error: KeyboardInterrupt) -> int:
 
 
 def _fail(prefix: str, message: str, status: int = BAD_INPUT) -> int:
-    """Write one line to stderr and return the status."""
     with suppress(OSError):
         print(printable(f"{prefix}: {' '.join(message.split())}"), file=sys.stderr, flush=True)
     try:

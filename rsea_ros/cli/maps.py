@@ -3,8 +3,6 @@
 Import maps by name: those in config/imports, beside the rigs.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
@@ -23,8 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print a line for each map."""
     from msg_adapters.tables import load_map
-    from rsea_ros.cli._columns import columns
-    from rsea_ros.cli._terminal import say
+    from rsea_ros.cli._terminal import columns, say
 
     print(columns([(name, load_map(map_path(name)).about) for name in map_names()]))
     print()

@@ -34,24 +34,13 @@ SHORTEST = 20.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add_results(parser, f"{PAPER_JSON}, {REPORT} and the simulated bags", "out/paper")
-    parser.add_argument(
-        "--duration",
-        type=float,
-        default=160.0,
-        help="duration of each simulated test, s (default %(default)s)",
-    )
-    parser.add_argument(
-        "--seed",
-        type=whole_number,
-        default=5,
-        help="seed of benches, commands and noise (default %(default)s)",
-    )
-    parser.add_argument(
-        "--figures",
-        type=path,
-        metavar="DIR",
-        help="only write the figures of docs/derivation.md into this directory",
-    )
+    add = parser.add_argument
+    about = "duration of each simulated test, s (default %(default)s)"
+    add("--duration", type=float, default=160.0, help=about)
+    about = "seed of benches, commands and noise (default %(default)s)"
+    add("--seed", type=whole_number, default=5, help=about)
+    about = "only write the figures of docs/derivation.md into this directory"
+    add("--figures", type=path, metavar="DIR", help=about)
     add_json(parser, PAPER_JSON)
 
 
@@ -64,8 +53,6 @@ def run(args: argparse.Namespace) -> int:
         return _figures(args)
     if not args.duration >= SHORTEST:
         raise ParameterError(f"--duration {args.duration:g} s, expected at least {SHORTEST:g} s")
-    if args.seed < 0:
-        raise ParameterError(f"--seed {args.seed}, expected 0 or more")
     with progress("paper") as tell, NewFiles(results_place(args, "out/paper", FILES)) as new:
         tests = _tests(args, new, tell)
         tell("page", 0.95)

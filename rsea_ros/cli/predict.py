@@ -1,7 +1,5 @@
 """`rsea predict`: simulate a model on the commands of a new bag."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Mapping
@@ -14,7 +12,7 @@ import numpy as np
 from msg_adapters import read_record
 from rsea_ros.checks.check import check_record
 from rsea_ros.cli._output import add_force
-from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
+from rsea_ros.cli._topics import add_topic_options, cut, topic_map
 from rsea_ros.model.prediction_errors import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import check_free, write_text
@@ -29,28 +27,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("model", help="model.yaml, or the name or file of any rig")
     parser.add_argument("bag", help="rosbag2 directory, .mcap or .db3")
-    parser.add_argument(
-        "--out",
-        metavar="CSV",
-        help="file for the predicted channels: t in s, then one column per channel in SI units",
-    )
+    about = "file for the predicted channels: t in s, then one column per channel in SI units"
+    parser.add_argument("--out", metavar="CSV", help=about)
     parser.add_argument("--rig", action=_RigComesFirst, help=argparse.SUPPRESS)
     add_force(parser)
     parser.add_argument("--json", action="store_true", help="no effect: this verb always prints JSON")
-    add_topic_options(parser)
-    add_window_options(parser)
+    add_topic_options(parser, window=True)
 
 
 class _RigComesFirst(argparse.Action):
     """Refuses the option that other verbs have, and says what stands in its place."""
 
     def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: object,
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object,
         option_string: str | None = None,
-    ) -> NoReturn:
+    ) -> NoReturn:  # fmt: skip
         """Leave with status 2."""
         parser.error(f"no --rig here: a model or a rig is the first argument, `{parser.prog} {values} BAG`")
 
@@ -66,9 +57,7 @@ def run(args: argparse.Namespace) -> int:
     comparisons = predict(rig, record)
     if args.out:
         write_text(args.out, _table(comparisons), force=args.force)
-    errors = {
-        n: pick(c, "rms_error fit_percent") for n, c in comparisons.items()
-    }
+    errors = {n: pick(c, "rms_error fit_percent") for n, c in comparisons.items()}
     with np.errstate(all="ignore"):
         faults_json = [fault_json(fault) for fault in check_record(record, rig, args.axis).faults]
     print(json.dumps({"channels": errors, "data": {"faults": faults_json}}, indent=2))

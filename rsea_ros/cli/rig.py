@@ -50,7 +50,7 @@ def _new(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> int:
-    from rsea_ros.cli._columns import columns
+    from rsea_ros.cli._terminal import columns
     from rsea_ros.model.rig_file import load_rig
 
     rig = load_rig(args.rig)
@@ -63,7 +63,6 @@ def _check(args: argparse.Namespace) -> int:
 
 
 def _row(rig: Rig, name: str) -> tuple[str, ...]:
-    """Return name, number, unit, spread and source of a value."""
     from rsea_ros.documents.units import plain
 
     doubt = f"+-{100.0 * rig.spread(name):g} %" if name in rig.free() else "fixed"

@@ -1,7 +1,5 @@
 """`rsea rigs`: the rigs that come with the package."""
 
-from __future__ import annotations
-
 import argparse
 
 HELP = "list the rigs of the package, with a description of each bench"
@@ -14,8 +12,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for each rig."""
-    from rsea_ros.cli._columns import columns
-    from rsea_ros.cli._terminal import say
+    from rsea_ros.cli._terminal import columns, say
     from rsea_ros.model.rig_file import load_rig, rig_names
 
     print(columns([(name, load_rig(name).about) for name in rig_names()]))

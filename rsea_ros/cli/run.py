@@ -1,7 +1,5 @@
 """`rsea run`: start a node without `ros2 run`."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
@@ -21,15 +19,10 @@ _NODES = Path(__file__).resolve().parents[1] / "nodes"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments; unknown ones go to the node."""
     parser.add_argument("node", metavar="NODE", help=f"{', '.join(node_names())}, or your own .py file")
-    parser.add_argument(
-        "parameters",
-        nargs="*",
-        metavar="NAME:=VALUE",
-        help="parameters of the node (rsea run NODE --params lists them)",
-    )
-    parser.add_argument(
-        "--params", action="store_true", help="show the parameters of the node with unit and range"
-    )
+    about = "parameters of the node (rsea run NODE --params lists them)"
+    parser.add_argument("parameters", nargs="*", metavar="NAME:=VALUE", help=about)
+    about = "show the parameters of the node with unit and range"
+    parser.add_argument("--params", action="store_true", help=about)
     parser.set_defaults(pass_on=[])
 
 

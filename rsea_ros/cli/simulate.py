@@ -1,7 +1,5 @@
 """`rsea simulate`: a synthetic bag, with any effect of the catalogue switched on."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from pathlib import Path
@@ -32,54 +30,37 @@ _MOST_TORQUE, _MOST_TURNED = 100.0, 3.2
 """N m, rad. Larger commands are refused unless --limit allows them."""
 
 
-def _default(name: str) -> str:
-    return f"(default {getattr(ExcitationSettings(), name):g}, for a position loop {getattr(JOINT, name):g})"
+_OPTIONS = (
+    ("rate", "rate", "rate of the commands, Hz"),
+    ("amplitude", "amplitude", "amplitude, N·m, for a position loop rad"),
+    ("deviation", "noise", "standard deviation of noise on a chirp, N·m, for a position loop rad"),
+    ("low", "low", "lowest frequency, Hz"),
+    ("high", "high", "highest frequency, Hz"),
+)
+"""Option, setting of the excitation, meaning; the defaults are those of the kind of rig."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("rig", help="rig or model.yaml, or the name of one in config/rigs")
-    parser.add_argument("--out", required=True, help="bag to write: a directory, or a file .mcap or .db3")
+    add, default = parser.add_argument, ExcitationSettings()
+    add("rig", help="rig or model.yaml, or the name of one in config/rigs")
+    add("--out", required=True, help="bag to write: a directory, or a file .mcap or .db3")
     add_force(parser)
-    parser.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME:param=value,…",
-        help="switch an effect on, SI units; without parameters its typical size. Effects: "
-        + ", ".join(catalogue()),
-    )
-    default = ExcitationSettings()
-    parser.add_argument(
-        "--excitation",
-        default="chirp",
-        choices=sorted(KINDS),
-        help="kind of the command (default %(default)s)",
-    )
-    parser.add_argument("--duration", type=float, default=60.0, help="duration, s (default %(default)s)")
-    parser.add_argument("--rate", type=float, help=f"rate of the commands, Hz {_default('rate')}")
-    parser.add_argument(
-        "--amplitude", type=float, help=f"amplitude, N·m, for a position loop rad {_default('amplitude')}"
-    )
-    parser.add_argument(
-        "--deviation",
-        type=float,
-        help=f"standard deviation of noise on a chirp, N·m, for a position loop rad {_default('noise')}",
-    )
-    parser.add_argument("--low", type=float, help=f"lowest frequency, Hz {_default('low')}")
-    parser.add_argument("--high", type=float, help=f"highest frequency, Hz {_default('high')}")
-    parser.add_argument(
-        "--period",
-        type=float,
-        default=default.period,
-        help="period of multisine and steps, s (default %(default)s)",
-    )
-    add = parser.add_argument
+    about = "switch an effect on, SI units; without parameters its typical size. Effects: "
+    about += ", ".join(catalogue())
+    add("--effect", action="append", default=[], metavar="NAME:param=value,…", help=about)
+    kinds = sorted(KINDS)
+    add("--excitation", default="chirp", choices=kinds, help="kind of the command (default %(default)s)")
+    add("--duration", type=float, default=60.0, help="duration, s (default %(default)s)")
+    for name, field, about in _OPTIONS:
+        usual = f"(default {getattr(default, field):g}, for a position loop {getattr(JOINT, field):g})"
+        add(f"--{name}", type=float, help=f"{about} {usual}")
+    about = "period of multisine and steps, s (default %(default)s)"
+    add("--period", type=float, default=default.period, help=about)
     add("--limit", type=float, help="largest command allowed (default 100 N·m, for a position loop 3.2 rad)")
-    parser.add_argument(
-        "--seed", type=whole_number, default=0, help="seed of command and sensor noise (default %(default)s)"
-    )
-    parser.add_argument("--no-noise", action="store_true", help="simulate perfect sensors")
+    about = "seed of command and sensor noise (default %(default)s)"
+    add("--seed", type=whole_number, default=0, help=about)
+    add("--no-noise", action="store_true", help="simulate perfect sensors")
     add_topic_options(parser)
 
 
@@ -89,34 +70,21 @@ def run(args: argparse.Namespace) -> int:
     rig = load_rig(args.rig)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
     check_effects(rig.effects)
-    settings = _settings(args, JOINT if rig.loop else ExcitationSettings())
+    given = {field: value for name, field, _ in _OPTIONS if (value := getattr(args, name)) is not None}
+    default = JOINT if rig.loop else ExcitationSettings()
+    settings = replace(default, duration=args.duration, period=args.period, seed=args.seed, **given)
     values = excitation(args.excitation, settings)
     limit, unit = (_MOST_TURNED, "rad") if rig.loop else (_MOST_TORQUE, "N m")
     check_limits(values, limit if args.limit is None else args.limit, settings.rate, unit)
     command = Channel(np.arange(len(values)) / settings.rate, values)
     record = synthesize(rig, command, seed=args.seed + 1, noise=not args.no_noise)
     write_record(record, args.out, topic_map(args), force=args.force)
-    print(
-        f"{args.out}: {args.duration:g} s at {settings.rate:g} Hz of {rig.name}"
-        + "".join(f", {e.name}" for e in rig.effects)
-    )
+    made = ", ".join([rig.name, *(e.name for e in rig.effects)])
+    print(f"{args.out}: {args.duration:g} s at {settings.rate:g} Hz of {made}")
     if args.high is not None and settings.top < args.high:
         half = settings.rate / 2.0
         say(f"excited up to {settings.top:g} Hz, not {args.high:g} Hz: half the rate is {half:g} Hz")
     return 0
-
-
-def _settings(args: argparse.Namespace, default: ExcitationSettings) -> ExcitationSettings:
-    """Return the excitation of the options, with the defaults of this kind of rig."""
-    options = {
-        "rate": args.rate,
-        "amplitude": args.amplitude,
-        "noise": args.deviation,
-        "low": args.low,
-        "high": args.high,
-    }
-    given = {name: value for name, value in options.items() if value is not None}
-    return replace(default, duration=args.duration, period=args.period, seed=args.seed, **given)
 
 
 def parse_effect(text: str) -> EffectSetting:

@@ -1,7 +1,5 @@
 """rsea test: the suite of the repository, whole or a group of it."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import signal

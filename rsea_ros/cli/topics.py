@@ -24,15 +24,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for action in (rate, echo):
         action.add_argument("topic", help="name of the topic, /rsea/ft or ft")
     for action, usual in ((parser, 1.0), (listing, 1.0), (rate, 3.0)):
-        action.add_argument(
-            "--seconds", type=positive, default=usual, help="time to listen, s (default %(default)s)"
-        )
-    echo.add_argument(
-        "--count", type=whole_number, default=1, help="number of messages to show (default %(default)s)"
-    )
-    echo.add_argument(
-        "--seconds", type=positive, default=10.0, help="longest time to wait, s (default %(default)s)"
-    )
+        about = "time to listen, s (default %(default)s)"
+        action.add_argument("--seconds", type=positive, default=usual, help=about)
+    about = "number of messages to show (default %(default)s)"
+    echo.add_argument("--count", type=whole_number, default=1, help=about)
+    about = "longest time to wait, s (default %(default)s)"
+    echo.add_argument("--seconds", type=positive, default=10.0, help=about)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _list(listener: Listener, seconds: float) -> None:
-    from rsea_ros.cli._columns import columns
+    from rsea_ros.cli._terminal import columns
 
     rows = listener.topics(seconds)
     print(columns([("topic", "type", "publishers", "subscribers"), *rows]) if rows else "no topic")

@@ -1,7 +1,5 @@
 """`rsea watch`: the live view in a browser."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -1,7 +1,5 @@
 """The findings of a check: on a terminal, one line each, and for programs (docs/check.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -13,7 +11,7 @@ from rsea_ros.checks.pairs import Pair
 from rsea_ros.report import words
 from rsea_ros.report.result_files import fault_json, pick, strict
 from rsea_ros.report.rig import rig_in_brackets
-from rsea_ros.report.wrapped_lines import WIDTH, wrap
+from rsea_ros.report.words import WIDTH, wrap
 
 SCHEMA = 1
 _LIGHT, _KIND, _CHANNEL = 7, 14, 25

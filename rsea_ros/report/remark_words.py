@@ -1,7 +1,5 @@
 """Faults of the data, and the remarks of a fit or a diagnosis, in words."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Which rig a result was made with, and what speaks against it: in words, as HTML, for programs."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Sequence
 from typing import Any

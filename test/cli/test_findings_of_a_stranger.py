@@ -9,7 +9,7 @@ import pytest
 
 import rsea_ros as rsea
 from msg_adapters import write_record
-from rsea_ros.cli._shown import show_controls
+from rsea_ros.cli._terminal import show_controls
 from rsea_ros.cli.main import main
 from rsea_ros.errors import ParameterError
 from rsea_ros.records.record import Channel

@@ -11,7 +11,7 @@ import pytest
 from rsea_ros import compiler
 from rsea_ros.cli import _terminal as _lines
 from rsea_ros.cli.main import main
-from rsea_ros.report.wrapped_lines import command_row, row, wrap
+from rsea_ros.report.words import command_row, row, wrap
 
 VERBS = [
     ["--help"], ["rigs"], ["maps"], ["effects"], ["effects", "structural_resonance"],
@@ -31,7 +31,7 @@ def folder(tmp_path_factory):
 def test_a_verb_prints_no_line_wider_than_the_terminal(folder, monkeypatch, capsys):
     """A line of the demo had 400 characters."""
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(_lines, "columns", lambda: 80)
+    monkeypatch.setattr(_lines, "width", lambda: 80)
     assert [main(words) for words in VERBS] == [0] * len(VERBS)
     assert [line for line in capsys.readouterr().out.splitlines() if len(line) > 80] == []
 

@@ -10,8 +10,8 @@ import pytest
 
 from msg_adapters import write_record
 from rsea_ros.checks import carried as usable
+from rsea_ros.checks import check as checks
 from rsea_ros.checks.finding import Findings
-from rsea_ros.cli import _checks
 from rsea_ros.design import spring_design, tolerance
 from rsea_ros.diagnosis import diagnose
 from rsea_ros.identification import identify
@@ -66,7 +66,7 @@ def prepare(record: Record, folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
         (identify, "identify", result), (diagnose, "diagnose", result),
         (spring_design, "spring_design", result), (spring_design, "least_stiffness", 1.0),
         (tolerance, "robust_stiffness", np.inf),
-        (usable, "check_diagnosable", None), (_checks, "check_record", Findings("run.mcap", RIG, (), ())),
+        (usable, "check_diagnosable", None), (checks, "check_record", Findings("run.mcap", RIG, (), ())),
         (results, "identification_json", JSON), (results, "identification_report", "page"),
         (diagnosis_files, "diagnosis_json", JSON), (diagnosis_files, "diagnosis_report", "page"),
         (diagnosis_files, "overlay_records", {"/rsea": record}),

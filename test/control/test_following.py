@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.following import Following
-from rsea_ros.report.figures.palette import AFTER
+from rsea_ros.report.figures.figure import AFTER
 from rsea_ros.report.figures.response_curves import ResponseCurve, response_figure
 
 HZ = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0])

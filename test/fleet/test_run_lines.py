@@ -8,7 +8,7 @@ from argparse import Namespace
 import pytest
 from fleet_stubs import HIP, KNEE, stub_work
 
-from rsea_ros.cli import _fleet_run
+from rsea_ros.cli import fleet
 from rsea_ros.cli.main import main
 from rsea_ros.fleet import task
 from rsea_ros.fleet.sources import bags_of
@@ -63,6 +63,6 @@ def test_a_signal_says_how_many_recordings_are_left(folder, tmp_path, monkeypatc
     held = bags_of([str(folder)], (KNEE, HIP))
     args = Namespace(serial=True, scheduler=None, no_wait=True, again=False, time_limit=60.0, pages=False)
     with pytest.raises(Stopped) as caught:
-        _fleet_run.write_rows(args, str(tmp_path / "new"), held)
+        fleet.write_rows(args, str(tmp_path / "new"), held)
     total = 2 * len(held)
     assert caught.value.note == f"{total - 2} of {total} recordings are left, run the same line again"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from fleet_stubs import stub_work
 
-from rsea_ros.cli import _fleet_watch
+from rsea_ros.cli import fleet
 from rsea_ros.cli.main import main
 from rsea_ros.fleet import task
 from rsea_ros.processes import Stopped
@@ -27,7 +27,7 @@ def watch(tmp_path, folder, monkeypatch, capsys):
                 raise Stopped(15)
             left.pop(0)()
 
-        monkeypatch.setattr(_fleet_watch.time, "sleep", sleep)
+        monkeypatch.setattr(fleet.time, "sleep", sleep)
         paths = [str(tmp_path / "new"), str(folder), "--map", str(tmp_path / "joints.yaml")]
         status = main(["fleet", "watch", *paths, "--serial"])
         said = capsys.readouterr()

@@ -8,7 +8,7 @@ from foreign import JOINT_STATE, STORE, WRENCH, joint_state, wrench
 from hypothesis import given
 from hypothesis import strategies as st
 
-from msg_adapters import encoding
+from msg_adapters import cdr
 from msg_adapters.cdr import blocks
 from rsea_ros.errors import BagError
 
@@ -69,11 +69,11 @@ def test_encoded_bytes_equal_those_of_rosbags(name):
     expected = [
         joint_state(int(s), [name], [p], [], [e]) for s, p, e in zip(at, position, effort, strict=True)
     ]
-    got = encoding.joint_states(at, name, position=position, effort=effort)
+    got = cdr.joint_states(at, name, position=position, effort=effort)
     assert got == [bytes(STORE.serialize_cdr(message, JOINT_STATE)) for message in expected]
     six = np.arange(12.0).reshape(2, 6)
     expected = [wrench(int(s), row.tolist(), "ft_sensor") for s, row in zip(at, six, strict=True)]
-    assert encoding.wrenches(at, six) == [bytes(STORE.serialize_cdr(message, WRENCH)) for message in expected]
+    assert cdr.wrenches(at, six) == [bytes(STORE.serialize_cdr(message, WRENCH)) for message in expected]
 
 
 def test_rubbish_in_the_padding_does_not_change_the_layout():

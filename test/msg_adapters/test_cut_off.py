@@ -23,7 +23,7 @@ RECORDER = """
 import sys, time
 import numpy as np
 from msg_adapters import BagWriter
-from msg_adapters.encoding import joint_states, wrenches
+from msg_adapters.cdr import joint_states, wrenches
 with BagWriter(sys.argv[1], sys.argv[2]) as bag:
     for k in range(1_000_000):
         stamps = np.array([1_763_000_000_000_000_000 + k * 3_571_428])

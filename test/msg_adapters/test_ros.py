@@ -11,7 +11,7 @@ import pytest
 from foreign import JOINT_STATE, WRENCH
 from rclpy.serialization import deserialize_message, serialize_message
 
-from msg_adapters import encoding, ros
+from msg_adapters import cdr, ros
 from msg_adapters.cdr import blocks
 from rsea_ros.errors import ParameterError
 
@@ -41,9 +41,9 @@ def test_bytes_of_fast_cdr_are_decoded():
 
 
 def test_our_bytes_are_understood_by_fast_cdr():
-    (raw,) = encoding.joint_states(np.array([STAMP]), "knee", effort=np.array([-3.5]))
+    (raw,) = cdr.joint_states(np.array([STAMP]), "knee", effort=np.array([-3.5]))
     assert ros.effort_of(deserialize_message(raw, ros.JointState), "knee") == (STAMP, -3.5)
-    (raw,) = encoding.wrenches(np.array([STAMP]), np.arange(6.0)[None, :])
+    (raw,) = cdr.wrenches(np.array([STAMP]), np.arange(6.0)[None, :])
     assert ros.wrench_of(deserialize_message(raw, ros.WrenchStamped), "torque.x") == (STAMP, 3.0)
 
 

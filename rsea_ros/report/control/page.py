@@ -1,7 +1,5 @@
 """The report of a controlled actuator: torque tracking and output impedance."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
@@ -15,22 +13,12 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.report import words
 from rsea_ros.report.control.tables import control_tables, gains_words, rates, typeset
-from rsea_ros.report.figures.figure import (
-    Figure,
-    Json,
-    axis,
-    band,
-    frequency_axis,
-    layout,
-    line,
-    names_beside,
-)  # fmt: skip
-from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
+from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
 from rsea_ros.report.page import Block, bullets, key_numbers, page, section
 from rsea_ros.report.result_files import Provenance
 
-_COLOURS = (AFTER, BEFORE, TRUTH)
+_COLOURS = (fig.AFTER, fig.BEFORE, fig.TRUTH)
 
 BAND = (
     "Band: all benches of the set with that load (K_s ± 10 %, b_m ± 50 %, one sample and 2 ms late, the mode "
@@ -84,7 +72,7 @@ def _keys(study: Study) -> list[tuple[str, str]]:
     ]
 
 
-def _following(study: Study) -> list[Figure]:
+def _following(study: Study) -> list[fig.Figure]:
     """Return T_d over desired torque with its band over the set: clamped, and on an unknown free load."""
     first, rate = study.rates[0].free, f"{study.rates[0].design.rate:g} Hz"
     followed = np.nonzero(np.abs(first.gain) < 3.0)[0]
@@ -104,14 +92,14 @@ def _following(study: Study) -> list[Figure]:
 
 def _following_figure(
     study: Study, rig: Rig, title: str, seen: Sequence[tuple[Following, Spread]], more: str = ""
-) -> Figure:
+) -> fig.Figure:
     curves = [
         ResponseCurve(rate, colour, c.hz, c.torque, 2.0, band=_band(c, apart), phase=c.phase)
         for rate, (c, apart), colour in zip(rates(study), seen, _COLOURS, strict=False)
     ]
     hz = np.geomspace(1.0, 0.45 * max(at.design.rate for at in study.rates), 300)
     opened = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
-    curves.append(ResponseCurve("without control", MEASURED, hz, opened, 1.2, "dot"))
+    curves.append(ResponseCurve("without control", fig.MEASURED, hz, opened, 1.2, "dot"))
     caption = f"Distal over desired torque, 1 N·m, sine by sine, in simulation. {BAND} {more}".strip()
     marks = [Mark(3.0 * study.resonance, "3 × resonance")]
     return response_figure(title, curves, marks, caption, (-50.0, 15.0))
@@ -127,30 +115,31 @@ def _band(curve: Following, apart: Spread) -> Band:
     return Band(hz, (low, high), (late, early))
 
 
-def _impedance_figure(study: Study) -> Figure:
-    """Return the output impedance."""
+def _impedance_figure(study: Study) -> fig.Figure:
     first, shades = study.rates[0].impedance, list(zip(study.rates, _COLOURS, strict=False))
     items = [
         (f"{at.design.rate:g} Hz", at.impedance.hz, at.impedance.controlled, c, "solid") for at, c in shades
     ]
-    items += [("motor off", first.hz, first.motor_off, QUIET, "dash"),
-              ("passive spring", first.hz, first.spring, MEASURED, "dot")]  # fmt: skip
-    data = [band(at.softness.hz, at.softness.low, at.softness.high, faint(c, 0.18)) for at, c in shades]
+    items += [("motor off", first.hz, first.motor_off, fig.QUIET, "dash"),
+              ("passive spring", first.hz, first.spring, fig.MEASURED, "dot")]  # fmt: skip
+    data = [
+        fig.band(at.softness.hz, at.softness.low, at.softness.high, fig.faint(c, 0.18)) for at, c in shades
+    ]
     for name, hz, z, colour, dash in items:
-        look: Json = {"line": {"color": colour, "width": 1.8, "dash": dash}}
-        data.append(line(hz, np.abs(z), name, colour, hovertemplate="%{y:.3g} N·m per rad/s", **look))
+        look: fig.Json = {"line": {"color": colour, "width": 1.8, "dash": dash}}
+        data.append(fig.line(hz, np.abs(z), name, colour, hovertemplate="%{y:.3g} N·m per rad/s", **look))
     one = int(np.argmin(np.abs(first.hz - 1.0)))
     softer = abs(first.spring[one]) / abs(first.controlled[one])
     highest = max(float(at.impedance.hz[-1]) for at in study.rates)
-    return Figure(
+    return fig.Figure(
         title=f"At 1 Hz the moved output is {softer:.0f} times softer than the spring alone",
         caption="Torque error for each rad/s of the distal side, housing clamped. Spring alone: K_s/s + b_s. "
         "Band: the locked benches of the set.",
         data=data,
-        layout=layout(
-            xaxis=frequency_axis(float(first.hz[0]), highest),
-            yaxis=axis("N·m per rad/s", type="log"),
-            annotations=names_beside([(name, colour) for name, _, _, colour, _ in items], 0.08),
+        layout=fig.layout(
+            xaxis=fig.frequency_axis(float(first.hz[0]), highest),
+            yaxis=fig.axis("N·m per rad/s", type="log"),
+            annotations=fig.names_beside([(name, colour) for name, _, _, colour, _ in items], 0.08),
             margin={"l": 64, "r": 150, "t": 12, "b": 48},
         ),
         height=400,

@@ -1,7 +1,5 @@
 """A controlled actuator in tables: trials, gains and margins, compensations, limits; and control.json."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The report of a design: the result of the method, its gaps, and the designs that meet all demands."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -16,13 +14,13 @@ from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.design.surface import Point, bandwidth_contours, log_marks
 from rsea_ros.report.design.tables import checks_table, margins_table, springs_table, trains_table
-from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, points
-from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, QUIET, TRUTH, faint
+from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
 from rsea_ros.report.page import Block, Html, equation, key_numbers, page, section
 from rsea_ros.report.result_files import Provenance
 
-_COLOURS = (BEFORE, AFTER, TRUTH)
+_COLOURS = (fig.BEFORE, fig.AFTER, fig.TRUTH)
+_MARKS = (0.2, 0.5, 1, 2, 5, 10, 20)
 _TOP = 2e4
 """N·m/rad, upper end of the map of feasible designs."""
 
@@ -103,7 +101,7 @@ def _method(asked: SpringDesign, least: SpringDesign) -> Html:
     )
 
 
-def _map(designs: Sequence[SpringDesign]) -> Figure:
+def _map(designs: Sequence[SpringDesign]) -> fig.Figure:
     r, unit = designs[0].requirement, designs[0].unit
     j, bounds = np.geomspace(2e-4, 2e-2, 25), stiffness_bounds(r, unit)
     lines = {
@@ -115,22 +113,24 @@ def _map(designs: Sequence[SpringDesign]) -> Figure:
         f"{r.bandwidth:g} Hz, Eq. (7)": undamped_stiffness(r.bandwidth, j),
     }
     least = np.max(list(lines.values()), axis=0)
-    hidden: Json = {"hoverinfo": "skip", "line": {"width": 0}}
-    hover: Json = {"hovertemplate": "%{y:.0f} N·m/rad"}
-    data: list[Json] = [
-        line(1e3 * j, np.full(len(j), _TOP), "", TRUTH, **hidden),
-        line(1e3 * j, least, "", TRUTH, fill="tonexty", fillcolor=faint(TRUTH, 0.12), **hidden),
+    hidden: fig.Json = {"hoverinfo": "skip", "line": {"width": 0}}
+    hover: fig.Json = {"hovertemplate": "%{y:.0f} N·m/rad"}
+    data: list[fig.Json] = [
+        fig.line(1e3 * j, np.full(len(j), _TOP), "", fig.TRUTH, **hidden),
+        fig.line(
+            1e3 * j, least, "", fig.TRUTH, fill="tonexty", fillcolor=fig.faint(fig.TRUTH, 0.12), **hidden
+        ),
     ]
     middle = float(np.log10(1e3 * j[len(j) // 3]))
-    names = [label("<b>meets all demands</b>", middle, float(np.log10(0.6 * _TOP)), TRUTH)]
-    for (name, k), colour in zip(lines.items(), (BEFORE, INK, QUIET, AFTER), strict=True):
-        data.append(line(1e3 * j, k, name, colour, **hover))
-        names.append(label(name, 1.01, float(np.log10(k[-1])), colour, xref="paper"))
+    names = [fig.label("<b>meets all demands</b>", middle, float(np.log10(0.6 * _TOP)), fig.TRUTH)]
+    for (name, k), colour in zip(lines.items(), (fig.BEFORE, fig.INK, fig.QUIET, fig.AFTER), strict=True):
+        data.append(fig.line(1e3 * j, k, name, colour, **hover))
+        names.append(fig.label(name, 1.01, float(np.log10(k[-1])), colour, xref="paper"))
     for d, colour in zip(designs, _COLOURS, strict=False):
         x, k_s = 1e3 * r.inertia, d.stiffness
-        data.append(points([x], [k_s], f"{k_s:.0f}", marker={"size": 10, "color": colour}, **hover))
+        data.append(fig.points([x], [k_s], f"{k_s:.0f}", marker={"size": 10, "color": colour}, **hover))
         at = float(np.log10(x)), float(np.log10(k_s))
-        names.append(label(f"<b>{k_s:.0f}</b>", *at, colour, xshift=8, yshift=-11))
+        names.append(fig.label(f"<b>{k_s:.0f}</b>", *at, colour, xshift=8, yshift=-11))
     alone = f"{float(undamped_stiffness(r.bandwidth, unit.spin)):.0f} N·m/rad"
     title = (
         f"A chassis without mass needs {alone} for {r.bandwidth:g} Hz; a heavier one less, until it cancels "
@@ -141,30 +141,30 @@ def _map(designs: Sequence[SpringDesign]) -> Figure:
             f"However light the chassis, {r.bandwidth:g} Hz need {alone} with this rotor: Eq. (7) considers "
             "only the chassis"
         )
-    plane = layout(
-        xaxis=axis("spring chassis inertia J_sc, g·m²", type="log", **log_marks(0.2, 0.5, 1, 2, 5, 10, 20)),
-        yaxis=axis(
+    plane = fig.layout(
+        xaxis=fig.axis("spring chassis inertia J_sc, g·m²", type="log", **log_marks(*_MARKS)),
+        yaxis=fig.axis(
             "stiffness K_s, N·m/rad", type="log", range=[float(np.log10(v)) for v in (50.0, _TOP)],
             **log_marks(100, 200, 500, 1000, 2000, 5000, 10000),
         ),
         annotations=names, hovermode="closest", margin={"l": 72, "r": 210, "t": 12, "b": 48},
     )  # fmt: skip
     caption = "A design meets a demand above its line. Eq. (7) is the only one that the paper draws."
-    return Figure(title, caption, data, plane, 460)
+    return fig.Figure(title, caption, data, plane, 460)
 
 
-def _surface(d: SpringDesign) -> Figure:
+def _surface(d: SpringDesign) -> fig.Figure:
     k = d.stiffness
     shown = [
-        Point(f"{k:.0f} N·m/rad, chassis", k, d.requirement.inertia, AFTER),
-        Point("the same with the rotor's spin", k, d.inner, BEFORE, "bottom center"),
+        Point(f"{k:.0f} N·m/rad, chassis", k, d.requirement.inertia, fig.AFTER),
+        Point("the same with the rotor's spin", k, d.inner, fig.BEFORE, "bottom center"),
     ]
     title = "Bandwidth by Eq. (7) over stiffness and inertia (Fig. 9)"
     caption = "Both axes are logarithmic; lines of equal bandwidth every 20 Hz."
     return bandwidth_contours(title, shown, caption)
 
 
-def _open_loop(designs: Sequence[SpringDesign]) -> Figure:
+def _open_loop(designs: Sequence[SpringDesign]) -> fig.Figure:
     hz: FloatArray = np.geomspace(0.5, 300.0, 500)
     curves = []
     for d, colour in zip(designs, _COLOURS, strict=False):

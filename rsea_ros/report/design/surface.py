@@ -1,7 +1,5 @@
 """Fig. 9: bandwidth over stiffness and inertia, Eq. (7), as contours and as the surface's two views."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,8 +7,7 @@ import numpy as np
 
 from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.records.record import FloatArray
-from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, numbers, points
-from rsea_ros.report.figures.palette import INK, faint
+from rsea_ros.report.figures import figure as fig
 
 _SHADES = [[0.0, "#eef3f8"], [0.5, "#7fa8cf"], [1.0, "#123f6d"]]
 
@@ -27,29 +24,29 @@ class Point:
     side: str = "top center"
 
 
-def bandwidth_contours(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
+def bandwidth_contours(title: str, shown: Sequence[Point], caption: str = "") -> fig.Figure:
     """Return lines of equal bandwidth by Eq. (7) with actuators among them."""
     k, j = _grid(shown)
-    contours: Json = {
+    contours: fig.Json = {
         "type": "contour",
-        "x": numbers(k),
-        "y": numbers(1e3 * j),
-        "z": [numbers(row) for row in undamped_band(k[None, :], j[:, None])],
+        "x": fig.numbers(k),
+        "y": fig.numbers(1e3 * j),
+        "z": [fig.numbers(row) for row in undamped_band(k[None, :], j[:, None])],
         "colorscale": _SHADES,
         "showscale": False,
         "contours": {"start": 20, "end": 400, "size": 20, "showlabels": True},
-        "line": {"color": faint(INK, 0.35)},
+        "line": {"color": fig.faint(fig.INK, 0.35)},
         "hovertemplate": "K_s %{x:.0f} N·m/rad<br>inertia %{y:.2f} g·m²<br>%{z:.1f} Hz<extra></extra>",
     }
-    plane = layout(
-        xaxis=axis("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
-        yaxis=axis("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
+    plane = fig.layout(
+        xaxis=fig.axis("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
+        yaxis=fig.axis("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
         hovermode="closest",
     )
-    return Figure(title, caption, [contours, *(_named(p) for p in shown)], plane, 480)
+    return fig.Figure(title, caption, [contours, *(_named(p) for p in shown)], plane, 480)
 
 
-def _named(p: Point) -> Json:
+def _named(p: Point) -> fig.Json:
     z = float(undamped_band(p.stiffness, p.inertia))
     return {
         "type": "scatter",
@@ -58,13 +55,13 @@ def _named(p: Point) -> Json:
         "y": [1e3 * abs(p.inertia)],
         "text": [f"<b>{p.name.replace(', n', ',<br>n')}</b>"],
         "textposition": p.side,
-        "textfont": {"size": 12, "color": INK},
+        "textfont": {"size": 12, "color": fig.INK},
         "marker": {"size": 9, "color": p.colour, "line": {"color": "#ffffff", "width": 1}},
         "hovertemplate": f"{p.name}: {z:.1f} Hz<extra></extra>",
     }
 
 
-def slices(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
+def slices(title: str, shown: Sequence[Point], caption: str = "") -> fig.Figure:
     """Return Fig. 9 (b) and (c): bandwidth over inertia at some stiffnesses, and the other way round."""
     k, j = _grid(shown)
     shades = ("#9db9d6", "#5f8fbf", "#1864ab")
@@ -72,27 +69,27 @@ def slices(title: str, shown: Sequence[Point], caption: str = "") -> Figure:
     views += [(f"{1e3 * v:g} g·m²", k, undamped_band(k, v), "2") for v in (1e-2, 3e-3, 1e-3)]
     data, names = [], []
     for (name, x, y, which), shade in zip(views, shades * 2, strict=True):
-        place: Json = {"xaxis": f"x{which}", "yaxis": f"y{which}"} if which else {}
-        data.append(line(x, y, name, shade, hovertemplate="%{y:.1f} Hz", **place))
-        at: Json = {"xref": f"x{which}", "yref": f"y{which}", "xshift": 6}
-        names.append(label(name, float(np.log10(x[-1])), float(np.log10(y[-1])), shade, **at))
+        place: fig.Json = {"xaxis": f"x{which}", "yaxis": f"y{which}"} if which else {}
+        data.append(fig.line(x, y, name, shade, hovertemplate="%{y:.1f} Hz", **place))
+        at: fig.Json = {"xref": f"x{which}", "yref": f"y{which}", "xshift": 6}
+        names.append(fig.label(name, float(np.log10(x[-1])), float(np.log10(y[-1])), shade, **at))
     for p in shown:
         z, dot = [float(undamped_band(p.stiffness, p.inertia))], {"size": 9, "color": p.colour}
-        data.append(points([1e3 * abs(p.inertia)], z, p.name, marker=dot))
-        data.append(points([p.stiffness], z, p.name, marker=dot, xaxis="x2", yaxis="y2"))
+        data.append(fig.points([1e3 * abs(p.inertia)], z, p.name, marker=dot))
+        data.append(fig.points([p.stiffness], z, p.name, marker=dot, xaxis="x2", yaxis="y2"))
     decades = {"type": "log"} | log_marks(0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
-    drawing = layout(
-        xaxis=axis("inertia, g·m²", domain=[0.0, 0.4], anchor="y", **decades),
-        yaxis=axis("bandwidth, Hz", anchor="x", **decades),
-        xaxis2=axis("stiffness, N·m/rad", domain=[0.56, 0.97], anchor="y2", **decades),
-        yaxis2=axis("", anchor="x2", **decades),
+    drawing = fig.layout(
+        xaxis=fig.axis("inertia, g·m²", domain=[0.0, 0.4], anchor="y", **decades),
+        yaxis=fig.axis("bandwidth, Hz", anchor="x", **decades),
+        xaxis2=fig.axis("stiffness, N·m/rad", domain=[0.56, 0.97], anchor="y2", **decades),
+        yaxis2=fig.axis("", anchor="x2", **decades),
         annotations=names,
         hovermode="closest",
     )
-    return Figure(title, caption, data, drawing, 400)
+    return fig.Figure(title, caption, data, drawing, 400)
 
 
-def log_marks(*values: float) -> Json:
+def log_marks(*values: float) -> fig.Json:
     """Return plain numbers on a logarithmic axis."""
     return {"tickvals": list(values), "ticktext": [f"{v:g}" for v in values]}
 

@@ -1,7 +1,5 @@
 """A design in tables: demands, trains, springs, margins; and design.json."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Figures of a diagnosis before and after: the residual over frequency, the channel over time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +7,8 @@ import numpy as np
 from rsea_ros.diagnosis.result import Diagnosis, Spectrum
 from rsea_ros.documents.wording import list_names
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import Figure, band
+from rsea_ros.report.figures.figure import AFTER, BEFORE, Figure, band, faint
 from rsea_ros.report.figures.overlay import Simulated, overlay_figure
-from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
 from rsea_ros.report.figures.spectrum import ABOVE_FLOOR, SpectrumLine, finding, in_bands, residual_figure
 
 _FIRST_VIEW = 3.0

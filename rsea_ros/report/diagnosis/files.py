@@ -1,7 +1,5 @@
 """The files of a diagnosis, all or none: diagnosis.json, overlay.mcap, the extended model, the page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

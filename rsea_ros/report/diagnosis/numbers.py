@@ -1,7 +1,5 @@
 """Numbers of a diagnosis as people read them: residuals over the noise, gains, sizes with their doubt."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A sketch of the bench from the command to the end that holds the spring, with the culprits marked."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from html import escape
 

@@ -1,7 +1,5 @@
 """The essence of a diagnosis on a terminal, in about ten lines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from rich.text import Text
@@ -13,7 +11,7 @@ from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.page import fitted_rivals
 from rsea_ros.report.remark_words import fault_lines, remark_sentences
 from rsea_ros.report.rig import command, rig_named, right_rig, split_off_rig
-from rsea_ros.report.wrapped_lines import LABEL, WIDTH, command_row, row, wrap
+from rsea_ros.report.words import LABEL, WIDTH, command_row, row, wrap
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
 _MOST = 3

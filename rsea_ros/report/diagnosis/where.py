@@ -1,7 +1,5 @@
 """Where the simulation is wrong: its residual over the noise against load, speed, rotor angle and time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,8 +13,7 @@ from rsea_ros.model.extent import SKIPPED_START
 from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import words as say
-from rsea_ros.report.figures.figure import Figure, Json, axis, layout, line, names_beside
-from rsea_ros.report.figures.palette import AFTER, BEFORE, NOISE, QUIET
+from rsea_ros.report.figures import figure as fig
 
 BINS = 16
 _FEWEST = 4 * BINS
@@ -83,29 +80,31 @@ def _respects(
     yield "time", "s", overlay.t - overlay.t[0], True
 
 
-def where_figure(shown: Sequence[Profile], changed: bool, colour: str = BEFORE) -> Figure:
+def where_figure(shown: Sequence[Profile], changed: bool, colour: str = fig.BEFORE) -> fig.Figure:
     """Return one panel for each respect, side by side.
 
     changed: whether to draw the residual with the causes too. colour: of the residual without them.
     """
-    curves = [("before" if changed else "residual", colour), *([("after", AFTER)] if changed else [])]
+    curves = [("before" if changed else "residual", colour), *([("after", fig.AFTER)] if changed else [])]
     width = (1.0 - _GAP * (len(shown) - 1)) / len(shown)
-    data: list[Json] = []
-    axes: Json = {"yaxis": _level_axis(shown)}
+    data: list[fig.Json] = []
+    axes: fig.Json = {"yaxis": _level_axis(shown)}
     for i, p in enumerate(shown):
         x, left = f"x{i + 1 if i else ''}", i * (width + _GAP)
         title = f"{say.respect(p.what)}, {words.unit(p.unit)}"
-        axes[x.replace("x", "xaxis")] = axis(title, domain=[left, min(left + width, 1.0)], nticks=5)
-        place: Json = {"xaxis": x, "yaxis": "y"}
-        data.append(line(p.edges[[0, -1]], np.ones(2), "noise", NOISE, 6.0, hoverinfo="skip", **place))
+        axes[x.replace("x", "xaxis")] = fig.axis(title, domain=[left, min(left + width, 1.0)], nticks=5)
+        place: fig.Json = {"xaxis": x, "yaxis": "y"}
+        data.append(
+            fig.line(p.edges[[0, -1]], np.ones(2), "noise", fig.NOISE, 6.0, hoverinfo="skip", **place)
+        )
         for (name, shade), values in zip(curves, (p.before, p.after), strict=False):
             steps = np.append(values, values[-1])
-            trace = line(p.edges, steps, name, shade, 1.8, hovertemplate="%{y:.2f} times", **place)
+            trace = fig.line(p.edges, steps, name, shade, 1.8, hovertemplate="%{y:.2f} times", **place)
             data.append({**trace, "line": {**trace["line"], "shape": "hv"}})
-    names = names_beside([*((f"<b>{name}</b>", c) for name, c in curves), ("noise", QUIET)], 0.09)
+    names = fig.names_beside([*((f"<b>{name}</b>", c) for name, c in curves), ("noise", fig.QUIET)], 0.09)
     caption = "RMS of the residual over the noise. Bins of load and speed hold equally many samples."
-    drawing = layout(**axes, annotations=names, hovermode="closest")
-    return Figure(finding(shown), caption, data, drawing, 320)
+    drawing = fig.layout(**axes, annotations=names, hovermode="closest")
+    return fig.Figure(finding(shown), caption, data, drawing, 320)
 
 
 def finding(shown: Sequence[Profile]) -> str:
@@ -129,7 +128,7 @@ def _extremes(profile: Profile) -> str:
     return f"{most} times the noise from {where}, {least} where it is least"
 
 
-def _level_axis(shown: Sequence[Profile]) -> Json:
+def _level_axis(shown: Sequence[Profile]) -> fig.Json:
     """Return the axis of all panels; 1, 2 and 5 of each decade stand as plain numbers.
 
     Zero (a sensor at rest) has no place on it.
@@ -140,4 +139,4 @@ def _level_axis(shown: Sequence[Profile]) -> Json:
     each = (1,) if high - low > _MANY_DECADES else (1, 2, 5)
     marks = [m * 10.0**e for e in range(-2, 7) for m in each if low <= np.log10(m * 10.0**e) <= high]
     text = [f"{m:g}" for m in marks]
-    return axis("times the noise", type="log", range=[low, high], tickvals=marks, ticktext=text)
+    return fig.axis("times the noise", type="log", range=[low, high], tickvals=marks, ticktext=text)

@@ -1,7 +1,5 @@
 """A diagnosis in sentences: verdict, certainty and evidence of causes, rejections, the next run."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Designed runs and sessions of them in sentences, and experiment.json."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -208,7 +206,6 @@ def campaign_json(outcome: CampaignOutcome, campaign: Campaign) -> dict[str, Any
 
 
 def _run(p: Proposal | None) -> dict[str, Any] | None:
-    """Return a run: its shape, its expected separation, its peaks."""
     if p is None:
         return None
     pairs = [
@@ -221,7 +218,6 @@ def _run(p: Proposal | None) -> dict[str, Any] | None:
 
 
 def _proof(proof: Proof) -> dict[str, Any]:
-    """Return a pair that no run separates."""
     b = proof.bound
     return {
         "causes": [b.true, b.rival],

@@ -1,7 +1,5 @@
 """Bode figure: measured response with its 95 % band, the model, their ratio, the coherence; its finding."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -11,18 +9,7 @@ from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.records.record import UNITS, ComplexArray, FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import (
-    Figure,
-    Json,
-    axis,
-    band,
-    frequency_axis,
-    label,
-    layout,
-    line,
-    names_beside,
-)  # fmt: skip
-from rsea_ros.report.figures.palette import AFTER, MEASURED, QUIET, faint
+from rsea_ros.report.figures import figure as fig
 
 _SIDE = Z95 / np.sqrt(2.0)
 """Half-width of the 95 % interval of a circular complex variable along one direction, in its sd."""
@@ -39,7 +26,7 @@ Values = TypeVar("Values", FloatArray, ComplexArray)
 Sides = tuple[FloatArray, FloatArray, FloatArray]
 
 
-def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) -> Figure:
+def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) -> fig.Figure:
     """Return gain, phase, ratio and coherence over frequency. model: at the measured frequencies."""
     shown, fit = thin(measured, model)
     hz, response = shown.frequency, shown.response
@@ -59,27 +46,33 @@ def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) 
         reach = (np.abs(ratio) + high)[trusted]
         limit = min(_MOST_DECIBEL, max(0.1, 1.2 * float(np.quantile(reach, 0.98)) if trusted.any() else 1.2))
         data += [
-            line(hz[[0, -1]], np.zeros(2), "model", AFTER, 1.6, yaxis="y3", hoverinfo="skip"),
-            band(hz, ratio + low, ratio + high, faint(MEASURED, 0.28), yaxis="y3"),
-            line(hz, ratio, "measured / model", MEASURED, 1.6, yaxis="y3", hovertemplate="%{y:.3f} dB"),
+            fig.line(hz[[0, -1]], np.zeros(2), "model", fig.AFTER, 1.6, yaxis="y3", hoverinfo="skip"),
+            fig.band(hz, ratio + low, ratio + high, fig.faint(fig.MEASURED, 0.28), yaxis="y3"),
+            fig.line(
+                hz, ratio, "measured / model", fig.MEASURED, 1.6, yaxis="y3", hovertemplate="%{y:.3f} dB"
+            ),
         ]
-    data.append(line(hz, shown.coherence, "coherence", QUIET, 1.2, yaxis="y4", hovertemplate="%{y:.3f}"))
-    return Figure(
+    data.append(
+        fig.line(hz, shown.coherence, "coherence", fig.QUIET, 1.2, yaxis="y4", hovertemplate="%{y:.3f}")
+    )
+    return fig.Figure(
         finding(measured, model), _caption(measured), data, _layout(shown, fit is not None, limit), 720
     )
 
 
 def _curves(
     hz: FloatArray, measured: Sides, has_model: bool, model: FloatArray, y: str, hover: str
-) -> list[Json]:
+) -> list[fig.Json]:
     """Return the measured values with their band, and the model's on top. measured: low, middle, high."""
     low, middle, high = measured
     traces = [
-        band(hz, low, high, faint(MEASURED, 0.28), yaxis=y),
-        line(hz, middle, "measured", faint(MEASURED, 0.55), 5.0, yaxis=y, hovertemplate=hover),
+        fig.band(hz, low, high, fig.faint(fig.MEASURED, 0.28), yaxis=y),
+        fig.line(hz, middle, "measured", fig.faint(fig.MEASURED, 0.55), 5.0, yaxis=y, hovertemplate=hover),
     ]
     return (
-        [*traces, line(hz, model, "model", AFTER, 1.6, yaxis=y, hovertemplate=hover)] if has_model else traces
+        [*traces, fig.line(hz, model, "model", fig.AFTER, 1.6, yaxis=y, hovertemplate=hover)]
+        if has_model
+        else traces
     )
 
 
@@ -87,19 +80,19 @@ def _decibel(ratio: FloatArray) -> FloatArray:
     return np.asarray(20.0 * np.log10(np.maximum(ratio, 0.05)))
 
 
-def _layout(shown: FrequencyResponse, has_model: bool, limit: float) -> Json:
-    names = [*([("<b>model</b>", AFTER)] if has_model else []), ("measured,<br>95 % band", MEASURED)]
+def _layout(shown: FrequencyResponse, has_model: bool, limit: float) -> fig.Json:
+    names = [*([("<b>model</b>", fig.AFTER)] if has_model else []), ("measured,<br>95 % band", fig.MEASURED)]
     above, below = (words.unit(UNITS[n]) for n in (shown.output, shown.input))
     reference = "" if above == below else f" re 1 {above} per {below}"
-    return layout(
-        xaxis=frequency_axis(shown.frequency[0], shown.frequency[-1], anchor="y4"),
-        yaxis=axis(f"gain, dB{reference}", domain=[0.64, 1.0]),
-        yaxis2=axis("phase, °", domain=[0.39, 0.6], dtick=90),
-        yaxis3=axis("gain, dB", domain=[0.165, 0.35], range=[-limit, limit], nticks=5),
-        yaxis4=axis("coherence", domain=[0.0, 0.125], range=[0, 1.08], tickvals=[0, 0.5, 1]),
+    return fig.layout(
+        xaxis=fig.frequency_axis(shown.frequency[0], shown.frequency[-1], anchor="y4"),
+        yaxis=fig.axis(f"gain, dB{reference}", domain=[0.64, 1.0]),
+        yaxis2=fig.axis("phase, °", domain=[0.39, 0.6], dtick=90),
+        yaxis3=fig.axis("gain, dB", domain=[0.165, 0.35], range=[-limit, limit], nticks=5),
+        yaxis4=fig.axis("coherence", domain=[0.0, 0.125], range=[0, 1.08], tickvals=[0, 0.5, 1]),
         annotations=[
-            *names_beside(names, 0.04),
-            label("measured<br>÷ model", 1.015, 0.0, MEASURED, xref="paper", yref="y3"),
+            *fig.names_beside(names, 0.04),
+            fig.label("measured<br>÷ model", 1.015, 0.0, fig.MEASURED, xref="paper", yref="y3"),
         ],
         hoversubplots="axis",
     )
@@ -125,7 +118,6 @@ def finding(measured: FrequencyResponse, model: ComplexArray | None) -> str:
 
 
 def _caption(measured: FrequencyResponse) -> str:
-    """Return how far to trust the measurement and how it was made."""
     high = measured.frequency[measured.coherence > _COHERENT]
     reach = f"Coherence is above {_COHERENT:g} up to {words.number(high[-1])} Hz. " if len(high) else ""
     return (

@@ -1,6 +1,7 @@
-"""A figure as plain values in the terms of plotly.js: a sentence that says the finding, traces, layout."""
+"""A figure as plain values in the terms of plotly.js: a sentence that says the finding, traces, layout.
 
-from __future__ import annotations
+Few colours, each with one meaning on every page; colour-blind readers can distinguish them.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,12 +11,28 @@ from typing import Any
 import numpy as np
 
 from rsea_ros.records.record import FloatArray
-from rsea_ros.report.figures.palette import GRID, INK, QUIET
 
 Json = dict[str, Any]
+INK = "#1f2933"
+QUIET = "#66717d"
+GRID = "#e6e9ec"
+MEASURED = "#7b8794"
+AFTER = "#1864ab"
+"""The model at the end: fitted, or extended."""
+BEFORE = "#d9730d"
+"""The model that something is wrong with."""
+NOISE = "#adb5bd"
+TRUTH = "#2b8a3e"
+
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 _DIGITS, _MOST_DIGITS = 5, 15
 """Significant digits of a number, at least and at most: a double has 15."""
+
+
+def faint(colour: str, opacity: float) -> str:
+    """Return a #rrggbb colour as rgba() of an opacity from 0 to 1."""
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"
 
 
 @dataclass(frozen=True)

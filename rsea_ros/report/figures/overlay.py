@@ -1,7 +1,5 @@
 """Measured against simulated over time, residual beneath. Drawn coarse, and from all samples on zoom."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 from collections.abc import Mapping, Sequence
@@ -13,8 +11,7 @@ import numpy.typing as npt
 
 from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, names_beside
-from rsea_ros.report.figures.palette import MEASURED, faint
+from rsea_ros.report.figures.figure import MEASURED, Figure, Json, axis, faint, label, layout, names_beside
 
 MOST_SAMPLES = 45_000
 """Of a trace in the page: the paper's 160 s at 280 Hz. A longer one keeps its and the residual's extremes."""

@@ -1,25 +1,12 @@
 """Gain and phase of several responses with marks where the paper says a number."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rsea_ros.records.record import ComplexArray, FloatArray
-from rsea_ros.report.figures.figure import (
-    Figure,
-    Json,
-    axis,
-    band,
-    frequency_axis,
-    label,
-    layout,
-    line,
-    names_beside,
-)  # fmt: skip
-from rsea_ros.report.figures.palette import QUIET, faint
+from rsea_ros.report.figures import figure as fig
 
 
 @dataclass(frozen=True)
@@ -65,41 +52,43 @@ class Mark:
 def response_figure(
     title: str, responses: Sequence[ResponseCurve], marks: Sequence[Mark] = (), caption: str = "",
     decibel: tuple[float, float] | None = None,
-) -> Figure:  # fmt: skip
+) -> fig.Figure:  # fmt: skip
     """Return gain and phase over frequency; marks are vertical lines. decibel: range of the gain axis."""
-    data: list[Json] = []
+    data: list[fig.Json] = []
     for r in responses:
         if r.band is not None:
-            shade = faint(r.colour, 0.18)
-            data.append(band(r.band.hz, *r.band.gain, shade))
-            data.append(band(r.band.hz, *r.band.phase, shade, yaxis="y2"))
+            shade = fig.faint(r.colour, 0.18)
+            data.append(fig.band(r.band.hz, *r.band.gain, shade))
+            data.append(fig.band(r.band.hz, *r.band.phase, shade, yaxis="y2"))
         gain = 20.0 * np.log10(np.abs(r.values))
-        parts: Json = {"line": {"color": r.colour, "width": r.width, "dash": r.dash}}
-        data.append(line(r.hz, gain, r.name, r.colour, hovertemplate="%{y:.2f} dB", **parts))
+        parts: fig.Json = {"line": {"color": r.colour, "width": r.width, "dash": r.dash}}
+        data.append(fig.line(r.hz, gain, r.name, r.colour, hovertemplate="%{y:.2f} dB", **parts))
         parts |= {"hovertemplate": "%{y:.1f}°", "yaxis": "y2"}
-        data.append(line(r.hz, r.degrees, r.name, r.colour, **parts))
-    return Figure(title, caption, data, _layout(responses, marks, decibel), 560)
+        data.append(fig.line(r.hz, r.degrees, r.name, r.colour, **parts))
+    return fig.Figure(title, caption, data, _layout(responses, marks, decibel), 560)
 
 
 def _layout(
     responses: Sequence[ResponseCurve], marks: Sequence[Mark], decibel: tuple[float, float] | None
-) -> Json:
+) -> fig.Json:
     low, high = min(r.hz[0] for r in responses), max(r.hz[-1] for r in responses)
     turned = [np.ptp(r.degrees) for r in responses]
     turned += [np.ptp(np.concatenate(r.band.phase)) for r in responses if r.band is not None]
     tick = 90.0 if max(turned) <= 720.0 else 180.0  # not more than eight marks
     notes = [
-        label(m.text, float(np.log10(m.hz)), 1.0, QUIET, yref="paper", yanchor="bottom", xanchor=m.anchor)
+        fig.label(
+            m.text, float(np.log10(m.hz)), 1.0, fig.QUIET, yref="paper", yanchor="bottom", xanchor=m.anchor
+        )
         for m in marks
     ]
-    stroke: Json = {"type": "line", "xref": "x", "yref": "paper"}
-    style = {"color": QUIET, "width": 1, "dash": "dot"}
-    gain = axis("gain, dB", domain=[0.44, 1.0])
-    return layout(
-        xaxis=frequency_axis(low, high, anchor="y2"),
+    stroke: fig.Json = {"type": "line", "xref": "x", "yref": "paper"}
+    style = {"color": fig.QUIET, "width": 1, "dash": "dot"}
+    gain = fig.axis("gain, dB", domain=[0.44, 1.0])
+    return fig.layout(
+        xaxis=fig.frequency_axis(low, high, anchor="y2"),
         yaxis={**gain, "range": list(decibel)} if decibel else gain,
-        yaxis2=axis("phase, °", domain=[0.0, 0.36], dtick=tick),
-        annotations=[*names_beside([(r.name, r.colour) for r in responses], 0.075), *notes],
+        yaxis2=fig.axis("phase, °", domain=[0.0, 0.36], dtick=tick),
+        annotations=[*fig.names_beside([(r.name, r.colour) for r in responses], 0.075), *notes],
         shapes=[{**stroke, "x0": m.hz, "x1": m.hz, "y0": 0.0, "y1": 1.0, "line": style} for m in marks],
         hoversubplots="axis",
         margin={"l": 64, "r": 190, "t": 34, "b": 48},

@@ -1,7 +1,5 @@
 """Amplitude spectral density of residuals against the noise floor."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,8 +7,7 @@ import numpy as np
 
 from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import Figure, Json, axis, frequency_axis, layout, line, names_beside
-from rsea_ros.report.figures.palette import NOISE, QUIET
+from rsea_ros.report.figures import figure as fig
 
 _PER_DECADE = 40
 _LONGEST = 4096
@@ -31,20 +28,24 @@ class SpectrumLine:
 def residual_figure(
     title: str, channel: str, frequency: FloatArray, curves: Sequence[SpectrumLine], noise: float,
     caption: str = "",
-) -> Figure:  # fmt: skip
+) -> fig.Figure:  # fmt: skip
     """Return the densities of residuals over frequency, Hz. noise: density of the noise floor."""
     unit, floor, ends = words.unit(UNITS[channel]), np.full(2, noise), frequency[[0, -1]]
     drawn = [(c, *in_bands(frequency, c.density)) for c in curves]
-    data: list[Json] = [line(ends, floor, "noise floor", NOISE, 6.0, hoverinfo="skip")]
-    data += [line(f, d, c.name, c.colour, 1.8, hovertemplate=f"%{{y:.3g}} {unit}/√Hz") for c, f, d in drawn]
+    data: list[fig.Json] = [fig.line(ends, floor, "noise floor", fig.NOISE, 6.0, hoverinfo="skip")]
+    data += [
+        fig.line(f, d, c.name, c.colour, 1.8, hovertemplate=f"%{{y:.3g}} {unit}/√Hz") for c, f, d in drawn
+    ]
     exponents = np.log10(np.maximum(np.concatenate([*(d for _, _, d in drawn), floor]), _TINY))
     low, high = float(exponents.min()), float(exponents.max())
     lacking = max(0.0, 2.0 - (high - low)) / 2.0  # two decades at least
     reach = [low - lacking - 0.1, high + lacking + 0.3]
-    height = axis(f"density, {unit}/√Hz", type="log", dtick=1, exponentformat="power", range=reach)
-    names = names_beside([*((f"<b>{c.name}</b>", c.colour) for c in curves), ("noise floor", QUIET)], 0.075)
-    across = frequency_axis(frequency[0], frequency[-1])
-    return Figure(title, caption, data, layout(xaxis=across, yaxis=height, annotations=names), 380)
+    height = fig.axis(f"density, {unit}/√Hz", type="log", dtick=1, exponentformat="power", range=reach)
+    names = fig.names_beside(
+        [*((f"<b>{c.name}</b>", c.colour) for c in curves), ("noise floor", fig.QUIET)], 0.075
+    )
+    across = fig.frequency_axis(frequency[0], frequency[-1])
+    return fig.Figure(title, caption, data, fig.layout(xaxis=across, yaxis=height, annotations=names), 380)
 
 
 def density(residual: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:

@@ -8,20 +8,8 @@ import numpy as np
 
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, numbers, points
-from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, NOISE, QUIET, faint
-from rsea_ros.report.fleet.words import (
-    amount,
-    beginning,
-    cause_name,
-    dates,
-    finding,
-    name,
-    percent,
-    short_day,
-    size_now,
-    value,
-)  # fmt: skip
+from rsea_ros.report.figures import figure as fig
+from rsea_ros.report.fleet import words as say
 from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Change, Interval, Trend
 from rsea_ros.trends.series import DAY, YEAR
@@ -37,10 +25,10 @@ _FINE = 0.02
 _AHEAD = 0.5
 """Share of the time covered up to which a trend is drawn on."""
 _MARGIN = {"l": 64, "r": 24, "t": 12, "b": 40}
-_ACROSS: Json = {"xref": "paper", "x0": 0.0, "x1": 1.0}
+_ACROSS: fig.Json = {"xref": "paper", "x0": 0.0, "x1": 1.0}
 
 
-def _date_axis(steps: Steps, until_s: float = 0.0) -> Json:
+def _date_axis(steps: Steps, until_s: float = 0.0) -> fig.Json:
     """Return an axis of dates over all steps, longer where something lies beyond them."""
     end = max(float(steps.edges[-1]), until_s)
     days = (end - float(steps.edges[0])) / DAY
@@ -48,32 +36,32 @@ def _date_axis(steps: Steps, until_s: float = 0.0) -> Json:
         {"dtick": 1000.0 * DAY * (1 if days <= _FEW / 2 else 2), "tickformat": _DAY} if days <= _FEW else {}
     )
     formats = [{"dtickrange": [None, "M1"], "value": _DAY}, {"dtickrange": ["M1", None], "value": "%b\n%Y"}]
-    return axis("", type="date", range=dates(steps.edges[0], end), showgrid=False, hoverformat="%e %b %Y",
-                tickformatstops=[] if ticks else formats, **ticks)  # fmt: skip
+    base = {"showgrid": False, "hoverformat": "%e %b %Y", "tickformatstops": [] if ticks else formats}
+    return fig.axis("", type="date", range=say.dates(steps.edges[0], end), **base, **ticks)
 
 
-def _change_marks(change: Change | Appearance) -> list[Json]:
+def _change_marks(change: Change | Appearance) -> list[fig.Json]:
     """Return a line where something changed, and a band where it may have."""
-    a, b, c = dates(change.earliest_s, change.since_s, change.latest_s)
+    a, b, c = say.dates(change.earliest_s, change.since_s, change.latest_s)
     common = {"xref": "x", "yref": "paper", "y0": 0.0, "y1": 1.0}
-    band = {"type": "rect", "x0": a, "x1": c, "fillcolor": faint(BEFORE, 0.14), "line": {"width": 0}}
-    stroke = {"type": "line", "x0": b, "x1": b, "line": {"color": BEFORE, "width": 1.2, "dash": "dot"}}
+    band = {"type": "rect", "x0": a, "x1": c, "fillcolor": fig.faint(fig.BEFORE, 0.14), "line": {"width": 0}}
+    stroke = {"type": "line", "x0": b, "x1": b, "line": {"color": fig.BEFORE, "width": 1.2, "dash": "dot"}}
     return [{**common, **band, "layer": "below"}, {**common, **stroke}]
 
 
-def _bars(colour: str, sides: FloatArray, below: FloatArray | None = None, **look: Any) -> Json:
-    lopsided = {} if below is None else {"symmetric": False, "arrayminus": numbers(below)}
-    return {"type": "data", "array": numbers(sides), "color": colour, "width": 0, **lopsided, **look}
+def _bars(colour: str, sides: FloatArray, below: FloatArray | None = None, **look: Any) -> fig.Json:
+    lopsided = {} if below is None else {"symmetric": False, "arrayminus": fig.numbers(below)}
+    return {"type": "data", "array": fig.numbers(sides), "color": colour, "width": 0, **lopsided, **look}
 
 
-def naming_figure(naming: Naming, appearance: Appearance | None, steps: Steps) -> Figure:
+def naming_figure(naming: Naming, appearance: Appearance | None, steps: Steps) -> fig.Figure:
     """Return a cause by its size; without one, and of a fault, the share of recordings that name it."""
-    plain = name(naming.about) + (" in the data" if naming.kind == "fault" else "")
+    plain = say.name(naming.about) + (" in the data" if naming.kind == "fault" else "")
     often = f"{int(np.sum(naming.named))} of {len(naming.named)} recordings"
     title = f"{plain}{' is named' if naming.kind == 'cause' else ''} in {often}"
     if appearance is not None:
-        plain = plain if naming.kind == "fault" else cause_name(appearance)
-        title = f"{plain} {beginning(appearance)}{size_now(appearance)}"
+        plain = plain if naming.kind == "fault" else say.cause_name(appearance)
+        title = f"{plain} {say.beginning(appearance)}{say.size_now(appearance)}"
     since = [] if appearance is None or appearance.from_first else _change_marks(appearance)
     if naming.size is None or not np.any(np.isfinite(naming.size)):
         return _shares(naming, title, since, steps)
@@ -81,21 +69,21 @@ def naming_figure(naming: Naming, appearance: Appearance | None, steps: Steps) -
     factor, unit = (100.0, "%") if naming.unit == "1" else words.unit_factor(typical, naming.unit)
     limit, note = naming.limit * factor, []
     if np.isfinite(limit):
-        note.append(label("detection limit", 0.0, limit, QUIET, xref="paper", yanchor="bottom"))
+        note.append(fig.label("detection limit", 0.0, limit, fig.QUIET, xref="paper", yanchor="bottom"))
         since.append({"type": "rect", **_ACROSS, "y0": 0.0, "y1": limit, "layer": "below",
-                      "fillcolor": faint(NOISE, 0.18), "line": {"width": 0}})  # fmt: skip
-    height = axis(f"{naming.parameter.replace('_', ' ')}, {unit}".rstrip(", "), rangemode="tozero")
-    return Figure(
+                      "fillcolor": fig.faint(fig.NOISE, 0.18), "line": {"width": 0}})  # fmt: skip
+    height = fig.axis(f"{naming.parameter.replace('_', ' ')}, {unit}".rstrip(", "), rangemode="tozero")
+    return fig.Figure(
         title,
         f"Median size of each {steps.name}, with the middle half. Grey at zero: recordings that do not name "
         "it; below the detection limit they could not.",
         _sizes(naming, naming.size * factor, unit, steps),
-        layout(xaxis=_date_axis(steps), yaxis=height, shapes=since, annotations=note, margin=_MARGIN),
+        fig.layout(xaxis=_date_axis(steps), yaxis=height, shapes=since, annotations=note, margin=_MARGIN),
         height=260,
     )
 
 
-def _sizes(naming: Naming, size: FloatArray, unit: str, steps: Steps) -> list[Json]:
+def _sizes(naming: Naming, size: FloatArray, unit: str, steps: Steps) -> list[fig.Json]:
     """Return sizes where it is named, and marks at zero where it is not. size: in the axis' unit."""
     usable = naming.named & np.isfinite(size)
     place = steps.place(naming.time_s[usable])
@@ -103,35 +91,35 @@ def _sizes(naming: Naming, size: FloatArray, unit: str, steps: Steps) -> list[Js
     low, middle, high = (
         np.array([np.quantile(size[usable][place == k], q) for k in weeks]) for q in (0.25, 0.5, 0.75)
     )
-    sides = _bars(faint(BEFORE, 0.6), high - middle, middle - low, thickness=1.2)
-    without = dates(*steps.middle[steps.count(naming.time_s[~naming.named]) > 0])
-    grey, dot = {"color": NOISE, "size": 4}, {"color": BEFORE, "size": 6}
+    sides = _bars(fig.faint(fig.BEFORE, 0.6), high - middle, middle - low, thickness=1.2)
+    without = say.dates(*steps.middle[steps.count(naming.time_s[~naming.named]) > 0])
+    grey, dot = {"color": fig.NOISE, "size": 4}, {"color": fig.BEFORE, "size": 6}
     return [
-        points(dates(*steps.middle[weeks]), numbers(middle), "named", marker=dot, error_y=sides,
+        fig.points(say.dates(*steps.middle[weeks]), fig.numbers(middle), "named", marker=dot, error_y=sides,
                hovertemplate=f"%{{y:.4g}} {unit}"),
-        points(without, [0.0] * len(without), "not named", marker=grey, hovertemplate="not named"),
+        fig.points(without, [0.0] * len(without), "not named", marker=grey, hovertemplate="not named"),
     ]  # fmt: skip
 
 
-def _shares(naming: Naming, title: str, since: list[Json], steps: Steps) -> Figure:
+def _shares(naming: Naming, title: str, since: list[fig.Json], steps: Steps) -> fig.Figure:
     asked, named = steps.count(naming.time_s), steps.count(naming.time_s[naming.named])
     some = asked > 0
     bars = {
-        "type": "bar", "name": "recordings", "width": _BAR * steps.days, "x": dates(*steps.middle[some]),
-        "y": numbers(100.0 * named[some] / asked[some]),
-        "marker": {"color": faint(BEFORE if naming.kind == "cause" else MEASURED, 0.8)},
+        "type": "bar", "name": "recordings", "width": _BAR * steps.days, "x": say.dates(*steps.middle[some]),
+        "y": fig.numbers(100.0 * named[some] / asked[some]),
+        "marker": {"color": fig.faint(fig.BEFORE if naming.kind == "cause" else fig.MEASURED, 0.8)},
         "customdata": np.column_stack([named[some], asked[some]]).tolist(),
         "hovertemplate": "%{customdata[0]} of %{customdata[1]} recordings<extra></extra>",
     }  # fmt: skip
-    drawing = layout(
-        xaxis=_date_axis(steps), yaxis=axis("%", range=[0.0, 102.0]), shapes=since, margin=_MARGIN
+    drawing = fig.layout(
+        xaxis=_date_axis(steps), yaxis=fig.axis("%", range=[0.0, 102.0]), shapes=since, margin=_MARGIN
     )
-    return Figure(
+    return fig.Figure(
         title, f"Share of the recordings of each {steps.name} that name it.", [bars], drawing, height=200
     )
 
 
-def parameter_figure(trend: Trend, steps: Steps) -> Figure:
+def parameter_figure(trend: Trend, steps: Steps) -> fig.Figure:
     """Return the figure of a parameter that the recordings determine: course, changes, forecast."""
     factor, unit = words.unit_factor(trend.now.value if trend.now else 1.0, trend.series.unit)
     assert trend.curve is not None
@@ -142,15 +130,17 @@ def parameter_figure(trend: Trend, steps: Steps) -> Figure:
     margin = {**_MARGIN, "t": 30 if labels else 12}
     if trend.to_limit_s is not None and trend.to_limit_s.value <= until:
         y = float(trend.limit * factor)
-        shapes.append({"type": "line", **_ACROSS, "y0": y, "y1": y, "line": {"color": BEFORE, "width": 1}})
-        labels.append(label("limit", 0.0, y, BEFORE, xref="paper", yanchor="bottom"))
-    return Figure(
-        finding(trend),
+        shapes.append(
+            {"type": "line", **_ACROSS, "y0": y, "y1": y, "line": {"color": fig.BEFORE, "width": 1}}
+        )
+        labels.append(fig.label("limit", 0.0, y, fig.BEFORE, xref="paper", yanchor="bottom"))
+    return fig.Figure(
+        say.finding(trend),
         _caption(trend),
         [*_course(trend, factor, fine), *ahead, *_weeks(bins, trend, steps, factor, unit, fine)],
-        layout(
+        fig.layout(
             xaxis=_date_axis(steps, until),
-            yaxis=axis(f"{name(trend.series.parameter)}, {unit}".rstrip(", "), hoverformat=".4g"),
+            yaxis=fig.axis(f"{say.name(trend.series.parameter)}, {unit}".rstrip(", "), hoverformat=".4g"),
             yaxis2={"overlaying": "y", "range": [0.0, 1.0], "visible": False, "fixedrange": True},
             shapes=shapes,
             annotations=labels,
@@ -160,42 +150,42 @@ def parameter_figure(trend: Trend, steps: Steps) -> Figure:
     )
 
 
-def _weeks(bins: Binned, trend: Trend, steps: Steps, factor: float, unit: str, fine: float) -> list[Json]:
+def _weeks(bins: Binned, trend: Trend, steps: Steps, factor: float, unit: str, fine: float) -> list[fig.Json]:
     """Return the mean of each step, and marks below those that could not determine it. fine: resolution."""
     some, none = np.isfinite(bins.value), (bins.recorded > 0) & (bins.identifiable == 0)
     time_s = trend.series.time_s
-    places = dates(*np.clip(steps.middle, time_s[0], time_s[-1])[some])
+    places = say.dates(*np.clip(steps.middle, time_s[0], time_s[-1])[some])
     half = (bins.high - bins.low)[some] * factor / 2.0
-    missing = {"yaxis": "y2", "marker": {"symbol": "x-thin-open", "size": 7, "color": NOISE}}
-    bottom = dates(*steps.middle[none])
+    sides = _bars(fig.faint(fig.MEASURED, 0.7), half, thickness=1)
+    cross = {"symbol": "x-thin-open", "size": 7, "color": fig.NOISE}
+    missing = {"hovertemplate": "not enough excitation", "yaxis": "y2", "marker": cross}
+    bottom = say.dates(*steps.middle[none])
     return [
-        points(
-            places, numbers(bins.value[some] * factor, fine), steps.name,
-            marker={"color": MEASURED, "size": 5}, error_y=_bars(faint(MEASURED, 0.7), half, thickness=1),
+        fig.points(
+            places, fig.numbers(bins.value[some] * factor, fine), steps.name,
+            marker={"color": fig.MEASURED, "size": 5}, error_y=sides,
             customdata=np.column_stack([bins.identifiable[some], bins.recorded[some]]).astype(int).tolist(),
             hovertemplate=f"%{{y:.7g}} {unit}, %{{customdata[0]}} of %{{customdata[1]}} recordings",
         ),
-        points(bottom, [0.02] * len(bottom), "could not be determined", hovertemplate="not enough excitation",
-               **missing),
+        fig.points(bottom, [0.02] * len(bottom), "could not be determined", **missing),
     ]  # fmt: skip
 
 
-def _fan(x: list[str], y: list[float | None], colour: str) -> Json:
+def _fan(x: list[str], y: list[float | None], colour: str) -> fig.Json:
     return {"type": "scatter", "mode": "lines", "x": x, "y": y, "fill": "toself", "line": {"width": 0},
             "fillcolor": colour, "hoverinfo": "skip"}  # fmt: skip
 
 
-def _course(trend: Trend, factor: float, fine: float) -> list[Json]:
-    """Return the course as a line in its band."""
+def _course(trend: Trend, factor: float, fine: float) -> list[fig.Json]:
     assert trend.curve is not None
-    c, x = trend.curve, dates(*trend.curve.time_s)
-    sides = numbers(np.concatenate([c.high, c.low[::-1]]) * factor, fine)
-    look: Json = {"mode": "lines", "hoverinfo": "skip", "line": {"color": AFTER, "width": 2}}
-    middle = points(x, numbers(c.value * factor, fine), "trend", **look)
-    return [_fan([*x, *x[::-1]], sides, faint(AFTER, 0.16)), middle]
+    c, x = trend.curve, say.dates(*trend.curve.time_s)
+    sides = fig.numbers(np.concatenate([c.high, c.low[::-1]]) * factor, fine)
+    look: fig.Json = {"mode": "lines", "hoverinfo": "skip", "line": {"color": fig.AFTER, "width": 2}}
+    middle = fig.points(x, fig.numbers(c.value * factor, fine), "trend", **look)
+    return [_fan([*x, *x[::-1]], sides, fig.faint(fig.AFTER, 0.16)), middle]
 
 
-def _ahead(trend: Trend, steps: Steps, factor: float) -> tuple[list[Json], float]:
+def _ahead(trend: Trend, steps: Steps, factor: float) -> tuple[list[fig.Json], float]:
     """Return a sure trend extrapolated to its limit, or a sensible time, and its end (POSIX s)."""
     now, slope = trend.now, trend.per_year
     if trend.state != "trending" or now is None or slope is None or trend.curve is None:
@@ -206,33 +196,33 @@ def _ahead(trend: Trend, steps: Steps, factor: float) -> tuple[list[Json], float
         until = min(until, trend.to_limit_s.high)
     years = (until - last) / (YEAR * DAY)
     ends = Interval(*(n + years * s for n, s in zip(now, slope, strict=True)))
-    sides = numbers(np.array([now.high, ends.high, ends.low, now.low]) * factor)
-    look: Json = {
+    sides = fig.numbers(np.array([now.high, ends.high, ends.low, now.low]) * factor)
+    look: fig.Json = {
         "mode": "lines",
         "hoverinfo": "skip",
-        "line": {"color": BEFORE, "width": 1.6, "dash": "dash"},
+        "line": {"color": fig.BEFORE, "width": 1.6, "dash": "dash"},
     }
-    middle = points(
-        dates(last, until), numbers(np.array([now.value, ends.value]) * factor), "forecast", **look
+    middle = fig.points(
+        say.dates(last, until), fig.numbers(np.array([now.value, ends.value]) * factor), "forecast", **look
     )
-    return [_fan(dates(last, until, until, last), sides, faint(BEFORE, 0.15)), middle], until
+    return [_fan(say.dates(last, until, until, last), sides, fig.faint(fig.BEFORE, 0.15)), middle], until
 
 
-def _label(change: Change, trend: Trend) -> Json:
+def _label(change: Change, trend: Trend) -> fig.Json:
     share = change.size.value / abs(trend.first.value) if trend.first and trend.first.value else np.nan
-    text = f"{percent(share)}, " if np.isfinite(share) else ""
-    x: Any = dates(change.since_s)[0]
-    at: Json = {"yref": "paper", "yanchor": "bottom", "xanchor": "center"}
-    return label(f"{text}{short_day(change.since_s)}", x, 1.0, BEFORE, **at)
+    text = f"{say.percent(share)}, " if np.isfinite(share) else ""
+    x: Any = say.dates(change.since_s)[0]
+    at: fig.Json = {"yref": "paper", "yanchor": "bottom", "xanchor": "center"}
+    return fig.label(f"{text}{say.short_day(change.since_s)}", x, 1.0, fig.BEFORE, **at)
 
 
 def _caption(trend: Trend) -> str:
     s, now = trend.series, trend.now
-    parts = [f"Now {value(now, s.unit)}"] if now else []
+    parts = [f"Now {say.value(now, s.unit)}"] if now else []
     if now and trend.per_kelvin is not None:
-        parts[0] += f", at the mean temperature; a kelvin makes {percent(trend.per_kelvin.value)} of it"
+        parts[0] += f", at the mean temperature; a kelvin makes {say.percent(trend.per_kelvin.value)} of it"
     if now and now.value and trend.day_sd > 0.0:
-        parts.append(f"Days scatter by {amount(trend.day_sd / abs(now.value))}")
+        parts.append(f"Days scatter by {say.amount(trend.day_sd / abs(now.value))}")
     return ". ".join([*parts, f"{determined_by(trend)} recordings determine it."])
 
 

@@ -1,7 +1,5 @@
 """The page of a joint: findings, each parameter over time, causes, recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence, Set
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where pages and results lie, seen from a page."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from html import escape

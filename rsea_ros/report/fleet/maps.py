@@ -1,7 +1,5 @@
 """Pictures of a fleet as wide as the page: joints × weeks, and a bar for each finding from its day on."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
@@ -132,7 +130,6 @@ def _class(depth: float) -> str:
 
 
 def _key(low: str, high: str, ends: tuple[float, float], middle: str = "") -> Html:
-    """Return the scale of colours with its ends."""
     steps = np.linspace(*ends, 2 * _SHADES + 1)
     cells = "".join(
         f'<rect x="{k}" width="1" height="1" class="{_class(float(v)) or "z"}"/>' for k, v in enumerate(steps)
@@ -168,7 +165,6 @@ def timeline(alarms: Sequence[Alarm], steps: Steps, links: Links) -> Html:
 
 
 def _place(time_s: float, steps: Steps) -> float:
-    """Return where a time lies in a picture, 0 to 100 %."""
     first, last = float(steps.edges[0]), float(steps.edges[-1])
     return min(100.0, max(0.0, 100.0 * (time_s - first) / (last - first)))
 

@@ -1,7 +1,5 @@
 """The pages of a fleet: of the fleet, worst joints first, and of each joint, as files of one folder."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -149,7 +147,6 @@ def _plural(number: int, word: str) -> str:
 
 
 def _grouped(number: int) -> str:
-    """Return a number with its thousands apart."""
     return f"{number:,}".replace(",", " ")
 
 

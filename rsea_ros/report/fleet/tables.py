@@ -1,7 +1,5 @@
 """Tables of a fleet: findings, joints, undetermined parameters, recordings."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 
@@ -9,19 +7,9 @@ import numpy as np
 
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
+from rsea_ros.report.fleet import words as say
 from rsea_ros.report.fleet.figures import determined_by
 from rsea_ros.report.fleet.links import Links
-from rsea_ros.report.fleet.words import (
-    amount,
-    day,
-    doubt_of_date,
-    name,
-    percent,
-    sentence,
-    short_day,
-    undetermined_state,
-    value,
-)  # fmt: skip
 from rsea_ros.report.page import Html, listed, named, paragraph, table
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Interval, Trend
@@ -45,9 +33,9 @@ def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) 
     return listed(
         alarms,
         *([("Joint", lambda a: links.joint(a.joint))] if with_joint else []),
-        ("Finding", sentence),
-        ("Began", lambda a: doubt_of_date(a) or "–"),
-        ("#Size, 95 %", lambda a: value(a.size, a.unit) if a.size is not None else "–"),
+        ("Finding", say.sentence),
+        ("Began", lambda a: say.doubt_of_date(a) or "–"),
+        ("#Size, 95 %", lambda a: say.value(a.size, a.unit) if a.size is not None else "–"),
         ("#Sure", sure),
         ("Shown first by", lambda a: links.recording(a.recording, a.artefacts) if a.recording else "–"),
     )
@@ -72,7 +60,7 @@ def joint_table(
         rows.append((
             links.joint(joint), state if np.any(dated & own) else "no recording has a date",
             str(int(np.sum(own))), str(int(np.sum(own & ~done))),
-            f"{len(determined)} of {len(trends)}", percent(moved) if moved == moved else "–",
+            f"{len(determined)} of {len(trends)}", say.percent(moved) if moved == moved else "–",
         ))  # fmt: skip
     numbers = ("#Recordings", "#Refused or broken", "#Parameters with a trend", "#Largest change")
     return table(["Joint", "State", *numbers], rows)
@@ -91,18 +79,20 @@ def parameter_rows(trends: Sequence[Trend]) -> Html:
 
     def slope(t: Trend) -> str:
         a_year = share(t, t.per_year.value) if t.per_year else math.nan
-        return "–" if math.isnan(a_year) else percent(a_year)
+        return "–" if math.isnan(a_year) else say.percent(a_year)
 
     def size(t: Trend, of: float) -> str:
-        return "–" if math.isnan(share(t, of)) else amount(share(t, of))
+        return "–" if math.isnan(share(t, of)) else say.amount(share(t, of))
 
     states = {"trending": "going on"}
     return listed(
         trends,
-        ("Parameter", lambda t: named(name(t.series.parameter), t.series.parameter)),
+        ("Parameter", lambda t: named(say.name(t.series.parameter), t.series.parameter)),
         (
             "State",
-            lambda t: undetermined_state(t) if t.state == "undetermined" else states.get(t.state, t.state),
+            lambda t: (
+                say.undetermined_state(t) if t.state == "undetermined" else states.get(t.state, t.state)
+            ),
         ),
         ("#Now, 95 %", _level),
         ("#A year", slope),
@@ -116,12 +106,12 @@ def _level(trend: Trend) -> str:
     """Return the level now; without a trend, the value of the latest recording that determines it."""
     s = trend.series
     if trend.now is not None:
-        return value(trend.now, s.unit)
+        return say.value(trend.now, s.unit)
     if not np.any(s.identifiable):
         return "–"
     last = int(np.flatnonzero(s.identifiable)[-1])
     v, half = float(s.value[last]), float(Z95 * s.sd[last])
-    return named(value(Interval(v, v - half, v + half), s.unit), "latest recording")
+    return named(say.value(Interval(v, v - half, v + half), s.unit), "latest recording")
 
 
 def undated_rows(joint: str, history: Table) -> Html:
@@ -137,7 +127,7 @@ def undated_rows(joint: str, history: Table) -> Html:
             figures = [float(of_sure(values[sure])) for of_sure in (np.median, np.min, np.max)]
             factor, unit = (100.0, "%") if unit == "1" else words.unit_factor(figures[0], unit)
             shown = [f"{words.number(v * factor, 4)} {unit}" for v in figures]
-        rows.append((named(name(parameter), parameter), *shown, f"{int(np.sum(sure))} of {len(at)}"))
+        rows.append((named(say.name(parameter), parameter), *shown, f"{int(np.sum(sure))} of {len(at)}"))
     return table(["Parameter", "#Median", "#Least", "#Most", "#Determined by"], rows)
 
 
@@ -146,14 +136,14 @@ def undetermined_table(undetermined: Sequence[Trend], links: Links) -> Html:
 
     def why(t: Trend) -> str:
         if t.state != "undetermined":
-            return f"Determined until {day(t.silent_since_s)}, but by no later recording"
+            return f"Determined until {say.day(t.silent_since_s)}, but by no later recording"
         return words.sentence(t.reason)
 
     return listed(
         undetermined,
         ("Joint", lambda t: links.joint(t.series.joint)),
-        ("Parameter", lambda t: name(t.series.parameter)),
-        ("State", lambda t: undetermined_state(t) if t.state == "undetermined" else "silent"),
+        ("Parameter", lambda t: say.name(t.series.parameter)),
+        ("State", lambda t: say.undetermined_state(t) if t.state == "undetermined" else "silent"),
         ("Why", why),
     )
 
@@ -175,7 +165,7 @@ def recording_table(recordings: Table, rows: np.ndarray, links: Links) -> Html:
     return Html(paragraph(_NO_PAGE if lacking else "") + listed(
         latest,
         ("Recording", lambda i: links.recording(text("recording", i), text("artefacts", i))),
-        ("Date", lambda i: short_day(time_s[i]) if np.isfinite(time_s[i]) else "unknown"),
+        ("Date", lambda i: say.short_day(time_s[i]) if np.isfinite(time_s[i]) else "unknown"),
         ("Outcome", lambda i: text("outcome", i)),
         ("Verdict", lambda i: text("verdict", i).replace("_", " ")),
         ("Causes", lambda i: names("causes", "name", i)),

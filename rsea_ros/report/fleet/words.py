@@ -1,7 +1,5 @@
 """Dates, names and findings of a fleet in plain English."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone

@@ -1,7 +1,5 @@
 """The report of an identification, as one HTML file beside identification.json and model.yaml."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from html import escape
@@ -14,34 +12,13 @@ from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import SENSED, UNITS, FloatArray
 from rsea_ros.records.statistics import Z95
+from rsea_ros.report import page as html
 from rsea_ros.report import words
 from rsea_ros.report.figures.bode import bode_figure
-from rsea_ros.report.figures.figure import Figure
+from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, MEASURED, QUIET, Figure, faint
 from rsea_ros.report.figures.overlay import Simulated, overlay_figure
-from rsea_ros.report.figures.palette import AFTER, BEFORE, GRID, MEASURED, QUIET, faint
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, finding, residual_figure
-from rsea_ros.report.identification.words import (
-    doubt_sentences,
-    identification_json,
-    next_command,
-    statics_sentences,
-    value_text,
-    verdict_sentence,
-)  # fmt: skip
-from rsea_ros.report.page import (
-    Block,
-    Html,
-    bullets,
-    code,
-    fold,
-    key_numbers,
-    listed,
-    named,
-    page,
-    paragraph,
-    section,
-    table,
-)  # fmt: skip
+from rsea_ros.report.identification import words as say
 from rsea_ros.report.remark_words import fault_lines, remark_sentences
 from rsea_ros.report.result_files import IDENTIFICATION_JSON, MODEL, REPORT, Provenance, json_text
 from rsea_ros.report.rig import rig_named, right_rig_block, split_off_rig
@@ -59,7 +36,7 @@ def write_results(
     Raises OutputError for a name that is taken, OSError where something cannot be written.
     """
     with NewFiles(out) as new:
-        new.write(IDENTIFICATION_JSON, json_text(identification_json(identification), provenance))
+        new.write(IDENTIFICATION_JSON, json_text(say.identification_json(identification), provenance))
         new.write(MODEL, rig_text(identification.rig))
         return new.write(REPORT, identification_report(identification, provenance))
 
@@ -72,51 +49,55 @@ def identification_report(identification: Identification, provenance: Provenance
     notes = [*i.notes, *remark_sentences(i.clocks), "rsea identify. All values in SI."]
     footer = [f"Data: {', '.join(i.sources)}", *damage, *notes]
     about = i.rig.about or i.rig.name.replace("_", " ")
-    return page(verdict_sentence(i), kicker + about, _blocks(i), footer, provenance)
+    return html.page(say.verdict_sentence(i), kicker + about, _blocks(i), footer, provenance)
 
 
-def _blocks(i: Identification) -> Iterator[Block]:
+def _blocks(i: Identification) -> Iterator[html.Block]:
     if i.residual_rms:
         n = next((n for n in SENSED if n in i.residual_rms), next(iter(i.residual_rms)))
-        yield key_numbers([
+        yield html.key_numbers([
             (f"{i.fit_percent[n]:.2f} %", f"of the {words.channel(n)} explained"),
             (words.quantity(i.residual_rms[n], UNITS[n], 3), "residual, RMS"),
             (words.quantity(i.noise_rms[n], UNITS[n], 3), "sensor noise, RMS"),
             (f"{i.duration:.0f} s", f"of data at {i.rate:.0f} Hz"),
         ])  # fmt: skip
-    if following := next_command(i):
-        yield paragraph(Html(f'<p class="next">To find the cause and its gain: {code(following)}</p>'))
+    if following := say.next_command(i):
+        yield html.paragraph(
+            html.Html(f'<p class="next">To find the cause and its gain: {html.code(following)}</p>')
+        )
     yield right_rig_block(i.remarks)
     yield _parameters(i.parameters)
     if i.statics is not None:
-        yield section("Slow ramps against the locked output", bullets(statics_sentences(i.statics)))
+        yield html.section(
+            "Slow ramps against the locked output", html.bullets(say.statics_sentences(i.statics))
+        )
     models = i.models or (None,) * len(i.responses)
     yield from map(bode_figure, i.responses, models)
     by_name = {o.channel: o for o in i.overlays}  # the motor torque only repeats the command
     for overlay in [by_name[n] for n in SENSED if n in by_name] or i.overlays:
         yield _over_time(i, overlay)
         yield _over_frequency(i, overlay)
-    unclear = (*doubt_sentences(i), *remark_sentences(split_off_rig(i.remarks)[1]))
+    unclear = (*say.doubt_sentences(i), *remark_sentences(split_off_rig(i.remarks)[1]))
     yield undetermined_section(unclear)
     physical = [k for k, p in enumerate(i.parameters) if not p.name.startswith("clock.")]
     names = [i.parameters[k].name for k in physical]
     yield correlation_section(names, i.correlation[np.ix_(physical, physical)])
 
 
-def undetermined_section(sentences: Sequence[str]) -> Html:
+def undetermined_section(sentences: Sequence[str]) -> html.Html:
     """Return what data cannot determine, a sentence each."""
-    body = bullets(sentences) if sentences else "The data determine every free value."
-    return section("What these data cannot determine", body)
+    body = html.bullets(sentences) if sentences else "The data determine every free value."
+    return html.section("What these data cannot determine", body)
 
 
-def _parameters(parameters: Sequence[ParameterEstimate]) -> Html:
+def _parameters(parameters: Sequence[ParameterEstimate]) -> html.Html:
     physical = [p for p in parameters if not p.name.startswith(CLOCKS)]
     settled = sum(p.determined == "yes" for p in physical)
     share = f"all {settled}" if settled == len(physical) else f"{settled} of {len(physical)}"
-    return section(
+    return html.section(
         f"The data determine {share} parameters",
         parameter_table(parameters),
-        paragraph(_clock_sentence(parameters), "caption under"),
+        html.paragraph(_clock_sentence(parameters), "caption under"),
         caption="Grey: value of the rig with its 95 % range. Blue: result with its 95 % interval.",
     )
 
@@ -133,13 +114,13 @@ def _clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     return f"Sensors read later than their stamps by: {'; '.join(parts)}." if parts else ""
 
 
-def parameter_table(parameters: Sequence[ParameterEstimate]) -> Html:
+def parameter_table(parameters: Sequence[ParameterEstimate]) -> html.Html:
     """Return the physical parameters, sensor clocks left out: value, interval, the rig's, how sure."""
-    return listed(
+    return html.listed(
         [p for p in parameters if not p.name.startswith(CLOCKS)],
         ("Parameter", _named),
-        ("#Value ± 95 %", lambda p: Html("<b>{}</b>{}".format(*value_text(p)))),
-        ("Unit", lambda p: Html(f"<span class='unit'>{escape(words.unit(p.unit))}</span>")),
+        ("#Value ± 95 %", lambda p: html.Html("<b>{}</b>{}".format(*say.value_text(p)))),
+        ("Unit", lambda p: html.Html(f"<span class='unit'>{escape(words.unit(p.unit))}</span>")),
         ("Compared with the rig", _interval),
         ("#Rig", lambda p: words.number(p.start, 4)),
         (
@@ -150,13 +131,13 @@ def parameter_table(parameters: Sequence[ParameterEstimate]) -> Html:
     )
 
 
-def _named(p: ParameterEstimate) -> Html:
+def _named(p: ParameterEstimate) -> html.Html:
     letter, _, index = words.SYMBOLS.get(p.name, "").partition("_")
     symbol = f"<i>{letter}</i><sub>{index}</sub>" if letter else ""
-    return named(Html(f"{escape(words.parameter(p.name))} {symbol}"), p.name)
+    return html.named(html.Html(f"{escape(words.parameter(p.name))} {symbol}"), p.name)
 
 
-def _interval(p: ParameterEstimate) -> Html:
+def _interval(p: ParameterEstimate) -> html.Html:
     """Return a small drawing: prior as a grey bar (95 %), its middle, and the result with its interval."""
     side = Z95 * p.spread * abs(p.start)
     if not (math.isfinite(side) and side > 0.0):
@@ -173,7 +154,7 @@ def _interval(p: ParameterEstimate) -> Html:
     middle = _HEIGHT / 2.0
     rig = f"rig {p.start - side:.4g} to {p.start + side:.4g}"
     spoken = escape(f"{rig}, result {p.value:.4g} {words.unit(p.unit)}".rstrip())
-    return Html(
+    return html.Html(
         f'<svg class="interval" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{spoken}">'
         f"<title>{spoken}</title>{stroke(p.start - side, p.start + side, GRID, 8)}"
         f'<line x1="{at(p.start)}" x2="{at(p.start)}" y1="{middle - 7:g}" y2="{middle + 7:g}" '
@@ -200,16 +181,16 @@ def _over_frequency(i: Identification, overlay: Overlay) -> Figure:
     return residual_figure(title, n, frequency, [measured, SpectrumLine("residual", AFTER, values)], noise)
 
 
-def correlation_section(names: Sequence[str], matrix: FloatArray) -> Html:
+def correlation_section(names: Sequence[str], matrix: FloatArray) -> html.Html:
     """Return which parameters move together, as shaded cells; empty for fewer than two parameters.
 
     matrix: (n, n), nan where not defined.
     """
     if len(names) < 2:
-        return Html()
+        return html.Html()
     rows = [[f"{i + 1} {words.parameter(name)}", *map(_cell, matrix[i])] for i, name in enumerate(names)]
-    shown = table(["", *(f"#{i}" for i in range(1, len(names) + 1))], rows, "matrix")
-    return fold("Correlation of the parameters", correlation_finding(names, matrix), shown)
+    shown = html.table(["", *(f"#{i}" for i in range(1, len(names) + 1))], rows, "matrix")
+    return html.fold("Correlation of the parameters", correlation_finding(names, matrix), shown)
 
 
 def correlation_finding(names: Sequence[str], matrix: FloatArray) -> str:
@@ -225,8 +206,7 @@ def correlation_finding(names: Sequence[str], matrix: FloatArray) -> str:
 
 
 def _cell(value: float) -> str:
-    """Return a cell, the more coloured the stronger the correlation."""
     if not np.isfinite(value):
         return "–"
     shade = faint(AFTER if value >= 0.0 else BEFORE, 0.6 * min(1.0, abs(float(value))))
-    return Html(f"<span style='background:{shade}'>{words.minus(f'{value:.2f}')}</span>")
+    return html.Html(f"<span style='background:{shade}'>{words.minus(f'{value:.2f}')}</span>")

@@ -1,7 +1,5 @@
 """An identification in words: sentences, the table of a terminal, identification.json."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of a law: the missing torque and the law over its variable, and both over time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,25 +8,14 @@ from rsea_ros.laws.law import WrittenLaw
 from rsea_ros.records.record import FloatArray, IntArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import (
-    Figure,
-    Json,
-    axis,
-    band,
-    layout,
-    line,
-    names_beside,
-    numbers,
-    points,
-)  # fmt: skip
-from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, QUIET, faint
+from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.law.words import NAMES, UNITS
 
 _WINDOWS = 12
 _CURVE = 160
 
 
-def over_figure(written: WrittenLaw) -> Figure:
+def over_figure(written: WrittenLaw) -> fig.Figure:
     """Return the missing torque and the law over the law's variable; a wave's angle within one period."""
     shown, law, x, y = written.shown, written.law, written.shown.x, written.shown.values
     cycles = [p.shape for p in law.parts if p.term.shape == "cycles_per_revolution" and shown.over == "theta"]
@@ -40,30 +27,31 @@ def over_figure(written: WrittenLaw) -> Figure:
     mean = np.flatnonzero(np.isfinite(middle))[::6]
     windows = np.array_split(np.argsort(shown.t), _WINDOWS)
 
-    def cloud(k: IntArray | slice, colour: str, size: float, name: str, visible: bool = True) -> Json:
+    def cloud(k: IntArray | slice, colour: str, size: float, name: str, visible: bool = True) -> fig.Json:
         look = {"marker": {"size": size, "color": colour}, "visible": visible, "hoverinfo": "skip"}
-        return points(numbers(x[k]), numbers(y[k]), name, **look)
+        return fig.points(fig.numbers(x[k]), fig.numbers(y[k]), name, **look)
 
-    data: list[Json] = [
-        cloud(slice(None), faint(MEASURED, 0.28), 3.5, "measured"),
-        *(cloud(k, faint(BEFORE, 0.85), 5, "", i == 0) for i, k in enumerate(windows)),
-        band(centre, low, high, faint(AFTER, 0.16)),
-        points(numbers(centre[mean]), numbers(middle[mean]), "mean",
-               marker={"size": 6, "color": INK}, error_y={"type": "data", "array": numbers(error[mean]),
-                                                         "thickness": 1.2, "width": 0, "color": INK}),
-        line(centre, 0.5 * (low + high), "law", AFTER, 2.6, hovertemplate=f"%{{y:.3g}} {unit}"),
+    sides: fig.Json = {"type": "data", "array": fig.numbers(error[mean]), "thickness": 1.2, "width": 0,
+                       "color": fig.INK}  # fmt: skip
+    data: list[fig.Json] = [
+        cloud(slice(None), fig.faint(fig.MEASURED, 0.28), 3.5, "measured"),
+        *(cloud(k, fig.faint(fig.BEFORE, 0.85), 5, "", i == 0) for i, k in enumerate(windows)),
+        fig.band(centre, low, high, fig.faint(fig.AFTER, 0.16)),
+        fig.points(fig.numbers(centre[mean]), fig.numbers(middle[mean]), "mean",
+                   marker={"size": 6, "color": fig.INK}, error_y=sides),
+        fig.line(centre, 0.5 * (low + high), "law", fig.AFTER, 2.6, hovertemplate=f"%{{y:.3g}} {unit}"),
     ]  # fmt: skip
     top = 1.15 * float(np.quantile(np.abs(y), 0.995))
     wave = "one period of the " if cycles and cycles[0] else ""
-    return Figure(
+    return fig.Figure(
         f"The missing {quantity} over the {NAMES[shown.over]}, and the law in it",
         f"Grey: missing in the simulation, point by point (one sigma {shown.sd:.2g} {unit}). Black: its "
         "mean with 95 %. Blue: the law; its band is the spread from its other variables. The slider shows "
         "one stretch of time in orange.",
         data,
-        layout(
-            xaxis=axis(f"{wave}{NAMES[shown.over]}, {words.unit(UNITS[shown.over])}"),
-            yaxis=axis(f"missing, {unit}", range=[-top, top]),
+        fig.layout(
+            xaxis=fig.axis(f"{wave}{NAMES[shown.over]}, {words.unit(UNITS[shown.over])}"),
+            yaxis=fig.axis(f"missing, {unit}", range=[-top, top]),
             hovermode="closest", sliders=[_slider(shown.t, windows)],
             margin={"l": 64, "r": 24, "t": 12, "b": 96},
         ),
@@ -71,17 +59,17 @@ def over_figure(written: WrittenLaw) -> Figure:
     )  # fmt: skip
 
 
-def _slider(t: FloatArray, windows: Sequence[IntArray]) -> Json:
+def _slider(t: FloatArray, windows: Sequence[IntArray]) -> fig.Json:
     """Return the slider that shows one window of the record at a time. windows: indices into t (s)."""
     steps = [
         {"label": f"{t[k[0]]:.0f}", "method": "restyle",
          "args": ["visible", [True, *(j == i for j in range(len(windows))), True, True, True]]}
         for i, k in enumerate(windows)
     ]  # fmt: skip
-    small = {"size": 12, "color": QUIET}
+    small = {"size": 12, "color": fig.QUIET}
     value = {"prefix": "orange: from ", "suffix": " s on", "font": small}
     return {"active": 0, "currentvalue": value, "steps": steps, "pad": {"t": 44}, "len": 1.0, "x": 0.0,
-            "tickcolor": QUIET, "font": small}  # fmt: skip
+            "tickcolor": fig.QUIET, "font": small}  # fmt: skip
 
 
 def _curve(x: FloatArray, law: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -105,15 +93,16 @@ def _bin_means(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatA
     return np.where(count > 4, mean, np.nan), error
 
 
-def time_figure(written: WrittenLaw) -> Figure:
+def time_figure(written: WrittenLaw) -> fig.Figure:
     """Return the missing torque and the law over time."""
     shown, unit = written.shown, words.unit("rad" if written.law.place == "encoder" else "N m")
-    curves = (("missing", shown.values, MEASURED, 1.0), ("law", shown.law, AFTER, 1.4))
+    curves = (("missing", shown.values, fig.MEASURED, 1.0), ("law", shown.law, fig.AFTER, 1.4))
     data = [
-        line(shown.t, y, name, colour, w, hovertemplate=f"%{{y:.3g}} {unit}") for name, y, colour, w in curves
+        fig.line(shown.t, y, name, colour, w, hovertemplate=f"%{{y:.3g}} {unit}")
+        for name, y, colour, w in curves
     ]
-    names = names_beside([(name, colour) for name, _, colour, _ in curves], 0.13)
+    names = fig.names_beside([(name, colour) for name, _, colour, _ in curves], 0.13)
     middle = float(shown.t[len(shown.t) // 2])
-    across = axis("time, s", range=[middle, min(middle + 3.0, float(shown.t[-1]))])
-    plane = layout(xaxis=across, yaxis=axis(unit), annotations=names)
-    return Figure("The same over time", "Drag to look closer, double click to see all.", data, plane, 300)
+    across = fig.axis("time, s", range=[middle, min(middle + 3.0, float(shown.t[-1]))])
+    plane = fig.layout(xaxis=across, yaxis=fig.axis(unit), annotations=names)
+    return fig.Figure("The same over time", "Drag to look closer, double click to see all.", data, plane, 300)

@@ -1,7 +1,5 @@
 """A law for the residual of a model in sentences, and law.json."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

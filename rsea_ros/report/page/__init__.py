@@ -4,21 +4,37 @@ A block is a figure under its finding, or a section: a finding, tables and sente
 wherever it is not yet Html.
 """
 
-from __future__ import annotations
-
+import base64
 import json
 import re
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from html import escape, unescape
 from pathlib import Path
 from typing import TypeVar
 
 from rsea_ros.report.figures.figure import Figure
-from rsea_ros.report.page.bundle import packed_plotly
 from rsea_ros.report.result_files import Provenance, strict
 
+_FOLDER = Path(__file__).parent
+VENDOR = _FOLDER / "vendor"
+VERSION = "4.1.1"
+SHA256 = "79542150855a52c567260e3137095dbe2b744e6d702a5cabe67da246942fba7a"
+"""Of plotly-cartesian.min.js, the bundle of plane figures, as npm has it in plotly.js-cartesian-dist-min. It
+is packed, its MIT licence beside it."""
+PLANE = {
+    "bar", "box", "contour", "heatmap", "histogram", "histogram2d", "histogram2dcontour", "image", "pie",
+    "scatter", "scatterternary", "violin",
+}  # fmt: skip
+"""Types of traces that it draws, as its README lists them."""
 _NUMBER = " class='number'"
 Item = TypeVar("Item")
+
+
+@lru_cache(maxsize=1)
+def packed_plotly() -> str:
+    """Return plotly.js as base64 of gzip; page.js unpacks it in the browser."""
+    return base64.b64encode((VENDOR / "plotly-cartesian.min.js.gz").read_bytes()).decode("ascii")
 
 
 class Html(str):
@@ -95,7 +111,7 @@ def _block(block: Block, index: int) -> str:
 
 
 def _asset(name: str) -> str:
-    return (Path(__file__).parent / name).read_text(encoding="utf-8")
+    return (_FOLDER / name).read_text(encoding="utf-8")
 
 
 def section(title: str, *blocks: str, caption: str = "") -> Html:

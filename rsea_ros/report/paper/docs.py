@@ -1,7 +1,5 @@
 """The figures of docs/derivation.md, still drawings: `rsea paper --figures docs/figures` makes them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from html import escape
@@ -14,10 +12,9 @@ from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper.rival_models import lumped_rig, readings
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.palette import AFTER, BEFORE, GRID, INK, QUIET, TRUTH
+from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, INK, QUIET, TRUTH
 from rsea_ros.report.figures.response_curves import Mark, ResponseCurve
-from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit
-from rsea_ros.report.paper.figures import end_response, end_to_end_curves, prototype_band
+from rsea_ros.report.paper.figures import circuit, end_response, end_to_end_curves, prototype_band
 
 _HZ: FloatArray = np.geomspace(0.1, 140.0, 240)
 _WIDTH, _HEIGHT = 760.0, 300.0
@@ -46,8 +43,8 @@ def documentation_figures() -> dict[str, str]:
     )
     resonances = [Mark(1.34, "1.34 Hz"), Mark(6.07, "6.1 Hz"), Mark(19.8, "19.8 Hz")]
     return {
-        "general_circuit.svg": _on_white(general_circuit()),
-        "epicyclic_circuit.svg": _on_white(epicyclic_circuit()),
+        "general_circuit.svg": _on_white(circuit("general")),
+        "epicyclic_circuit.svg": _on_white(circuit("epicyclic")),
         "clamped.svg": gain_svg(parts, (-60.0, 20.0), [Mark(6.37, "6.4 Hz")]),
         "moving_output.svg": gain_svg(moving, (-70.0, 10.0), resonances),
         "end_to_end.svg": gain_svg(ends, (-40.0, 40.0), edges),

@@ -1,9 +1,8 @@
-"""Figs. 9, 15, 18 and 20 of the paper, redrawn."""
-
-from __future__ import annotations
+"""Figs. 6 to 8 of the paper as drawn once, and Figs. 9, 15, 18 and 20 redrawn."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -21,11 +20,20 @@ from rsea_ros.records.record import ComplexArray, FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.design.surface import Point, bandwidth_contours, slices
 from rsea_ros.report.figures.bode import thin
-from rsea_ros.report.figures.figure import Figure
-from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
+from rsea_ros.report.figures.figure import AFTER, BEFORE, INK, MEASURED, TRUTH, Figure, faint
 from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
 
 _HZ: FloatArray = np.geomspace(0.1, 140.0, 500)
+
+
+def circuit(name: str) -> str:
+    """Return a drawing of the paper as SVG: torque is voltage, velocity is current.
+
+    name: general (Fig. 6, an actuator between two loads), lumped (Fig. 7, both ends fixed: the branches of
+    the loads are open, and one loop is left), epicyclic (Fig. 8, the train as a three-port: two transformers
+    on the rotor's inertia). They were drawn once with schemdraw and are kept beside this file.
+    """
+    return (Path(__file__).parent / f"{name}_circuit.svg").read_text(encoding="utf-8").rstrip("\n")
 
 
 def figure_9() -> list[Figure]:

@@ -1,7 +1,5 @@
 """The paper recomputed: one HTML page, and paper.json with every number beside ours."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,7 +15,6 @@ from rsea_ros.paper.rival_models import lumped_rig as lumped_model
 from rsea_ros.report import words
 from rsea_ros.report.page import Block, key_numbers, page
 from rsea_ros.report.paper import figures, tables
-from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit, lumped_circuit
 from rsea_ros.report.result_files import pick, strict
 
 CONTINUOUS = {"paper_high_impedance": 44.2, "prototype_knee": 67.0}
@@ -92,16 +89,16 @@ def _keys() -> list[tuple[str, str]]:
 
 def _drawings() -> list[tuple[str, str]]:
     return [
-        ("Fig. 6: between two loads. Z_m = b_m and the rotor, Z_s = b_s + K_s/s", general_circuit()),
+        ("Fig. 6: between two loads. Z_m = b_m and the rotor, Z_s = b_s + K_s/s", figures.circuit("general")),
         (
             "Fig. 7: both ends clamped. The branches of the loads are open (the paper's text: "
             "short-circuited; the figure itself we have not seen)",
-            lumped_circuit(),
+            figures.circuit("lumped"),
         ),
         (
             "Fig. 8: the epicyclic train as a three-port. Mu_1 = 502, Mu_2 = 1 with our direction of ω_h "
             "(paper: −1; its polarity dots we have not seen)",
-            epicyclic_circuit(),
+            figures.circuit("epicyclic"),
         ),
     ]
 

@@ -1,7 +1,5 @@
 """The tables of the paper's page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from html import escape
 

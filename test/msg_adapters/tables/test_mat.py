@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from msg_adapters.tables import mat_file
+from msg_adapters.tables import child, column_files
 from msg_adapters.tables.column_files import read_columns
 from rsea_ros.errors import ImportMapError
 
@@ -45,7 +45,7 @@ def test_variables_that_cannot_be_a_channel_are_refused(tmp_path, column, text):
 def test_only_what_is_named_is_loaded_and_its_size_comes_first(tmp_path, monkeypatch):
     file = tmp_path / "run.mat"
     savemat(file, {"x": np.arange(50.0), "large": np.zeros(400)})
-    monkeypatch.setattr(mat_file, "LARGEST", 100)
+    monkeypatch.setattr(column_files, "LARGEST", 100)
     assert read_columns(file, ["x"])["x"].size == 50
     with pytest.raises(ImportMapError, match="variable 'large' has 400 values, expected fewer than 100"):
         read_columns(file, ["large"])
@@ -72,8 +72,8 @@ def test_version_7_3_is_named(tmp_path, head):
 def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, program, message):
     (tmp_path / "child.py").write_text(program)
     savemat(tmp_path / "run.mat", {"x": np.arange(5.0)})
-    monkeypatch.setattr(mat_file, "CHILD", tmp_path / "child.py")
-    monkeypatch.setattr(mat_file, "TIME", 0.3 if "while" in program else 20.0)
+    monkeypatch.setattr(column_files, "MAT", tmp_path / "child.py")
+    monkeypatch.setattr(child, "SECONDS", 0.3 if "while" in program else 20.0)
     with pytest.raises(ImportMapError, match=message):
         read_columns(tmp_path / "run.mat", ["x"])
 

@@ -18,7 +18,7 @@ from rsea_ros.report.figures.overlay import (
     sample_extremes,
     without,
 )
-from rsea_ros.report.figures.palette import AFTER, BEFORE
+from rsea_ros.report.figures.figure import AFTER, BEFORE
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, residual_figure
 
 

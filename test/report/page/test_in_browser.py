@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.report.diagnosis.sketch import sketch
-from rsea_ros.report.figures.figure import Figure, axis, label, layout, line
-from rsea_ros.report.figures.palette import BEFORE, INK
+from rsea_ros.report.figures.figure import BEFORE, INK, Figure, axis, label, layout, line
 from rsea_ros.report.page import Html, equation, page, table
 from test.watch.browser import Browser
 
