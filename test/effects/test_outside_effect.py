@@ -33,7 +33,7 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import MEASURED
-from rsea_ros.report.diagnosis.sketch import part_of
+from rsea_ros.report.diagnosis.figures import part_of
 
 PADDLE = '''
 """Torque of a paddle in oil: between dry and viscous friction.

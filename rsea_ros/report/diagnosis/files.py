@@ -9,21 +9,12 @@ from rsea_ros.identification.result import Overlay
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import Channel, Record
+from rsea_ros.report import result_files as outputs
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.page import diagnosis_report
 from rsea_ros.report.identification.words import parameters_json
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.report.result_files import (
-    DIAGNOSIS_JSON,
-    MODEL,
-    OVERLAY,
-    REPORT,
-    Provenance,
-    fault_json,
-    json_text,
-    pick,
-    strict,
-)  # fmt: skip
+from rsea_ros.report.result_files import pick
 from rsea_ros.report.rig import rig_json
 
 SCHEMA = 1
@@ -35,7 +26,7 @@ OverlayWriter = Callable[[Mapping[str, Record], Path], None]
 
 def write_diagnosis(
     diagnosis: Diagnosis, record: Record, out: Destination | str | Path, write: OverlayWriter,
-    provenance: Provenance | None = None,
+    provenance: outputs.Provenance | None = None,
 ) -> Path:  # fmt: skip
     """Write diagnosis.json, model.yaml, overlay.mcap and report.html, and return the report's path.
 
@@ -43,10 +34,10 @@ def write_diagnosis(
     BagError where something cannot be written.
     """
     with NewFiles(out) as new:
-        new.write(DIAGNOSIS_JSON, json_text(diagnosis_json(diagnosis), provenance))
-        new.write(MODEL, rig_text(diagnosis.extended_rig))
-        write(overlay_records(diagnosis, record), new.stage(OVERLAY))
-        return new.write(REPORT, diagnosis_report(diagnosis, provenance))
+        new.write(outputs.DIAGNOSIS_JSON, outputs.json_text(diagnosis_json(diagnosis), provenance))
+        new.write(outputs.MODEL, rig_text(diagnosis.extended_rig))
+        write(overlay_records(diagnosis, record), new.stage(outputs.OVERLAY))
+        return new.write(outputs.REPORT, diagnosis_report(diagnosis, provenance))
 
 
 def overlay_records(diagnosis: Diagnosis, record: Record) -> Mapping[str, Record]:
@@ -66,7 +57,7 @@ def overlay_records(diagnosis: Diagnosis, record: Record) -> Mapping[str, Record
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the contents of diagnosis.json; infinite numbers and NaN are null."""
-    d, numbers = diagnosis, {s.name: strict(s.value) for s in diagnosis.settings.numbers()}
+    d, numbers = diagnosis, {s.name: outputs.strict(s.value) for s in diagnosis.settings.numbers()}
     following = d.next_experiment
     return {
         "schema": SCHEMA,
@@ -75,7 +66,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **pick(d, "verdict channel"),
         "sentence": say.diagnosis_sentence(d),
         "data": {**pick(d, "bags=sources duration_s=duration rate_hz=rate"),
-                 "faults": [fault_json(f) for f in d.faults]},
+                 "faults": [outputs.fault_json(f) for f in d.faults]},
         "baseline": {"parameters": parameters_json(d.baseline),
                      **pick(d, "residual_rms noise_rms fit_percent")},
         "misfit": _misfits(d.misfit),

@@ -13,8 +13,7 @@ from rsea_ros.report import page as html
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
-from rsea_ros.report.diagnosis.figures import spectrum_figure, time_figure
-from rsea_ros.report.diagnosis.sketch import sketch
+from rsea_ros.report.diagnosis.figures import sketch, spectrum_figure, time_figure
 from rsea_ros.report.diagnosis.where import profiles, where_figure
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, MEASURED, faint
 from rsea_ros.report.identification.page import parameter_table, undetermined_section

@@ -4,10 +4,9 @@ from collections.abc import Iterator, Sequence, Set
 
 import numpy as np
 
+from rsea_ros.report.fleet import words as say
 from rsea_ros.report.fleet.figures import naming_figure, parameter_figure
-from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.tables import alarm_table, parameter_rows, recording_table, trends_of, undated_rows
-from rsea_ros.report.fleet.words import finding, latest_causes, name, sentence, undetermined_state
 from rsea_ros.report.page import Block, Html, fold, key_numbers, page, section
 from rsea_ros.report.words import sentence as capital
 from rsea_ros.trends.alarms import Alarm
@@ -27,15 +26,15 @@ _UNDATED = (
 
 def joint_page(
     joint: str, fleet: FleetTrends, alarms: Sequence[Alarm], history: Table, recordings: Table, steps: Steps,
-    links: Links,
+    links: say.Links,
 ) -> str:  # fmt: skip
     """Return the page as HTML that opens without a network. alarms: of this joint, the most urgent first."""
     rows = np.flatnonzero(np.asarray(recordings["joint"], str) == joint)
     dated = bool(np.any(np.isfinite(np.asarray(recordings["time_s"], float)[rows])))
     determined = sum(t.state != "undetermined" for t in trends_of(joint, fleet))
     if alarms:
-        title = sentence(alarms[0])
-    elif latest := latest_causes([joint], recordings).get(joint, ""):
+        title = say.sentence(alarms[0])
+    elif latest := say.latest_causes([joint], recordings).get(joint, ""):
         title = f"{latest} in its latest recording"
     elif not dated:
         title = "no recording has a date"
@@ -88,14 +87,13 @@ def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: St
     groups: dict[tuple[str, str], list[str]] = {}  # by the reason why they have no trend
     for t in undetermined:
         if not np.isfinite(t.silent_since_s):
-            groups.setdefault((undetermined_state(t), t.reason), []).append(name(t.series.parameter))
+            groups.setdefault((say.undetermined_state(t), t.reason), []).append(say.name(t.series.parameter))
     for (state, reason), names in groups.items():
         title = f"{names[0] if len(names) == 1 else f'{len(names)} parameters'}: {state}"
         which = f"{'; '.join(names)}. " if len(names) > 1 else ""
         yield section(title, f"{which}{capital(reason)}.")
-    yield from (
-        section(finding(t), f"{capital(t.reason)}.") for t in undetermined if np.isfinite(t.silent_since_s)
-    )
+    silent = (t for t in undetermined if np.isfinite(t.silent_since_s))
+    yield from (section(say.finding(t), f"{capital(t.reason)}.") for t in silent)
 
 
 def _namings(

@@ -8,8 +8,7 @@ from html import escape
 import numpy as np
 
 from rsea_ros.records.record import FloatArray
-from rsea_ros.report.fleet.links import Links
-from rsea_ros.report.fleet.words import about, doubt_of_date, name, percent, short_day, undetermined_state
+from rsea_ros.report.fleet import words as say
 from rsea_ros.report.page import Html, section
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Trend
@@ -32,7 +31,9 @@ _BEGIN, _END = 6.0, 96.0
 _STRIDES = (1, 2, 3, 6, 12, 24, 60, 120)
 
 
-def heat_map(parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: Links) -> Html:
+def heat_map(
+    parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: say.Links
+) -> Html:
     """Return the section of a parameter, the first joint on top; grey if not determined."""
     rows = [fleet.trends.get((joint, parameter), fleet.sizes.get((joint, parameter))) for joint in joints]
     shown = [_row(trend, steps) for trend in rows]
@@ -43,29 +44,29 @@ def heat_map(parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: S
 
     def text(i: int, j: int) -> str:
         if np.isfinite(change[i, j]):
-            return percent(float(change[i, j]))
+            return say.percent(float(change[i, j]))
         trend = rows[i]
-        return undetermined_state(trend) if trend and trend.state == "undetermined" else "not determined"
+        return say.undetermined_state(trend) if trend and trend.state == "undetermined" else "not determined"
 
     determined = [t for t in rows if t is not None and t.state != "undetermined"]
     moved = [t for t in determined if t.state != "steady"]
     which = f"all {len(determined)} joints that determine it" if len(determined) > 1 else "one joint"
-    title = f"{name(parameter)}: steady in {which}"
+    title = f"{say.name(parameter)}: steady in {which}"
     if moved:
         most = max(moved, key=lambda t: abs(t.relative))
         where = f"{len(moved)} of {len(determined)} joints, most in {most.series.joint}"
-        title = f"{name(parameter)}: changed in {where}, by {percent(most.relative)}"
+        title = f"{say.name(parameter)}: changed in {where}, by {say.percent(most.relative)}"
     return section(
         title,
         _picture(change / full, undetermined, joints, steps, links, text),
-        _key(percent(-full), percent(full), (-1.0, 1.0), ", middle: as on the first day"),
+        _key(say.percent(-full), say.percent(full), (-1.0, 1.0), ", middle: as on the first day"),
         caption=f"Mean of each {steps.name} against the joint's first level, at its mean temperature. Grey: "
         "recordings that do not determine it, or of too few days for a level. Empty: no recording.",
     )
 
 
 def naming_map(
-    subject: str, kind: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: Links
+    subject: str, kind: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: say.Links
 ) -> Html:
     """Return the section of a cause or a fault: the share of each week's recordings that name it."""
     of = {n.joint: n for n in fleet.namings if (n.about, n.kind) == (subject, kind)}
@@ -73,7 +74,7 @@ def naming_map(
     named = np.array([steps.count(of[j].time_s[of[j].named]) for j in joints])
     share: FloatArray = np.where(asked > 0, named / np.maximum(asked, 1), np.nan)
     often = int(np.sum(np.any(share >= _OFTEN, axis=1)))
-    plain = name(subject) + ("" if kind == "cause" else " in the data")
+    plain = say.name(subject) + ("" if kind == "cause" else " in the data")
     nothing = np.zeros(share.shape, bool)
     return section(
         f"{plain}: often in {often} of {len(fleet.joints)} joints",
@@ -106,14 +107,14 @@ def _row(trend: Trend | None, steps: Steps) -> tuple[FloatArray, BoolArray]:
 
 
 def _picture(
-    depth: FloatArray, undetermined: BoolArray, joints: Sequence[str], steps: Steps, links: Links,
+    depth: FloatArray, undetermined: BoolArray, joints: Sequence[str], steps: Steps, links: say.Links,
     text: Callable[[int, int], str],
 ) -> Html:  # fmt: skip
     """Return the cells. depth: -1 to 1, NaN for none, shape (joints, steps). text: of a cell."""
     cells = []
     for i, j in np.argwhere(np.isfinite(depth) | undetermined).tolist():
         shade = "n" if undetermined[i, j] else _class(float(depth[i, j]))
-        spoken = escape(f"{joints[i]}, {short_day(float(steps.edges[j]))}: {text(i, j)}")
+        spoken = escape(f"{joints[i]}, {say.short_day(float(steps.edges[j]))}: {text(i, j)}")
         look = f' class="{shade}"' if shade else ""
         cells.append(f'<rect x="{j}" y="{i}" width=".92" height=".86"{look}><title>{spoken}</title></rect>')
     labels = "".join(f"<li>{links.joint(j)}</li>" for j in joints)
@@ -138,7 +139,7 @@ def _key(low: str, high: str, ends: tuple[float, float], middle: str = "") -> Ht
     return Html(f'<div class="key">{escape(low)}{scale}{escape(high)}{middle}</div>')
 
 
-def timeline(alarms: Sequence[Alarm], steps: Steps, links: Links) -> Html:
+def timeline(alarms: Sequence[Alarm], steps: Steps, links: say.Links) -> Html:
     """Return the section of the findings that have a date, in the order given; empty without one."""
     dated = [a for a in alarms if math.isfinite(a.since_s)]
     if not dated:
@@ -147,12 +148,12 @@ def timeline(alarms: Sequence[Alarm], steps: Steps, links: Links) -> Html:
     for a in dated[:_MOST]:
         early, begin, late = (_place(t, steps) for t in (a.earliest_s, a.since_s, a.latest_s))
         rows.append(
-            f'<div class="span {a.kind}"><p>{links.joint(a.joint)} {escape(about(a))}'
-            f"<small>began {escape(doubt_of_date(a))}</small></p>"
+            f'<div class="span {a.kind}"><p>{links.joint(a.joint)} {escape(say.about(a))}'
+            f"<small>began {escape(say.doubt_of_date(a))}</small></p>"
             f'<div class="rail"><i class="doubt" style="left:{early:.1f}%;width:{late - early:.1f}%"></i>'
             f'<i style="left:{begin:.1f}%;width:{100.0 - begin:.1f}%"></i></div></div>'
         )
-    first = short_day(min(a.since_s for a in dated[:_MOST]))
+    first = say.short_day(min(a.since_s for a in dated[:_MOST]))
     number = "one finding" if len(dated) == 1 else f"{len(dated)} findings"
     more = f" The first {_MOST} of {len(dated)} findings." if len(dated) > _MOST else ""
     return section(
@@ -173,7 +174,7 @@ def _months(steps: Steps) -> str:
     """Return the names of months at their places below a picture; of days where all lies in two months."""
     first, last = (datetime.fromtimestamp(float(t), timezone.utc) for t in (steps.edges[0], steps.edges[-1]))
     whole = 12 * (last.year - first.year) + last.month - first.month
-    marks = [(float(steps.edges[0]), short_day(float(steps.edges[0])))]
+    marks = [(float(steps.edges[0]), say.short_day(float(steps.edges[0])))]
     if whole >= 2:
         stride = next((s for s in _STRIDES if whole / s <= _MONTHS), _STRIDES[-1])
         every = [12 * first.year + first.month - 1 + k for k in range(1, whole + 1)]
@@ -181,7 +182,7 @@ def _months(steps: Steps) -> str:
         starts = [t for t in starts if _place(t.timestamp(), steps) < _END]
         marks = []
         for t in starts:  # with its year below the first and each January
-            _, month, year = short_day(t.timestamp()).split()
+            _, month, year = say.short_day(t.timestamp()).split()
             marks.append((t.timestamp(), f"{month}\n{year}" if t is starts[0] or t.month == 1 else month))
     spans = ""
     for time_s, text in marks:

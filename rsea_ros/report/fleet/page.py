@@ -8,11 +8,10 @@ import numpy as np
 
 from rsea_ros.documents.wording import list_names
 from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.report.fleet import words as say
 from rsea_ros.report.fleet.joint_page import joint_page
-from rsea_ros.report.fleet.links import Links, page_names
 from rsea_ros.report.fleet.maps import heat_map, naming_map, shades, timeline
 from rsea_ros.report.fleet.tables import alarm_table, joint_table, undetermined_table
-from rsea_ros.report.fleet.words import about, day, latest_causes, name, percent
 from rsea_ros.report.page import Block, Html, bullets, fold, key_numbers, page, section
 from rsea_ros.trends.alarms import Alarm, alarms_of, by_joint, worst_first
 from rsea_ros.trends.fleet_trends import fleet_trends
@@ -39,7 +38,8 @@ def write_fleet_report(
     alarms = alarms_of(fleet, recordings)
     steps, groups = _steps(recordings), by_joint(alarms)
     with NewFiles(out) as new:
-        links = Links(new.folder, Path(store) if store is not None else new.folder, page_names(fleet.joints))
+        folder = new.folder if store is None else Path(store)
+        links = say.Links(new.folder, folder, say.page_names(fleet.joints))
         for joint, name in links.pages.items():
             findings = groups.get(joint, [])
             new.write(name, joint_page(joint, fleet, findings, history, recordings, steps, links))
@@ -59,10 +59,10 @@ def _period(recordings: Table) -> tuple[float, float] | None:
 
 
 def fleet_page(
-    fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
+    fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: say.Links
 ) -> str:
     """Return the page as HTML that opens without a network."""
-    period = " to ".join(map(day, _period(recordings) or ())) or "no date"
+    period = " to ".join(map(say.day, _period(recordings) or ())) or "no date"
     footer = [period, "rsea fleet report. All values in SI, all times UTC."]
     kicker = f"Fleet of {len(fleet.joints)} joints · {period}"
     blocks = _blocks(fleet, alarms, recordings, steps, links)
@@ -70,7 +70,7 @@ def fleet_page(
 
 
 def _blocks(
-    fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
+    fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: say.Links
 ) -> Iterator[Block]:
     groups, joints = by_joint(alarms), worst_first(fleet.joints, alarms)
     ranked = [a for group in groups.values() for a in group]
@@ -99,7 +99,7 @@ def _blocks(
     for kind, subject in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
         naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, subject)}
         yield naming_map(subject, kind, [j for j in joints if j in naming][:_ROWS], fleet, steps, links)
-    latest = latest_causes(joints, recordings)
+    latest = say.latest_causes(joints, recordings)
     yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
     number = "One trend" if len(silent) == 1 else f"{len(silent)} trends"
     if silent:
@@ -129,7 +129,7 @@ def _parameters_with_map(fleet: FleetTrends, shown: Sequence[str]) -> list[str]:
 
 def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:
     if not any(t.state != "undetermined" for t in fleet.trends.values()):
-        latest = latest_causes(fleet.joints, recordings)
+        latest = say.latest_causes(fleet.joints, recordings)
         named = "".join(f"; the latest name {cause} in {joint}" for joint, cause in latest.items())
         if len(latest) > 1:
             named = f"; the latest of {len(latest)} joints name causes"
@@ -139,7 +139,7 @@ def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) ->
         return f"All {len(fleet.joints)} joints are steady"
     first = next(iter(groups))
     number = f"{len(groups)} of {len(fleet.joints)} joints need" if len(groups) > 1 else "One joint needs"
-    return f"{number} a look, {first} first: {about(groups[first][0])}"
+    return f"{number} a look, {first} first: {say.about(groups[first][0])}"
 
 
 def _plural(number: int, word: str) -> str:
@@ -152,7 +152,8 @@ def _grouped(number: int) -> str:
 
 def _sure(fleet: FleetTrends) -> list[str]:
     rate = f"{100.0 * fleet.false_discovery:g}"
-    warm = [f"{name(p)} {percent(m)} (± {200.0 * s:.2f} %)" for p, (m, s) in fleet.per_kelvin.items() if m]
+    known = [(say.name(p), say.percent(m), s) for p, (m, s) in fleet.per_kelvin.items() if m]
+    warm = [f"{name} {change} (± {200.0 * s:.2f} %)" for name, change, s in known]
     lines = [
         f"{fleet.tests} series were tested for any step or ramp, and every cause and fault for the day from "
         f"which on it is named. At most {rate} in 100 of the findings are expected to be false (Benjamini "

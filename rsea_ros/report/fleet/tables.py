@@ -9,7 +9,7 @@ from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.fleet import words as say
 from rsea_ros.report.fleet.figures import determined_by
-from rsea_ros.report.fleet.links import Links
+from rsea_ros.report.fleet.words import Links
 from rsea_ros.report.page import Html, listed, named, paragraph, table
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Interval, Trend

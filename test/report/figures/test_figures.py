@@ -8,7 +8,7 @@ import gzip
 import numpy as np
 import pytest
 
-from rsea_ros.report.figures.figure import line
+from rsea_ros.report.figures.figure import AFTER, BEFORE, line
 from rsea_ros.report.figures.overlay import (
     MOST_SAMPLES,
     Simulated,
@@ -18,7 +18,6 @@ from rsea_ros.report.figures.overlay import (
     sample_extremes,
     without,
 )
-from rsea_ros.report.figures.figure import AFTER, BEFORE
 from rsea_ros.report.figures.spectrum import SpectrumLine, density, residual_figure
 
 

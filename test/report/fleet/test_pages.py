@@ -10,9 +10,8 @@ import pytest
 from fleet_histories import cause, history, recordings
 from worn_fleet import WORN
 
-from rsea_ros.report.fleet.links import page_names
 from rsea_ros.report.fleet.page import write_fleet_report
-from rsea_ros.report.fleet.words import doubt_of_date, percent
+from rsea_ros.report.fleet.words import doubt_of_date, page_names, percent
 from rsea_ros.trends import alarms
 
 

@@ -8,7 +8,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from rsea_ros.report.diagnosis.sketch import sketch
+from rsea_ros.report.diagnosis.figures import sketch
 from rsea_ros.report.figures.figure import BEFORE, INK, Figure, axis, label, layout, line
 from rsea_ros.report.page import Html, equation, page, table
 from test.watch.browser import Browser

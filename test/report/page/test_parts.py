@@ -15,14 +15,13 @@ import pytest
 from rsea_ros import report
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.result import Identification
-from rsea_ros.report.diagnosis.sketch import part_of, sketch
+from rsea_ros.report.diagnosis.figures import part_of, sketch
 from rsea_ros.report.identification.page import (
     correlation_finding,
     correlation_section,
     identification_report,
 )
-from rsea_ros.report.page import Html, fold, page, section
-from rsea_ros.report.page.bundle import PLANE, SHA256, VENDOR, VERSION, packed_plotly
+from rsea_ros.report.page import PLANE, SHA256, VENDOR, VERSION, Html, fold, packed_plotly, page, section
 from rsea_ros.report.result_files import json_text, provenance_of
 
 
