@@ -18,8 +18,8 @@ from rsea_ros.cli._output import FOUND, Action, add_actions, add_fail_on, add_fo
 from rsea_ros.cli._terminal import progress
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.fleet import FleetError, need_extra
 from rsea_ros.fleet.executor import Executor, serial
-from rsea_ros.fleet.fleet_error import FleetError, need_extra
 from rsea_ros.fleet.joints import Diagnose, load_joints
 from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.task import TIME_LIMIT

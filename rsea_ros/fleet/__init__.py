@@ -5,20 +5,38 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
+
+from rsea_ros.errors import FieldError, RseaError
 
 if TYPE_CHECKING:
     from rsea_ros.fleet.query import history, recordings
 
-__all__ = ["history", "recordings"]
+__all__ = ["FleetError", "JointMapError", "history", "need_extra", "recordings"]
+
+PACKAGES = ("pyarrow", "duckdb", "fsspec", "dask", "distributed")
+
+
+class FleetError(RseaError, ValueError):
+    """A source, a store or a cluster that cannot be used."""
+
+
+class JointMapError(FieldError):
+    """A joint map with a missing, unknown or impossible value."""
+
+
+def need_extra() -> None:
+    """Raise FleetError where a package of the extra `fleet` is not installed."""
+    missing = [name for name in PACKAGES if find_spec(name) is None]
+    if missing:
+        install = "pip install 'rsea_ros[fleet]'"
+        raise FleetError(f"{', '.join(missing)}: not installed, expected for rsea fleet: {install}")
 
 
 def __getattr__(name: str) -> Any:
-    if name in __all__:
-        import importlib
-
-        from rsea_ros.fleet.fleet_error import need_extra
-
-        need_extra()
-        return getattr(importlib.import_module("rsea_ros.fleet.query"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    need_extra()
+    return getattr(import_module("rsea_ros.fleet.query"), name)

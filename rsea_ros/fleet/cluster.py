@@ -19,8 +19,8 @@ from dask.utils import key_split
 from distributed.scheduler import KilledWorker
 from distributed.utils import silence_logging_cmgr
 
+from rsea_ros.fleet import FleetError
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
-from rsea_ros.fleet.fleet_error import FleetError
 from rsea_ros.fleet.pool import frequent_collection
 
 PER_WORKER = 3

@@ -18,7 +18,7 @@ from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.strict_yaml import NEEDED, Key, mapping, names, only_keys, table, text
 from rsea_ros.documents.wording import quote
 from rsea_ros.errors import FieldError, RseaError
-from rsea_ros.fleet.fleet_error import JointMapError
+from rsea_ros.fleet import JointMapError
 from rsea_ros.model.rig_file import load_rig, rig_folders, rig_text
 
 MAP = (

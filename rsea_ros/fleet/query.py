@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet import FleetError
 from rsea_ros.fleet.row import ARROW, EXPECTED_FILES
 from rsea_ros.fleet.store import Store, open_store
 

@@ -22,7 +22,7 @@ import pyarrow.compute as pc
 from pyarrow import parquet
 
 from rsea_ros.documents.wording import brief
-from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet import FleetError
 from rsea_ros.outputs.new_files import Destination, NewFiles
 
 SCHEMA = 1

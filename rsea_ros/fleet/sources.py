@@ -12,7 +12,7 @@ from typing import Any
 
 from fsspec.core import url_to_fs
 
-from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet import FleetError
 from rsea_ros.fleet.joints import MappedJoint
 
 METADATA = "metadata.yaml"

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
 
-from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet import FleetError
 from rsea_ros.fleet.row import (
     SCHEMA,
     Row,

@@ -9,10 +9,9 @@ from types import SimpleNamespace
 import pytest
 from distributed.scheduler import KilledWorker
 
-from rsea_ros.fleet import cluster
+from rsea_ros.fleet import FleetError, cluster
 from rsea_ros.fleet.cluster import OnDask, on_scheduler
 from rsea_ros.fleet.executor import Job, WorkerLost
-from rsea_ros.fleet.fleet_error import FleetError
 
 
 class Future:

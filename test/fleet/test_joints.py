@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rsea_ros.fleet.fleet_error import JointMapError
+from rsea_ros.fleet import JointMapError
 from rsea_ros.fleet.joints import MappedJoint, load_joints
 
 GOOD = """

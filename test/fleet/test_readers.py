@@ -6,8 +6,7 @@ import pytest
 from fleet_stubs import KNEE, MARCH, stub_work
 from pyarrow import parquet
 
-from rsea_ros.fleet import history, query, recordings
-from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet import FleetError, history, query, recordings
 from rsea_ros.fleet.query import MergedError, answer
 from rsea_ros.fleet.row import read
 from rsea_ros.fleet.sources import Bag

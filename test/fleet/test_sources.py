@@ -9,7 +9,7 @@ import fsspec
 import pytest
 from fleet_stubs import HIP, KNEE
 
-from rsea_ros.fleet.fleet_error import FleetError
+from rsea_ros.fleet import FleetError
 from rsea_ros.fleet.sources import bags_of, fingerprint, local_copy, relist
 
 
