@@ -13,8 +13,7 @@ sys.path.insert(0, str(ROOT))
 
 from rsea_ros import DOOR  # noqa: E402
 from rsea_ros.documents.units import plain  # noqa: E402
-from rsea_ros.effects._page import EffectPage  # noqa: E402
-from rsea_ros.effects.catalogue import catalogue  # noqa: E402
+from rsea_ros.effects.catalogue import EffectPage, catalogue  # noqa: E402
 from rsea_ros.effects.parameter import MACHINE  # noqa: E402
 
 project = "rsea_ros"

@@ -17,8 +17,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the catalogue, or one effect with the description in its file."""
     from rsea_ros import effects
     from rsea_ros.cli._terminal import say
-    from rsea_ros.effects._page import EffectPage
-    from rsea_ros.effects.catalogue import effect_named
+    from rsea_ros.effects.catalogue import EffectPage, effect_named
     from rsea_ros.effects.parameter import MACHINE
 
     if args.name is None:

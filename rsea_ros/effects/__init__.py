@@ -12,15 +12,14 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rsea_ros.effects._page import EffectPage
+    from rsea_ros.effects.catalogue import EffectPage
 
 
 class _Catalogue(ModuleType):
     """The package itself, with effects by name; those of RSEA_EFFECTS included."""
 
     def __getitem__(self, name: str) -> EffectPage:
-        from rsea_ros.effects._page import EffectPage
-        from rsea_ros.effects.catalogue import effect_named
+        from rsea_ros.effects.catalogue import EffectPage, effect_named
 
         return EffectPage(effect_named(name))
 
@@ -43,7 +42,7 @@ class _Catalogue(ModuleType):
         return "\n".join(f"{name:<{width}}  {self[name].about}" for name in self)
 
     def _repr_html_(self) -> str:
-        from rsea_ros.effects._page import catalogue_table
+        from rsea_ros.effects.catalogue import catalogue_table
 
         return catalogue_table([self[name] for name in self])
 

@@ -1,18 +1,22 @@
-"""The catalogue: every file of this folder that has an `EFFECT`, and files that a user adds."""
+"""The catalogue: every file of this folder that has an `EFFECT`, files that a user adds; its pages."""
 
 from __future__ import annotations
 
 import importlib
 import os
 import pkgutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
+from html import escape
 from pathlib import Path
 from types import MappingProxyType
 
+from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import did_you_mean, quote
-from rsea_ros.effects.effect import Effect
+from rsea_ros.effects.effect import Effect, Parameter, without_equation
+from rsea_ros.effects.parameter import powers_of
 from rsea_ros.errors import ParameterError
 from rsea_ros.plugins import plugin_constant, plugin_files
 
@@ -71,3 +75,83 @@ def look_alikes(name: str, effects: Iterable[Effect]) -> list[Effect]:
 def _own_names() -> frozenset[str]:
     names = (m.name for m in pkgutil.iter_modules([str(Path(__file__).parent)]))
     return frozenset(n for n in names if n not in _NOT_EFFECTS and not n.startswith("_"))
+
+
+@dataclass(frozen=True)
+class EffectPage:
+    """An effect of the catalogue, shown as text, or as a table in a notebook."""
+
+    effect: Effect
+
+    @property
+    def name(self) -> str:
+        """The name in rigs, results and `rsea.effects`."""
+        return self.effect.name
+
+    @property
+    def about(self) -> str:
+        """The meaning in a few words."""
+        return self.effect.about
+
+    @property
+    def equation(self) -> str:
+        """The equation in plain text."""
+        return self.effect.equation
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Parameters by name, with unit, bounds, typical size and the value at which the effect vanishes."""
+        return {p.name: p for p in self.effect.parameters}
+
+    @property
+    def description(self) -> str:
+        """The docstring of the effect's file without its equation: meaning and source."""
+        return without_equation(self.effect.docstring)
+
+    def __repr__(self) -> str:
+        """Return name, meaning, equation and parameters as text."""
+        rows = [
+            f"  {p.name} ({plain(p.unit) or 1}): typical {p.typical:g}, vanishes at {p.null:g}, "
+            f"fitted within {p.low:g} to {p.high:g}" + _after(", growing with ", self.grows_with(p))
+            + f": {p.reason}"
+            for p in self.effect.parameters
+        ]
+        return "\n".join([f"{self.name}: {self.effect.about}", f"  {self.equation}", *rows])
+
+    @staticmethod
+    def grows_with(parameter: Parameter) -> str:
+        """Return with which numbers of the machine bounds and sizes grow, as a fraction; empty for none."""
+        powers = () if parameter.is_fixed else powers_of(parameter.unit)
+        over, under = (
+            " ".join(name if abs(k) == 1 else f"{name}^{abs(k)}" for name, k in powers if k * side > 0)
+            for side in (1, -1)
+        )
+        return (over or "1") + _after(" / ", under) if powers else ""
+
+    def _repr_html_(self) -> str:
+        head = "<tr><th>parameter</th><th>unit</th><th>typical</th><th>vanishes at</th><th>bounds</th>"
+        head += "<th>grows with</th><th>why</th></tr>"
+        rows = "".join(
+            f"<tr><td>{escape(p.name)}</td><td>{escape(plain(p.unit) or '1')}</td>"
+            f"<td>{p.typical:g}</td><td>{p.null:g}</td>"
+            f"<td>{p.low:g} to {p.high:g}</td><td>{self.grows_with(p)}</td>"
+            f"<td>{escape(p.reason)}</td></tr>"
+            for p in self.effect.parameters
+        )
+        description = escape(self.description)
+        equation = f"<p><code>{escape(self.equation)}</code></p>"
+        return f"<h4>{escape(self.name)}</h4>{equation}<table>{head}{rows}</table><pre>{description}</pre>"
+
+
+def catalogue_table(pages: Sequence[EffectPage]) -> str:
+    """Return an HTML table of effects: name, meaning, equation."""
+    head = "<tr><th>effect</th><th>what it is</th><th>equation</th></tr>"
+    rows = "".join(
+        f"<tr><td><b>{escape(p.name)}</b></td><td>{escape(p.about)}</td><td>{escape(p.equation)}</td></tr>"
+        for p in pages
+    )
+    return f"<table>{head}{rows}</table>"
+
+
+def _after(joint: str, text: str) -> str:
+    return joint + text if text else ""
