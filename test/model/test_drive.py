@@ -7,7 +7,7 @@ import pytest
 import slow
 from random_rigs import WITH_SPRING
 
-from rsea_ros.errors import IdentificationError
+from rsea_ros.errors import ChannelError, IdentificationError
 from rsea_ros.model.drive import LONGEST_STEP, coarser, drive_from, steps_per_sample
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -121,6 +121,11 @@ def test_step_is_a_whole_fraction_of_the_period(rate):
 def test_unusable_commands_are_refused(command, message):
     with pytest.raises(IdentificationError, match=message):
         drive_from(Record({"command": command}, source="bag"))
+
+
+def test_a_record_without_a_command_is_refused():
+    with pytest.raises(ChannelError, match="no channel 'command'"):
+        drive_from(Record({"ft": Channel(np.arange(20.0), np.zeros(20))}, source="bag"))
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.31])
