@@ -1,4 +1,4 @@
-"""Bad and unusual benches and bags: a result, or one line and status 2. The full gate is bench/inputs.py."""
+"""Bad and unusual benches and bags: a result, or one line and status 2. The full gate is `bench inputs`."""
 
 from __future__ import annotations
 

@@ -1,20 +1,16 @@
 """This project: `diagnose` on the training samples with the rig of the case, then a free run of its model.
 
-Silverbox has a rig whose effects are stated; there the rig is fitted as in bench/public_silverbox.py.
+Silverbox has a rig whose effects are stated; there the rig is fitted as in bench/public/silverbox.py.
 """
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from common import NotApplicable, PeerCase, PeerResult, main
 
-sys.path.append(str(Path(__file__).resolve().parents[2]))
-
-from bench.public_fit import RIGS, case_of, fit_rig, record_of, rig_of
+from bench.public.fit import RIGS, case_of, fit_rig, record_of, rig_of
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.errors import RigError
 from rsea_ros.model.rig_file import load_rig

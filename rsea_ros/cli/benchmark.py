@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 HELP = "name hidden causes: make records of known truth, answer them, score answers (make, run, score)"
 EXAMPLE = "rsea benchmark make records --seed 1 && rsea benchmark run records --out answers.jsonl"
-GENERATOR = Path(__file__).resolve().parents[2] / "bench" / "cause_naming.py"
+GENERATOR = Path(__file__).resolve().parents[2] / "bench" / "diagnosis" / "cause_naming.py"
 SHORTEST, MOST = 16, 9999
 """Characters of a secret seed: shorter ones could be found by trying; records of a data set."""
 HEAD = (

@@ -10,7 +10,7 @@ to and fro at f. P = T_d / T_m; S is the sensitivity, to a torque on the gear an
 whichever is larger; Z the output impedance, Z_s that of the bare spring. The loop is the sampled one, with
 hold and one sample of delay, exact at every frequency. |S| <= M keeps a gain margin of M / (M - 1) and a
 phase margin of 2 asin(1 / 2 M): 6 dB, 29 deg for 2; 3.5 dB, 19 deg for 3. The set: uncertainty.py, its
-corners here, all of it in `bench/torque_control.py`. The search is Nelder and Mead's in the logarithms of
+corners here, all of it in `python -m bench control`. The search is Nelder and Mead's in the logarithms of
 the gains; then the poles of the closed loop, taken from the code that runs, decide whether the design is let
 through.
 """

@@ -20,9 +20,9 @@ from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.identification.settings import IntervalSettings, NoiseSettings, Setting
 
 T = TypeVar("T")
-CHOSEN = "chosen on the benchmark; bench/settings_curve.py shows the outcomes over it"
+CHOSEN = "chosen on the benchmark; python -m bench diagnosis settings_curve shows the outcomes over it"
 CALIBRATED = (
-    "fixed when the coefficients of naming/status.py were fitted: after a change, `bench/calibration.py fit`"
+    "fixed when the coefficients of naming/status.py were fitted: after a change, `bench calibration fit`"
 )
 
 
@@ -103,7 +103,7 @@ class ForwardSettings:
     paired_fits: int = number(2, "1", "pairs that are fitted to all training blocks")
     smaller_guess: float = number(
         0.1, "1", "share of a first guess that is tried where two linear steps from it led uphill",
-        "a tenth of a typical size is nearly linear; without it mild effects were lost (effect_coverage.py)",
+        "a tenth of a typical size is nearly linear; without it mild effects were lost (`diagnosis coverage`)",
     )  # fmt: skip
     screening_steps: int = number(2, "1", "Gauss-Newton steps of an effect's screening, with old derivatives")
     screening_part: float = number(
@@ -111,7 +111,7 @@ class ForwardSettings:
     )
     bent_guesses: int = number(
         2, "1", "guesses that are fitted on after those steps, where derivatives change on the way",
-        "the better of two after the steps is not always the better in the end (effect_coverage.py)",
+        "the better of two after the steps is not always the better in the end (`diagnosis coverage`)",
     )  # fmt: skip
     bent_steps: int = number(4, "1", "steps of that fit")
     clear: float = number(
@@ -316,7 +316,7 @@ class SizeSettings:
     model_error: float = number(
         0.0025, "1", "relative error of the simulation itself in every size, one sigma",
         "fits to MuJoCo's play of the same bench deviate by 0.10 % RMS, 0.64 % at most "
-        "(bench/model_doubt.py); coverage is measured on another bench (test/independent)",
+        "(python -m bench diagnosis model_doubt); coverage is measured on another bench (test/independent)",
     )  # fmt: skip
     fall: float = number(
         1.02, "1", "ratio by which a channel's residual must fall for the gain to speak of that channel",

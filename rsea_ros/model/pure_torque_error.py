@@ -138,7 +138,7 @@ class ErrorSettings:
     which none is said.
 
     With less window or hysteresis noise whose share is the tolerance changes the verdict more than once a
-    second (bench/observer.py flag).
+    second (python -m bench observer flag).
     """
 
     tolerance: float = 0.3

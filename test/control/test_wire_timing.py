@@ -1,7 +1,7 @@
 """Driver and bench on a wire, without time: a cycle writes first, then reads; a sensor has its own clock.
 
 The peer's motor, its registers and its quanta, and the simulated plant are those of `rsea bench`; the
-instants are given, not waited for. On the wire itself: bench/driver.py controller.
+instants are given, not waited for. On the wire itself: python -m bench driver controller.
 """
 
 import math

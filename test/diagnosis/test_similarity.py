@@ -1,7 +1,7 @@
 """A diagnosis does not depend on how strong a machine is: bounds and starts scale with its size.
 
 Scales are powers of 4, so that a machine 4^n times as strong gives the same to rounding;
-`python bench/similarity.py` diagnoses every effect at other factors.
+`python -m bench diagnosis similarity` diagnoses every effect at other factors.
 """
 
 from __future__ import annotations

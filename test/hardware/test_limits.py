@@ -186,7 +186,7 @@ def test_limits_hold_for_every_rig(limits, reading, told):
 
 
 def test_the_ramp_after_the_last_command_takes_its_time_not_cycles():
-    """Seed 2 of bench/driver.py random: cycles of 60 ms on a busy machine made 340 ms of a ramp of 20 ms."""
+    """Seed 2 of `bench driver random`: cycles of 60 ms on a busy machine made 340 ms of a ramp of 20 ms."""
     guard = Guard(Limits(68.0, command_timeout=0.05, ramp=0.02), 1.0 / 280.0)
     for _ in range(3):
         guard.allowed_torque(10.0, 0.0)

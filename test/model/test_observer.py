@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from bench.observer_truth import true_run
+from bench.observer.truth import true_run
 from rsea_ros.errors import RigError
 from rsea_ros.model.observer import Observer, noise_of, observe
 from rsea_ros.model.observer.transition import transition

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.observer_truth import true_run
+from bench.observer.truth import true_run
 from msg_adapters import write_record
 from msg_adapters.ros import (
     Bool,

@@ -9,9 +9,9 @@ p = 1 / (1 + exp(-(a_0 + sum_i a_i f_i)))
 
 The features f are the fit of the law's shape (evidence.py), the further gain of a flexible law
 (flexible.py), its odds among its rivals (weighing.py), and its gain. The coefficients are those of
-`bench/calibration.py fit`; "none of these" is the mass that a cause and its rivals leave.
+`python -m bench calibration fit`; "none of these" is the mass that a cause and its rivals leave.
 
-Written by `python bench/calibration.py fit`, from records of the project's own plants; `score` tests them.
+Written by `python -m bench calibration fit`, from records of the project's own plants; `score` tests them.
 """
 
 from __future__ import annotations

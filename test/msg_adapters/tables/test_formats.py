@@ -147,7 +147,7 @@ def test_an_array_that_promises_more_than_the_file_holds_is_refused(tmp_path):
 
 @pytest.mark.parametrize("header", [b"{'descr': '<f8', 'shape': (6,), ", b"{'descr': ((((((", b"\x00\xff('"])
 def test_a_damaged_header_is_one_line(tmp_path, header):
-    """Damaged files in bench/inputs.py brought an error of the tokenizer that nobody had thought of."""
+    """Damaged files in `bench inputs` brought an error of the tokenizer that nobody had thought of."""
     with zipfile.ZipFile(tmp_path / "run.npz", "w") as archive:
         text = header.ljust(117) + b"\n"
         archive.writestr("t.npy", b"\x93NUMPY\x01\x00v\x00" + text + T.tobytes())

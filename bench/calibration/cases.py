@@ -1,0 +1,255 @@
+"""Records for the calibration of probabilities: several plants, overlapping effects, laws of no catalogue.
+
+The plants `open`, `loop`, `sea` and `rigid` are rigs of this project with drawn values, simulated by it,
+with laws that the catalogue lacks put into the command or the sensors; `second` is test/independent, which
+shares no code with it and has such laws in its mechanics too. Coefficients are fitted on the former and
+judged on the latter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from independent.bench import drawn_bench, record_command
+from independent.hidden import OFF_CATALOGUE, hide, hide_off_catalogue
+from independent.severities import SEVERITIES, SIZES, drawn_parameters
+
+from bench.calibration.laws import LAWS, RATE
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.model.rig import PositionLoop, Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import measure, simulate
+from rsea_ros.records.record import Channel, FloatArray, Record
+
+FAMILIES = ("open", "second", "loop", "second", "sea", "second", "rigid", "second")
+"""Plants in the order in which records are made; `second` judges the others."""
+GROUPS = {
+    "one": 0.15,
+    "two": 0.22,
+    "three": 0.10,
+    "four": 0.03,
+    "off": 0.15,
+    "off_and_one": 0.18,
+    "off_and_two": 0.08,
+    "taken_out": 0.08,
+    "clean": 0.01,
+}
+"""Share of the records by hidden causes: effects of the catalogue, a law that it lacks (off), or both."""
+COUNT = {"one": 1, "two": 2, "three": 3, "four": 4, "off_and_one": 1, "off_and_two": 2, "taken_out": 2}
+ON_RIGID = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "torque_ripple", "damping_drift")
+NOT_ON_SEA = ("torque_constant_error", "current_loop_lag", "hard_stop")
+"""Effects that a machine without a measured motor torque cannot tell, or that its travel never meets."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a record is made from.
+
+    hidden: effects with their parameters. off: a law outside the catalogue and its relative size. without:
+    effects that the diagnosis may not use. coloured: N m RMS of such noise in the F/T sensor.
+    """
+
+    name: str
+    family: str
+    group: str
+    seed: int
+    excitation: str
+    duration: float
+    hidden: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    off: tuple[str, float] | None = None
+    without: tuple[str, ...] = ()
+    coloured: float = 0.0
+
+    @property
+    def truth(self) -> tuple[str, ...]:
+        """Names that are right."""
+        return tuple(n for n in self.hidden if n not in self.without)
+
+
+def plans(count: int, seed: int) -> list[Plan]:
+    """Return the plans of so many records; a larger count begins with the same ones."""
+    return [_plan(k, np.random.default_rng([seed, k])) for k in range(count)]
+
+
+def _plan(k: int, rng: np.random.Generator) -> Plan:
+    family = FAMILIES[k % len(FAMILIES)]
+    group = str(rng.choice(list(GROUPS), p=np.array(list(GROUPS.values())) / sum(GROUPS.values())))
+    names = _drawn_effects(family, COUNT.get(group, 0), rng)
+    hidden = {n: _sizes(n, family, rng) for n in names}
+    off = None
+    if group.startswith("off"):
+        laws = list(OFF_CATALOGUE) if family == "second" else [n for n, f in LAWS.items() if family in f.on]
+        off = (str(rng.choice(laws)), float(rng.choice((0.5, 1.0, 1.6)) * rng.uniform(0.8, 1.2)))
+    kinds = ("work", "work", "steps") if family in ("loop", "rigid") else ("chirp", "multisine", "work")
+    return Plan(
+        name=f"{k:04d}-{family}-{group}",
+        family=family,
+        group=group,
+        seed=int(rng.integers(1, 2**31)),
+        excitation=str(rng.choice(kinds)),
+        duration=float(rng.choice((10.0, 12.0))),
+        hidden=hidden,
+        off=off,
+        without=_kin(names[0]) if group == "taken_out" else _unknown(family, off),
+        coloured=float(rng.choice((0.0, 0.0, 0.05, 0.2))),
+    )
+
+
+def _unknown(family: str, off: tuple[str, float] | None) -> tuple[str, ...]:
+    """Return the effect of the catalogue that a law equals, which the diagnosis may not use."""
+    known = LAWS[off[0]].known_as if off and family != "second" else ""
+    return (known,) if known in catalogue() else ()
+
+
+def _sizes(name: str, family: str, rng: np.random.Generator) -> dict[str, float]:
+    """Return parameters of an effect; a drive without a spring works against larger torques."""
+    drawn = drawn_parameters(name, str(rng.choice(SEVERITIES, p=(0.35, 0.4, 0.25))), rng)
+    torques = {p.name for p in catalogue()[name].parameters if p.unit == "N m"}
+    return {p: v * (6.0 if family == "rigid" and p in torques else 1.0) for p, v in drawn.items()}
+
+
+def _drawn_effects(family: str, count: int, rng: np.random.Generator) -> list[str]:
+    """Return effects that are not confused with each other, of those that a plant can show."""
+    effects = catalogue()
+    possible = [n for n in SIZES if family != "rigid" or n in ON_RIGID]
+    possible = [n for n in possible if family != "sea" or n not in NOT_ON_SEA]
+    chosen: list[str] = []
+    for name in rng.permutation(possible):
+        alike = set(effects[name].claims.confusable_with) | {
+            n for n in possible if name in effects[n].claims.confusable_with
+        }
+        if len(chosen) < count and not alike & set(chosen):
+            chosen.append(str(name))
+    return chosen
+
+
+def _kin(name: str) -> tuple[str, ...]:
+    effects = catalogue()
+    alike = [n for n, e in effects.items() if name in e.claims.confusable_with]
+    return (name, *dict.fromkeys([*effects[name].claims.confusable_with, *alike]))
+
+
+def left_out(plan: Plan, pool: int) -> tuple[str, ...]:
+    """Return the effects that a diagnosis may not use: the plan's, and all but `pool` where pool is not 0.
+
+    The hidden effects and those confused with them stay, so a pool keeps the likeliest wrong names.
+    """
+    effects = catalogue()
+    mimics = OFF_CATALOGUE[plan.off[0]][1] if plan.off and plan.off[0] in OFF_CATALOGUE else ()
+    wanted = dict.fromkeys([*plan.truth, *mimics, *(k for n in plan.truth for k in _kin(n))])
+    drawn = np.random.default_rng([plan.seed, 1]).permutation(list(effects))
+    stays = [*wanted, *(str(n) for n in drawn if n not in wanted)][: max(pool, len(plan.truth))]
+    return (*plan.without, *(n for n in effects if pool and n not in stays and n not in plan.without))
+
+
+def simulate_plan(plan: Plan) -> tuple[Record, Rig]:
+    """Simulate a plan; return the record and the rig that a user would diagnose it with."""
+    rng = np.random.default_rng(plan.seed)
+    return _second(plan, rng) if plan.family == "second" else _simulate(plan, rng)
+
+
+def _command(plan: Plan, rng: np.random.Generator, size: float = 1.0) -> FloatArray:
+    """Return the commands of a plan, N m."""
+    from independent.excitations import chirp_noise, odd_multisine
+
+    if plan.excitation == "chirp":
+        return size * chirp_noise(plan.duration, rng)
+    if plan.excitation == "multisine":
+        return size * odd_multisine(plan.duration, rng, period=5.0 if plan.duration != 12.0 else 4.0)
+    levels = 30.0 * work(plan.duration, rng, smooth=plan.excitation == "work")
+    noise = 0.0 if plan.family in ("loop", "rigid") else 1.0  # no loop has white noise in its reference
+    return size * (levels + noise * rng.normal(size=len(levels)))
+
+
+def work(duration: float, rng: np.random.Generator, smooth: bool) -> FloatArray:
+    """Return a log of normal work, -1 to 1: levels held for 0.2 to 1.2 s, smoothed moves between if asked."""
+    levels, n = [], round(duration * RATE)
+    while sum(map(len, levels)) < n:
+        levels.append(np.full(round(rng.uniform(0.2, 1.2) * RATE), rng.uniform(-1.0, 1.0)))
+    held = np.concatenate(levels)[:n]
+    if not smooth:
+        return held
+    window = np.hanning(round(0.15 * RATE) + 2)[1:-1]
+    return np.convolve(held, window / window.sum(), mode="same")
+
+
+def _second(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
+    bench = drawn_bench(rng)
+    for effect, parameters in plan.hidden.items():
+        bench = hide(bench, effect, parameters)
+    if plan.off:
+        bench = hide_off_catalogue(bench, *plan.off)
+    record = record_command(bench, _command(plan, rng), rng)
+    return _with_colour(record, plan, rng), load_rig("paper_high_impedance")
+
+
+def _simulate(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
+    """Return a record of one of the project's rigs with drawn values, and the rig as stated."""
+    stated = rig_of(plan.family)
+    true = stated.with_values(
+        {n: stated[n] * float(np.exp(0.5 * stated.spread(n) * rng.normal())) for n in stated.free()}
+    )
+    for name, parameters in plan.hidden.items():
+        true = true.with_effect(name, **parameters)
+    law = LAWS[plan.off[0]] if plan.off else None
+    t = np.arange(round(plan.duration * RATE)) / RATE
+    commanded = _command(plan, rng)
+    acting = law.command(commanded, plan.off[1]) if law and law.command and plan.off else commanded
+    names = [n for n in stated.sensors if n != "reference"]
+    blank = {n: Channel(t + 1.0 / RATE, np.zeros(len(t))) for n in names}
+    channels = {"command": Channel(t, acting), **blank}
+    if plan.family in ("loop", "rigid"):
+        channels = _with_loop(channels, true, commanded, acting)
+    outputs = simulate(true, Record(channels, plan.name))
+    measured = {n: measure(true, n, outputs[n], rng) for n in names}
+    if law and law.sensor and plan.off:
+        measured = law.sensor(measured, plan.off[1], t, rng)
+    record = Record(
+        {
+            **{n: Channel(c.t, c.y) for n, c in channels.items() if n not in measured},
+            **{n: Channel(t + 1.0 / RATE, y) for n, y in measured.items()},
+        },
+        plan.name,
+    )
+    commands = measured["motor_torque"] if plan.family in ("loop", "rigid") else commanded
+    stamps = t + 1.0 / RATE if plan.family in ("loop", "rigid") else t
+    record = record.with_channels(command=Channel(stamps, commands))
+    return _with_colour(record, plan, rng), stated
+
+
+def _with_loop(channels, rig: Rig, commanded: FloatArray, acting: FloatArray):
+    """Return channels with a reference (rad) that demands about the commanded torque."""
+    softness = 2.0 / rig["spring.stiffness"] if not rig.rigid_spring else 0.02
+    reference = Channel(channels["command"].t, softness * commanded)
+    return {**channels, "command": Channel(reference.t, acting - commanded), "reference": reference}
+
+
+def rig_of(family: str) -> Rig:
+    """Return the rig of a family as a user would state it."""
+    if family == "rigid":
+        return replace(load_rig("bare_drive"), controller=PositionLoop(15.0, 120.0, 200.0))
+    rig = load_rig("paper_high_impedance")
+    if family == "loop":
+        return replace(rig, controller=PositionLoop(15.0, 80.0, 80.0))
+    if family != "sea":
+        return rig
+    spreads = {"rotor.reflected_inertia": 1.0, "rotor.reflected_damping": 1.0, "spring.stiffness": 0.2}
+    values = {"rotor.reflected_inertia": 0.4, "rotor.reflected_damping": 12.0, "spring.stiffness": 2100.0}
+    quantities = {
+        n: replace(q, value=values.get(n, q.value), spread=spreads.get(n, q.spread))
+        for n, q in rig.quantities.items()
+    }
+    sensors = {n: s for n, s in rig.sensors.items() if n in ("ft", "position")}
+    return replace(rig, quantities=quantities, sensors=sensors)
+
+
+def _with_colour(record: Record, plan: Plan, rng: np.random.Generator) -> Record:
+    """Return the record with noise of the F/T sensor that falls with frequency, as of an amplifier."""
+    if not plan.coloured or "ft" not in record:
+        return record
+    white = rng.normal(size=len(record["ft"]))
+    slow = np.convolve(white, np.exp(-np.arange(40) / 8.0), mode="same")
+    ft = record["ft"].y + plan.coloured * slow / slow.std()
+    return record.with_channels(ft=Channel(record["ft"].t, ft))

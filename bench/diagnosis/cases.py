@@ -1,0 +1,237 @@
+"""Records with a known cause, for measuring the diagnosis: made by the second bench, not by the model.
+
+`plan(seed)` lists the cases; `Plan.make()` simulates one case, so that a run needs only one in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import permutations
+
+import numpy as np
+from independent.bench import Bench, drawn_bench, record_run
+from independent.faults import FAULTS
+from independent.hidden import (
+    BESIDE_THE_CONTRACT,
+    OFF_CATALOGUE,
+    hide,
+    hide_beside_the_contract,
+    hide_off_catalogue,
+)
+from independent.severities import SEVERITIES, SIZES, drawn_parameters
+
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.records.record import Record
+
+PAIRS = (
+    ("coulomb_friction", "structural_resonance"),
+    ("coulomb_friction", "backlash"),
+    ("coulomb_friction", "command_delay"),
+    ("coulomb_friction", "nonlinear_spring"),
+    ("coulomb_friction", "torque_ripple"),
+    ("coulomb_friction", "ft_drift"),
+    ("coulomb_friction", "mains_interference"),
+    ("coulomb_friction", "stiffness_drift"),
+    ("backlash", "structural_resonance"),
+    ("backlash", "current_loop_lag"),
+    ("backlash", "ft_bias"),
+    ("nonlinear_spring", "command_delay"),
+    ("nonlinear_spring", "mains_interference"),
+    ("nonlinear_spring", "damping_drift"),
+    ("torque_constant_error", "structural_resonance"),
+    ("torque_constant_error", "command_delay"),
+    ("torque_saturation", "ft_bias"),
+    ("torque_saturation", "structural_resonance"),
+    ("load_dependent_friction", "mains_interference"),
+    ("load_dependent_friction", "current_loop_lag"),
+    ("asymmetric_friction", "structural_resonance"),
+    ("torque_ripple", "ft_sensor_lag"),
+    ("hard_stop", "ft_drift"),
+    ("damping_drift", "structural_resonance"),
+)
+"""Two effects that different parts of the data show."""
+
+READINGS = (
+    ("asymmetric_friction", {"offset": 1.5}, {"friction_offset": 0.0, "one_sided": 1.5}),
+    ("spring_hysteresis", {"torque": 1.2, "angle": 2.5e-3}, {"bouc_wen_beta": 0.5}),
+    ("backlash", {"gap": 2.0e-3}, {"encoder_on_chassis": 1.0}),
+    ("gear_compliance", {"stiffness": 2.2e3}, {"encoder_on_chassis": 0.0}),
+    (
+        "torque_ripple",
+        {"amplitude": 1.2, "cycles_per_revolution": 2.0 * np.pi / (502 * 0.011), "phase": 0.0},
+        {"ripple": 0.0, "cogging": 1.2, "cogging_period": 0.011},  # a wave of the output angle: the same law
+    ),
+)
+"""Effect, its size, and values of the bench that stand for another reading of its definition."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One record, its hidden effects, and another record of the same bench with another seed."""
+
+    name: str
+    record: Record
+    truth_causes: tuple[str, ...]
+    truth_parameters: Mapping[str, Mapping[str, float]]
+    fresh_record: Record | None
+    group: str = "single"
+    mimics: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The ingredients of a case; without: effects that the diagnosis may not use.
+
+    group: single, pair, clean, off_catalogue, taken_out, faulty, reading, drawn_pair, drawn_triple, newer, or
+    unsearched (an effect that a diagnosis does not try unless a rig states it).
+    newer: an effect that came after the first 23, and the factor on its main parameter.
+    """
+
+    name: str
+    group: str
+    seed: int
+    excitation: str = "chirp_noise"
+    hidden: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
+    off: tuple[str, float] | None = None
+    newer: tuple[str, float] | None = None
+    faults: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    duration: float = 60.0
+
+    def bench(self) -> Bench:
+        """Return the bench that this case is measured on."""
+        bench = drawn_bench(np.random.default_rng(self.seed))
+        for effect, parameters in self.hidden.items():
+            bench = hide(bench, effect, parameters)
+        if self.newer:
+            bench = hide_beside_the_contract(bench, *self.newer)
+        if self.off:
+            bench = hide_off_catalogue(bench, *self.off)
+        return bench.with_values(**self.values)
+
+    def make(self, fresh: bool = True, duration: float | None = None) -> Case:
+        """Simulate the case: its record with the faults put in, and a fresh record without.
+
+        fresh: with that one. duration: of each, s, in place of the plan's.
+        """
+        bench, seconds = self.bench(), duration or self.duration
+        record = record_run(bench, self.seed + 1, self.excitation, seconds)
+        again = record_run(bench, self.seed + 2, self.excitation, seconds) if fresh else None
+        rng = np.random.default_rng(self.seed + 3)
+        for fault in self.faults:
+            record = FAULTS[fault](record, rng)
+        mimics = OFF_CATALOGUE[self.off[0]][1] if self.off else ()
+        truth = self.truth()
+        return Case(
+            self.name, record, tuple(truth), truth, again, self.group, mimics, self.faults, self.without
+        )
+
+    def truth(self) -> Mapping[str, Mapping[str, float]]:
+        """Return the hidden effects with their parameters in the catalogue's units."""
+        if not self.newer:
+            return self.hidden
+        effect, factor = self.newer
+        parameters = dict(BESIDE_THE_CONTRACT[effect][0])
+        main = next(iter(parameters))
+        return {effect: {**parameters, main: parameters[main] * factor}}
+
+
+def plan(seed: int = 2024) -> tuple[Plan, ...]:
+    """Return all cases that a seed makes, each with a seed of its own."""
+    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings, _taken_out, _draw, _newer)
+    rng = np.random.default_rng(seed)
+    return tuple(case for maker in makers for case in maker(rng))
+
+
+def _excitation(k: int) -> str:
+    return ("chirp_noise", "multisine")[k % 2]
+
+
+def _seed(rng: np.random.Generator) -> int:
+    return int(rng.integers(1, 2**31)) * 8
+
+
+def _singles(rng: np.random.Generator) -> Iterator[Plan]:
+    for effect in SIZES:
+        for severity in SEVERITIES:
+            for excitation in ("chirp_noise", "multisine"):
+                hidden = {effect: drawn_parameters(effect, severity, rng)}
+                name = f"{effect}-{severity}-{excitation}"
+                yield Plan(name, "single", _seed(rng), excitation, hidden)
+
+
+def _pairs(rng: np.random.Generator) -> Iterator[Plan]:
+    for k, pair in enumerate(PAIRS):
+        severity = SEVERITIES[1 + k % 2]
+        hidden = {effect: drawn_parameters(effect, severity, rng) for effect in pair}
+        yield Plan("+".join(pair), "pair", _seed(rng), _excitation(k // 2), hidden)
+
+
+def _clean(rng: np.random.Generator) -> Iterator[Plan]:
+    for k in range(24):
+        yield Plan(f"clean-{k:02d}", "clean", _seed(rng), _excitation(k))
+
+
+def _off_catalogue(rng: np.random.Generator) -> Iterator[Plan]:
+    for k, effect in enumerate(OFF_CATALOGUE):
+        for factor in (0.7, 1.4):
+            off = (effect, factor * rng.uniform(0.9, 1.1))
+            yield Plan(f"off-{effect}-{factor}", "off_catalogue", _seed(rng), _excitation(k), off=off)
+
+
+def _taken_out(rng: np.random.Generator) -> Iterator[Plan]:
+    """Every effect hidden, and taken out of the catalogue with all effects that are confused with it."""
+    for k, (name, effect) in enumerate(catalogue().items()):
+        if name in SIZES:
+            kin = [n for n, e in catalogue().items() if name in e.claims.confusable_with]
+            without = (name, *dict.fromkeys([*effect.claims.confusable_with, *kin]))
+            hidden = {name: drawn_parameters(name, "medium", rng)}
+            yield Plan(f"taken_out-{name}", "taken_out", _seed(rng), _excitation(k), hidden, without=without)
+
+
+def _faulty(rng: np.random.Generator) -> Iterator[Plan]:
+    """Every fault on a healthy bench, and on a bench with an effect that must be named in spite of it."""
+    for k, fault in enumerate(FAULTS):
+        yield Plan(f"fault-{fault}", "faulty", _seed(rng), _excitation(k), faults=(fault,))
+        if fault != "missing_topic":
+            hidden = {"coulomb_friction": drawn_parameters("coulomb_friction", "medium", rng)}
+            name = f"fault-{fault}-coulomb_friction"
+            yield Plan(name, "faulty", _seed(rng), _excitation(k), hidden, faults=(fault,))
+
+
+def _draw(rng: np.random.Generator) -> Iterator[Plan]:
+    """Two or three effects drawn at random, of those that are not confused with each other."""
+    effects, names = catalogue(), list(SIZES)
+    for group, count, number in (("drawn_pair", 2, 50), ("drawn_triple", 3, 25)):
+        drawn = 0
+        while drawn < number:
+            chosen = [str(n) for n in rng.choice(names, count, replace=False)]
+            if any(b in effects[a].claims.confusable_with for a, b in permutations(chosen, 2)):
+                continue
+            drawn += 1
+            severity = SEVERITIES[1 + int(rng.integers(2))]
+            hidden = {effect: drawn_parameters(effect, severity, rng) for effect in chosen}
+            name = f"{'+'.join(chosen)}-{severity}"
+            yield Plan(name, group, _seed(rng), _excitation(int(rng.integers(2))), hidden)
+
+
+def _newer(rng: np.random.Generator) -> Iterator[Plan]:
+    """The effects that came after the first 23, at half, full and twice the medium size; drawn last, so that
+    the seeds of all other cases stay."""
+    for effect in BESIDE_THE_CONTRACT:
+        for k, factor in enumerate((0.5, 1.0, 2.0)):
+            name = f"newer-{effect}-{factor:g}"
+            group = "newer" if catalogue()[effect].is_searched else "unsearched"
+            yield Plan(name, group, _seed(rng), _excitation(k), newer=(effect, factor))
+
+
+def _readings(rng: np.random.Generator) -> Iterator[Plan]:
+    """Other readings of the definitions of effects; no limits hold for these, but the matrix shows them."""
+    for effect, parameters, values in READINGS:
+        for excitation in ("chirp_noise", "multisine"):
+            name = f"reading-{effect}-{excitation}"
+            yield Plan(name, "reading", _seed(rng), excitation, {effect: parameters}, values)

@@ -1,0 +1,116 @@
+"""How often identify's 95 % intervals hold the truth, on records of the second bench with something wrong.
+
+python -m bench diagnosis intervals --seeds 100 [--scenarios NAME ...] [--duration 20] [--first 0]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from independent.bench import Bench, drawn_bench, record_run
+from scipy.signal import lfilter
+
+from bench import parser_of
+from bench.diagnosis.coverage_cases import RIG_VALUES
+from rsea_ros.identification.identify import identify
+from rsea_ros.identification.result import Identification
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.records.record import Channel, Record
+
+RIG = "paper_high_impedance"
+COLOURED = {"ft": 0.06, "position": 1.5e-5}
+"""RMS of the coloured noise, N m and rad."""
+CLOCKS = {"ft": "ft", "command": "command", "position": "joint", "velocity": "joint", "motor_torque": "joint"}
+"""Channels whose stamps come in one message."""
+
+Spoil = Callable[[Record, np.random.Generator], Record]
+
+
+def keep_record(record: Record, rng: np.random.Generator) -> Record:
+    """Return the record as it is."""
+    return record
+
+
+def with_coloured_noise(record: Record, rng: np.random.Generator) -> Record:
+    """Return the record with noise of first order, 0.9 from sample to sample, on F/T torque and position."""
+    changed = {}
+    for name, rms in COLOURED.items():
+        white = rng.normal(size=len(record[name]) + 500)
+        noise = rms * np.sqrt(1.0 - 0.9**2) * lfilter([1.0], [1.0, -0.9], white)[500:]
+        changed[name] = Channel(record[name].t.copy(), record[name].y + noise)
+    return record.with_channels(**changed)
+
+
+def jitter(clocks: Sequence[str], by: float = 3e-4) -> Spoil:
+    """Return a function that shifts every stamp of these clocks by up to `by` s."""
+
+    def spoil(record: Record, rng: np.random.Generator) -> Record:
+        off = {c: rng.uniform(-by, by, len(record["command"])) for c in clocks}
+        changed = {n: c for n, c in record.channels.items() if CLOCKS[n] in clocks}
+        return record.with_channels(
+            **{n: Channel(c.t + off[CLOCKS[n]][: len(c)], c.y.copy()) for n, c in changed.items()}
+        )
+
+    return spoil
+
+
+SCENARIOS: dict[str, tuple[dict[str, float], Spoil]] = {
+    "white noise": ({}, keep_record),
+    "coloured noise, AR 0.9": ({}, with_coloured_noise),
+    "sensor stamps off by 0.3 ms": ({}, jitter(("ft", "joint"))),
+    "command stamps off by 0.3 ms": ({}, jitter(("command",))),
+    "all stamps off by 0.3 ms": ({}, jitter(("command", "ft", "joint"))),
+    "Coulomb friction 0.02 N·m": ({"coulomb": 0.02}, keep_record),
+    "Coulomb friction 0.1 N·m": ({"coulomb": 0.1}, keep_record),
+    "Coulomb friction 0.3 N·m": ({"coulomb": 0.3}, keep_record),
+    "motor constant 10 % off": ({"torque_gain": 1.1}, keep_record),
+    "F/T gain 10 % off": ({"ft_gain": 1.1}, keep_record),
+    "command delay 2 ms": ({"delay": 2e-3}, keep_record),
+}
+
+
+def bench_of(seed: int, hidden: dict[str, float]) -> Bench:
+    """Return the bench of a seed with something hidden in it."""
+    return drawn_bench(np.random.default_rng(seed)).with_values(**hidden)
+
+
+def outcome(name: str, seed: int, duration: float) -> tuple[Identification, dict[str, float]]:
+    """Identify one record; return the result and the true values by name."""
+    hidden, spoil = SCENARIOS[name]
+    bench = bench_of(seed, hidden)
+    excitation = ("chirp_noise", "multisine", "white_noise")[seed % 3]
+    record = spoil(record_run(bench, seed, excitation, duration), np.random.default_rng(seed + 10_000))
+    plant = bench.plant._asdict()
+    return identify([record], load_rig(RIG)), {n: plant[alias] for n, alias in RIG_VALUES.items()}
+
+
+def row(name: str, seeds: Sequence[int], duration: float) -> str:
+    """Return one line of the table: coverage by parameter, and the median half width of K_s."""
+    inside = dict.fromkeys(RIG_VALUES, 0)
+    widths, ratios = [], []
+    for seed in seeds:
+        result, true = outcome(name, seed, duration)
+        for p in result.parameters:
+            if p.name in true:
+                inside[p.name] += p.ci95[0] <= true[p.name] <= p.ci95[1]
+                if p.name == "spring.stiffness":
+                    widths.append(50.0 * (p.ci95[1] - p.ci95[0]) / p.value)
+        ratios.append(max(v / result.noise_rms[n] for n, v in result.residual_rms.items()))
+    shares = "".join(f"{100.0 * inside[n] / len(seeds):10.0f}" for n in RIG_VALUES)
+    return f"{name:30}{shares}{np.median(widths):14.3g}{np.median(ratios):12.2f}"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Print the table."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--seeds", type=int, default=100, help="records a scenario (default %(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="first seed (default %(default)s)")
+    parser.add_argument("--duration", type=float, default=20.0, help="s, of a record (default %(default)s)")
+    parser.add_argument("--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), metavar="NAME")
+    args = parser.parse_args(argv)
+    print(f"truth inside the 95 % interval, %, of {args.seeds} records of {args.duration:g} s")
+    print(f"{'':30}{'J_m':>10}{'b_m':>10}{'K_s':>10}{'b_s':>10}{'K_s ± %':>14}{'x noise':>12}")
+    for name in args.scenarios:
+        print(row(name, range(args.first, args.first + args.seeds), args.duration), flush=True)
+    return 0

@@ -1,0 +1,306 @@
+"""Each special branch of the diagnosis switched off in turn: where does it decide, and is it right there?
+
+A branch stands here as a function of the package and what it returns where the branch does nothing. A first
+run of a record notes which branches ever do something. Only those are played again without: the others cannot
+change a number. Branches that act after the search are played again from the search's end.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bench import parser_of
+from bench.frozen.cases import Entry, Played, bench_records, case_records, lab_records, small_records
+from bench.frozen.play import KEPT, line_of, said
+from bench.results import append_line, read_lines
+from rsea_ros.diagnosis.backward_elimination import ReducedModels
+from rsea_ros.diagnosis.candidate import Candidate
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.errors import RseaError
+
+steps = importlib.import_module("rsea_ros.diagnosis.diagnose")
+Off = Callable[..., Any]
+_WITH = ReducedModels._with
+
+
+class Branch(NamedTuple):
+    """A branch: its functions, `module:attribute` below rsea_ros.diagnosis, and what each does when off.
+
+    late: it acts after the search. setting: what switches it off, in place of functions.
+    acts: whether a call does something, of its result and arguments, where the call without is too dear.
+    """
+
+    functions: Mapping[str, Off] = {}
+    late: bool = False
+    setting: tuple[str, str, Any] | None = None
+    acts: Callable[..., bool] | None = None
+
+
+def _nothing(*_args: Any, **_kwargs: Any) -> list[Any]:
+    return []
+
+
+def _no(*_args: Any, **_kwargs: Any) -> bool:
+    return False
+
+
+def _fitted_on(self: ReducedModels, model: Candidate, *rest: Any) -> Candidate | None:
+    """Return a model with a rival in the place of a cause, fitted to the end also where it is far."""
+
+    def is_far(owner: ReducedModels, m: Candidate) -> bool:
+        return m is model and ReducedModels._is_far(owner, m)
+
+    patient = type("Patient", (ReducedModels,), {"_is_far": is_far})
+    mine = (self.effects, self.pools, self.settings, self.fitted)
+    return _WITH(patient(*mine), model, *rest)
+
+
+def _was_dropped(result: Candidate | None, self: ReducedModels, model: Candidate, *_: Any) -> bool:
+    return result is not None and self._is_far(result) and not self._is_far(model)
+
+
+FITS, FORWARD = "step_fits:StepFits", "stepwise:ForwardStep"
+BRANCHES: Mapping[str, Branch] = {
+    "overlooked by the pieces": Branch({f"{FITS}.find_overlooked": _nothing}),
+    "nearly as good, fitted on": Branch({f"{FITS}.nearly_as_good": _nothing}),
+    "modes again from typical values": Branch({f"{FITS}.fit_modes_again": lambda self, models: list(models)}),
+    "ripple on the measured angle": Branch({f"{FITS}.on_measured_angle": _nothing}),
+    "starts from stated values": Branch({f"{FITS}._from_stated_values": _nothing}),
+    "pairs": Branch({f"{FORWARD}._pairs": _nothing}),
+    "pairs nearer the rig": Branch({f"{FORWARD}._pairs_nearer_the_rig": _nothing}),
+    "replacement step": Branch({"stepwise:replacement_step": lambda step: importlib.import_module(
+        "rsea_ros.diagnosis.stepwise").NO_STEP}),
+    "bent guesses": Branch({"step_fits:continue_fit": lambda screened, rule: screened}),
+    "a tenth of the guess": Branch({"step_fits:_other_guesses": _nothing}),
+    "rough effects": Branch({"step_fits:_rough": lambda effect: effect}),
+    "common clock into the delay": Branch({"candidate:with_common_clock_in_delay": lambda solution: None}),
+    "a time within the clocks is no cause": Branch({
+        "candidate:is_within_clocks": _no, "backward_elimination:is_within_clocks": _no}),
+    "quick replacement dropped": Branch(
+        {"backward_elimination:ReducedModels._with": _fitted_on}, acts=_was_dropped),
+    "one late cause promoted": Branch(
+        {"naming.weighing:promote_best": lambda selection, stages, *_: (selection, stages)}, late=True),
+    "close rivals fitted to the end": Branch(
+        {"naming.weighing:_with_close_ones_fitted": lambda tried, *_: tried}, late=True),
+    "a cause that changes nothing": Branch(late=True, setting=("evidence", "least_contribution", 0.0)),
+    "wandering sensor (carried)": Branch(late=True, setting=("naming", "carried", math.inf)),
+    "size open by ten": Branch({"naming.conclusion:is_known": lambda size, rule: True}, late=True),
+    "rig doubtful": Branch({"naming.weighing:is_off_rig": _no}, late=True),
+    "known values that pay": Branch({
+        "criteria:keeps_known_values": _no, "backward_elimination:keeps_known_values": _no}),
+    "play remark": Branch({"naming.conclusion:undetermined_play": lambda *_: ()}, late=True),
+    "takes_most": Branch({"naming.conclusion:takes_most": _no}, late=True),
+    "missed response by coherence": Branch({"score:missed_response": lambda *_: 0.0}),
+}  # fmt: skip
+"""By the names of the list in the issue that asked for the table."""
+
+
+@contextlib.contextmanager
+def replaced(functions: Mapping[str, Callable[[Off], Off]]) -> Iterator[None]:
+    """Replace functions of the diagnosis by what is made of them within a with statement."""
+    with contextlib.ExitStack() as stack:
+        for place, make in functions.items():
+            module, name = place.split(":")
+            *owner, attribute = name.split(".")
+            target: Any = importlib.import_module(f"rsea_ros.diagnosis.{module}")
+            for part in owner:
+                target = getattr(target, part)
+            before = getattr(target, attribute)
+            stack.callback(setattr, target, attribute, before)
+            setattr(target, attribute, make(before))
+        yield
+
+
+def _without(branch: Branch) -> contextlib.AbstractContextManager[None]:
+    return replaced({place: lambda _, off=off: off for place, off in branch.functions.items()})
+
+
+def _settings(branch: Branch, settings: DiagnosisSettings) -> DiagnosisSettings:
+    if branch.setting is None:
+        return settings
+    group, name, value = branch.setting
+    return replace(settings, **{group: replace(getattr(settings, group), **{name: value})})
+
+
+@contextlib.contextmanager
+def _noting(acts: Counter[str]) -> Iterator[None]:
+    """Count how often each branch does something within a with statement."""
+
+    def noted(name: str, off: Off) -> Callable[[Off], Off]:
+        does = BRANCHES[name].acts or (lambda result, *args: not _same(result, off(*args)))
+
+        def make(before: Off) -> Off:
+            def call(*args: Any) -> Any:
+                result = before(*args)
+                acts[name] += does(result, *args)
+                return result
+
+            return call
+
+        return make
+
+    places = {p: noted(n, off) for n, b in BRANCHES.items() for p, off in b.functions.items()}
+    with replaced(places):
+        yield
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Return whether two results are one: the same objects, in the same order."""
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
+    return a is b or (isinstance(a, bool | float | str) and a == b)
+
+
+class _Search(NamedTuple):
+    """The search of a record, from whose end the late branches go on."""
+
+    found: tuple[Any, Any]
+    seconds: float
+
+
+@contextlib.contextmanager
+def _kept_search(kept: list[_Search]) -> Iterator[None]:
+    """Keep the search of the first diagnosis within a with statement, and take it in the others."""
+    before = steps.search
+
+    def search(*args: Any, **kwargs: Any) -> Any:
+        if not kept:
+            begin = time.process_time()
+            found = before(*args, **kwargs)
+            kept.append(_Search(found, time.process_time() - begin))
+        return kept[0].found
+
+    steps.search = search
+    try:
+        yield
+    finally:
+        steps.search = before
+
+
+def play(entry: Entry) -> Iterator[dict[str, Any]]:
+    """Yield a line of a record as it is, then one without each branch that does something on it."""
+    played = entry.make()
+    settings = replace(DEFAULT, without=played.without)
+    acts: Counter[str] = Counter()
+    kept: list[_Search] = []
+    with _noting(acts), _kept_search(kept):
+        first = _line(entry.name, played, settings)
+    acts.update({name: 1 for name, branch in BRANCHES.items() if branch.setting})
+    yield {**first, "branch": "", "acts": dict(acts), "truth": played.truth}
+    for name in (n for n in BRANCHES if acts[n]):
+        branch = BRANCHES[name]
+        with _without(branch), _kept_search(kept) if branch.late else contextlib.nullcontext():
+            line = _line(entry.name, played, _settings(branch, settings))
+        saved = kept[0].seconds if branch.late and kept else 0.0
+        yield {**line, "branch": name, "processor": round(line["processor"] + saved, 1)}
+
+
+def _line(name: str, played: Played, settings: DiagnosisSettings) -> dict[str, Any]:
+    begin, clock = time.perf_counter(), time.process_time()
+    try:
+        result = steps.diagnose([played.record], played.rig, settings=settings)
+    except RseaError as error:
+        return {"record": name, "verdict": f"error: {error}", "causes": [], "digest": "", "seconds": 0.0,
+                "processor": 0.0, "remarks": []}  # fmt: skip
+    line = line_of(name, result, time.perf_counter() - begin)
+    remarks = sorted({r.code for r in result.remarks})
+    return {**line, "processor": round(time.process_time() - clock, 1), "remarks": remarks}
+
+
+def records() -> Iterator[Entry]:
+    """Yield the records of the table: more than half from plants of other hands, no set in a row."""
+    small = list(small_records(311, 5.0, 500))
+    lab = [e for seed in (312, 313) for e in lab_records(seed, 10.0)]
+    own = [e for e in bench_records(2031, 10.0) if not e.name.split("-")[1].startswith(("clean", "fault"))]
+    mixed = [own[(k * 37) % len(own)] for k in range(30)]
+    every: Sequence[Iterator[Entry]] = [iter(small), iter(lab), iter(mixed), case_records()]
+    for k in range(60):
+        for turn in (0, 0, 1, 2) if k % 4 else (0, 3):
+            entry = next(every[turn], None)
+            if entry is not None:
+                yield entry
+
+
+def run(path: Path, minutes: float = math.inf) -> None:
+    """Append to a file the lines that it lacks, record by record, for some minutes."""
+    stop = time.monotonic() + 60.0 * minutes
+    done = {line["record"] for line in read_lines(path) if line["branch"] == "end"}
+    for entry in records():
+        if entry.name in done or time.monotonic() > stop:
+            continue
+        for line in play(entry):
+            append_line(path, line)
+        append_line(path, {"record": entry.name, "branch": "end"})
+        print(entry.name, flush=True)
+
+
+def main(argv: Sequence[str]) -> int:
+    """Play the records that the log lacks, and print the table."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--log", type=Path, default=KEPT / "ablation.jsonl", help="a line of JSON each")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="0: only the table of the log")
+    args = parser.parse_args(argv)
+    run(args.log, args.minutes)
+    print(table(read_lines(args.log)))
+    return 0
+
+
+def is_right(line: Mapping[str, Any], truth: Sequence[str] | None) -> bool:
+    """Return whether no wrong name is told as sure, and every hidden cause is named where there is one."""
+    names = {c["name"] for c in line["causes"]}
+    sure = {c["name"] for c in line["causes"] if c["status"] == "confirmed"}
+    hidden = set(truth or ())
+    return sure <= hidden and hidden <= names
+
+
+def table(lines: Iterable[Mapping[str, Any]]) -> str:
+    """Return for each branch how often it acts and decides, what is right with and without, and its cost."""
+    by_record: dict[str, dict[str, Mapping[str, Any]]] = {}
+    for line in lines:
+        by_record.setdefault(line["record"], {})[line["branch"]] = line
+    whole = {name: played for name, played in by_record.items() if "end" in played}
+    rows = [
+        "| branch | acts on | decides on: name, status, verdict | right with; without | only a number | "
+        "processor, % |",
+        "|---|--:|---|--:|--:|--:|",
+    ]
+    for name in BRANCHES:
+        rows.append(_row(name, [p for p in whole.values() if name in p]))
+    others = sum(n.startswith("plants") for n in whole)
+    return "\n".join([f"{len(whole)} records, {others} of them from ../shared/plants.", "", *rows])
+
+
+def _row(name: str, played: Sequence[Mapping[str, Mapping[str, Any]]]) -> str:
+    pairs = [(p[""], p[name]) for p in played]
+    acting = [(a, b) for a, b in pairs if BRANCHES[name].setting is None or _moved(a, b)]
+    decided = [(a, b) for a, b in acting if said(a) != said(b)]
+    moved = sum(_moved(a, b) for a, b in acting) - len(decided)
+    kinds = Counter(kind for a, b in decided for kind in _kinds(a, b))
+    where = ", ".join(f"{kinds[k]} {k}" for k in ("name", "status", "verdict") if kinds[k])
+    right = "; ".join(str(sum(is_right(pair[k], pair[0]["truth"]) for pair in decided)) for k in (0, 1))
+    before, after = (sum(pair[k]["processor"] for pair in acting) for k in (0, 1))
+    cost = f"{100.0 * (before / after - 1.0):+.0f}" if after else ""
+    return f"| {name} | {len(acting)} | {f'{len(decided)}: {where}' if decided else '0'} |" \
+        f" {right if decided else ''} | {moved} | {cost} |"
+
+
+def _moved(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+    return bool(a["digest"] != b["digest"] or a["remarks"] != b["remarks"])
+
+
+def _kinds(a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[str]:
+    names = [{c["name"]: c["status"] for c in line["causes"]} for line in (a, b)]
+    if names[0].keys() != names[1].keys():
+        yield "name"
+    if any(names[0][n] != names[1][n] for n in names[0].keys() & names[1].keys()):
+        yield "status"
+    if a["verdict"] != b["verdict"]:
+        yield "verdict"

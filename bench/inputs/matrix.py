@@ -1,0 +1,162 @@
+"""The matrix: every rig, every verb, every subset of channels, and pairs of values of all other factors."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain, combinations, product
+from pathlib import Path
+from typing import Any
+
+from bench.inputs.bags import CHANNELS, COMMANDS, SENSORS, STAMPS, bag_of
+from bench.inputs.cover import Case, cover_pairs
+from bench.inputs.outcome import Outcome, call, limit_child
+from bench.inputs.server import Work
+from rsea_ros.cli.main import verbs
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.identification.excitation import KINDS
+from rsea_ros.model.rig_file import load_rig, rig_folders
+
+BAG_VERBS = ("identify", "diagnose", "predict", "check")
+SUBSETS = tuple(chain.from_iterable(combinations(CHANNELS, k) for k in range(len(CHANNELS) + 1)))
+FIRST = 1_000_000_000
+"""ns, the epoch of a clock that began with the machine."""
+ROUND_FIGURES = 1_700_000_000_000_000_000
+"""ns, an epoch as a recorder has it."""
+
+
+def rigs() -> list[str]:
+    """Return the names of all rigs of config/rigs."""
+    return sorted({f.stem for folder in rig_folders() for f in folder.glob("*.yaml")})
+
+
+def bag_factors(names: Sequence[str]) -> dict[str, list[Any]]:
+    """Return the factors that vary from bag to bag; common values stand several times."""
+    return {
+        "rig": list(names),
+        "verb": [v for v in BAG_VERBS if v in verbs()],
+        "channels": list(SUBSETS),
+        "sensors": ["stated", "stated", "zero", "left out", "mixed"],
+        "noise": [True, True, False],
+        "bench": ["as stated", "misfit"],
+        "rate": [280.0] * 15 + [1.0, 5.0, 50.0, 1000.0, 2000.0],
+        "states": [1.0] * 6 + [0.2, 0.9, 4.0],
+        "duration": [5.0] * 6 + [12.0] * 12 + [30.0] * 3 + [2.0, 90.0, 600.0],
+        "command": [*COMMANDS, "white_noise", "chirp", "white_noise"],
+        "stamps": [*STAMPS, *["even"] * 12],
+        "dead": [*SENSORS, *["none"] * 16],
+        "loop": [False, True],
+        "json": [False, True],
+        "epoch": [FIRST, ROUND_FIGURES],
+        "storage": [".mcap", ".mcap", "", ".db3"],
+    }
+
+
+def bag_cases(seed: int, quick: bool) -> tuple[list[Case], str]:
+    """Return the cases that play a bag, and a sentence on what they cover."""
+    rng = random.Random(seed)
+    factors = bag_factors(rigs())
+    whole = {"stamps": "even", "dead": "none"}
+    rigid = {name for name in factors["rig"] if load_rig(name).rigid_spring}
+    triples = (
+        (r, v, c)
+        for r, v, c in product(factors["rig"], factors["verb"], SUBSETS)
+        if not (r in rigid and "deflection" in c)
+    )
+    must = [{"rig": r, "verb": v, "channels": c, **whole} for r, v, c in triples]
+    cases, pairs = cover_pairs(factors, rng, must)
+    said = f"each of {len(must)} rigs × verbs × subsets of channels; {pairs} pairs of {len(factors)} factors"
+    rng.shuffle(cases)
+    if quick:
+        cases = [c for c in cases if c["duration"] <= 12.0 and c["rate"] <= 280.0][:60]
+    return cases, said
+
+
+def samples(case: Case) -> float:
+    """Return the number of samples of the longest channel of a case, or a stand-in for it."""
+    return float(case.get("rate", 1.0) * case.get("duration", 1.0) * max(1.0, case.get("states", 1.0)))
+
+
+def expense(case: Case) -> tuple[bool, float]:
+    """Return a key that sorts cases by their cost, so that an interrupted run has played the most."""
+    return case["verb"] == "control", samples(case)
+
+
+def play_bag(case: Case, folder: Path) -> Outcome:
+    """Make the bag of a case and run its verb on it."""
+    bag, rig = bag_of(case, folder)
+    limit_child(case["verb"])
+    verb, out = case["verb"], folder / "results"
+    arguments = [verb, *([str(rig), str(bag)] if verb == "predict" else [str(bag), "--rig", str(rig)])]
+    if verb in ("identify", "diagnose"):
+        arguments += ["--out", str(out)]
+    elif verb == "predict":
+        arguments += ["--out", str(folder / "results.csv")]
+    outcome = call([*arguments, *(["--json"] if case["json"] or verb == "predict" else [])])
+    if outcome.kind == "result" and verb in ("identify", "diagnose") and not (out / "report.html").exists():
+        return Outcome("message", "a result without its report", outcome.detail)
+    return outcome
+
+
+def other_cases(seed: int, quick: bool) -> list[Case]:
+    """Return the cases of the verbs that take a rig, numbers, or a table."""
+    rng = random.Random(seed)
+    names = rigs()
+    simulate = cover_pairs(
+        {"rig": names, "verb": ["simulate"], "excitation": sorted(KINDS),
+         "rate": [280.0, 1.0, 10.0, 1000.0, 2000.0],
+         "duration": [10.0, 2.0, 0.001, 60.0], "effect": [None, *catalogue()],
+         "amplitude": [20.0, 0.0, -5.0, 1e-300],
+         "period": [4.0, 0.001, 10.0, 1e9], "low": [0.05, 1e-9, 100.0], "high": [100.0, 1e-3, 1e9],
+         "no_noise": [False, True]}, rng)[0]  # fmt: skip
+    control = cover_pairs({"verb": ["control"], "rig": names, "rate": [280.0, 1000.0, 50.0, 2000.0, 10000.0],
+                        "free": [None, *names]}, rng)[0]  # fmt: skip
+    export = [{"verb": "export", "rig": r} for r in names]
+    odd = [1e-300, 1e-3, 1.0, 1e3, 1e300, 0.0, -1.0, "nan", "inf"]
+    options = ("torque", "bandwidth", "inertia", "mass", "diameter", "separation", "spring-radius",
+               "deflection",               "tolerance-db", "tolerance-deg", "stiffness")  # fmt: skip
+    design = [{"verb": "design", "option": o, "value": v} for o in options for v in odd]
+    design += [{"verb": "design", "option": "tolerance-deg", "value": v} for v in (89.9, 90, 90.1, 180)]
+    groups = [simulate, control, export, design]
+    if quick:
+        groups = [rng.sample(g, min(len(g), n)) for g, n in zip(groups, (12, 2, 3, 8), strict=True)]
+    return [case for group in groups for case in group]
+
+
+def play_other(case: Case, folder: Path) -> Outcome:
+    """Run a verb that takes a rig or numbers."""
+    limit_child()
+    return call(_ARGUMENTS[case["verb"]](case, folder))
+
+
+def _simulate(case: Case, folder: Path) -> list[str]:
+    numbers = [f"--{n}={case[n]!r}" for n in ("rate", "duration", "amplitude", "period", "low", "high")]
+    effect = [f"--effect={case['effect']}"] if case["effect"] else []
+    return ["simulate", case["rig"], "--out", str(folder / "bag.mcap"), "--excitation", case["excitation"],
+            *numbers, *effect, *(["--no-noise"] if case["no_noise"] else [])]  # fmt: skip
+
+
+def _control(case: Case, folder: Path) -> list[str]:
+    free = ["--free", case["free"]] if case["free"] else []
+    return ["control", case["rig"], *free, f"--rate={case['rate']!r}", "--out", str(folder / "out"), "--json"]
+
+
+_ARGUMENTS: Mapping[str, Callable[[Case, Path], list[str]]] = {
+    "simulate": _simulate,
+    "control": _control,
+    "export": lambda c, f: ["export", "--mjcf", c["rig"], "--no-play", "--out", str(f / "rig.xml")],
+    "design": lambda c, f: ["design", f"--{c['option']}={c['value']}", "--out", str(f / "out"), "--json"],
+}
+
+
+def describe(case: Mapping[str, Any]) -> str:
+    """Return a case in one line, in a form that `--only` can search."""
+    texts = {k: "+".join(v) or "command alone" if k == "channels" else v for k, v in case.items()}
+    return " ".join(f"{k}={v}" for k, v in texts.items())
+
+
+def works(cases: Sequence[Case], play: Callable[[Case, Path], Outcome], letter: str) -> Iterator[Work]:
+    """Return name and work of each case."""
+    for number, case in enumerate(cases):
+        name = f"{letter}{number:04d} {describe(case)}"
+        yield name, lambda folder, case=case: play(case, folder)

@@ -1,0 +1,180 @@
+"""Laws for errors without a name: how well `law` recovers laws that it does not know, on fresh records.
+
+    python -m bench laws --group catalogue --log out/laws.jsonl    each effect taken out in turn
+    python -m bench laws --group unknown --log out/laws.jsonl      laws the catalogue never had
+    python -m bench laws --group clean --log out/laws.jsonl        benches without anything hidden
+    python -m bench laws --group time                              seconds for 160 s of data
+    python -m bench laws --table --log out/laws.jsonl              the figures of a log
+
+A run that is stopped goes on where its log ends. gain: 1 - RMS(with) / RMS(without) on a fresh record, all
+channels in units of what the base leaves of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bench import parser_of
+from bench.laws.cases import LawCase, cases
+from bench.results import append_line, read_lines
+from rsea_ros.checks.faults import check
+from rsea_ros.diagnosis.diagnose import nominal_problem
+from rsea_ros.diagnosis.score import Score, score
+from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.effects.catalogue import lend
+from rsea_ros.identification.fit import fit
+from rsea_ros.identification.problem import simulate_cases
+from rsea_ros.laws.law import LawResult
+from rsea_ros.laws.learn import gain_of, learn
+from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.records.record import Record
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run the cases that the log lacks, or print its figures."""
+    args = _parser().parse_args(argv)
+    if args.table:
+        print(table(read_lines(args.log)))
+        return 0
+    if args.group == "time":
+        return _time(args.duration or 160.0)
+    done = {entry["name"] for entry in read_lines(args.log)}
+    for case in cases(args.clean):
+        if case.group != args.group or case.name in done or args.select not in case.name:
+            continue
+        row = _keep(case, args.duration or 30.0)
+        append_line(args.log, row)
+        print(_line(row), flush=True)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = parser_of(__doc__)
+    parser.add_argument("--group", choices=("catalogue", "unknown", "clean", "time"), default="catalogue")
+    parser.add_argument("--select", default="", metavar="TEXT", help="only cases with TEXT in their name")
+    parser.add_argument(
+        "--clean", type=int, default=50, metavar="N", help="clean benches (default %(default)s)"
+    )
+    parser.add_argument(
+        "--duration", type=float, metavar="S", help="of a record (default 30 s, 160 s for time)"
+    )
+    parser.add_argument("--log", type=Path, default=Path("out/laws.jsonl"), help="outcomes, one a line")
+    parser.add_argument("--table", action="store_true", help="print the figures of the log")
+    return parser
+
+
+def _keep(case: LawCase, duration: float) -> dict[str, object]:
+    """Return the outcome of a case, or that it broke: one must not stop the others."""
+    try:
+        return outcome(case, duration)
+    except Exception:
+        traceback.print_exc()
+        blank = {"seconds": 0.0, "terms": 0, "learnt": False, "places": [], "right": False, "gain": 0.0}
+        broken = {"names": ["broken"], "regressors": ["broken"], "true_gain": 1.0}
+        return {"name": case.name, "group": case.group, **blank, **broken}
+
+
+def outcome(case: LawCase, duration: float) -> dict[str, object]:
+    """Return the outcome of a case."""
+    record, fresh = case.records(duration)
+    rig = load_rig(case.rig)
+    start = time.process_time()
+    result = learn([record], rig)
+    seconds = time.process_time() - start
+    laws = [w.law for w in result.laws]
+    row: dict[str, object] = {
+        "name": case.name, "group": case.group, "seconds": round(seconds, 1), "at_floor": result.at_floor,
+        "terms": sum(len(law.parts) for law in laws), "learnt": any(law.is_learnt for law in laws),
+        "regressors": [law.regressor for law in laws], "places": [law.place for law in laws],
+        "names": [list(law.parameters) for law in laws], "own_gain": round(result.gain, 4),
+    }  # fmt: skip
+    if case.effect is None:
+        return row
+    true, gained = fresh_gains(case, result, rig, record, fresh)
+    first = [p.term.regressor for law in laws[:1] for p in law.parts] or [law.regressor for law in laws[:1]]
+    return {**row, "true_gain": round(true, 4), "gain": round(gained, 4),
+            "right": bool(first) and any(r in case.right for r in first)}  # fmt: skip
+
+
+def fresh_gains(
+    case: LawCase, result: LawResult, rig: Rig, record: Record, fresh: Record
+) -> tuple[float, float]:
+    """Return the gains on the fresh record of the true effect, fitted, and of the law."""
+    assert case.effect is not None
+    with lend(case.effect, *(w.effect for w in result.laws)):
+        true = rig.with_effects(EffectSetting(case.effect.name, dict(case.parameters)))
+        base, best, law = (_fit(r, record) for r in (rig, true, result.rig if result.laws else rig))
+        scores = [_score(r, fresh, rig) for r in (base, best, law)]
+    return gain_of(scores[0], scores[1])[0], gain_of(scores[0], scores[2])[0]
+
+
+def _fit(rig: Rig, record: Record) -> tuple[Rig, object]:
+    """Return a rig refitted to a record with its effects and clocks: `identify` with the law."""
+    from rsea_ros.identification.unknowns import apply
+
+    problem = nominal_problem([check(record, rig)], rig)
+    solution, _, _ = fit(problem.cases, rig)
+    return apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
+
+
+def _score(fitted: tuple[Rig, object], fresh: Record, rig: Rig) -> Score:
+    """Return the score on all of a fresh record."""
+    model, clocks = fitted
+    problem = nominal_problem([check(fresh, rig)], rig)
+    outputs = simulate_cases(problem.cases, model, clocks)  # type: ignore[arg-type]
+    return score(replace(problem, rig=rig), problem.cases, outputs, DEFAULT.blocks)
+
+
+def _time(duration: float) -> int:
+    case = next(c for c in cases(0) if c.name == "stribeck_friction")
+    record, _ = case.records(duration)
+    start, used = time.perf_counter(), time.process_time()
+    result = learn([record], load_rig(case.rig))
+    wall, cpu = time.perf_counter() - start, time.process_time() - used
+    print(f"{duration:g} s of data: {wall:.1f} s, {cpu:.1f} s of processor; gain {100 * result.gain:.1f} %")
+    return int(wall > 60.0)
+
+
+def _line(row: dict[str, object]) -> str:
+    share = ""
+    if "true_gain" in row:
+        share = f" gain {row['gain']:.3f} of {row['true_gain']:.3f} {'right' if row['right'] else 'WRONG'}"
+    law = f"terms {row['terms']} {row['places']} {row['regressors']}"
+    return f"{row['name']:<28}{share} {law} {row['seconds']} s"
+
+
+def table(rows: Sequence[dict[str, object]]) -> str:
+    """Return the figures of a log, required and measured."""
+    lines = ["| figure | asked | measured |", "|---|---|---|"]
+    for group, share, asked in (("catalogue", 0.9, 80), ("unknown", 0.7, 80)):
+        some = [r for r in rows if r["group"] == group]
+        if not some:
+            continue
+        right = [bool(r["right"]) for r in some]
+        enough = [float(r["gain"]) >= share * float(r["true_gain"]) for r in some]  # type: ignore[arg-type]
+        short = [int(r["terms"]) <= 5 and not r["learnt"] for r in some]  # type: ignore[call-overload]
+        whole = np.logical_and.reduce([right, enough, short]) if group == "catalogue" else np.array(right)
+        what = "at most 5 terms, gain and regressor" if group == "catalogue" else "regressor"
+        lines.append(f"| {group}: {what} | ≥ {asked} % | {100 * np.mean(whole):.0f} % of {len(some)} |")
+        lines.append(f"| {group}: right regressor | | {100 * np.mean(right):.0f} % |")
+        lines.append(f"| {group}: at least {share:g} of the true gain | | {100 * np.mean(enough):.0f} % |")
+    clean = [r for r in rows if r["group"] == "clean"]
+    if clean:
+        nothing = [not r["names"] for r in clean]
+        lines.append(
+            f"| clean benches without a law | ≥ 98 % | {100 * np.mean(nothing):.0f} % of {len(clean)} |"
+        )
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,134 @@
+"""The cases on which peers are compared, and their truth, which no peer sees.
+
+Homes: `sea` and `sea, backlash` are the kind of machine that this project is made for, simulated by
+test/independent, which shares no code with it. `pendulum, BAM's friction` is BAM's home: its own law, by the
+very equations that its adapter fits. `black box` is nobody's physics. Silverbox and EMPS are other people's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from independent.bench import Bench, record_run
+from scipy.io import loadmat
+from scipy.signal import butter, lfilter
+
+from bench.peers.second_order import NAMES, simulate_run
+from rsea_ros.records.record import FloatArray
+
+NONE = np.zeros(0)
+SEA_VALUES = {"inertia": 0.957, "damping": 26.088, "stiffness": 1530.456, "spring_damping": 3.0}
+"""The rig paper_high_impedance as a joint: rotor and chassis, both dampers, the spring."""
+FINER = 16
+"""Steps of the pendulum's simulation in one of the adapters'."""
+
+
+@dataclass(frozen=True)
+class PeerRecord:
+    """Samples of a case. noise: of y, in its unit, not a number where unknown. truth: values and cause."""
+
+    name: str
+    u: FloatArray
+    y: FloatArray
+    rate: float
+    split: int
+    physics: str
+    stated: Mapping[str, float]
+    noise: float = float("nan")
+    position: FloatArray = field(default_factory=lambda: NONE)
+    velocity: FloatArray = field(default_factory=lambda: NONE)
+    truth: Mapping[str, float] = field(default_factory=dict)
+    cause: str = ""
+
+    @property
+    def arrays(self) -> dict[str, object]:
+        """What a peer sees, but for meta: nothing measured from `split` on."""
+        hidden = {n: getattr(self, n).copy() for n in ("y", "position", "velocity")}
+        for y in hidden.values():
+            y[self.split :] = np.nan
+        return {"t": np.arange(len(self.u)) / self.rate, "u": self.u, "split": self.split, **hidden}
+
+    @property
+    def meta(self) -> dict[str, object]:
+        """Name, physics and stated values; torque, bias: typical sizes, of u and of an offset of y."""
+        train = self.y[: self.split]
+        sizes = {"torque": float(self.u.std()), "bias": 0.1 * float(train.std())}
+        return {"name": self.name, "physics": self.physics, "stated": dict(self.stated), **sizes}
+
+
+def _sea(name: str, cause: str, **hidden: float) -> PeerRecord:
+    values = {"j_m": 1.08 * 0.953, "b_m": 0.93 * 23.088, "k_s": 1.02 * 1530.456, **hidden}
+    bench = Bench().with_values(**values)
+    plant = bench.plant
+    record = record_run(bench, 11, "chirp_noise", 20.0)
+    truth = {"inertia": plant.j_m + plant.j_sc, "damping": plant.b_m + plant.b_s, "stiffness": plant.k_s}
+    y, position, velocity = (np.array(record[n].y) for n in ("ft", "position", "velocity"))
+    u = np.array(record["command"].y)
+    split = 3 * len(u) // 4
+    return PeerRecord(name, u, y, 280.0, split, "sea", SEA_VALUES, 0.03, position, velocity, truth, cause)
+
+
+def sea() -> PeerRecord:
+    """A bench with wrong nominal values and nothing else."""
+    return _sea("sea", "")
+
+
+def sea_backlash() -> PeerRecord:
+    """4 mrad of play, and a spring that is 15.6 % stiffer than stated."""
+    return _sea("sea, backlash", "backlash", gap=4.0e-3, k_s=1.156 * 1530.456)
+
+
+def pendulum() -> PeerRecord:
+    """A pendulum with BAM's friction: Coulomb, Stribeck and load-dependent parts."""
+    rate, n = 200.0, 4000
+    stated = {"inertia": 0.155, "damping": 0.05, "gravity": 3.0}
+    truth = {"inertia": 0.165, "damping": 0.06, "gravity": 2.7}
+    friction = {"friction": 0.25, "stribeck": 0.2, "stribeck_velocity": 0.3, "alpha": 1.35}
+    friction |= {"load_motor": 0.08, "load_external": 0.12}
+    rng = np.random.default_rng(5)
+    t = np.arange(n) / rate
+    lines = np.arange(1, 41) * 0.1
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(lines))
+    u = np.sin(2.0 * np.pi * t[:, None] * lines + phases) @ (1.0 / np.sqrt(lines))
+    u *= 1.6 / u.std()
+    p = np.array([{**dict.fromkeys(NAMES, 0.0), **truth, **friction}[name] for name in NAMES])
+    q = simulate_run(p, np.repeat(u, FINER), 1.0 / rate / FINER, False)[FINER - 1 :: FINER]
+    velocity = np.gradient(q, 1.0 / rate) + 0.02 * rng.normal(size=n)
+    y, noise = q + 5e-4 * rng.normal(size=n), 5e-4
+    name, cause, split = "pendulum, BAM's friction", "friction", 3 * n // 4
+    return PeerRecord(name, u, y, rate, split, "joint", stated, noise, y, velocity, truth, cause)
+
+
+def black_box() -> PeerRecord:
+    """A filter, a saturating curve, a filter: no joint at all."""
+    rng = np.random.default_rng(6)
+    n = 3000
+    u = lfilter(*butter(2, 0.3), rng.normal(size=n))
+    inner = lfilter(*butter(2, 0.2), u) / 0.25
+    y = lfilter(*butter(1, 0.25), np.tanh(inner) + 0.2 * inner**2)
+    return PeerRecord("black box", u, y + 0.005 * rng.normal(size=n), 100.0, 2250, "none", {}, 0.005)
+
+
+def silverbox(data: Path) -> PeerRecord:
+    """The first 10 000 samples of the multisine of the training part; the last 2500 held out."""
+    path = data / "silverbox" / "SNLS80mV.csv"
+    u, y = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=(0, 1), max_rows=50650)[40650:].T
+    return PeerRecord("silverbox", u.copy(), y.copy(), 1e7 / 2**14, 7500, "duffing", {})
+
+
+def emps(data: Path) -> PeerRecord:
+    """The identification record at 100 Hz, force as input; after 16 s held out, a free run."""
+    held = loadmat(data / "emps" / "DATA_EMPS.mat")
+    force = np.ravel(held["vir"]) * float(np.ravel(held["gtau"])[0])
+    n = len(force) // 10
+    u, y = force[: 10 * n].reshape(n, 10).mean(axis=1), np.ravel(held["qm"])[9 : 10 * n : 10].astype(float)
+    stated = {"inertia": 80.0, "damping": 150.0}
+    published = {"inertia": 95.109, "damping": 203.503}
+    return PeerRecord("emps", u, y, 100.0, 1600, "drive", stated, position=y, truth=published)
+
+
+SIMULATED: tuple[Callable[[], PeerRecord], ...] = (sea, sea_backlash, pendulum, black_box)
+REAL: tuple[Callable[[Path], PeerRecord], ...] = (silverbox, emps)

@@ -1,0 +1,162 @@
+"""Peers on the same records: each in its own environment, the same blocks, the same budget of processor time.
+
+    python -m bench peers --realdata ../shared/realdata
+    python -m bench peers --peers gp lstm --cases sea --budget 30
+
+Makes the environments that are missing (pip, requirements in bench/peers/NAME.txt), runs every peer on every
+case and prints the table; results stay in OUT, and only missing ones are run again. What is compared, with
+which settings, and who is at home where: docs/peers.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench import ROOT, parser_of
+from bench.peers.cases import REAL, SIMULATED, PeerRecord
+
+HERE = Path(__file__).resolve().parent
+PEERS = ("rsea", "mujoco_sysid", "bam", "cma_pace", "sysidentpy", "jax_sysid", "pysindy", "lstm", "gp")
+PAGE = ROOT / "docs" / "peers.md"
+MARK = "<!-- table -->\n"
+HEAD = (
+    "| case | peer | residual / noise | fit, % | values off, % | cause | s | note |\n"
+    "|---|---|--:|--:|--:|---|--:|---|\n"
+)
+PATIENCE = 8.0
+"""Times the budget: wall seconds after which a peer is stopped; the machine may be busy with others."""
+INSTALL = 900.0
+"""s for an environment."""
+DIVERGED = -1000.0
+"""Fit, %, below which a free run is said to diverge."""
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run what is missing, and print the table."""
+    args = _parser().parse_args(argv)
+    cases = [make() for make in SIMULATED]
+    if args.realdata:
+        cases += [make(args.realdata) for make in REAL]
+    cases = [c for c in cases if not args.cases or c.name in args.cases]
+    args.out.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for case in cases:
+        for peer in args.peers:
+            result = _result(peer, case, args)
+            rows.append(_row(peer, case, result))
+            print(rows[-1], file=sys.stderr, flush=True)
+    table = HEAD + "\n".join(rows) + "\n"
+    print(table)
+    if args.write:
+        before, mark, after = PAGE.read_text(encoding="utf-8").partition(MARK)
+        _, end, rest = after.partition("\n\n")
+        PAGE.write_text(before + mark + table.rstrip("\n") + end + rest, encoding="utf-8")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = parser_of(__doc__)
+    add = parser.add_argument
+    add("--peers", nargs="+", default=PEERS, choices=PEERS, metavar="PEER", help=f"of {', '.join(PEERS)}")
+    add("--cases", nargs="+", default=[], metavar="CASE", help="names of cases (default all)")
+    add("--realdata", type=Path, help="folder with silverbox and emps; without it those cases are left out")
+    add("--budget", type=float, default=20.0, help="processor seconds for a fit (default %(default)g)")
+    add("--envs", type=Path, default=Path("out/peers/envs"), help="environments (default %(default)s)")
+    add("--out", type=Path, default=Path("out/peers"), help="cases and results (default %(default)s)")
+    add("--table", action="store_true", help="run nothing, print the results so far")
+    add("--write", action="store_true", help=f"put the table into docs/{PAGE.name} too")
+    return parser
+
+
+def _result(peer: str, case: PeerRecord, args: argparse.Namespace) -> dict[str, Any]:
+    """Return the result of a peer, from its file if there is one."""
+    stem = f"{case.name.replace(' ', '_').replace(',', '').replace(chr(39), '')}"
+    target = args.out / f"{stem}.{peer}.json"
+    if target.exists():
+        return dict(json.loads(target.read_text(encoding="utf-8")))
+    if args.table:
+        return {"not_run": "not yet"}
+    python, reason = _python(peer, args.envs)
+    if reason:
+        return {"not_run": reason}
+    source = args.out / f"{stem}.npz"
+    np.savez(source, meta=json.dumps(case.meta), **case.arrays)  # type: ignore[arg-type]
+    command = [python, HERE / f"with_{peer}.py", source, target, str(args.budget)]
+    one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    try:
+        done = subprocess.run(
+            list(map(str, command)), env={**os.environ, **one_thread}, timeout=PATIENCE * args.budget,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return {"not_run": f"stopped after {PATIENCE * args.budget:g} s"}
+    if not target.exists():
+        lines = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
+        return {"not_run": lines[-1][:120]}
+    return dict(json.loads(target.read_text(encoding="utf-8")))
+
+
+def _python(peer: str, envs: Path) -> tuple[Path, str]:
+    """Return the interpreter of a peer's environment, which is made if missing, or why it cannot be."""
+    if peer == "rsea":
+        return Path(sys.executable), ""
+    python = (envs / peer / "bin" / "python").absolute()
+    complete = envs / peer / "complete"
+    if complete.exists():
+        return python, ""
+    steps = [
+        [sys.executable, "-m", "venv", "--clear", envs / peer],
+        [python, "-m", "pip", "install", "-q", "-r", HERE / f"{peer}.txt"],
+    ]
+    for step in steps:
+        try:
+            done = subprocess.run(
+                list(map(str, step)), capture_output=True, text=True, check=False, timeout=INSTALL
+            )
+        except subprocess.TimeoutExpired:
+            return python, f"not installed within {INSTALL:g} s"
+        if done.returncode:
+            lines = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
+            return python, f"not installed: {lines[-1][:120]}"
+    complete.touch()
+    return python, ""
+
+
+def _row(peer: str, case: PeerRecord, result: dict[str, Any]) -> str:
+    if "not_run" in result:
+        return f"| {case.name} | {peer} | not run: {_cell(result['not_run'])} | | | | | |"
+    error = np.array(result["prediction"]) - case.y[case.split :]
+    rms = float(np.sqrt(np.mean(error**2)))
+    fit = 100.0 * (1.0 - rms / float(case.y[case.split :].std()))
+    cause = _cell(result["cause"] or "none named")
+    fits = _number(fit) if fit > DIVERGED else "diverges"
+    texts = [_number(rms / case.noise), fits, _number(_values_off(case, result)), cause]
+    cells = (case.name, peer, *texts, f"{result['seconds']:.1f}", _cell(result["note"]))
+    return f"| {' | '.join(cells)} |"
+
+
+def _values_off(case: PeerRecord, result: dict[str, Any]) -> float:
+    """Return the RMS relative error of the true values that a peer states, %; not a number for none."""
+    pairs = [(result["parameters"][n], v) for n, v in case.truth.items() if n in result["parameters"]]
+    errors = [float(value) / true - 1.0 for value, true in pairs]
+    return 100.0 * math.sqrt(sum(e**2 for e in errors) / len(errors)) if errors else math.nan
+
+
+def _number(value: float) -> str:
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.3g}" if not 1e3 <= abs(value) < 1e6 else f"{value:.0f}"
+
+
+def _cell(text: str) -> str:
+    return " ".join(str(text).replace("|", "/").split())

@@ -1,0 +1,126 @@
+"""For all public benchmarks: a rig fitted by output error on position, and its error on a test record.
+
+The simulation, the effects and the solver are the project's; nothing is fitted to a test record but the two
+numbers of its initial state, and those on the first samples only, which no score counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bench import SHARED
+from rsea_ros.identification.fit import unknowns_of
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Solution, solve
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.model.drive import Drive, drive_from
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import simulate_drive
+from rsea_ros.records.record import Channel, FloatArray, Record
+
+DATA = SHARED / "realdata"
+RIGS = Path(__file__).resolve().parent / "rigs"
+REFINE = 4
+"""Factor by which steps are shorter than usual: the errors scored here lie far below a sensor's noise."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """A test: its name, its error, published errors, and the limit asked for, inf for none."""
+
+    test: str
+    error: float
+    unit: str
+    published: str
+    asked: float
+
+
+def record_of(command: FloatArray, position: FloatArray, rate: float) -> Record:
+    """Return a record whose two channels were sampled together."""
+    t = np.arange(len(command)) / rate
+    return Record({"command": Channel(t, command), "position": Channel(t, position)}, source="benchmark")
+
+
+def case_of(
+    rig: Rig,
+    record: Record,
+    skip: int,
+    refine: int = REFINE,
+    initial: tuple[float, float] = (0.0, 0.0),
+) -> Case:
+    """Return a record ready to be fitted to its position.
+
+    skip: samples at the start that no residual looks at: the initial state, position and velocity, decays in
+    them.
+    """
+    mask = np.arange(len(record["position"])) >= skip
+    return Case(
+        drive=replace(drive_from(record, hold=rig.hold, refine=refine), initial=initial),
+        t={"position": record["position"].t},
+        measured={"position": record["position"].y},
+        noise={"position": rig.sensors["position"].noise},
+        mask={"position": mask},
+    )
+
+
+def fit_rig(rig: Rig, cases: Sequence[Case], iterations: int = 60) -> Solution:
+    """Return the fit of all free values of a rig and its effects, by output error on position."""
+    unknowns = tuple(u for u in unknowns_of(rig, cases) if not u.is_clock)
+    return solve(Problem(tuple(cases), rig, unknowns, ("position",)), iterations=iterations)
+
+
+def rig_of(solution: Solution) -> Rig:
+    """Return the rig with the values of a fit."""
+    return apply(solution.problem.rig, solution.problem.unknowns, solution.theta)[0]
+
+
+def error_of(rig: Rig, record: Record, window: int, refine: int = REFINE) -> float:
+    """Return the RMS error on a test record, the first `window` samples left out, as the position's unit.
+
+    They give the initial state: position and velocity that fit them best.
+    """
+    drive = drive_from(record, hold=rig.hold, refine=refine)
+    started = replace(drive, initial=_initial(rig, drive, record["position"].y[:window]))
+    return _rms(simulate_drive(rig, started)["position"] - record["position"].y, window)
+
+
+def error_from(
+    rig: Rig,
+    record: Record,
+    skip: int = 0,
+    refine: int = REFINE,
+    initial: tuple[float, float] = (0.0, 0.0),
+) -> float:
+    """Return the RMS error on a test record that is simulated from a state, its first samples left out."""
+    drive = replace(drive_from(record, hold=rig.hold, refine=refine), initial=initial)
+    return _rms(simulate_drive(rig, drive)["position"] - record["position"].y, skip)
+
+
+def _rms(error: FloatArray, skip: int) -> float:
+    return float(np.sqrt(np.mean(error[skip:] ** 2)))
+
+
+def _initial(rig: Rig, drive: Drive, measured: FloatArray) -> tuple[float, float]:
+    """Return the position and velocity that fit the first samples best, by Gauss-Newton."""
+    steps = int(drive.at["position"][len(measured)])
+    short = replace(
+        drive,
+        command=drive.command[:steps],
+        at={"position": drive.at["position"][: len(measured)]},
+        impulse={"position": drive.impulse["position"][: len(measured)]},
+    )
+    speed = np.ptp(measured) / max(drive.step * steps, 1e-9)
+    state, scale = np.array([measured[0], 0.0]), np.array([1e-3 * np.ptp(measured), 1e-3 * speed])
+
+    def simulate_run(at: FloatArray) -> FloatArray:
+        return simulate_drive(rig, replace(short, initial=(float(at[0]), float(at[1]))))["position"]
+
+    for _ in range(6):
+        now = simulate_run(state)
+        slope = np.column_stack([(simulate_run(state + s) - now) / s.sum() for s in np.diag(scale)])
+        state = state - np.linalg.lstsq(slope, now - measured, rcond=None)[0]
+    return float(state[0]), float(state[1])

@@ -1,0 +1,116 @@
+"""Lines of JSON: of long benches that go on where they stopped, of every run, and the kept ones of the pages.
+
+In a page, the rows of a table below `<!-- rows: TOPIC SECTION -->`, head and rule come from the kept lines:
+the first column is the row, `required` what is asked, each other column what was measured under its name.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import re
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bench import ROOT
+
+RUNS, KEPT = ROOT / "out" / "results.jsonl", ROOT / "bench" / "kept.jsonl"
+PAGES = ROOT / "docs"
+MARK = re.compile(r"<!-- rows: (\S+) (\S+) -->\n(\|.*\n)(\|[-:| ]*\n)((?:\|.*\n)*)")
+
+
+class Row(NamedTuple):
+    """A row of a run; measured: a text, or one for each column of a table."""
+
+    row: str
+    required: str
+    measured: str | Mapping[str, str]
+
+
+def read_lines(path: Path) -> list[dict[str, Any]]:
+    """Return the entries of a file of JSON lines; none if it does not exist."""
+    return [json.loads(line) for line in path.read_text("utf-8").splitlines()] if path.exists() else []
+
+
+def append_line(path: Path, entry: Mapping[str, Any]) -> None:
+    """Append an entry to a file of JSON lines, and make its folder if it is missing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(entry, ensure_ascii=False) + "\n")
+
+
+def add_run(topic: str, section: str, rows: Sequence[Row], seconds: float) -> None:
+    """Append the rows of a run."""
+    git = ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"]
+    commit = subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip()
+    run = {
+        "seconds": round(seconds, 1), "machine": f"{platform.machine()}, Python {platform.python_version()}",
+        "commit": commit, "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+    }  # fmt: skip
+    for row in rows:
+        append_line(RUNS, {"topic": topic, "section": section, **row._asdict(), **run})
+
+
+def rows_of(text: str) -> list[Row]:
+    """Return the rows of the Markdown tables in a text, or its lines where it has none."""
+    rows, head = [], None
+    for line in text.splitlines():
+        if not line.startswith("|"):
+            head = None
+        elif head is None:
+            head = _cells(line)
+        elif set(line) - set("|-: "):
+            values = dict(zip(head, _cells(line), strict=False))
+            rows.append(Row(values.pop(head[0]), values.pop("required", ""), values))
+    return rows or [Row(line.strip(), "", "") for line in text.splitlines() if line.strip()]
+
+
+def _cells(line: str) -> list[str]:
+    return [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip())[1:-1]]
+
+
+def keep_last(topic: str, section: str) -> int:
+    """Put the rows of the last run of a section in the place of its kept ones; status 2 without a run."""
+    runs = [r for r in read_lines(RUNS) if (r["topic"], r["section"]) == (topic, section)]
+    if not runs:
+        print(f"{topic} {section}: no run in {RUNS}, expected one before it is kept", file=sys.stderr)
+        return 2
+    others = [r for r in read_lines(KEPT) if (r["topic"], r["section"]) != (topic, section)]
+    last = [r for r in runs if r["date"] == runs[-1]["date"]]
+    KEPT.write_text("".join(json.dumps(r, ensure_ascii=False) + "\n" for r in (*others, *last)), "utf-8")
+    return 0
+
+
+def write_pages(check: bool = False) -> int:
+    """Write the tables of docs/ from the kept rows. check: write nothing, status 1 where one differs."""
+    kept, stale = read_lines(KEPT), []
+    for page in sorted(PAGES.glob("*.md")):
+        before = page.read_text(encoding="utf-8")
+        after = MARK.sub(lambda found: _table(found, kept), before)
+        if after != before:
+            stale.append(page.name)
+            if not check:
+                page.write_text(after, encoding="utf-8")
+    print(", ".join(stale) or "no page changes")
+    return int(check and bool(stale))
+
+
+def _table(found: re.Match[str], kept: Sequence[Mapping[str, Any]]) -> str:
+    topic, section, head, rule, old = found.groups()
+    rows = [r for r in kept if (r["topic"], r["section"]) == (topic, section)]
+    text = "".join(f"| {' | '.join(_columns(r, _cells(head)))} |\n" for r in rows)
+    return f"<!-- rows: {topic} {section} -->\n{head}{rule}{text or old}"
+
+
+def _columns(row: Mapping[str, Any], head: Sequence[str]) -> Iterator[str]:
+    measured = row["measured"]
+    yield row["row"]
+    for name in head[1:]:
+        if name == "required":
+            yield row["required"]
+        else:
+            yield measured.get(name, "") if isinstance(measured, dict) else measured
