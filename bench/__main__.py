@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bench import ROOT, parser_of
-from bench.results import Row, add_run, keep_last, rows_of, write_pages
+from bench.results import Row, add_run, keep_last, tables_of, write_pages
 
 
 class Parts(NamedTuple):
@@ -51,7 +51,7 @@ PARTS: Mapping[str, Parts] = {
     ),
 }  # fmt: skip
 COMMANDS: Mapping[str, Sequence[str]] = {
-    "diagnosis": ("score", "coverage", "overlap", "intervals", "settings_curve", "settings_table",
+    "diagnosis": ("score", "coverage", "overlap", "intervals", "settings",
                   "model_doubt", "mujoco"),
     "frozen": ("play", "ablation"),
     "calibration": ("run",),
@@ -126,7 +126,7 @@ def _run_parts(topic: str, parts: Parts, argv: Sequence[str]) -> int:
                 rows.append(Row(*row) if isinstance(row, tuple) else Row(row, "", ""))
                 print("".join(f"{text:{width}} " for text, width in zip(rows[-1], (58, 22, 0), strict=True)),
                       flush=True)  # fmt: skip
-        add_run(topic, name, rows, time.monotonic() - begin)
+        add_run(topic, name, [rows], time.monotonic() - begin)
     return 0
 
 
@@ -145,7 +145,7 @@ def _run_command(topic: str, name: str, argv: Sequence[str]) -> int:
     sys.argv[0] = f"python -m bench {topic} {name}"
     with contextlib.redirect_stdout(said):
         status = _module(topic, name).main(argv) or 0
-    add_run(topic, name, rows_of(said.getvalue()), time.monotonic() - begin)
+    add_run(topic, name, tables_of(said.getvalue()), time.monotonic() - begin)
     return int(status)
 
 

@@ -43,30 +43,35 @@ def append_line(path: Path, entry: Mapping[str, Any]) -> None:
         file.write(json.dumps(entry, ensure_ascii=False) + "\n")
 
 
-def add_run(topic: str, section: str, rows: Sequence[Row], seconds: float) -> None:
-    """Append the rows of a run."""
+def add_run(topic: str, section: str, tables: Sequence[Sequence[Row]], seconds: float) -> None:
+    """Append the rows of a run; those of its second table are of `SECTION.2`."""
     git = ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"]
     commit = subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip()
     run = {
         "seconds": round(seconds, 1), "machine": f"{platform.machine()}, Python {platform.python_version()}",
         "commit": commit, "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
     }  # fmt: skip
-    for row in rows:
-        append_line(RUNS, {"topic": topic, "section": section, **row._asdict(), **run})
+    for number, rows in enumerate(tables, start=1):
+        name = section if number == 1 else f"{section}.{number}"
+        for row in rows:
+            append_line(RUNS, {"topic": topic, "section": name, **row._asdict(), **run})
 
 
-def rows_of(text: str) -> list[Row]:
-    """Return the rows of the Markdown tables in a text, or its lines where it has none."""
-    rows, head = [], None
+def tables_of(text: str) -> list[list[Row]]:
+    """Return the rows of each Markdown table in a text, or its lines as one where it has none."""
+    tables: list[list[Row]] = []
+    head: list[str] = []
     for line in text.splitlines():
         if not line.startswith("|"):
-            head = None
-        elif head is None:
+            head = []
+        elif not head:
             head = _cells(line)
+            tables.append([])
         elif set(line) - set("|-: "):
-            values = dict(zip(head, _cells(line), strict=False))
-            rows.append(Row(values.pop(head[0]), values.pop("required", ""), values))
-    return rows or [Row(line.strip(), "", "") for line in text.splitlines() if line.strip()]
+            first, *cells = _cells(line)
+            values = dict(zip(head[1:], cells, strict=False))
+            tables[-1].append(Row(first, values.pop("required", ""), values))
+    return tables or [[Row(line.strip(), "", "") for line in text.splitlines() if line.strip()]]
 
 
 def _cells(line: str) -> list[str]:
@@ -75,11 +80,15 @@ def _cells(line: str) -> list[str]:
 
 def keep_last(topic: str, section: str) -> int:
     """Put the rows of the last run of a section in the place of its kept ones; status 2 without a run."""
-    runs = [r for r in read_lines(RUNS) if (r["topic"], r["section"]) == (topic, section)]
+
+    def concerns(line: Mapping[str, Any]) -> bool:
+        return bool(line["topic"] == topic and line["section"].partition(".")[0] == section)
+
+    runs = [r for r in read_lines(RUNS) if concerns(r)]
     if not runs:
         print(f"{topic} {section}: no run in {RUNS}, expected one before it is kept", file=sys.stderr)
         return 2
-    others = [r for r in read_lines(KEPT) if (r["topic"], r["section"]) != (topic, section)]
+    others = [r for r in read_lines(KEPT) if not concerns(r)]
     last = [r for r in runs if r["date"] == runs[-1]["date"]]
     KEPT.write_text("".join(json.dumps(r, ensure_ascii=False) + "\n" for r in (*others, *last)), "utf-8")
     return 0
@@ -95,15 +104,17 @@ def write_pages(check: bool = False) -> int:
             stale.append(page.name)
             if not check:
                 page.write_text(after, encoding="utf-8")
-    print(", ".join(stale) or "no page changes")
+    print(", ".join(stale) or "every page is as its rows say")
     return int(check and bool(stale))
 
 
 def _table(found: re.Match[str], kept: Sequence[Mapping[str, Any]]) -> str:
-    topic, section, head, rule, old = found.groups()
+    topic, section, head, rule, _ = found.groups()
     rows = [r for r in kept if (r["topic"], r["section"]) == (topic, section)]
+    if not rows:
+        raise SystemExit(f"{topic} {section}: no row in {KEPT}, expected those of a table of docs/")
     text = "".join(f"| {' | '.join(_columns(r, _cells(head)))} |\n" for r in rows)
-    return f"<!-- rows: {topic} {section} -->\n{head}{rule}{text or old}"
+    return f"<!-- rows: {topic} {section} -->\n{head}{rule}{text}"
 
 
 def _columns(row: Mapping[str, Any], head: Sequence[str]) -> Iterator[str]:
@@ -113,4 +124,4 @@ def _columns(row: Mapping[str, Any], head: Sequence[str]) -> Iterator[str]:
         if name == "required":
             yield row["required"]
         else:
-            yield measured.get(name, "") if isinstance(measured, dict) else measured
+            yield measured[name] if isinstance(measured, dict) else measured

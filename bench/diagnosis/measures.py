@@ -10,7 +10,7 @@ from math import isfinite
 import numpy as np
 from independent.hidden import BESIDE_THE_CONTRACT, CATALOGUE
 
-from bench.diagnosis.outcome import OUTSIDE, Found, Outcome
+from bench.diagnosis.outcome import OUTSIDE, Outcome
 from rsea_ros.diagnosis.settings import DEFAULT
 
 HIDDEN = ("single", "newer", "pair", "drawn_pair", "drawn_triple")
@@ -117,30 +117,6 @@ def _longest(what: str, values: Sequence[float], asked: float) -> Measure:
     return Measure(what, longest, len(values), f"<= {asked:g}", longest <= asked)
 
 
-def table(outcomes: Sequence[Outcome]) -> list[str]:
-    """Return a line for each effect: cases, right, errors of every parameter (median, worst), coverage."""
-    singles = [o for o in outcomes if o.group in ("single", "newer", "reading") and o.truth]
-    lines = [f"{'effect':<26}{'right':>8}   parameter: median and worst error %, share in its interval"]
-    for group in ("single", "newer", "reading"):
-        for effect in NAMES:
-            of = [o for o in singles if o.truth == (effect,) and o.group == group]
-            if of:
-                right = f"{sum(o.right for o in of)}/{len(of)}"
-                name = f"{effect} *" if group == "reading" else effect
-                lines.append(f"{name:<26}{right:>8}   {_parameters([f for o in of for f in o.found])}")
-    return lines
-
-
-def _parameters(sizes: Sequence[Found]) -> str:
-    parts = []
-    for name in dict.fromkeys(f.parameter for f in sizes):
-        of = [f for f in sizes if f.parameter == name]
-        error = [100.0 * f.error for f in of]
-        covered = f"{sum(f.covered for f in of)}/{len(of)}"
-        parts.append(f"{name} {np.median(error):.2g} {max(error):.2g} {covered}")
-    return "; ".join(parts)
-
-
 def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:
     """Return counts of the first cause named (columns) for each truth (rows); two effects count twice."""
     rows: dict[str, Counter[str]] = {}
@@ -184,12 +160,3 @@ def markdown(outcomes: Sequence[Outcome]) -> str:
 
 def _cell(count: int, right: bool) -> str:
     return f"**{count}**" if right and count else str(count or "")
-
-
-def matrix_text(outcomes: Sequence[Outcome]) -> list[str]:
-    """Return the matrix for a terminal: one line a truth, answers by how often they came."""
-    lines = []
-    for truth, row in confusion(outcomes).items():
-        answers = ", ".join(f"{name} {count}" for name, count in row.most_common())
-        lines.append(f"{truth:<26} -> {answers}")
-    return lines

@@ -1,6 +1,6 @@
 """Measure the diagnosis on records of known cause: the issue's measures, a confusion matrix, every case.
 
-python -m bench diagnosis --cases all --json out/diagnosis.json --markdown out/matrix.md
+python -m bench diagnosis --cases all --json out/diagnosis.json
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 from bench import parser_of
 from bench.diagnosis.cases import plan
-from bench.diagnosis.measures import markdown, matrix_text, measures, table
+from bench.diagnosis.measures import markdown, measures
 from bench.diagnosis.outcome import Outcome, run_case
 from bench.diagnosis.shared import SHARED, shared_cases
 
@@ -30,7 +30,7 @@ def main(argv: Sequence[str]) -> int:
         outcomes.append(outcome)
         print(_line(outcome, len(outcomes), len(jobs)), flush=True)
         _write(args, outcomes)
-    _summary(outcomes)
+    print(markdown(outcomes))
     return 0
 
 
@@ -44,7 +44,6 @@ def _parser() -> argparse.ArgumentParser:
         "--jobs", type=int, default=1, metavar="N", help="cases at a time (default %(default)s)"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="all outcomes")
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="measures and confusion matrix")
     return parser
 
 
@@ -100,18 +99,8 @@ def _write(args: argparse.Namespace, outcomes: Sequence[Outcome]) -> None:
     """Write the outcomes so far to a new file first, so that a stopped run leaves whole files."""
     entries = [{**asdict(o), "right": o.right, "right_or_rival": o.right_or_rival} for o in outcomes]
     summary = [asdict(m) for m in measures(outcomes)]
-    for path, text in (
-        (args.json, lambda: json.dumps({"measures": summary, "cases": entries}, indent=1)),
-        (args.markdown, lambda: markdown(outcomes)),
-    ):
-        if path:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            aside = path.with_name(path.name + ".part")
-            aside.write_text(text())
-            aside.replace(path)
-
-
-def _summary(outcomes: Sequence[Outcome]) -> None:
-    print("\n" + "\n".join(table(outcomes)))
-    print("\ntruth -> first cause named\n" + "\n".join(matrix_text(outcomes)))
-    print("\n" + "\n".join(str(m) for m in measures(outcomes)))
+    if args.json:
+        args.json.parent.mkdir(parents=True, exist_ok=True)
+        aside = args.json.with_name(args.json.name + ".part")
+        aside.write_text(json.dumps({"measures": summary, "cases": entries}, indent=1))
+        aside.replace(args.json)

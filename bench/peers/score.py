@@ -3,8 +3,8 @@
     python -m bench peers --realdata ../shared/realdata
     python -m bench peers --peers gp lstm --cases sea --budget 30
 
-Makes the environments that are missing (pip, requirements in bench/peers/NAME.txt), runs every peer on every
-case and prints the table; results stay in OUT, and only missing ones are run again. What is compared, with
+Runs every peer that has an environment (ENVS/NAME, PINS says with what) on every case and prints the table;
+results stay in OUT, and only missing ones are run again. What is compared, with
 which settings, and who is at home where: docs/peers.md.
 """
 
@@ -22,21 +22,28 @@ from typing import Any
 
 import numpy as np
 
-from bench import ROOT, parser_of
+from bench import parser_of
 from bench.peers.cases import REAL, SIMULATED, PeerRecord
 
 HERE = Path(__file__).resolve().parent
-PEERS = ("rsea", "mujoco_sysid", "bam", "cma_pace", "sysidentpy", "jax_sysid", "pysindy", "lstm", "gp")
-PAGE = ROOT / "docs" / "peers.md"
-MARK = "<!-- table -->\n"
+PINS = {
+    "mujoco_sysid": "mujoco[sysid]==4.0.0 scipy==1.16.3",
+    "bam": "cma==4.5.0 numba==0.68.1 scipy==1.17.1",
+    "cma_pace": "cma==4.5.0 numba==0.68.1 scipy==1.17.1",
+    "sysidentpy": "sysidentpy==0.9.0",
+    "jax_sysid": "jax-sysid==1.1.0",
+    "pysindy": "pysindy==2.1.0",
+    "lstm": "torch==2.13.0 numpy==2.3.5",
+    "gp": "scikit-learn==1.9.1 scipy==1.16.3",
+}
+"""By peer: the versions that were compared, for who makes its environment; nothing here installs them."""
+PEERS = ("rsea", *PINS)
 HEAD = (
     "| case | peer | residual / noise | fit, % | values off, % | cause | s | note |\n"
     "|---|---|--:|--:|--:|---|--:|---|\n"
 )
 PATIENCE = 8.0
 """Times the budget: wall seconds after which a peer is stopped; the machine may be busy with others."""
-INSTALL = 900.0
-"""s for an environment."""
 DIVERGED = -1000.0
 """Fit, %, below which a free run is said to diverge."""
 
@@ -57,10 +64,6 @@ def main(argv: Sequence[str]) -> int:
             print(rows[-1], file=sys.stderr, flush=True)
     table = HEAD + "\n".join(rows) + "\n"
     print(table)
-    if args.write:
-        before, mark, after = PAGE.read_text(encoding="utf-8").partition(MARK)
-        _, end, rest = after.partition("\n\n")
-        PAGE.write_text(before + mark + table.rstrip("\n") + end + rest, encoding="utf-8")
     return 0
 
 
@@ -74,7 +77,6 @@ def _parser() -> argparse.ArgumentParser:
     add("--envs", type=Path, default=Path("out/peers/envs"), help="environments (default %(default)s)")
     add("--out", type=Path, default=Path("out/peers"), help="cases and results (default %(default)s)")
     add("--table", action="store_true", help="run nothing, print the results so far")
-    add("--write", action="store_true", help=f"put the table into docs/{PAGE.name} too")
     return parser
 
 
@@ -107,29 +109,9 @@ def _result(peer: str, case: PeerRecord, args: argparse.Namespace) -> dict[str, 
 
 
 def _python(peer: str, envs: Path) -> tuple[Path, str]:
-    """Return the interpreter of a peer's environment, which is made if missing, or why it cannot be."""
-    if peer == "rsea":
-        return Path(sys.executable), ""
-    python = (envs / peer / "bin" / "python").absolute()
-    complete = envs / peer / "complete"
-    if complete.exists():
-        return python, ""
-    steps = [
-        [sys.executable, "-m", "venv", "--clear", envs / peer],
-        [python, "-m", "pip", "install", "-q", "-r", HERE / f"{peer}.txt"],
-    ]
-    for step in steps:
-        try:
-            done = subprocess.run(
-                list(map(str, step)), capture_output=True, text=True, check=False, timeout=INSTALL
-            )
-        except subprocess.TimeoutExpired:
-            return python, f"not installed within {INSTALL:g} s"
-        if done.returncode:
-            lines = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
-            return python, f"not installed: {lines[-1][:120]}"
-    complete.touch()
-    return python, ""
+    """Return the interpreter of a peer's environment, or why there is none."""
+    python = Path(sys.executable) if peer == "rsea" else (envs / peer / "bin" / "python").absolute()
+    return python, "" if python.exists() else f"no environment {envs / peer}, expected one with {PINS[peer]}"
 
 
 def _row(peer: str, case: PeerRecord, result: dict[str, Any]) -> str:

@@ -1,8 +1,5 @@
 """The public benchmarks, by the project's own simulation, effects and solver: nonlinearbenchmark.org.
 
-    python -m bench public            the table, with seconds
-    python -m bench public --write    into docs/public.md too
-
 Data: ../shared/realdata, beside the repository; download and licences: nonlinearbenchmark.org.
 """
 
@@ -13,12 +10,9 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 
-from bench import ROOT
 from bench.public import boucwen, emps, silverbox
 from bench.public.fit import DATA, Score
 
-PAGE = ROOT / "docs" / "public.md"
-MARK = "<!-- table -->\n"
 HEAD = "| test | error here | published | required |  | s |\n|---|---|---|---|---|---|\n"
 
 
@@ -31,10 +25,6 @@ def main(argv: Sequence[str]) -> int:
     rows = [_row(score, seconds) for scores, seconds in timed for score in scores]
     table = HEAD + "\n".join(rows) + "\n"
     print(table)
-    if "--write" in argv:
-        before, mark, after = PAGE.read_text(encoding="utf-8").partition(MARK)
-        _, end, rest = after.partition("\n\n")
-        PAGE.write_text(before + mark + table.rstrip("\n") + end + rest, encoding="utf-8")
     return int(any(s.error > s.asked for scores, _ in timed for s in scores))
 
 

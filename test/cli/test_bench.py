@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from bench.__main__ import index
+from bench.__main__ import main as run_bench
+from bench.results import tables_of, write_pages
 from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli.main import main
 from rsea_ros.errors import DeviceError
@@ -86,3 +89,19 @@ def test_a_file_with_the_name_of_the_port_is_not_removed(tmp_path, capsys):
 def test_impossible_options_are_refused(words, message, capsys):
     assert main(["bench", *map(str, words)]) == 2
     assert capsys.readouterr() == ("", message)
+
+
+def test_the_tables_of_the_pages_are_the_kept_rows_of_the_benchmarks():
+    assert write_pages(check=True) == 0
+
+
+def test_every_benchmark_is_listed_with_what_it_measures(capsys):
+    assert run_bench(["-h"]) == 0
+    listed = capsys.readouterr().out
+    assert all(what and f"{topic:12} {name}" in listed for topic, name, what in index())
+
+
+def test_a_run_keeps_each_table_that_it_prints_by_rows_and_columns():
+    text = "found:\n| a | required | b |\n|---|--:|---|\n| x | <= 1 | 0.5 |\n\n| a |\n|---|\n| y |\n"
+    (first,), (second,) = tables_of(text)
+    assert first == ("x", "<= 1", {"b": "0.5"}) and second == ("y", "", {})

@@ -1,7 +1,6 @@
 """A diagnosis does not depend on how strong a machine is: bounds and starts scale with its size.
 
-Scales are powers of 4, so that a machine 4^n times as strong gives the same to rounding;
-`python -m bench diagnosis similarity` diagnoses every effect at other factors.
+Scales are powers of 4, so that a machine 4^n times as strong gives the same to rounding.
 """
 
 from __future__ import annotations

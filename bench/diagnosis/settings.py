@@ -1,0 +1,106 @@
+"""Outcomes over one number of DiagnosisSettings, each number moved alone: why it has its value.
+
+    settings                                       the ten curves of docs/settings.md
+    settings acceptance.fall 0.05 0.2 --limit 24   one, on records of the benchmark
+    settings --list                                every number and its reason
+
+Right: the hidden causes and no other are named. Wrong: causes named that are none. Missed: hidden causes not
+named. Changed: records whose causes, statuses or verdict differ from those at the value in use, in bold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bench import parser_of
+from bench.diagnosis.cases import Plan, plan
+from bench.diagnosis.outcome import run_case
+from bench.results import append_line, read_lines
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.report.diagnosis.page import value_text
+
+CURVES: Mapping[str, Sequence[float]] = {
+    "acceptance.fall": (0.03, 0.1, 0.2, 0.3),
+    "acceptance.matters": (0.005, 0.05, 0.1),
+    "acceptance.fall_in_doubt": (0.1, 0.2, 0.5),
+    "floor.misfit": (1.2, 2.0, 3.0),
+    "floor.reached": (1.05, 1.2, 1.4),
+    "forward.piece_fits": (3, 5, 15),
+    "forward.full_fits": (1, 2, 6),
+    "forward.hope_one": (0.8, 0.9, 1.0),
+    "naming.confirmed_at_floor": (0.5, 0.9, 0.98),
+    "naming.confirmed": (0.8, 0.9, 0.995),
+}
+"""Values of each setting that are played beside its own."""
+CASES = (
+    "coulomb_friction-mild-chirp_noise", "stribeck_friction-mild-multisine", "backlash-mild-chirp_noise",
+    "spring_hysteresis-mild-multisine", "current_loop_lag-mild-chirp_noise", "clean-00",
+    "off-friction_by_angle-1.4", "taken_out-coulomb_friction", "coulomb_friction+command_delay",
+    "nonlinear_spring+damping_drift", "torque_constant_error+structural_resonance",
+    "stiffness_drift+damping_drift+ft_drift-medium",
+)  # fmt: skip
+"""Mild effects, which a threshold loses first; none; one outside the catalogue; two and three at once."""
+DURATION = 12.0
+IN_USE = {s.name: s.value for s in DEFAULT.numbers() if not isinstance(s.value, tuple)}
+
+
+def main(argv: Sequence[str]) -> int:
+    """Print a table for each setting: right, wrong, missed and changed over its values."""
+    parser = parser_of(__doc__)
+    parser.add_argument("setting", nargs="?", choices=IN_USE, metavar="GROUP.FIELD", help="to change")
+    parser.add_argument("values", nargs="*", type=float, metavar="VALUE", help="what to set it to, in turn")
+    parser.add_argument("--list", action="store_true", help="print every setting and its reason")
+    parser.add_argument("--select", default="", metavar="TEXT", help="only cases with TEXT in name or group")
+    parser.add_argument("--limit", type=int, metavar="N", help="only N cases, spread evenly over all")
+    parser.add_argument("--log", type=Path, default=Path("out/settings.jsonl"), help="goes on where it ends")
+    args = parser.parse_args(argv)
+    if args.list:
+        for s in DEFAULT.numbers():
+            print(f"{s.name:<30}{value_text(s.value):>8} {s.unit:<3} {s.meaning}: {s.reason}")
+        return 0
+    curves, plans = CURVES, [replace(p, duration=DURATION) for p in plan() if p.name in CASES]
+    if args.setting:
+        curves = {args.setting: args.values}
+        plans = [p for p in plan() if args.select in f"{p.name} {p.group}"]
+        count = min(args.limit or len(plans), len(plans))
+        plans = [plans[k * len(plans) // count] for k in range(count)]
+    for name, values in curves.items():
+        print(f"{name}, {len(plans)} records\n| value | right | wrong | missed | changed |")
+        print("|---|---|---|---|---|")
+        base = [_played(p, name, float(IN_USE[name]), args.log) for p in plans]
+        for value in sorted({*map(float, values), float(IN_USE[name])}):
+            shown = f"**{value:g}**" if value == IN_USE[name] else f"{value:g}"
+            cells = _counts([_played(p, name, value, args.log) for p in plans], base)
+            print(f"| {shown} | {' | '.join(map(str, cells))} |", flush=True)
+        print()
+    return 0
+
+
+def with_value(name: str, value: float) -> DiagnosisSettings:
+    """Return the settings with one number changed, `group.field`."""
+    group, field = name.split(".")
+    changed = replace(getattr(DEFAULT, group), **{field: type(IN_USE[name])(value)})
+    return replace(DEFAULT, **{group: changed})
+
+
+def _played(case: Plan, setting: str, value: float, log: Path) -> Mapping[str, Any]:
+    """Return the outcome of a record with a value, from the log where it is there. The value in use: once."""
+    key = {"case": case.name, "duration": case.duration}
+    key |= {} if value == IN_USE[setting] else {"setting": setting, "value": value}
+    for line in read_lines(log):
+        if {k: v for k, v in line.items() if k != "outcome"} == key:
+            return dict(line["outcome"])
+    o = run_case(case.make(), settings=with_value(setting, value))
+    said = {"truth": [*o.truth], "named": [*o.named], "statuses": [*o.statuses], "verdict": o.verdict}
+    append_line(log, {**key, "outcome": {**said, "right": o.right}})
+    return {**said, "right": o.right}
+
+
+def _counts(played: Sequence[Mapping[str, Any]], base: Sequence[Mapping[str, Any]]) -> Iterator[int]:
+    yield sum(p["right"] for p in played)
+    yield sum(len({*p["named"]} - {*p["truth"]}) for p in played)
+    yield sum(len({*p["truth"]} - {*p["named"]}) for p in played)
+    yield sum(p != b for p, b in zip(played, base, strict=True))
