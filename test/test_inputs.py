@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import sys
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bench.inputs.bags import bag_of, record_of
 from rsea_ros.cli.main import main
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.effects.catalogue import effect_named
@@ -21,10 +20,6 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import drive_of, synthesize
 from rsea_ros.records.record import Channel, Record
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
-
-from inputs_bags import bag_of, record_of
 
 BENCH = {
     "rig": "paper_high_impedance", "channels": ("ft", "position"), "sensors": "stated", "noise": True,
