@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import itertools
 import math
 import time
 from collections import Counter
@@ -18,7 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bench import parser_of
-from bench.frozen.cases import Entry, Played, bench_records, case_records, lab_records, small_records
+from bench.frozen.cases import Entry, Played, bench_records, lab_records, small_records
 from bench.frozen.play import KEPT, line_of, said
 from bench.results import append_line, read_lines
 from rsea_ros.diagnosis.backward_elimination import ReducedModels
@@ -35,13 +36,15 @@ class Branch(NamedTuple):
     """A branch: its functions, `module:attribute` below rsea_ros.diagnosis, and what each does when off.
 
     late: it acts after the search. setting: what switches it off, in place of functions.
-    acts: whether a call does something, of its result and arguments, where the call without is too dear.
+    acts: whether a call does something, of its result and arguments, where the call without is too dear; of
+    the function `noted` where a setting switches the branch off.
     """
 
     functions: Mapping[str, Off] = {}
     late: bool = False
     setting: tuple[str, str, Any] | None = None
     acts: Callable[..., bool] | None = None
+    noted: str = ""
 
 
 def _nothing(*_args: Any, **_kwargs: Any) -> list[Any]:
@@ -90,8 +93,12 @@ BRANCHES: Mapping[str, Branch] = {
         {"naming.weighing:promote_best": lambda selection, stages, *_: (selection, stages)}, late=True),
     "close rivals fitted to the end": Branch(
         {"naming.weighing:_with_close_ones_fitted": lambda tried, *_: tried}, late=True),
-    "a cause that changes nothing": Branch(late=True, setting=("evidence", "least_contribution", 0.0)),
-    "wandering sensor (carried)": Branch(late=True, setting=("naming", "carried", math.inf)),
+    "a cause that changes nothing": Branch(
+        late=True, setting=("evidence", "least_contribution", 0.0),
+        noted="naming.evidence:rows_of", acts=lambda rows, *_: rows is None),
+    "wandering sensor (carried)": Branch(
+        late=True, setting=("naming", "carried", math.inf), noted="naming.status:probabilities_and_status",
+        acts=lambda _, every, *__: every[0].signature.carried > DEFAULT.naming.carried),
     "size open by ten": Branch({"naming.conclusion:is_known": lambda size, rule: True}, late=True),
     "rig doubtful": Branch({"naming.weighing:is_off_rig": _no}, late=True),
     "known values that pay": Branch({
@@ -148,6 +155,7 @@ def _noting(acts: Counter[str]) -> Iterator[None]:
         return make
 
     places = {p: noted(n, off) for n, b in BRANCHES.items() for p, off in b.functions.items()}
+    places |= {b.noted: noted(n, _no) for n, b in BRANCHES.items() if b.noted}
     with replaced(places):
         yield
 
@@ -193,7 +201,6 @@ def play(entry: Entry) -> Iterator[dict[str, Any]]:
     kept: list[_Search] = []
     with _noting(acts), _kept_search(kept):
         first = _line(entry.name, played, settings)
-    acts.update({name: 1 for name, branch in BRANCHES.items() if branch.setting})
     yield {**first, "branch": "", "acts": dict(acts), "truth": played.truth}
     for name in (n for n in BRANCHES if acts[n]):
         branch = BRANCHES[name]
@@ -221,12 +228,12 @@ def records() -> Iterator[Entry]:
     lab = [e for seed in (312, 313) for e in lab_records(seed, 10.0)]
     own = [e for e in bench_records(2031, 10.0) if not e.name.split("-")[1].startswith(("clean", "fault"))]
     mixed = [own[(k * 37) % len(own)] for k in range(30)]
-    every: Sequence[Iterator[Entry]] = [iter(small), iter(lab), iter(mixed), case_records()]
-    for k in range(60):
-        for turn in (0, 0, 1, 2) if k % 4 else (0, 3):
-            entry = next(every[turn], None)
-            if entry is not None:
-                yield entry
+    plants, own_ones = iter(small), iter(mixed)
+    every = (plants, own_ones, plants, iter(lab), own_ones)
+    for turn in itertools.islice(itertools.cycle(every), 5 * len(small)):
+        entry = next(turn, None)
+        if entry is not None:
+            yield entry
 
 
 def run(path: Path, minutes: float = math.inf) -> None:
@@ -280,20 +287,15 @@ def table(lines: Iterable[Mapping[str, Any]]) -> str:
 
 def _row(name: str, played: Sequence[Mapping[str, Mapping[str, Any]]]) -> str:
     pairs = [(p[""], p[name]) for p in played]
-    acting = [(a, b) for a, b in pairs if BRANCHES[name].setting is None or _moved(a, b)]
-    decided = [(a, b) for a, b in acting if said(a) != said(b)]
-    moved = sum(_moved(a, b) for a, b in acting) - len(decided)
+    decided = [(a, b) for a, b in pairs if said(a) != said(b)]
+    moved = sum(a["digest"] != b["digest"] or a["remarks"] != b["remarks"] for a, b in pairs) - len(decided)
     kinds = Counter(kind for a, b in decided for kind in _kinds(a, b))
     where = ", ".join(f"{kinds[k]} {k}" for k in ("name", "status", "verdict") if kinds[k])
     right = "; ".join(str(sum(is_right(pair[k], pair[0]["truth"]) for pair in decided)) for k in (0, 1))
-    before, after = (sum(pair[k]["processor"] for pair in acting) for k in (0, 1))
+    before, after = (sum(pair[k]["processor"] for pair in pairs) for k in (0, 1))
     cost = f"{100.0 * (before / after - 1.0):+.0f}" if after else ""
-    return f"| {name} | {len(acting)} | {f'{len(decided)}: {where}' if decided else '0'} |" \
+    return f"| {name} | {len(pairs)} | {f'{len(decided)}: {where}' if decided else '0'} |" \
         f" {right if decided else ''} | {moved} | {cost} |"
-
-
-def _moved(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
-    return bool(a["digest"] != b["digest"] or a["remarks"] != b["remarks"])
 
 
 def _kinds(a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[str]:
