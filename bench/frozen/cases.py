@@ -104,10 +104,10 @@ def _of_machine(file: str, name: str, rig: str) -> Played:
 @cache
 def plant(name: str) -> ModuleType:
     """Return a generator of ../shared/plants as a module."""
-    try:
-        return importlib.import_module(name)
-    finally:
-        sys.path.pop()
+    folder = str(SHARED / "plants")
+    if folder not in sys.path:
+        sys.path.append(folder)  # by its own name, under which numba keeps what it compiled
+    return importlib.import_module(name)
 
 
 def small_records(seed: int, seconds: float = SMALL_SECONDS, rate: int = 1000) -> Iterator[Entry]:

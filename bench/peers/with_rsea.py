@@ -5,10 +5,14 @@ Silverbox has a rig whose effects are stated; there the rig is fitted as in benc
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from common import NotApplicable, PeerCase, PeerResult, main
+
+sys.path.append(str(Path(__file__).resolve().parents[2]))
 
 from bench.public.fit import RIGS, case_of, fit_rig, record_of, rig_of
 from rsea_ros.diagnosis.diagnose import diagnose

@@ -1,7 +1,7 @@
 """Effects hidden in the second bench are named and sized; the diagnosis is not told which.
 
 The bench shares no code with the model (test/independent), so that an error in the simulator cannot be in
-both. One record of each kind, the shortest that decides; bench/diagnosis.py plays every effect in every
+both. One record of each kind, the shortest that decides; `bench diagnosis` plays every effect in every
 severity, pairs, and effects that the catalogue lacks.
 """
 
