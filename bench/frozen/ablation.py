@@ -282,7 +282,7 @@ def table(lines: Iterable[Mapping[str, Any]]) -> str:
     for name in BRANCHES:
         rows.append(_row(name, [p for p in whole.values() if name in p]))
     others = sum(n.startswith("plants") for n in whole)
-    return "\n".join([f"{len(whole)} records, {others} of them from ../shared/plants.", "", *rows])
+    return "\n".join([*rows, f"| *records played; from ../shared/plants* | {len(whole)}; {others} | | | | |"])
 
 
 def _row(name: str, played: Sequence[Mapping[str, Mapping[str, Any]]]) -> str:
