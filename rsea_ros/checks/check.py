@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -38,7 +39,7 @@ from rsea_ros.checks.signal_findings import (
     smoothing_findings,
     standstill_findings,
 )
-from rsea_ros.checks.stamp_findings import fault_finding, order, rates
+from rsea_ros.checks.stamp_findings import command_band, fault_finding, order, rates
 from rsea_ros.checks.verdicts import RIGHT_RIG, in_step, start_of, verdict_findings
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.solver import one_blas_thread
@@ -57,6 +58,8 @@ _APART = 5.0
 """Factor between the sizes of a channel and of what the rig would give, from which the rig is in doubt."""
 _BRIDGED = 0.01
 """Share of masked samples above which the lines that bridge them are no measure of a sensor's noise."""
+_FOLLOWS = {"angle_jumps": "clock_offset", "coarse_steps": "scale"}
+"""What a fault of a channel makes by itself: a lag that changes a jump, another unit coarse steps."""
 FAULTY = (
     "sign", "scale", "offset", "angle_jumps", "standstill", "smoothing", "clock_offset", "clock_drift",
     "wrong_rig",
@@ -80,21 +83,31 @@ def check_record(
         record = bound_values(record if rig.loop is None else with_command(record, rig))
         checked = check(record, rig)
         every = [*_topics(record, rig), *(fault_finding(f) for f in checked.faults)]
-        every += [*order(record), *rates(record, rig)]
-        if "command" in checked.record and len(checked.record["command"]) > 2:
+        moving = "command" in checked.record and len(checked.record["command"]) > 2
+        top = command_band(checked.record["command"])[1] if moving else math.inf
+        every += [*order(record), *rates(record, rig, top)]
+        if moving:
             every += excitation(checked.record, rig)
             every += jump_findings(checked.record)
             every += [] if _bridged_channels(checked) else standstill_findings(checked.record)
             if is_commanded(checked.record) and not is_too_fast(checked.record):
                 every += _against_rig(checked, rig, axis, values)
         every += _other_axes(checked, rig, axis, wrench)
-    every = [in_words_of(record, finding) for finding in every]
+    every = [in_words_of(record, finding) for finding in every if not _is_consequence(finding, every)]
     idle = (replace(f, kind="no_excitation") for f in every if (f.kind, f.light) == ("excitation", "red"))
     doubts = (*(f for f in every if f.kind in FAULTY and f.light != "green"), *idle)
-    faults = (*checked.faults, *map(_fault, doubts))
+    kept = {(f.kind, f.channel) for f in every}
+    known = (f for f in checked.faults if f.kind not in _FOLLOWS or (f.kind, f.channel) in kept)
+    faults = (*known, *map(_fault, doubts))
     findings = tuple(_of_targets(f) for f in every) if rig.loop is not None else tuple(every)
     found = tuple(dict.fromkeys(findings))
     return Findings(record.source, rig.name, found, faults, pairs=checked.pairs, masked=checked.masked)
+
+
+def _is_consequence(finding: Finding, every: Sequence[Finding]) -> bool:
+    """Return whether a red finding of the same channel explains a finding."""
+    why = _FOLLOWS.get(finding.kind)
+    return any((f.kind, f.channel, f.light) == (why, finding.channel, "red") for f in every)
 
 
 def _no_targets(record: Record) -> Finding:

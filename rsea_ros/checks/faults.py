@@ -44,6 +44,10 @@ _COMMANDED = 0.8
 """Of a run that two sensors hold: the share in which the command changes; at rest it does not."""
 _STEADY = 0.1
 """Of the turned angle: a velocity and a position that agree so well both measure a steady speed."""
+_STEPS_AT_REST = 4.0
+"""Steps of a position within which the integral of a noisy velocity stays while the joint rests."""
+_MADE = 0.3
+"""Of the turned angle: a jump that agrees so well is of the motion that a position missed while it froze."""
 _LONG_RUN = 20.0
 """Times the usual run of equal values: a longer one is no slow sensor."""
 _LONGEST_RUN = 0.5
@@ -134,6 +138,8 @@ def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str)
     A sensor that holds a value while nothing moves is sound: at rest, at a limit of the torque, stuck. One
     that freezes does so in fast and in slow motion alike, a coarse one rather in slow motion.
     """
+    if name == "position" and "velocity" in record:
+        suspect = suspect & _went_on(record, suspect)
     motion = _motion(record, name, suspect, kind) if suspect.any() else None
     if motion is None or not motion.moved.any():
         return suspect if motion is None else np.zeros(len(suspect), bool)
@@ -147,12 +153,52 @@ def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str)
     return _mostly(long, motion.moved, share) | _mostly(suspect & ~long, fast)
 
 
+def _runs(marked: BoolArray) -> list[tuple[int, int]]:
+    """Return first and end (exclusive) of each run of marked samples."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _went_on(record: Record, suspect: BoolArray) -> BoolArray:
+    """Return the samples of runs in which the velocity turned further than a few steps of the position."""
+    turned, least = _turned(record)
+    far = np.zeros(len(suspect), bool)
+    for first, end in _runs(suspect):
+        far[first:end] = np.ptp(turned[first:end]) > least
+    return far
+
+
+def _turned(record: Record) -> tuple[FloatArray, float]:
+    """Return the angle that the velocity turned by each sample of the position, and the least that counts."""
+    velocity, position = record["velocity"], record["position"]
+    speed = np.interp(position.t, velocity.t, velocity.y)
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(position.t))])
+    steps = np.abs(np.diff(position.y))
+    return turned, _STEPS_AT_REST * float(np.min(steps[steps > 0.0], initial=np.inf))
+
+
+def held_in_motion(record: Record) -> BoolArray:
+    """Return the samples of the position that repeat while the velocity makes the jump that ends the run."""
+    position = record["position"]
+    held: BoolArray = np.diff(position.y, prepend=np.nan) == 0.0
+    marked = np.zeros(len(held), bool)
+    if "velocity" not in record or not held.any():
+        return marked
+    turned, least = _turned(record)
+    for first, end in _runs(held):
+        if end < len(held):
+            held_back, made = turned[[end - 1, end]] - turned[first - 1]
+            jump = position.y[end] - position.y[first - 1]
+            went_on = abs(held_back) > max(least, 0.5 * abs(made))  # a joint at rest moves in the last step
+            marked[first:end] = went_on and abs(jump - made) < _MADE * abs(made)
+    return marked if marked.mean() < _SLOW else np.zeros(len(held), bool)
+
+
 def _at_steady_speed(record: Record, suspect: BoolArray) -> BoolArray:
     """Return the samples of runs in which the position turned as the held velocity says."""
     velocity, position = record["velocity"], record["position"]
     steady = np.zeros(len(suspect), bool)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], suspect, [False]]).astype(np.int8)))
-    for first, end in zip(edges[::2], edges[1::2], strict=True):
+    for first, end in _runs(suspect):
         span = velocity.t[[first, end - 1]]
         expected = float(velocity.y[first] * np.ptp(span))
         turned = float(np.diff(np.interp(span, position.t, position.y))[0])
@@ -220,12 +266,11 @@ def _dithers(channel: Channel) -> bool:
 
 def longest(channel: Channel, marked: BoolArray) -> str:
     """Return from when to when the longest run of marked samples lasts, for people; empty for short ones."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
-    first, last = edges[::2], edges[1::2] - 1
-    k = int(np.argmax(last - first)) if len(first) else 0
-    if not len(first) or channel.t[last[k]] - channel.t[first[k]] < _LONGEST_RUN:
+    first, end = max(_runs(marked), key=lambda run: run[1] - run[0], default=(0, 1))
+    begin, stop = channel.t[[first, end - 1]] if len(channel) else (0.0, 0.0)
+    if stop - begin < _LONGEST_RUN:
         return ""
-    return f"at {channel.y[first[k]]:.4g} from {channel.t[first[k]]:.4g} s to {channel.t[last[k]]:.4g} s"
+    return f"at {channel.y[first]:.4g} from {begin:.4g} s to {stop:.4g} s"
 
 
 _VISIBLE = 3.0
@@ -375,6 +420,7 @@ def _mask(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
             marked = while_others_moved(record, name, marked, kind)
         if kind == "frozen_samples":
             marked |= simultaneous_holds(record, name) & ~bad
+            marked |= held_in_motion(record) & ~bad if name == "position" else False
         share = np.count_nonzero(marked) / max(len(marked), 1)
         if share > (SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
             where = longest(channel, marked) if kind == "frozen_samples" else ""

@@ -185,9 +185,6 @@ def _parts(record: Record, law: Law) -> list[Pair]:
     if min(y.rate, x.rate) < min(_SLOWEST, 0.6 * max(y.rate, x.rate)):
         simple = law.powers[-1] < 2 and law.powers[0] >= 0 and y.rate < x.rate
         return [_matched(y, x, Pair(law, float(start), float(stop)))] if simple else []
-    if min(y.rate, x.rate) < min(_SLOWEST, 0.6 * max(y.rate, x.rate)):
-        simple = law.powers[-1] < 2 and law.powers[0] >= 0 and y.rate < x.rate
-        return [_matched(y, x, Pair(law, float(start), float(stop)))] if simple else []
     if len(y) < 64 or len(x) < 64 or not stop - start > _SHORTEST:
         return []
     both = Signals(y, x, *(_thinned(c) for c in (y, x)))

@@ -15,12 +15,11 @@ import math
 from collections.abc import Collection, Mapping
 
 import numpy as np
-from numpy.fft import rfft, rfftfreq
 
 from rsea_ros.checks.expected import Side, at_rest, moves
 from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.response_shape import Quotient, usable
-from rsea_ros.checks.stamp_findings import natural_frequency
+from rsea_ros.checks.stamp_findings import command_band, natural_frequency
 from rsea_ros.identification.noise import noise_floor
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import (
@@ -38,8 +37,8 @@ _MOSTLY = 0.5
 _WORTH_TELLING = 0.02
 _LOUD = 10.0
 """Times the rig's noise: friction and play leave up to seven times that without the command's coherence."""
-_BAND = (0.01, 0.99)
-"""Of the command's power: between these quantiles lies its band."""
+_MORE = 2.0
+"""Times the rig's noise, from which it is told why that is no fault."""
 _EXCITE = "excite it: `rsea simulate --help` lists the excitations, the node `excite` plays them"
 
 
@@ -53,7 +52,7 @@ def excitation(record: Record, rig: Rig) -> list[Finding]:
                 expected="a command that changes", detail="the command never changes", remedy=_EXCITE,
             )
         ]
-    low, high = band(record)
+    low, high = command_band(command)
     rms, peak = float(np.std(command.y)), float(np.max(np.abs(command.y)))
     detail = f"{low:.3g} to {high:.3g} Hz, peak {peak:.3g} N·m"
     natural = natural_frequency(rig)
@@ -77,16 +76,6 @@ def _rest(share: float) -> list[Finding]:
             remedy="cut it with --from and --to" if share > _MOSTLY else "",
         )
     ]
-
-
-def band(record: Record) -> tuple[float, float]:
-    """Return the frequencies, Hz, between which the command's power lies."""
-    command = record["command"]
-    even = np.interp(np.arange(command.t[0], command.t[-1], 1.0 / command.rate), command.t, command.y)
-    frequency, power = rfftfreq(len(even), 1.0 / command.rate), np.abs(rfft(even - even.mean())) ** 2
-    share = np.cumsum(power) / max(float(power.sum()), 1e-300)
-    low, high = (float(frequency[min(int(np.searchsorted(share, q)), len(share) - 1)]) for q in _BAND)
-    return low, high
 
 
 def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]:
@@ -118,7 +107,11 @@ def _rough(channel: Channel) -> float:
 
 
 def _times(noise: float, stated: float) -> str:
-    return f"{noise / stated:.2g} times the rig's" if stated > 0.0 else "the rig states none"
+    """Return the noise over the rig's, and what may make it larger without a fault of the sensor."""
+    if stated <= 0.0:
+        return "the rig states none"
+    larger = ", as friction and play may make it" if _MORE < noise / stated <= _LOUD else ""
+    return f"{noise / stated:.2g} times the rig's{larger}"
 
 
 _LARGE, _FAR = 1.0, 3.0
@@ -275,12 +268,19 @@ def _jumps(channel: Channel) -> IntArray:
 
 
 def _is_contradicted(record: Record, at: IntArray, sizes: FloatArray) -> BoolArray:
-    """Return for which jumps the measured velocity says that the machine made none."""
+    """Return for which jumps the measured velocity says that the machine made none.
+
+    Behind samples that repeat, a jump is of all the motion since the first of them.
+    """
     if "velocity" not in record or not len(at):
         return np.zeros(len(at), bool)
-    t, velocity = record["position"].t, record["velocity"]
-    around = [np.abs(np.interp(t[k], velocity.t, velocity.y)) for k in (at, at + 1)]
-    brought = np.maximum(*around) * (t[at + 1] - t[at])
+    position, velocity = record["position"], record["velocity"]
+    t, speed = position.t, np.interp(position.t, velocity.t, velocity.y)
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
+    new = np.diff(position.y, prepend=np.nan) != 0.0
+    since = np.maximum.accumulate(np.where(new, np.arange(len(t)), 0))[at]
+    brought = np.maximum(np.abs(speed[at]), np.abs(speed[at + 1])) * (t[at + 1] - t[at])
+    brought = np.maximum(brought, np.abs(turned[at + 1] - turned[since]))
     return np.asarray(brought < _CONTRADICTED * np.abs(sizes))
 
 

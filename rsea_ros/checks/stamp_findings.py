@@ -9,6 +9,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.fft import rfft, rfftfreq
 
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.identification.fit import SCATTER
@@ -23,6 +24,8 @@ _RED_SHARE = 0.2
 """Of a channel's samples: more bad ones make the channel, not some samples, doubtful."""
 _PER_CYCLE = 4.0
 """Samples to a cycle of the rig's natural frequency, at least."""
+_BAND = (0.01, 0.99)
+"""Of the command's power: between these quantiles lies its band."""
 _SLOW = 0.6
 """Of the command's rate: a slower sensor folds what is above its Nyquist frequency."""
 _LEFT_OUT, _MUCH = ("mixed_rows", "stray_stamps"), 0.02
@@ -69,8 +72,11 @@ def fault_finding(fault: Fault) -> Finding:
     )
 
 
-def rates(record: Record, rig: Rig) -> list[Finding]:
-    """Return the sample rate of every channel, and where it is too low for the rig."""
+def rates(record: Record, rig: Rig, top: float = math.inf) -> list[Finding]:
+    """Return the sample rate of every channel, and where it is too low for the rig.
+
+    top: of the command's band, Hz.
+    """
     held, _ = with_held_commands(record)
     natural, command = natural_frequency(rig), held["command"].rate if "command" in record else math.nan
     timed = {n: c for n, c in held.channels.items() if len(c) > 2}
@@ -80,7 +86,7 @@ def rates(record: Record, rig: Rig) -> list[Finding]:
     slow = is_slow(record)
     if slow and natural is None:
         return [_other_unit(n, c, f"> {SLOW:g} Hz", "record faster") for n, c in timed.items()]
-    findings = [_rate(n, c, natural, command, slow) for n, c in timed.items()]
+    findings = [_rate(n, c, natural, command, top, slow) for n, c in timed.items()]
     words = words_on_steps(record)
     return [replace(f, detail=words[f.channel]) if f.channel in words else f for f in findings]
 
@@ -92,8 +98,13 @@ def _other_unit(name: str, channel: Channel, expected: str, otherwise: str) -> F
     return Finding("red", "rate", name, channel.rate, "Hz", expected=expected, detail=lasts, remedy=remedy)
 
 
-def _rate(name: str, channel: Channel, natural: float | None, command: float, slow: bool) -> Finding:
-    """Return the finding of a channel's rate. slow: all channels are, so that another unit is likely."""
+def _rate(
+    name: str, channel: Channel, natural: float | None, command: float, top: float, slow: bool
+) -> Finding:
+    """Return the finding of a channel's rate; amber where the command never excites what the rate hides.
+
+    command: its rate, top: of its band, Hz. slow: all channels are, so that another unit is likely.
+    """
     steps = np.diff(channel.t)
     rate = channel.rate
     longest = f"longest interval {1e3 * float(steps.max()):.3g} ms"
@@ -103,8 +114,9 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float, sl
     if natural is not None and rate < _PER_CYCLE * natural:
         doubt = f"{AS_SECONDS} If so, " if slow else ""
         expected = f"> {_PER_CYCLE * natural:.3g} Hz, four samples to a cycle of the rig's {natural:.3g} Hz"
+        light: Light = "amber" if _PER_CYCLE * top < rate and not slow else "red"
         return Finding(
-            "red", "rate", name, rate, "Hz", expected=expected, detail=longest,
+            light, "rate", name, rate, "Hz", expected=expected, detail=longest,
             remedy=f"{doubt}record faster, or name the right rig with --rig",
         )
     if rate < _SLOW * command:
@@ -113,6 +125,15 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float, sl
             detail="slower than the commands: what is faster folds", remedy="record it faster",
         )
     return Finding("green", "rate", name, rate, "Hz", detail=longest)
+
+
+def command_band(command: Channel) -> tuple[float, float]:
+    """Return the frequencies, Hz, between which a command's power lies."""
+    even = np.interp(np.arange(command.t[0], command.t[-1], 1.0 / command.rate), command.t, command.y)
+    frequency, power = rfftfreq(len(even), 1.0 / command.rate), np.abs(rfft(even - even.mean())) ** 2
+    share = np.cumsum(power) / max(float(power.sum()), 1e-300)
+    low, high = (float(frequency[min(int(np.searchsorted(share, q)), len(share) - 1)]) for q in _BAND)
+    return low, high
 
 
 def natural_frequency(rig: Rig) -> float | None:

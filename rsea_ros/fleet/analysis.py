@@ -20,7 +20,7 @@ from msg_adapters.topic_map import ROLES
 from rsea_ros.checks.carried import check_diagnosable, require_motion, with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.faults import check
-from rsea_ros.checks.signal_findings import band
+from rsea_ros.checks.stamp_findings import command_band
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError
@@ -181,7 +181,7 @@ def excitation(record: Record) -> list[dict[str, Any]]:
             unit = UNITS[name]
             figures += [("rms", float(np.std(y)), unit), ("peak", float(np.max(np.abs(y))), unit)]
         if name == "command" and len(y) == len(record[name]) > 2 and np.all(np.diff(record[name].t) > 0.0):
-            low, high = band(record)
+            low, high = command_band(record["command"])
             figures += [("band_low", low, "Hz"), ("band_high", high, "Hz")]
     for channel, unit in (("position", "rad"), ("ft", "N m")):
         if channel in record and np.isfinite(record[channel].y).any():

@@ -20,7 +20,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel, Fault
+from rsea_ros.records.record import Channel, Fault, Record
 
 RIG = load_rig("paper_high_impedance")
 BENCH = drawn_bench(np.random.default_rng(2))
@@ -193,3 +193,16 @@ def test_a_velocity_that_is_the_rate_of_the_position_is_steady():
     assert {f.channel for f in check(record.with_channels(ft=noise), rig).faults} == set()
     stopped = record.with_channels(velocity=freeze(record, ("velocity",), 4.0)["velocity"], ft=noise)
     assert {f.channel for f in check(stopped, rig).faults} == {"velocity"}
+
+
+def test_a_joint_that_sticks_at_its_turns_is_neither_frozen_nor_clipped():
+    """A geared joint at 33 Hz rests half a second at each turn: "clipping", then "frozen samples"."""
+    rig, rng, t = load_rig("bare_drive"), np.random.default_rng(4), np.arange(2000) / 33.0
+    wave = np.sin(2.0 * np.pi * 0.1 * t)
+    q = np.round(0.45 * np.clip(1.05 * wave, -1.0, 1.0) / 3.81e-4) * 3.81e-4
+    v = np.round((np.gradient(q, t) + 0.003 * rng.standard_normal(len(t))) / 0.0049) * 0.0049
+    torque = 0.4 * np.cos(2.0 * np.pi * 0.1 * t)
+    values = {"command": torque, "position": q, "velocity": v, "motor_torque": torque}
+    record = Record({n: Channel(t, y) for n, y in values.items()})
+    assert not {f.kind for f in check(record, rig).faults} & {"frozen_samples", "clipping"}
+    assert frozen_channels(freeze(record, ("position",), 1.0, 4.0)) == {"position"}

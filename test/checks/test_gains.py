@@ -14,6 +14,7 @@ from independent.severities import drawn_parameters
 import rsea_ros as rsea
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.signal_findings import _average
+from rsea_ros.checks.stamp_findings import rates
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel
 from rsea_ros.report.check import check_json
@@ -192,6 +193,28 @@ def test_a_lag_in_the_second_half_only_is_told_from_when_to_when():
     assert (finding.kind, finding.channel, finding.light) == ("clock_offset", "ft", "red")
     assert finding.value == pytest.approx(0.5, abs=0.01)
     assert "from 5" in finding.detail and "--shift" not in finding.remedy
+
+
+def test_a_lag_or_a_unit_is_told_once_not_again_as_a_jump_or_coarse_steps():
+    """A position that was late from 5 s on was also an encoder that began to count anew, in red."""
+    q = run()["position"]
+    held = Channel(q.t, np.interp(q.t - np.where(q.t > 5.0, 0.3, 0.0), q.t, q.y))
+    found = {(f.kind, f.channel) for f in check_record(run().with_channels(position=held), RIG).findings}
+    assert ("clock_offset", "position") in found and ("angle_jumps", "position") not in found
+    degrees = check_record(run().with_channels(position=Channel(q.t, np.degrees(q.y))), RIG)
+    assert degrees.of("scale") and not degrees.of("coarse_steps")
+    assert not any(f.kind == "coarse_steps" for f in degrees.faults)
+
+
+def test_a_rate_below_a_mode_that_the_command_never_excites_is_no_red_light():
+    """A stiff coupling's mode at 689 Hz made every channel of a sound 100 Hz log red."""
+    lights = {f.light for top in (5.0, 140.0) for f in rates(slow(), RIG, top) if f.channel == "ft"}
+    assert lights == {"amber", "red"}
+
+
+def slow():
+    """Return the run with every twelfth sample, below four to a cycle of the rig."""
+    return run().with_channels(**{n: Channel(c.t[::12], c.y[::12]) for n, c in run().channels.items()})
 
 
 def test_a_lag_that_grows_is_no_dead_channel():
