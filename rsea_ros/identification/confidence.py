@@ -8,6 +8,7 @@ p unknowns (MacKinnon and White, J. Econometrics 29, 1985). Never less than H^-1
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -129,7 +130,10 @@ def sample_blocks(problem: Problem, length: float) -> IntArray:
 
 
 def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, float]:
-    """Return the 95 % interval in SI."""
+    """Return the 95 % interval in SI, of an angle half a turn either way at most."""
+    if unknown.is_cyclic:
+        middle, half = unknown.outer(coordinate), min(Z95 * sd, math.pi)
+        return middle - half, middle + half
     return unknown.outer(coordinate - Z95 * sd), unknown.outer(coordinate + Z95 * sd)
 
 

@@ -30,6 +30,7 @@ from rsea_ros.identification.frequency_response import model_response, responses
 from rsea_ros.identification.problem import Case, case_from
 from rsea_ros.identification.result import (
     AT_NOISE,
+    FAR_FROM_NOISE,
     FrequencyResponse,
     Identification,
     Overlay,
@@ -176,8 +177,10 @@ def _result(
     """Gather the result. cases: with their noise, before any weight followed a misfit."""
     problem = solution.problem
     errors = errors_by_channel(problem, outputs)
+    left = min([max(ratios_of(problem, cases, outputs).values()), *(other.times_noise for other in others)])
     parameters = tuple(
-        replace(p, ci95=span_all(p.ci95, p.name, others)) for p in parameters_of(solution, confidence)
+        replace(p, ci95=span_all(p.ci95, p.name, others), beside_misfit=left > FAR_FROM_NOISE)
+        for p in parameters_of(solution, confidence)
     )
     rig = identified_rig(solution, parameters)
     return Identification(

@@ -193,7 +193,7 @@ def how_determined(name: str, value: float, ci95: tuple[float, float], share: fl
     """
     low, high = ci95
     at_bound = value in ci95 and low < high
-    size = math.pi if name.endswith(".phase") else abs(value)
+    size = math.pi if name.endswith((".phase", "gravity_angle")) else abs(value)
     if share < IDENTIFIABLE_SHARE or at_bound or not max(high - value, value - low) < size:
         return "no"
     return "yes" if share >= _WELL else "in part"
@@ -201,8 +201,8 @@ def how_determined(name: str, value: float, ci95: tuple[float, float], share: fl
 
 Verdict = Literal["adequate", "misfit", "not_identifiable"]
 """Whether the model fits down to the noise, and if so, whether the data determine any of its values."""
-AT_NOISE = 1.1
-"""RMS of a residual over the noise, up to which it is the noise."""
+AT_NOISE, FAR_FROM_NOISE = 1.1, 2.0
+"""RMS of a residual over the noise, up to which it is the noise; from which most of it is something else."""
 
 
 @dataclass(frozen=True)
@@ -236,7 +236,8 @@ class ParameterEstimate:
 
     told_by_data: share of its information that comes from the data, 1 - var(posterior) / var(prior).
     start: the value that the rig stated. spread: relative one-sigma prior spread around it. spreads_off:
-    distance of the value from it in spreads.
+    distance of the value from it in spreads. beside_misfit: the residual is far from the noise, so that the
+    interval says nothing of what the missing law does to the value.
     """
 
     name: str
@@ -247,6 +248,7 @@ class ParameterEstimate:
     spread: float
     told_by_data: float
     spreads_off: float = 0.0
+    beside_misfit: bool = False
 
     @property
     def is_identifiable(self) -> bool:
@@ -255,8 +257,9 @@ class ParameterEstimate:
 
     @property
     def determined(self) -> Determined:
-        """Return how well the data determine the value."""
-        return how_determined(self.name, self.value, self.ci95, self.told_by_data)
+        """Return how well the data determine the value: beside a misfit in part at most."""
+        how = how_determined(self.name, self.value, self.ci95, self.told_by_data)
+        return "in part" if self.beside_misfit and how == "yes" else how
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from rsea_ros.effects.effect import Effect, Parameter
 from rsea_ros.model.rig import FIELDS, LEAST_SIZE, EffectSetting, Rig
 from rsea_ros.records.record import FloatArray
 
+TURN = 2.0 * math.pi
 CLOCK, CLOCK_RATE = "clock", "clock_rate"
 RATE_DOUBT, FASTEST = 50.0, 500.0
 """ppm, one sigma and bound. How much faster the clock of a sensor may run: cheap crystals differ by 100."""
@@ -80,12 +81,18 @@ class Unknown:
         """Whether it is the rate of a sensor's clock."""
         return self.name.startswith(CLOCK_RATE + ".")
 
+    @property
+    def is_cyclic(self) -> bool:
+        """Whether a whole turn more is the same value: an angle that only its sine enters by."""
+        return self.name.endswith(".gravity_angle")
+
     def sigmas(self, coordinate: float) -> float:
         """Return how many sigmas of its prior a value lies from its start.
 
         A wide doubt is one of the order of magnitude: with 100 % twice the start is one sigma above it, four
         times two. Below the start, where the value may be next to nothing, sigmas are even.
         """
+        coordinate = self.outer(coordinate) if self.is_cyclic else coordinate
         off = (coordinate - self.inner(self.start)) / self.doubt
         if off <= 0.0 or self.logarithmic or self.start <= 0.0 or not math.isfinite(self.doubt):
             return abs(off)
@@ -124,7 +131,7 @@ class Unknown:
     def outer(self, coordinate: float) -> float:
         """Return the value in SI, inside the bounds; 0 where 0 is allowed and only rounding is left."""
         value = math.exp(min(coordinate, 700.0)) if self.logarithmic else coordinate
-        value = min(max(value, self.low), self.high)
+        value = math.remainder(value, TURN) if self.is_cyclic else min(max(value, self.low), self.high)
         return 0.0 if abs(value) < LEAST_SIZE and self.low <= 0.0 else value
 
 

@@ -9,10 +9,12 @@ import pytest
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification import confidence
+from rsea_ros.identification.confidence import interval
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
-from rsea_ros.identification.result import Remark, shares_from_data
+from rsea_ros.identification.result import ParameterEstimate, Remark, shares_from_data
+from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -57,3 +59,17 @@ def test_values_of_which_only_a_combination_is_determined_are_not_and_nothing_is
     together = np.array([1e14, 1e14, 1.0])
     assert (shares_from_data(np.outer(together, together), np.ones(3)) < 1e-6).all()
     assert (shares_from_data(1e6 * np.eye(3), np.ones(3)) > 0.99).all()
+
+
+def test_far_from_the_noise_a_value_is_determined_in_part_at_most():
+    """Each was "yes" beside 9 801 times the noise."""
+    sure = ParameterEstimate("spring.damping", 1.24, "N m s/rad", (1.1, 1.3), 0.2, 2.0, 1.0)
+    assert sure.determined == "yes"
+    assert replace(sure, beside_misfit=True).determined == "in part"
+
+
+def test_the_angle_of_a_pendulum_is_an_angle():
+    """-25374.51895 +- 0.00044 rad was one that had run around."""
+    angle = Unknown("spring_end.gravity_angle", 0.0, "rad", -np.inf, np.inf, False, np.inf, 1.0)
+    low, high = interval(angle, -25374.0, 1e3)
+    assert abs(angle.outer(-25374.0)) <= np.pi and high - low == pytest.approx(2.0 * np.pi)

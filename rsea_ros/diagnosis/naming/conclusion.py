@@ -156,6 +156,7 @@ def dropped_cause(
         return Rejected(with_it.added, gain(with_it.test, without.test, channel)[0], "leaves_too_much")
     evidence = named.cause.evidence
     reason: Reason = "improbable" if evidence.is_sure else "leaves_too_much"
+    reason = reason if named.has_gain else "not_sure"
     return Rejected(with_it.added, evidence.gain, reason, probability=named.probability)
 
 
@@ -206,7 +207,7 @@ def outcome_of(weighing: Weighing, examined: Examined, settings: DiagnosisSettin
     if channel is None:
         source = examined.records[0].source
         raise IdentificationError(f"{source}: no sample is left to test on, expected a longer record")
-    naming = naming_of(weighing, settings)
+    naming = with_sure_gains(naming_of(weighing, settings), stages, channel, settings)
     steps = itertools.pairwise(stages)
     dropped = tuple(dropped_cause(a, b, naming, channel) for a, b in steps if not is_named(b, naming))
     stages = without_unnamed_end(stages, naming)
@@ -233,6 +234,26 @@ def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Name
     first, last = weighing.stages[0].test, weighing.stages[-1].test
     at_floor, most = is_at_floor(last, settings.floor), takes_most(first, last, settings)
     return {n.cause.evidence.name: n for n in name_causes(weighing.places, at_floor, most, settings)}
+
+
+def with_sure_gains(
+    naming: Mapping[str, Named], stages: Sequence[Evaluated], channel: str, settings: DiagnosisSettings
+) -> dict[str, Named]:
+    """Return the naming with no cause named whose own gain on held-out data may be none.
+
+    Except where all causes together leave only noise: of two that act together each may gain nothing alone.
+    """
+    if is_at_floor(stages[-1].test, settings.floor):
+        return dict(naming)
+    resamples, fall = settings.acceptance.resamples, settings.sizes
+    sure = {}
+    for without, with_it in itertools.pairwise(stages):
+        helped = _helped_channel(without.test, with_it.test, channel, fall)
+        sure[with_it.added] = gain(with_it.test, without.test, helped, resamples)[1][0] > 0.0
+    return {
+        name: by if sure.get(name, True) else replace(by, status=None, has_gain=False)
+        for name, by in naming.items()
+    }
 
 
 def with_sizes_known(

@@ -87,12 +87,16 @@ def probability(
 
 @dataclass(frozen=True)
 class Named:
-    """A weighed cause with its probability and status (None: not to be named), and its rivals with theirs."""
+    """A weighed cause with its probability and status (None: not to be named), and its rivals with theirs.
+
+    has_gain: it surely lowers the residual of held-out data by itself.
+    """
 
     cause: Weighed
     probability: float
     status: Status | None
     rivals: tuple[tuple[Weighed, float], ...]
+    has_gain: bool = True
 
 
 def name_causes(

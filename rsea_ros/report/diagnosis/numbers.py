@@ -38,13 +38,18 @@ def gain(diagnosis: Diagnosis, channel: str) -> float:
 
 
 def percent(share: float, digits: int = 1) -> str:
-    """Return a share as `97.3 %`, with a minus sign that is one."""
-    return words.minus(f"{100.0 * share:.{digits}f} %") if np.isfinite(share) else "–"
+    """Return a share as `97.3 %`, with a minus sign that is one; below −100 % as `< −100 %`."""
+    return f"{_percents(share, digits)} %" if np.isfinite(share) else "–"
+
+
+def _percents(share: float, digits: int) -> str:
+    """Return a share in percent; a residual that more than doubles is no gain, whatever its size."""
+    return words.minus(f"{100.0 * share:.{digits}f}" if share >= -1.0 else "< -100")
 
 
 def percent_range(interval: tuple[float, float]) -> str:
     """Return an interval of shares as `97.1 to 97.5 %`."""
-    low, high = (words.minus(f"{100.0 * side:.1f}") for side in interval)
+    low, high = (_percents(side, 1) for side in interval)
     return f"{low} to {high} %"
 
 

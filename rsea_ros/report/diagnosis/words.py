@@ -85,7 +85,8 @@ def _verdict(d: Diagnosis) -> tuple[str, str]:
         how, rest, end = f"{explains} part of the misfit", "the rest stays unexplained", "; " + _rest(d)
     left = f"{after:.2f}" if d.at_noise_floor or d.verdict == "explained" else _near(after)
     named = list_names([words.effect(c.name) for c in d.causes])
-    fall = f"with {pronoun} the {name} residual falls from {before:.1f} to {left} times the noise"
+    falls = f"falls from {before:.1f} to {left}" if after < before else f"stays at {left}"
+    fall = f"with {pronoun} the {name} residual {falls} times the noise"
     return words.sentence(f"{cause_list(d.causes)} {how}; {rest}"), words.sentence(
         f"{named} {how}: {fall}{end}"
     )
@@ -107,12 +108,17 @@ def _digits(ratio: float) -> str:
 
 
 def cause_list(causes: Sequence[Cause]) -> str:
-    """Return causes with their main size: `Coulomb friction (3.00 N·m) and backlash (1.20 mrad)`."""
+    """Return causes with their main size: `Coulomb friction (3.00 N·m) and backlash (1.20 mrad)`.
+
+    A size whose interval has both signs is open.
+    """
     shown = []
     for cause in causes:
         name, p = next(iter(cause.parameters.items()))
         label = f"{name.replace('_', ' ')} " if p.unit == "1" else ""
-        shown.append(f"{words.effect(cause.name)} ({label}{words.quantity(p.value, p.unit, 3)})")
+        known = p.ci95[0] * p.ci95[1] >= 0.0 and p.ci95[0] < p.ci95[1] < math.inf
+        size = f"{label}{words.quantity(p.value, p.unit, 3)}" if known else "size open"
+        shown.append(f"{words.effect(cause.name)} ({size})")
     return list_names(shown)
 
 
@@ -128,6 +134,8 @@ def status_line(cause: Cause, alternatives: Sequence[Alternative] = (), at_floor
     reason = _CERTAINTY[cause.status]
     if at_floor and cause.status == "leading":
         reason = "it reduces the residual to the noise, but another law may do the same"
+    elif cause.status == "leading" and cause.gain_holdout_ci95[0] <= 0.0:
+        reason = "by itself it may gain nothing on held-out data"
     if cause.status == "one_of" and rivals:
         return f"one of: {list_names(items, 'or')}; {reason}"
     text = f"{cause.status.replace('_', ' ')}: {items[0]}; {reason}"

@@ -71,14 +71,17 @@ def doubt_sentences(identification: Identification) -> tuple[str, ...]:
         sentences.append(_LOST)
     elif not identification.at_noise and identification.alternatives:
         names = " or ".join(words.effect(n) for n in identification.alternatives)
+        far = any(p.beside_misfit for p in identification.parameters)
         sentences.append(
-            f"The intervals also span what {names} would make of the values: it explains a part of the "
-            "misfit."
+            f"{words.sentence(names)} explains a part of the misfit, which is still far from the noise: the "
+            "values hold only if what else is missing does not move them."
+            if far
+            else f"The intervals also span what {names} would make of the values."
         )
     elif not identification.at_noise:
         sentences.append(
-            "The intervals hold only if what the model lacks does not move its values: nothing simple that "
-            "was tried explains the misfit."
+            "The values hold only if what the model lacks does not move them: nothing simple that was tried "
+            "explains the misfit."
         )
     return tuple(sentences)
 
@@ -99,8 +102,13 @@ def statics_sentences(statics: Statics) -> tuple[str, ...]:
 
 
 def value_text(p: ParameterEstimate) -> tuple[str, str]:
-    """Return a value and its 95 % interval: ("1530.5", " ± 0.1"), or lopsided ("1391", " (1391 … 1531)")."""
+    """Return a value and its 95 % interval: ("1530.5", " ± 0.1"), or lopsided ("1391", " (1391 … 1531)").
+
+    Far from the noise there is no interval: it would hold the noise alone, not the law that is missing.
+    """
     value, half = words.with_interval(p.value, *p.ci95)
+    if p.beside_misfit:
+        return value, " (no interval)"
     low, high = p.ci95
     sides = sorted((p.value - low, high - p.value))
     if not half or sides[1] <= words.LOPSIDED * sides[0]:

@@ -232,6 +232,21 @@ def test_one_of_names_its_rival_with_its_size():
     assert status_line(DELAY, (CONSTANT,)) == status_line(DELAY)
 
 
+def test_no_sentence_says_more_than_its_interval(diagnosed):
+    """"It certainly helps" stood beside -154 % [-429, 42], "39.0" above 40 +- 120, and +-10^14 %."""
+    vague = {"delay": CauseParameter(9.1e-3, "s", (-0.1, 0.12))}
+    unsure = replace(DELAY, parameters=vague, gain_holdout=-1.54, gain_holdout_ci95=(-1e12, 0.42))
+    assert "certainly" not in status_line(unsure)
+    assert say.cause_list([unsure]) == "command delay (size open)"
+    assert num.percent_range(unsure.gain_holdout_ci95) == "< −100 to 42.0 %"
+    worse = {n: 1.1 * v for n, v in diagnosed.diagnosis.residual_rms.items()}
+    d = replace(
+        diagnosed.diagnosis, verdict="partly_explained", causes=(DELAY,), extended_residual_rms=worse,
+        at_noise_floor=False,
+    )  # fmt: skip
+    assert "falls" not in diagnosis_sentence(d)
+
+
 def test_file_and_page_carry_status_probability_and_alternatives(diagnosed):
     assert diagnosed.diagnosis.causes[0].status == "confirmed"
     doubted = replace(
