@@ -46,6 +46,8 @@ _STEADY = 0.1
 """Of the turned angle: a velocity and a position that agree so well both measure a steady speed."""
 _STEPS_AT_REST = 4.0
 """Steps of a position within which the integral of a noisy velocity stays while the joint rests."""
+_FEWEST_HELD = 5
+"""Samples that a position repeats, at least, to have missed a motion: fewer are alike by its steps."""
 _MADE = 0.3
 """Of the turned angle: a jump that agrees so well is of the motion that a position missed while it froze."""
 _LONG_RUN = 20.0
@@ -186,7 +188,7 @@ def held_in_motion(record: Record) -> BoolArray:
         return marked
     turned, least = _turned(record)
     for first, end in _runs(held):
-        if end < len(held):
+        if end < len(held) and end - first >= _FEWEST_HELD:
             held_back, made = turned[[end - 1, end]] - turned[first - 1]
             jump = position.y[end] - position.y[first - 1]
             went_on = abs(held_back) > max(least, 0.5 * abs(made))  # a joint at rest moves in the last step
