@@ -174,6 +174,13 @@ def test_stamps_at_which_a_sensor_did_measure_stay_however_they_scatter(case):
     agree(result, true)
 
 
+def test_stamps_of_arrival_have_an_even_clock_at_their_early_edge():
+    """0.2 ms and an exponential of 0.3 ms: the latest looked wild, so b_s was 10 % off."""
+    t = np.arange(2800) / 280.0
+    arrived = t + 2e-4 + np.random.default_rng(1).exponential(3e-4, t.size)
+    assert np.max(np.abs(even_clock(arrived, 1.0 / 280.0) - t - 2e-4)) < 2e-5
+
+
 def test_an_even_clock_is_laid_through_gaps_and_not_through_wild_stamps():
     rng = np.random.default_rng(11)
     t = np.delete(np.arange(2000) * PERIOD, slice(700, 730))
