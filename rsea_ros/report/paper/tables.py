@@ -77,8 +77,7 @@ def table_1(drawings: Sequence[tuple[str, str]]) -> Html:
         "Table 1 and Figs. 6 to 8: the same machine as a circuit",
         table(["Mechanical", "Impedance", "Electrical", "Impedance"], TABLE_1),
         *(Html(f"<h3>{escape(caption)}</h3>{svg}") for caption, svg in drawings),
-        caption="Torque is voltage, velocity is current. The netlist of any rig is solved by nodal "
-        "analysis and agrees with the equations of motion to 1e-9 (test/model/test_circuit.py).",
+        caption="Torque is voltage, velocity is current.",
     )
 
 
