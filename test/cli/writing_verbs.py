@@ -22,6 +22,7 @@ from rsea_ros.report.design import page as design_page
 from rsea_ros.report.design import tables as design_tables
 from rsea_ros.report.diagnosis import files as diagnosis_files
 from rsea_ros.report.identification import page as results
+from rsea_ros.report.identification import words as identification_words
 
 RIG = "paper_high_impedance"
 MAP = "time: {column: t, unit: s}\nchannels:\n  command: {column: u, unit: N m}\n"
@@ -67,7 +68,7 @@ def prepare(record: Record, folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
         (spring_design, "spring_design", result), (spring_design, "least_stiffness", 1.0),
         (tolerance, "robust_stiffness", np.inf),
         (usable, "check_diagnosable", None), (checks, "check_record", Findings("run.mcap", RIG, (), ())),
-        (results, "identification_json", JSON), (results, "identification_report", "page"),
+        (identification_words, "identification_json", JSON), (results, "identification_report", "page"),
         (diagnosis_files, "diagnosis_json", JSON), (diagnosis_files, "diagnosis_report", "page"),
         (diagnosis_files, "overlay_records", {"/rsea": record}),
         (results, "rig_text", "rig"), (diagnosis_files, "rig_text", "rig"),
