@@ -66,7 +66,7 @@ class Polarity:
         """Forget everything: nothing is proven."""
         self._seen.start()
         self.proven, self.contradiction = False, ""
-        self._sent = [0.0] * SENT
+        self._sent, self._made = [0.0] * SENT, [0.0] * SENT
         self._friction, self._off = 0.0, 0
         self._direction, self._level, self._beyond = -1.0, self._pulse, ENOUGH * self._pulse
         self._pulsing, self._back, self._full, self._torque = False, False, False, 0.0
@@ -94,6 +94,7 @@ class Polarity:
     def watch(self, reading: Measurement, missed: int = 0) -> str:
         """Return a contradiction under torque, in words; empty without one."""
         heard = self._seen.hear(reading, self._sent[1], missed, keep=False)
+        self._made = [self._seen.made[1], *self._made[:-1]]
         if heard is None or self.contradiction:
             return self.contradiction
         ft, motion = heard
@@ -112,8 +113,11 @@ class Polarity:
         return self.contradiction
 
     def _outside(self, torque: float) -> float:
-        """Return by how much a torque is outside of what the motor made over the sample, N m."""
-        return max(min(self._seen.made) - torque, torque - max(self._seen.made), 0.0)
+        """Return by how much a torque is outside of what the motor made over the last SENT samples, N m.
+
+        A drive filters its velocity and measures its torque at another instant (decision 260).
+        """
+        return max(min(self._made) - torque, torque - max(self._made), 0.0)
 
     def _contradict(self, words: str) -> None:
         self.contradiction = (

@@ -164,11 +164,12 @@ class SignEvidence:
         m = m - m[:, 3:5] @ np.linalg.pinv(m[3:5, 3:5], rcond=1e-3) @ m[3:5, :]
         t, t_motion, t_made = m[0, 0], m[0, 1] + m[0, 2], m[0, 5]
         motion = m[1, 1] + 2.0 * m[1, 2] + m[2, 2]
-        if t <= 0.0:
+        free = count - 3.0 * ALIKE  # a fit of three to as many independent samples leaves nothing
+        if t <= 0.0 or free <= 0.0:
             return 1.0, math.inf
         factor = float((t_made - t_motion) / t)
         left = max(m[5, 5] - 2.0 * (m[1, 5] + m[2, 5]) + motion - factor * (t_made - t_motion), 0.0)
-        noise = 3.0 * math.sqrt(ALIKE * max(left / count, self.noise**2))
+        noise = 3.0 * math.sqrt(ALIKE * max(left / free, self.noise**2))
         return factor, (noise + DOUBT * math.sqrt(max(motion, 0.0))) / math.sqrt(t)
 
     def _information(self) -> FloatArray:

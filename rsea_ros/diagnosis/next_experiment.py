@@ -22,6 +22,7 @@ from rsea_ros.identification.solver import Solution, bounded_step, jacobian
 from rsea_ros.identification.unknowns import apply, start_vector
 from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig_limits import POWER, SLEW, derive, felt_through_spring
 from rsea_ros.model.simulation import simulate_drive
 from rsea_ros.records.record import UNITS, Channel, FloatArray, Record
 
@@ -30,21 +31,6 @@ SLOWEST, FASTEST = 50.0, 1000.0
 _TRIES, _CLOSER = 4, 0.98
 """How often an amplitude is brought down until a run is allowed; what it stays below the limit by then."""
 _SHOWN = ("position", "velocity", "ft")
-
-
-@dataclass(frozen=True)
-class DriverLimits:
-    """Limits of a driver (config/nodes/driver.yaml), which excite has too: torque N m, slew N m/s.
-
-    deflection: rad, of the spring. velocity: rad/s. ft: N m. power: W.
-    """
-
-    torque: float = 68.0
-    slew: float = 10_000.0
-    deflection: float = 0.0873
-    velocity: float = 5.0
-    ft: float = 110.0
-    power: float = 250.0
 
 
 @dataclass(frozen=True)
@@ -73,7 +59,7 @@ def allowed_run(
     like: the case of the present run, whose travel is the largest where nothing else bounds it. settings:
     amplitude and noise count by their ratio.
     """
-    bounds = _bounds(rig, like, DriverLimits())
+    bounds = _bounds(rig, like)
     for _ in range(_TRIES):
         try:
             scaled, command = _scale(kind, settings, peak)
@@ -89,21 +75,26 @@ def allowed_run(
     return None
 
 
-def _bounds(rig: Rig, like: Case, limits: DriverLimits) -> Mapping[str, float]:
-    """Return the limits by simulated quantity; a rig commanded by positions bounds its own torque."""
+def _bounds(rig: Rig, like: Case) -> Mapping[str, float]:
+    """Return the limits by simulated quantity, as a driver derives them for the rig.
+
+    A rig that positions command bounds its own torque.
+    """
     present: dict[str, float] = {
         n: float(np.nanmax(np.abs(y))) for n, y in like.measured.items() if n in ("position", "velocity")
     }
     if rig.loop is not None:
         return {"command": present.get("position", math.inf), **present}
+    limits, sources = derive({}, rig)
     bounds = present | {
-        "command": limits.torque, "slew": limits.slew, "velocity": limits.velocity, "power": limits.power,
+        "command": limits["torque"], "slew": SLEW, "velocity": limits["velocity"], "power": POWER,
     }  # fmt: skip
     if rig.rigid_spring:
         return bounds
     if rig.clamped == set(END_NAMES):
-        return {**bounds, "position": limits.deflection, "ft": limits.ft}
-    return {**bounds, "ft": min(limits.ft, limits.deflection * rig["spring.stiffness"])}
+        return {**bounds, "position": limits["deflection"], "ft": limits["ft"]}
+    felt_through_spring(limits, sources, rig)
+    return {**bounds, "ft": limits["ft"]}
 
 
 def _scale(kind: str, settings: ExcitationSettings, peak: float) -> tuple[ExcitationSettings, FloatArray]:

@@ -82,23 +82,6 @@ class Rating:
 UNRATED = Rating()
 
 
-@dataclass(frozen=True)
-class Mechanics:
-    """What a rig says of its limits.
-
-    motor: largest torque, N m, with what says so. stiffness: of the spring, N m/rad, inf where it is rigid.
-    damping: of motor and gear, N m s/rad. stop: angle at which the spring meets one, rad. free_end: the name
-    of an end that can turn, if any.
-    """
-
-    name: str
-    motor: tuple[float, str]
-    stiffness: float
-    damping: float
-    stop: float = math.inf
-    free_end: str = ""
-
-
 @runtime_checkable
 class Rated(Protocol):
     """A device that knows its rating, once it is open; others leave the limits to the rig."""
@@ -106,76 +89,6 @@ class Rated(Protocol):
     @property
     def rating(self) -> Rating:
         """Return it."""
-
-
-FASTEST, FELT, BENT = 5.0, 110.0, math.radians(5.0)
-"""Derived limits where rig and hardware state no smaller one: rad/s, half as much again as the paper's motor
-turns without load; N m, what the largest sensor of its series (120) measures with some to spare; rad, 5°."""
-SHARE = 0.8
-"""Of the velocity that the largest torque reaches against the gear's damping: 0.8 of it is a fault."""
-REACH = 3.0
-"""Times what the largest torque does at rest that a stated limit may be: a step overshoots to twice it, and
-stiffness and damping are known to some ten percent; degrees are 57 times radians, mrad 1000."""
-
-
-def derive(
-    stated: Mapping[str, float], rig: Mechanics, rating: Rating = UNRATED
-) -> tuple[dict[str, float], dict[str, str]]:
-    """Return limits of torque, deflection, velocity and ft, and the source of those that were not stated.
-
-    stated: by name; inf: none. Raises ParameterError for one that is beyond what the machine ever reaches.
-    """
-    limits: dict[str, float] = {}
-    sources: dict[str, str] = {}
-
-    def settle(name: str, *bounds: tuple[float, str]) -> float:
-        least = min(bounds)
-        limits[name] = stated.get(name, least[0])
-        if name not in stated:
-            sources[name] = least[1]
-        return least[0]
-
-    settle("deflection", (BENT, "5°, where the rig states no stop"), (rig.stop, "hard_stop of the rig"))
-    most = settle(
-        "torque",
-        rig.motor,
-        (rating.torque, "the motor's own limit"),
-        (rig.stiffness * limits["deflection"], "deflection_limit times the spring's stiffness"),
-    )
-    most = max(most, stated.get("torque", 0.0))
-    settle(
-        "velocity",
-        (FASTEST, "where gear and motor allow more"),
-        (SHARE * most / rig.damping if rig.damping else math.inf,
-         f"{SHARE:g} of what {most:.4g} N·m reach against the gear's damping"),
-        (rating.velocity, "the motor's speed without load"),
-    )  # fmt: skip
-    settle("ft", (FELT, "where the sensor states no smaller range"), (rating.ft, "the F/T sensor's range"))
-    largest = max(rig.motor[0], stated.get("torque", 0.0))
-    for name, unit, bound, whose in (
-        ("torque", "N·m", rating.torque * (1.0 + 1e-9), "the motor's own limit"),
-        ("ft", "N·m", rating.ft, "the F/T sensor's range"),
-        ("velocity", "rad/s", REACH * rating.velocity, f"{REACH:g} times the motor's speed without load"),
-        ("velocity", "rad/s", REACH * largest / rig.damping if rig.damping else math.inf,
-         f"{REACH:g} times what {largest:.4g} N·m reach against the gear's damping"),
-        ("deflection", "rad", REACH * largest / rig.stiffness,
-         f"{REACH:g} times what {largest:.4g} N·m deflect the spring"),
-    ):  # fmt: skip
-        value = stated.get(name, math.inf)
-        if math.isfinite(value) and value > bound:
-            raise ParameterError(
-                f"parameter {name}_limit = {value:g} {unit}, expected at most {bound:.4g} {unit}, {whose}"
-            )
-    return limits, sources
-
-
-def check_travel(limits: Limits, rig: Mechanics) -> None:
-    """Raise ParameterError for a rig with a free end whose position nothing limits."""
-    if rig.free_end and math.isinf(limits.position):
-        raise ParameterError(
-            f"parameter position_limit = 0 rad (none), expected one: {rig.free_end} of rig {rig.name} is free"
-            " to turn (or allow_no_position_limit = true)"
-        )
 
 
 def unmeasured_quantities(limits: Limits, state: State) -> list[str]:

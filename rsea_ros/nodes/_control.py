@@ -13,9 +13,9 @@ from rsea_ros.control.loads import LIGHTEST, lightest, load_range
 from rsea_ros.control.settings import CORNER, ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, design
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.rig import MOTOR_TORQUE
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
+from rsea_ros.model.rig_limits import SLEW, derive
+from rsea_ros.nodes._parameters import AXIS, DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._realtime import REALTIME
 
 Values = Mapping[str, Any]
@@ -46,9 +46,10 @@ TABLE = (
         "prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0
     ),
     NodeParameter(
-        "torque_limit", MOTOR_TORQUE, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0
+        "torque_limit", DERIVED, "largest torque that is commanded; -1: as the driver derives it", "N m",
+        DERIVED, 1000.0,
     ),
-    NodeParameter("slew_limit", 10_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
+    NodeParameter("slew_limit", SLEW, "largest change of torque in a second", "N m/s", 1.0, 1e6),
     NodeParameter("ramp", 0.25, "in which the limit grows after a start", "s", 0.0, 10.0),
     NodeParameter("stale", 0.05, "time without a measurement that ends the torque", "s", 0.005, 1.0),
     NodeParameter("release", 0.02, "from there to zero torque", "s", 0.0, 1.0),
@@ -56,12 +57,20 @@ TABLE = (
         "error_limit", 15.0, "of the torque against the desired one, for error_time", "N m", 0.1, 1e3
     ),
     NodeParameter("error_time", 0.5, "for which the error may be larger", "s", 0.0, 60.0),
-    NodeParameter("ft_limit", 110.0, "largest torque that ft may measure", "N m", 0.1, 1e3),
+    NodeParameter(
+        "ft_limit", DERIVED, "largest torque that ft may measure; 0: none; -1: derived", "N m", DERIVED, 1e3
+    ),
     NodeParameter("late_share", 0.5, "of the commands of late_time that may be late", "", 0.01, 1.0),
     NodeParameter("late_time", 1.0, "over which late commands are counted", "s", 0.05, 60.0),
     JOINT,
     *REALTIME,
 )
+
+
+def with_limits(values: Values) -> dict[str, Any]:
+    """Return the values with the limits that the rig derives, as the driver's. Raises ParameterError."""
+    limits, _ = derive(stated_limits(values, ("torque", "ft")), load_rig(values["rig"]))
+    return {**values, "torque_limit": limits["torque"], "ft_limit": limits["ft"]}
 
 
 def design_of(values: Values) -> ControllerDesign:

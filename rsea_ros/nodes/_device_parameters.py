@@ -8,15 +8,9 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import Device
 from rsea_ros.hardware.dynamixel.encoder import LINK, SPRING
 from rsea_ros.hardware.dynamixel.line import Line
-from rsea_ros.nodes._devices import (
-    DERIVED,
-    DYNAMIXEL,
-    Values,
-    device_of,
-    dynamixel_netft,
-    latency_of,
-)
-from rsea_ros.nodes._parameters import AXIS, NodeParameter
+from rsea_ros.model.rig_limits import POWER, SLEW
+from rsea_ros.nodes._devices import DYNAMIXEL, Values, device_of, dynamixel_netft, latency_of
+from rsea_ros.nodes._parameters import AXIS, DERIVED, NodeParameter
 
 MOTOR = (
     NodeParameter("port", "/dev/ttyUSB0", "serial port of the motor"),
@@ -89,7 +83,7 @@ LIMITS = (
     NodeParameter(
         "torque_limit", DERIVED, "largest torque that is commanded; -1: derived", "N m", DERIVED, 1000.0
     ),
-    NodeParameter("slew_limit", 10_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
+    NodeParameter("slew_limit", SLEW, "largest change of torque in a second", "N m/s", 1.0, 1e6),
     NodeParameter(
         "soft_start", 500.0, "growth of the limit after activation, fault, pause", "N m/s", 1.0, 1e6
     ),
@@ -101,7 +95,7 @@ LIMITS = (
     NodeParameter(
         "ft_limit", DERIVED, "of the torque that ft measures; 0: none; -1: derived", "N m", DERIVED, 1000.0
     ),
-    NodeParameter("power_limit", 250.0, "of the motor torque times velocity; 0: none", "W", 0.0, 1e5),
+    NodeParameter("power_limit", POWER, "of the motor torque times velocity; 0: none", "W", 0.0, 1e5),
     NodeParameter("effort_limit", 6.0, "by which measured may miss commanded; 0: none", "N m", 0.0, 1000.0),
     NodeParameter("effort_time", 0.1, "for which it may", "s", 0.0, 10.0),
     NodeParameter("temperature_limit", 70.0, "of the motor; 0: none", "°C", 0.0, 100.0),

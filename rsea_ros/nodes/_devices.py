@@ -15,18 +15,17 @@ from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.limits import UNRATED, Limits, Mechanics, Rating, derive
+from rsea_ros.hardware.limits import UNRATED, Limits, Rating
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.spring_sensor import Spring
-from rsea_ros.model.rig import END_NAMES, Rig, motor_torque
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_limits import derive, felt_through_spring
+from rsea_ros.nodes._parameters import stated_limits
 
 Values = Mapping[str, Any]
 
-
-DERIVED = -1.0
-"""Value of a limit's parameter: the limit comes from rig, motor and sensor."""
 DERIVABLE = ("torque", "deflection", "velocity", "ft")
 
 
@@ -37,8 +36,7 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
     ParameterError for a limit that cannot be applied, or is beyond what the machine can do.
     """
     rig = load_rig(values["rig"])
-    stated = {name: _stated(name, values[f"{name}_limit"]) for name in DERIVABLE
-              if values[f"{name}_limit"] != DERIVED}  # fmt: skip
+    stated = stated_limits(values, DERIVABLE)
     inapplicable = _inapplicable(values, rig)
     for name, why in inapplicable.items():
         if math.isfinite(stated.get(name, math.inf)):
@@ -46,22 +44,18 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
                 f"parameter {name}_limit = {stated[name]:g} cannot be applied to rig {rig.name}"
                 f" ({why}), expected 0 for none"
             )
-    limits, sources = derive(stated, mechanics_of(rig), rating)
+    limits, sources = derive(stated, rig, vars(rating))
     for name, why in inapplicable.items():
         limits[name] = math.inf
         if name in sources:
             sources[name] = why
     by_angle = _deflects(values, rig)
     if not by_angle and "deflection" not in inapplicable:
-        bent = limits["deflection"] * rig["spring.stiffness"]
-        if bent < limits["ft"]:
-            limits["ft"] = bent
-            sources["ft"] = f"deflection_limit {limits['deflection']:.4g} rad times the spring's stiffness"
-        sources["deflection"] = "ft_limit limits it"
+        felt_through_spring(limits, sources, rig)
     return Limits(
         torque=limits["torque"],
         slew=values["slew_limit"],
-        deflection=limits["deflection"] if by_angle else math.inf,
+        deflection=limits["deflection"],
         temperature=values["temperature_limit"] or math.inf,
         current=values["current_limit"] or math.inf,
         voltage=values["voltage_limit"],
@@ -77,26 +71,6 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
         effort_time=values["effort_time"],
         ft_axis=sign_and_index(values["axis"])[1],
         derived=sources,
-    )
-
-
-def _stated(name: str, value: float) -> float:
-    """Return a limit that is stated, inf for none. Raises ParameterError for a negative one."""
-    if value < 0.0:
-        expected = f"expected {DERIVED:g} to derive it, or at least 0"
-        raise ParameterError(f"parameter {name}_limit = {value:g}, {expected}")
-    return value if value or name == "torque" else math.inf
-
-
-def mechanics_of(rig: Rig) -> Mechanics:
-    """Return what a rig says of its limits."""
-    return Mechanics(
-        rig.name,
-        motor_torque(rig),
-        math.inf if rig.rigid_spring else rig["spring.stiffness"],
-        rig["rotor.reflected_damping"],
-        min((e.parameters["angle"] for e in rig.effects if e.name == "hard_stop"), default=math.inf),
-        next((end for end in END_NAMES if rig.end_is_free(end)), ""),
     )
 
 

@@ -13,12 +13,12 @@ from rsea_ros.errors import RseaError
 from rsea_ros.hardware.device import Device, State
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
-from rsea_ros.hardware.limits import check_travel
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_limits import check_travel
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import BenchTopics
 from rsea_ros.nodes._cycle import Cycle
-from rsea_ros.nodes._devices import limits_of, mechanics_of, spring_of
+from rsea_ros.nodes._devices import limits_of, spring_of
 from rsea_ros.nodes._drive import DriverCycle
 from rsea_ros.nodes._health import ERROR, OK, Health, NodeHealth
 from rsea_ros.nodes._joints import Jobs
@@ -77,7 +77,7 @@ class DrivenJoint:
         """
         assert self.drive is not None
         if not self._values["allow_no_position_limit"]:
-            check_travel(self.guarded.guard.limits, mechanics_of(load_rig(self._values["rig"])))
+            check_travel(self.guarded.guard.limits.position, load_rig(self._values["rig"]))
         with self.drive.deaf():
             self.drive.zero_first = zero_first
             self.guarded.enable()

@@ -17,6 +17,8 @@ from rsea_ros.errors import ParameterError
 
 Value = bool | int | float | str | list[str]
 
+DERIVED = -1.0
+"""Value of a limit's parameter: the limit comes from rig, motor and sensor."""
 _ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 
@@ -75,6 +77,20 @@ JOINT = NodeParameter(
     "joint", "joint", "name of the joint in commands and states; another one is refused", whole=True
 )
 """Of every node that commands or measures it."""
+
+
+def stated_limits(values: Mapping[str, Any], names: Sequence[str]) -> dict[str, float]:
+    """Return the limits that are not derived, inf for none. Raises ParameterError for a negative one."""
+    stated = {}
+    for name in names:
+        value = values[f"{name}_limit"]
+        if value == DERIVED:
+            continue
+        if value < 0.0:
+            expected = f"expected {DERIVED:g} to derive it, or at least 0"
+            raise ParameterError(f"parameter {name}_limit = {value:g}, {expected}")
+        stated[name] = value if value or name == "torque" else math.inf
+    return stated
 
 
 def declare(

@@ -19,7 +19,7 @@ from rsea_ros.control.grid import Grid
 from rsea_ros.control.polarity import Polarity
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._control import TABLE, ControllerLimits, controller_of, design_of, summary
+from rsea_ros.nodes._control import TABLE, ControllerLimits, controller_of, design_of, summary, with_limits
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._link import Measurements, link_of, link_values, link_words
@@ -41,6 +41,7 @@ class ControllerNode:
     """
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
+        values = with_limits(values)
         self._node, self._values = node, values
         self._design = design_of(values)
         self._link = link_of(values, self._design)

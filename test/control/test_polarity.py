@@ -3,11 +3,13 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.law import Gains
 from rsea_ros.control.polarity import Polarity
+from rsea_ros.control.sign_evidence import SignEvidence
 from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -72,6 +74,16 @@ def test_a_torque_that_is_ten_times_off_is_a_fault(factors, command):
     """An F/T gain far too low makes the motor ten times the desired torque, and no error shows it."""
     polarity, _ = probe(RIG, factors, command=command)
     assert "expected ft positive" in polarity.contradiction or "N·m at a command" in polarity.contradiction
+
+
+def test_a_velocity_with_unstated_noise_says_nothing_of_the_size_of_ft():
+    """Four samples under a fit of three left nothing: ft was 0.003 times the torque on 10 of 25 benches."""
+    seen = SignEvidence(RIG, RATE, 4.0)
+    dice = np.random.default_rng(3)
+    for k in range(12):
+        speed, ft = 0.02 * dice.standard_normal(), 0.01 * dice.standard_normal()
+        seen.hear(Measurement(ft, speed, 1e-5 * k, 0.1 * k), 0.0, 0)
+    assert math.isinf(seen._size()[1])
 
 
 def test_without_a_desired_torque_there_is_none():

@@ -7,11 +7,12 @@ import pytest
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.guarded import GuardedDevice
-from rsea_ros.hardware.limits import Rating, check_travel
+from rsea_ros.hardware.limits import Rating
 from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_limits import check_travel
 from rsea_ros.nodes import driver
-from rsea_ros.nodes._devices import limits_of, mechanics_of
+from rsea_ros.nodes._devices import limits_of
 
 DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
 
@@ -102,7 +103,7 @@ def test_60_newton_metres_on_a_free_end_are_refused_or_soon_a_fault(rig):
     """With all defaults they turned it by 5.9 rad in 3 s, without a fault."""
     values, clock = DEFAULTS | {"rig": rig}, Clock()
     with pytest.raises(ParameterError, match=r"position_limit = 0 rad \(none\), expected one: \w+ of rig"):
-        check_travel(limits_of(values), mechanics_of(load_rig(rig)))
+        check_travel(limits_of(values).position, load_rig(rig))
     device = SimulatedDevice(load_rig(rig), values["rate"], clock=clock)
     joint = GuardedDevice(device, limits_of(values), values["rate"], derive=partial(limits_of, values))
     joint.open()
