@@ -87,7 +87,10 @@ def solution(case, rig):
 
 @pytest.mark.parametrize(("name", "cause"), PAIRS)
 def test_no_run_exceeds_the_limits(name, cause):
-    """102 N m were asked for, and 5 rad/s where 2.4 are driven. Every excitation, at one and a half times the present run; the series too."""
+    """102 N m were asked for, and 5 rad/s where 2.4 are driven.
+
+    Every excitation, at one and a half times the present run; the series too.
+    """
     rig = load_rig(name)
     rig = rig.with_effects(*(e for e in rig.effects if e.name != cause), EffectSetting(cause, CAUSES[cause]))
     case, amplitude = present(rig)

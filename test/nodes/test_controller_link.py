@@ -14,7 +14,7 @@ from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes import _link as _measurements
-from rsea_ros.nodes._control import TABLE
+from rsea_ros.nodes._control import TABLE, with_limits
 from rsea_ros.nodes._link import link_of, link_values, link_words
 
 RATE = 280.0
@@ -30,7 +30,7 @@ def bench(name="paper_high_impedance", sensors=ENCODER, effects=()):
 
 def values(rig, path, **given):
     save_rig(rig, path / "model.yaml")
-    return {**{p.name: p.default for p in TABLE}, "rig": str(path / "model.yaml"), **given}
+    return with_limits({**{p.name: p.default for p in TABLE}, "rig": str(path / "model.yaml"), **given})
 
 
 def test_it_is_used_where_the_rig_has_the_sensor(tmp_path):

@@ -11,7 +11,7 @@ from rsea_ros.hardware.limits import Rating
 from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import check_travel
-from rsea_ros.nodes import driver
+from rsea_ros.nodes import _control, driver
 from rsea_ros.nodes._devices import limits_of
 
 DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
@@ -31,6 +31,16 @@ def test_the_default_slew_limit_limits_within_a_cycle():
 def test_replies_may_be_lost_for_the_same_time_at_any_rate(rate, cycles):
     """Three cycles at 1 kHz are 3 ms: any stall of the line was a fault, and 1 kHz never drove."""
     assert limits(rate=rate).lost_cycles == cycles
+
+
+@pytest.mark.parametrize("rig", ["pd_joint", "paper_high_impedance"])
+def test_a_controller_has_the_limits_of_its_driver(rig):
+    """It had 68 and 110 N m whatever the rig."""
+    values = {p.name: p.default for p in _control.TABLE} | {"rig": rig}
+    driven = limits(rig=rig)
+    stated = _control.with_limits(values | {"torque_limit": 2.0})
+    assert _control.with_limits(values)["torque_limit"] == driven.torque
+    assert (stated["torque_limit"], stated["ft_limit"]) == (2.0, 110.0)
 
 
 def test_a_spring_with_a_free_end_is_limited_by_what_ft_measures():
