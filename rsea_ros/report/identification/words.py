@@ -76,7 +76,8 @@ def doubt_sentences(identification: Identification) -> tuple[str, ...]:
             f"{words.sentence(names)} explains a part of the misfit, which is still far from the noise: the "
             "values hold only if what else is missing does not move them."
             if far
-            else f"The intervals also span what {names} would make of the values."
+            else f"The intervals also span what {names} would make of the values: it explains a part of the "
+            "misfit."
         )
     elif not identification.at_noise:
         sentences.append(
