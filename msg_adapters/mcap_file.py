@@ -12,8 +12,7 @@ from pathlib import Path
 
 from msg_adapters import mcap_records as mcap
 from msg_adapters.compression import ERRORS, Allowance, unpack_chunk
-from msg_adapters.contents import NAME as REMARKS
-from msg_adapters.contents import Contents, Messages, remarks_of
+from msg_adapters.contents import NAME as REMARKS, Contents, Messages, remarks_of
 
 UNITS = {
     "damaged_chunks": "chunks",

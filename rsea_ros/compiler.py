@@ -24,10 +24,13 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import caching as numba_caching
-from numba.core import ccallback, sigutils
-from numba.core import config as numba_config
-from numba.core import runtime as numba_runtime
+from numba.core import (
+    caching as numba_caching,
+    ccallback,
+    config as numba_config,
+    runtime as numba_runtime,
+    sigutils,
+)
 
 SHARED = (
     "effects/_*.py", "effects/effect.py", "effects/signal_table.py", "effects/spring_hysteresis.py",

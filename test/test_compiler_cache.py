@@ -15,8 +15,7 @@ from pathlib import Path
 import pytest
 from numba.core import config
 
-from rsea_ros import compiler
-from rsea_ros import compiler as compiler_cache
+from rsea_ros import compiler, compiler as compiler_cache
 from rsea_ros.compiler import SHARED, _own_cache, cache_folder, njit, shared_key, trusted_cache
 
 ROOT = Path(__file__).resolve().parents[1]

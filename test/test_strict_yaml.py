@@ -6,8 +6,7 @@ import os
 import time
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from rsea_ros.documents.strict_yaml import DEEPEST, LARGEST, dump, parse, read
 from rsea_ros.errors import FieldError

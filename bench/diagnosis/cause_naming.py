@@ -14,9 +14,14 @@ from pathlib import Path
 
 import numpy as np
 from independent.bench import Bench, drawn_bench, record_command
-from independent.hidden import BESIDE_THE_CONTRACT, OFF_CATALOGUE, hide, hide_beside_the_contract
-from independent.hidden import CATALOGUE as CONTRACT
-from independent.hidden import hide_off_catalogue as hide_outside
+from independent.hidden import (
+    BESIDE_THE_CONTRACT,
+    CATALOGUE as CONTRACT,
+    OFF_CATALOGUE,
+    hide,
+    hide_beside_the_contract,
+    hide_off_catalogue as hide_outside,
+)
 from independent.severities import SEVERITIES, drawn_parameters
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # `rsea benchmark make` runs this file

@@ -15,8 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from bench import parser_of
-from bench.public.fit import DATA, RIGS
-from bench.public.fit import record_of as benchmark_record
+from bench.public.fit import DATA, RIGS, record_of as benchmark_record
 from bench.public.silverbox import ANGLE, RATE, TORQUE
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.cli.maps import map_path

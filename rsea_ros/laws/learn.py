@@ -9,8 +9,7 @@ import numpy as np
 
 from rsea_ros.diagnosis.criteria import is_at_floor
 from rsea_ros.diagnosis.data_split import TEST
-from rsea_ros.diagnosis.score import Score, score_on
-from rsea_ros.diagnosis.score import gain_of as gain_of_blocks
+from rsea_ros.diagnosis.score import Score, gain_of as gain_of_blocks, score_on
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Effect

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from bench.__main__ import index
-from bench.__main__ import main as run_bench
+from bench.__main__ import index, main as run_bench
 from bench.results import tables_of, write_pages
 from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli.main import main

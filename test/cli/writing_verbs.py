@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from msg_adapters import write_record
-from rsea_ros.checks import carried as usable
-from rsea_ros.checks import check as checks
+from rsea_ros.checks import carried as usable, check as checks
 from rsea_ros.checks.finding import Findings
 from rsea_ros.design import spring_design, tolerance
 from rsea_ros.diagnosis import diagnose
@@ -18,11 +17,9 @@ from rsea_ros.identification import identify
 from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.records.record import Record
 from rsea_ros.report import result_files
-from rsea_ros.report.design import page as design_page
-from rsea_ros.report.design import tables as design_tables
+from rsea_ros.report.design import page as design_page, tables as design_tables
 from rsea_ros.report.diagnosis import files as diagnosis_files
-from rsea_ros.report.identification import page as results
-from rsea_ros.report.identification import words as identification_words
+from rsea_ros.report.identification import page as results, words as identification_words
 
 RIG = "paper_high_impedance"
 MAP = "time: {column: t, unit: s}\nchannels:\n  command: {column: u, unit: N m}\n"

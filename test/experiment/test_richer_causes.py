@@ -9,8 +9,7 @@ from independent.bench import Bench, record_command
 from independent.hidden import hide
 from slow_work import ASKED, CAUSES, RIG
 
-from rsea_ros.experiment import campaign
-from rsea_ros.experiment import campaign as shared_name
+from rsea_ros.experiment import campaign, campaign as shared_name
 from rsea_ros.experiment.campaign import Campaign, SharedName
 from rsea_ros.experiment.joint_weighing import weigh
 from rsea_ros.experiment.proposal import DesignRequest

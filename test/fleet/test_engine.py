@@ -13,9 +13,7 @@ from pathlib import Path
 import pytest
 from fleet_stubs import HIP, KNEE, stub_work
 
-from rsea_ros.fleet import FleetError
-from rsea_ros.fleet import engine as engines
-from rsea_ros.fleet import row as compaction
+from rsea_ros.fleet import FleetError, engine as engines, row as compaction
 from rsea_ros.fleet.engine import ATTEMPTS, Engine, EngineLimits
 from rsea_ros.fleet.executor import Done, Serial, WorkerLost
 from rsea_ros.fleet.query import answer

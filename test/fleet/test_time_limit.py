@@ -9,8 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from rsea_ros.cli.main import main
-from rsea_ros.fleet import analysis
-from rsea_ros.fleet import task as time_limit
+from rsea_ros.fleet import analysis, task as time_limit
 from rsea_ros.fleet.task import OutOfTime, limit_time
 
 MAP = "joints:\n  knee: {rig: paper_high_impedance}\n"

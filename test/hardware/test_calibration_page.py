@@ -12,8 +12,7 @@ import time
 import pytest
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.netft import calibration
-from rsea_ros.hardware.netft import calibration as web_page
+from rsea_ros.hardware.netft import calibration, calibration as web_page
 
 GOOD = (
     b"<?xml version='1.0'?><netft><cfgcpf>1000000</cfgcpf><cfgcpt>1000</cfgcpt>"

@@ -7,9 +7,7 @@ It stands in for a real bench in tests and benchmarks of the diagnosis. Its solv
 from __future__ import annotations
 
 import numpy as np
-from independent.equations import CURRENT, DC, DG, DH, H, sensor_torques
-from independent.equations import C as CHASSIS
-from independent.equations import G as GEAR
+from independent.equations import CURRENT, DC, DG, DH, C as CHASSIS, G as GEAR, H, sensor_torques
 from independent.excitations import EXCITATIONS, RATE
 from independent.plant import Bench, Outside, Plant
 from independent.solvers import run_fixed

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import test_catalogue as contract
 import test_claims as claimed
-from effect_bench import RIG, drive
-from effect_bench import command as chirp
+from effect_bench import RIG, command as chirp, drive
 
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from rsea_ros.design.mechanism import spring_radius, spring_rate
 from rsea_ros.errors import ParameterError

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from foreign import JOINT_STATE, STORE, WRENCH, joint_state, wrench
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from msg_adapters import cdr
 from msg_adapters.cdr import blocks

@@ -8,8 +8,7 @@ from xml.etree import ElementTree as XML
 
 import pytest
 
-from rsea_ros.nodes import _policies, _run
-from rsea_ros.nodes import _run as _sockets
+from rsea_ros.nodes import _policies, _run, _run as _sockets
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "security" / "policies.xml"
 

@@ -9,10 +9,8 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.settings import Setting
 from rsea_ros.records.record import UNITS
-from rsea_ros.report import page as html
-from rsea_ros.report import words
-from rsea_ros.report.diagnosis import numbers as num
-from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report import page as html, words
+from rsea_ros.report.diagnosis import numbers as num, words as say
 from rsea_ros.report.diagnosis.figures import sketch, spectrum_figure, time_figure
 from rsea_ros.report.diagnosis.where import profiles, where_figure
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, MEASURED, faint

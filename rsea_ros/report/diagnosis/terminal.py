@@ -6,8 +6,7 @@ from rich.text import Text
 
 from rsea_ros.diagnosis.result import Diagnosis, Misfit
 from rsea_ros.report import words
-from rsea_ros.report.diagnosis import numbers as num
-from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis import numbers as num, words as say
 from rsea_ros.report.diagnosis.page import fitted_rivals
 from rsea_ros.report.remark_words import fault_lines, remark_sentences
 from rsea_ros.report.rig import command, rig_named, right_rig, split_off_rig

@@ -12,8 +12,7 @@ from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import SENSED, UNITS, FloatArray
 from rsea_ros.records.statistics import Z95
-from rsea_ros.report import page as html
-from rsea_ros.report import words
+from rsea_ros.report import page as html, words
 from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, MEASURED, QUIET, Figure, faint
 from rsea_ros.report.figures.overlay import Simulated, overlay_figure

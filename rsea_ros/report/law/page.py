@@ -10,8 +10,7 @@ from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import UNITS
 from rsea_ros.records.statistics import Z95
-from rsea_ros.report import page as html
-from rsea_ros.report import words
+from rsea_ros.report import page as html, words
 from rsea_ros.report.figures.figure import AFTER, QUIET, faint
 from rsea_ros.report.law.figures import over_figure, time_figure
 from rsea_ros.report.law.words import gain_sentence, headline, law_json, parameter_lines

@@ -10,8 +10,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.bands import TOLERANCES, Bands, arrangements, bands, limits
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS, TABLE_2, claims
 from rsea_ros.paper.findings import findings
-from rsea_ros.paper.rival_models import MovingOutput
-from rsea_ros.paper.rival_models import lumped_rig as lumped_model
+from rsea_ros.paper.rival_models import MovingOutput, lumped_rig as lumped_model
 from rsea_ros.report import words
 from rsea_ros.report.page import Block, key_numbers, page
 from rsea_ros.report.paper import figures, tables

@@ -8,8 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from rsea_ros.diagnosis.criteria import verdict_of
 from rsea_ros.diagnosis.naming import conclusion as outcome

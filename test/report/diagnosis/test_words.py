@@ -25,8 +25,7 @@ from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
 from rsea_ros.identification.result import Overlay
 from rsea_ros.records.record import Fault
 from rsea_ros.report import words
-from rsea_ros.report.diagnosis import numbers as num
-from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis import numbers as num, words as say
 from rsea_ros.report.diagnosis.files import diagnosis_json
 from rsea_ros.report.diagnosis.page import diagnosis_report, settings_section
 from rsea_ros.report.diagnosis.terminal import terminal_lines
