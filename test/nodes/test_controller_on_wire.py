@@ -111,6 +111,20 @@ def test_the_end_of_the_controller_is_that_of_the_torque_and_another_one_begins_
     assert int(values["late_commands"]) < 0.5 * int(values["commands"])
 
 
+@pytest.mark.parametrize("ft", [False, True])
+def test_what_is_mounted_the_other_way_round_is_a_fault_after_small_pulses(wire, ft):
+    """The controller ran away to 68 N m at the motor before anybody had wished for a torque."""
+    wire.clear("controller")
+    wire.listener.until(lambda: wire.bench.torque()[0] == 0)
+    since = wire.bench.ask("reverse", ft=ft)["t"]
+    wire.health.clear()
+    signs = "signs: ft is reversed; ft, joint_states and motor torque contradict each other"
+    wire.hold(10.0, lambda: any(m.status[0].message.startswith(signs) for m in wire.health))
+    wire.bench.ask("reverse", ft=ft)
+    goals = [abs(goal) for _, goal, on in wire.bench.log(since)["torque"] if on]
+    assert 0.0 < max(goals) * TABLES[54024].ampere * 6.826 < 5.0
+
+
 def test_the_hangup_of_a_terminal_ends_the_driver_at_zero(wire):
     assert wire.driver.stop(signal.SIGHUP) == 0
     assert wire.bench.torque() == (0, False)

@@ -84,7 +84,10 @@ PAGE = f"""<?xml version="1.0"?>
 
 
 class ForceSensor:
-    """Streams records at `rate` (Hz) to the last client that asked. gone: records that were left out."""
+    """Streams records at `rate` (Hz) to the last client that asked. gone: records that were left out.
+
+    sign: −1 where all six values are reversed.
+    """
 
     def __init__(self, plant: Mechanism, rate: float, wrong: Misbehaviour, host: str = "127.0.0.1") -> None:
         self._plant, self._wrong = plant, wrong
@@ -100,7 +103,7 @@ class ForceSensor:
         self._rdt, self._ft, self.status = 0, 0, 0
         self._bias, self._counts = [0] * 6, [0] * 6
         self._due = 0
-        self.gone = 0
+        self.gone, self.sign = 0, 1
         self.keep = False
         self.sent: deque[tuple[int, tuple[int, ...]]] = deque(maxlen=RECORDS)
         self.page = _serve_page(host, PAGE.format(rate=round(rate)))
@@ -137,7 +140,7 @@ class ForceSensor:
         due = self._client is not None and self._due <= now
         while self._client and self._due <= now:
             self._due += self._period
-            counts = _counts(self._plant)
+            counts = [self.sign * count for count in _counts(self._plant)]
             self._counts = self._counts if self._wrong.happens("ft_stuck") else counts
             self._ft = (self._ft + 1) % (1 << 32)
             self._rdt = (self._rdt + 1) % (1 << 32)

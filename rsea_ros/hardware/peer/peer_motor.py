@@ -34,6 +34,7 @@ class Mechanism(Protocol):
 class EmulatedMotor:
     """One motor. torque_constant: N m at the output per A, 0: its model's. origin: counts at 0 rad.
 
+    sign: −1 where it is mounted the other way round, so that all it makes and measures is reversed.
     history: every write to it, as (clock in ns, `acting_goal`, whether torque is on), the newest `kept`; also
     where a torque begins or ends by itself, in other modes than that of torque.
     """
@@ -50,7 +51,7 @@ class EmulatedMotor:
         self._constant, self._origin = torque_constant or self.model.constant, origin
         self.memory = bytearray(TABLE_SIZE)
         self.history: deque[tuple[int, int, bool]] = deque(maxlen=kept)
-        self._touched = 0
+        self._touched, self.sign = 0, 1
         for name, register in self.model.registers.items():
             self.put(name, register.start)
         self.memory[0:2] = number.to_bytes(2, "little")
@@ -87,7 +88,7 @@ class EmulatedMotor:
             self.put("goal", 0)
             self._act(now)
         elif self.get("mode") != TORQUE_MODE and self.get("torque_enable"):
-            self._plant.write(self.torque())
+            self._plant.write(self.sign * self.torque())
             if not self.history or (self.history[-1][1] != 0) != (self.acting_goal() != 0):
                 self._act(now)
 
@@ -165,11 +166,12 @@ class EmulatedMotor:
             share = self.get("goal_pwm") / self.model.registers["goal_pwm"].high
         elif mode == VELOCITY_MODE:
             wanted = self.get("goal_velocity") * self.model.radian_per_second
-            share = (wanted - self._plant.read().velocity) / VELOCITY_BAND
+            share = (wanted - self._motion()[1]) / VELOCITY_BAND
         else:
-            state, turn = self._plant.read(), 2 * math.pi / self.model.counts_per_turn
+            position, velocity, _ = self._motion()
+            turn = 2 * math.pi / self.model.counts_per_turn
             goal = (self.get("goal_position") - self._origin - self.get("homing_offset")) * turn
-            share = (goal - state.position) / POSITION_BAND - state.velocity / (10.0 * VELOCITY_BAND)
+            share = (goal - position) / POSITION_BAND - velocity / (10.0 * VELOCITY_BAND)
         return max(-1.0, min(1.0, share)) * self.get("torque_limit") * unit
 
     def acting_goal(self) -> int:
@@ -181,15 +183,19 @@ class EmulatedMotor:
     def _act(self, now: int) -> None:
         entry = (now, self.acting_goal(), bool(self.get("torque_enable")))
         self.history.append(entry)
-        self._plant.write(self.torque())
+        self._plant.write(self.sign * self.torque())
+
+    def _motion(self) -> tuple[float, float, float]:
+        """Return position, velocity and torque as it counts them: rad, rad/s, N m."""
+        state = self._plant.read()
+        return self.sign * state.position, self.sign * state.velocity, self.sign * state.motor_torque
 
     def _measure(self, now: int) -> None:
-        state = self._plant.read()
-        model = self.model
-        counts = round(state.position / (2 * math.pi) * model.counts_per_turn)
+        model, (position, velocity, torque) = self.model, self._motion()
+        counts = round(position / (2 * math.pi) * model.counts_per_turn)
         self.put("position", self._origin + self.get("homing_offset") + counts)
-        self.put("velocity", round(state.velocity / model.radian_per_second))
-        self.put("current", round(state.motor_torque / self._constant / model.ampere))
+        self.put("velocity", round(velocity / model.radian_per_second))
+        self.put("current", round(torque / self._constant / model.ampere))
         if "tick" in model.registers:
             self.put("tick", now // 1_000_000 % 32768)
 
@@ -215,6 +221,6 @@ class EmulatedEncoder(EmulatedMotor):
         """Do nothing."""
 
     def _measure(self, now: int) -> None:
-        turns = self._plant.read().deflection / (2 * math.pi)
+        turns = self.sign * self._plant.read().deflection / (2 * math.pi)
         counts = round(turns * self.model.counts_per_turn)
         self.put("position", self._origin + self.get("homing_offset") + counts)

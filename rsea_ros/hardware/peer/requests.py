@@ -23,8 +23,9 @@ class LineRequests:
     """`{"do": NAME, …}`; the answer has `t`, the clock (ns) at which it was done, or `error`.
 
     misbehave (fields of Misbehaviour), set (items of the control table), alert (bits), sag (voltage in V),
-    vanish, appear (name), ft_gap (records), ft_restart, ft_rate (rate in Hz), ft_status (bits), model,
-    firmware (number), watch (keep F/T records), torque (goal, whether it is on), log, pauses, quit.
+    vanish, appear (name), reverse (ft: the sensor, not the motor), ft_gap (records), ft_restart, ft_rate
+    (rate in Hz), ft_status (bits), model, firmware (number), watch (keep F/T records), torque (goal, whether
+    it is on), log, pauses, quit.
 
     pauses: when the bench itself was held up until, and for how long, ns. `motor` in any request: its place
     on the line, 0 where it is not said.
@@ -49,8 +50,8 @@ class LineRequests:
             "ft_gap": lambda now, r: sensor.gap(int(r["records"])),
             "ft_restart": lambda now, r: sensor.restart(),
             "ft_rate": lambda now, r: sensor.set_rate(float(r["rate"])),
-            "ft_status": self._ft_status, "model": self._model, "firmware": self._firmware,
-            "watch": self._watch, "log": self._log,
+            "reverse": self._reverse, "ft_status": self._ft_status, "model": self._model,
+            "firmware": self._firmware, "watch": self._watch, "log": self._log,
             "pauses": lambda now, r: [pause for pause in self.pauses if pause[0] >= int(r.get("since", 0))],
             "torque": lambda now, r: [self._motor.acting_goal(), bool(self._motor.get("torque_enable"))],
         }  # fmt: skip
@@ -104,6 +105,11 @@ class LineRequests:
         self._motor.put("voltage", round(10 * float(request["voltage"])))
         if float(request["voltage"]) < LOWEST_VOLTAGE:
             self._motor.shut_down(now, VOLTAGE_ERROR)
+
+    def _reverse(self, now: int, request: Request) -> None:
+        """Mount F/T sensor or motor the other way round; the motor counts from the same zero."""
+        turned = self._sensor if request.get("ft") else self._motor
+        turned.sign = -turned.sign
 
     def _ft_status(self, now: int, request: Request) -> None:
         self._sensor.status = int(request.get("bits", SATURATED))
