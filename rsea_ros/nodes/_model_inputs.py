@@ -12,77 +12,90 @@ from statistics import median
 from rclpy.node import Node
 
 from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
-from rsea_ros.model.observer import Observer, TorqueEstimate
+from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
 from rsea_ros.model.rig import Rig
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 
-SAMPLES, TIME = 10, 50_000_000
-"""Equal samples, and ns of them, that are no chance."""
+SAMPLES, TIME, LONG = 10, 50_000_000, 500_000_000
+"""Equal samples, and ns of them, that are no chance; ns of alike ones, which a gear that sticks makes too."""
 
 
 class Frozen:
     """One topic's values. A sensor at rest may show the same counts; then something else must have moved.
 
     least: motion of the other sensor that proves a freeze; 0: none needed, this sensor's noise suffices.
+    band: change of the first value that is its noise; 0: a stopped sensor repeats all of them exactly.
+    doubted: whether it stands still beside such a motion. frozen: whether for too long to be chance.
     """
 
-    def __init__(self, least: float = 0.0) -> None:
-        self._least = least
+    def __init__(self, least: float = 0.0, band: float = 0.0) -> None:
+        self._least, self._band, self._time = least, band, LONG if band else TIME
         self._last: Sequence[float] = ()
         self._since = self._count = 0
         self._low, self._high = math.inf, -math.inf
-        self.frozen = False
+        self.doubted = self.frozen = False
 
     def take(self, stamp: int, values: Sequence[float]) -> bool:
         """Process a sample (stamp in ns); return whether the sensor has stopped."""
-        if values != self._last or stamp < self._since:
-            self._last, self._since, self._count, self.frozen = values, stamp, 0, False
-            self._low, self._high = math.inf, -math.inf
+        if not self._stands(values) or stamp < self._since:
+            self._last, self._since, self._count = values, stamp, 0
+            self._low, self._high, self.doubted, self.frozen = math.inf, -math.inf, False, False
         self._count += 1
-        if self._count >= SAMPLES and stamp - self._since >= TIME:
-            self.frozen = self.frozen or self._high - self._low >= self._least or self._least == 0.0
+        self.doubted = self.doubted or self._high - self._low >= self._least or self._least == 0.0
+        if self._count >= SAMPLES and stamp - self._since >= self._time:
+            self.frozen = self.doubted
         return self.frozen
+
+    def _stands(self, values: Sequence[float]) -> bool:
+        if self._band == 0.0:
+            return values == self._last
+        return bool(self._last) and abs(values[0] - self._last[0]) <= self._band
 
     def beside(self, value: float) -> None:
         """Process a sample of another sensor."""
         self._low, self._high = min(self._low, value), max(self._high, value)
 
 
-MOVED, LEAST = 12.0, 0.1
+MOVED, LEAST, BAND = 12.0, 0.1, 6.0
 """Standard deviations of ft, and N m, by which it must move while joint_states stand still, to tell that they
-have stopped: more than noise does in a second, less than what matters."""
+have stopped: more than noise does in a second, less than what matters. Standard deviations of the position
+within which it stands still under its noise."""
 
 
 class StoppedSensors:
     """Watches joint_states and ft beside the commands."""
 
-    def __init__(self, ft_noise: float, stiffness: float = 0.0, *, ft_repeats: bool = False) -> None:
-        """ft_noise: standard deviation, N m. stiffness: of the spring, N m/rad.
+    def __init__(self, noise: Noise, stiffness: float = 0.0, *, ft_repeats: bool = False) -> None:
+        """stiffness: of the spring, N m/rad.
 
         ft_repeats: whether ft may repeat a value at rest because its quantum exceeds its noise, as that of an
         encoder does.
         """
-        least = max(MOVED * ft_noise, LEAST)
-        self._states_by_ft, self._states_by_command = Frozen(least), Frozen(least)
+        least, band = max(MOVED * noise.ft, LEAST), BAND * noise.position
+        self._by_ft = Frozen(least), Frozen(max(least, 2.0 * stiffness * band), band)
+        self._by_command = Frozen(least), Frozen(least, band)
         self._ft, self._stiffness = Frozen(least if ft_repeats else 0.0), stiffness
 
     def take_state(self, stamp: int, position: float, effort: float) -> bool:
-        """Process a state (ns, rad, N m); return whether joint_states have stopped."""
-        self._states_by_command.take(stamp, (position, effort))
+        """Process a state (ns, rad, N m); return whether it stands still while ft moves."""
         self._ft.beside(self._stiffness * position)
-        return self._states_by_ft.take(stamp, (position, effort))
+        for sensor in (*self._by_ft, *self._by_command):
+            sensor.take(stamp, (position, effort))
+        return any(sensor.doubted for sensor in self._by_ft)
 
     def take_ft(self, stamp: int, torque: float) -> bool:
         """Process a torque of the sensor (ns, N m); return whether ft has stopped."""
-        self._states_by_ft.beside(torque)
+        for sensor in self._by_ft:
+            sensor.beside(torque)
         return self._ft.take(stamp, (torque,))
 
     def take_command(self, torque: float) -> None:
         """Process a commanded torque, N m."""
-        self._states_by_command.beside(torque)
+        for sensor in self._by_command:
+            sensor.beside(torque)
 
     @property
     def ft_frozen(self) -> bool:
@@ -91,21 +104,26 @@ class StoppedSensors:
 
     @property
     def frozen(self) -> list[str]:
-        """Topics that repeat a value where it should change."""
-        topics = (("joint_states", self._states_by_ft), ("ft", self._ft))
-        return [topic for topic, sensor in topics if sensor.frozen]
+        """Topics that repeat a value where it should change.
+
+        Beside ft alone a position within its noise may be that of a gear that sticks while the load moves.
+        """
+        repeats, alike = self._by_ft
+        stopped = repeats.frozen or (alike.frozen and self._by_command[1].frozen)
+        topics = (("joint_states", stopped), ("ft", self._ft.frozen))
+        return [topic for topic, is_frozen in topics if is_frozen]
 
     @property
     def unmoved(self) -> bool:
         """Whether joint_states repeat a value while commands move: they have stopped, or the drive is off."""
-        return self._states_by_command.frozen
+        return self._by_command[0].frozen
 
 
-def stopped_sensors(rig: Rig, ft_noise: float) -> StoppedSensors:
-    """Return the watch of a rig's sensors. ft_noise: standard deviation, N m."""
+def stopped_sensors(rig: Rig, noise: Noise) -> StoppedSensors:
+    """Return the watch of a rig's sensors."""
     ft = rig.sensors.get("ft")
     ft_repeats = ft is not None and ft.quantum > 2.0 * ft.noise
-    return StoppedSensors(ft_noise, rig["spring.stiffness"], ft_repeats=ft_repeats)
+    return StoppedSensors(noise, rig["spring.stiffness"], ft_repeats=ft_repeats)
 
 
 PERIODS = 64
@@ -189,7 +207,7 @@ class ModelInputs:
         return median(self._periods) if len(self._periods) == PERIODS else math.nan
 
     def _measure(self, stamp: int, a: float, b: float, kind: int) -> TorqueEstimate | None:
-        """Give a sample to the observer, unless its sensor has stopped."""
+        """Give a sample to the observer, unless its sensor has stopped. ft outvotes a state."""
         if kind == _FT:
             self._ft_stamp = stamp
             if self.stopped.take_ft(stamp, a):
@@ -198,7 +216,8 @@ class ModelInputs:
         if not self._ft_stamp or stamp < self._ft_stamp - SECOND:
             self._ft_stamp = stamp
         self._state_stamp = stamp
-        if self.stopped.take_state(stamp, a, b):
+        doubted = self.stopped.take_state(stamp, a, b) and not self.ft_silent
+        if doubted or "joint_states" in self.stopped.frozen:
             return None
         return self._observer.state(self.seconds(stamp), a, b)
 

@@ -72,7 +72,7 @@ class ModelNode:
         self._writer = RawWriter(template, TYPES["joint_states"], "effort")
         self._flags = Flags(node)
         read = InputSettings(**{n: values[n] for n in ("ft_timeout", "axis", "reliable", "joint")})
-        self._stopped = stopped_sensors(rig, noise.ft)
+        self._stopped = stopped_sensors(rig, noise)
         self._inputs = ModelInputs(node, observer, self._stopped, read)
         self._assess = ModelHealth(rig, noise, observer, self._band, self._error, self._inputs)
         self._lock = threading.Lock()

@@ -2,8 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
+from bench.observer.truth import true_run
 from msg_adapters.ros import (
     JointState,
     WrenchStamped,
@@ -11,9 +13,9 @@ from msg_adapters.ros import (
     torque_command_message,
     wrench_message,
 )
-from rsea_ros.model.observer import Observer
+from rsea_ros.model.observer import Observer, noise_of
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._model_inputs import InputSettings, ModelInputs, StoppedSensors
+from rsea_ros.nodes._model_inputs import Frozen, InputSettings, ModelInputs, StoppedSensors
 from rsea_ros.nodes._qos import COMMAND
 
 RIG = load_rig("paper_high_impedance")
@@ -22,9 +24,10 @@ EPOCH, PERIOD = 1_700_000_000_000_000_000, 1e9 / 280.0
 
 
 def feed(listener, inputs, publishers, samples):
-    """Publish samples of command, (position, effort) and torque, and have them taken."""
+    """Publish samples of command, (position, effort) and torque; return the estimates."""
+    estimates = []
     for start in range(0, len(samples), 20):
-        some, count = samples[start : start + 20], 0
+        some, before = samples[start : start + 20], len(estimates)
         for k, (command, state, torque) in enumerate(some, start):
             stamp = round(EPOCH + k * PERIOD)
             publishers["torque_command"].publish(torque_command_message(stamp, command))
@@ -32,11 +35,11 @@ def feed(listener, inputs, publishers, samples):
             publishers["ft"].publish(wrench_message(stamp, torque))
 
         def has_arrived():
-            nonlocal count
-            count += sum(1 for _ in inputs.take())
-            return count >= len(some) or inputs.stopped.frozen  # noqa: B023  called at once
+            estimates.extend(estimate for _, estimate in inputs.take())
+            return len(estimates) >= before + len(some) or inputs.stopped.ft_frozen  # noqa: B023  called at once
 
         listener.until(has_arrived)
+    return estimates
 
 
 @pytest.fixture
@@ -46,7 +49,7 @@ def inputs_of(listener):
 
     def make(**more):
         node = listener.node
-        inputs = ModelInputs(node, Observer(RIG), StoppedSensors(0.03, **more), READ)
+        inputs = ModelInputs(node, Observer(RIG), StoppedSensors(noise_of(RIG), **more), READ)
         kinds = {"torque_command": JointState, "joint_states": JointState, "ft": WrenchStamped}
         made.extend(node.create_publisher(kind, topic, COMMAND) for topic, kind in kinds.items())
         publishers = dict(zip(kinds, made[-3:], strict=True))
@@ -56,6 +59,49 @@ def inputs_of(listener):
     yield make
     for publisher in made:
         listener.node.destroy_publisher(publisher)
+
+
+def test_a_value_with_noise_that_stands_still_has_stopped_and_may_go_on():
+    ft = Frozen()
+    assert not any(ft.take(round(k * PERIOD), (0.01 * (k % 3),)) for k in range(100))
+    assert [ft.take(round((100 + k) * PERIOD), (1.0,)) for k in range(30)][-1]
+    assert not ft.take(round(130 * PERIOD), (1.1,))
+
+
+def test_a_joint_at_rest_is_no_fault_until_its_torque_moves():
+    joint = Frozen(least=0.3)
+    for k in range(100):
+        joint.beside(0.02 * (-1) ** k)
+        assert not joint.take(round(k * PERIOD), (0.1, 0.0))
+    for k in range(100, 130):
+        joint.beside(0.05 * (k - 100))
+        stopped = joint.take(round(k * PERIOD), (0.1, 0.0))
+    assert stopped
+
+
+def test_a_few_equal_samples_are_chance():
+    ft = Frozen()
+    assert not any(ft.take(round(k * PERIOD), (float(k // 8),)) for k in range(200))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_the_estimate_follows_ft_as_soon_as_joint_states_stand_still(listener, inputs_of, noise):
+    """It was 18 N m off, and under noise of its own for as long as they stood, then ft was named for it."""
+    inputs, publishers = inputs_of(stiffness=RIG["spring.stiffness"])
+    count, stop = 500, 180
+    run = true_run(RIG, 10.0 * np.sin(10.0 * math.pi * np.arange(count) / 280.0), 280.0, seed=1)
+    command, position, effort, ft = (
+        run.record[n].y.copy() for n in ("command", "position", "motor_torque", "ft")
+    )
+    dice = np.random.default_rng(2).standard_normal((2, count - stop))
+    position[stop:] = position[stop] + noise * noise_of(RIG).position * dice[0]
+    effort[stop:] = effort[stop] + noise * noise_of(RIG).motor_torque * dice[1]
+    states = zip(position.tolist(), effort.tolist(), strict=True)
+    samples = list(zip([*command[1:], 0.0], states, ft.tolist(), strict=True))
+    estimates = feed(listener, inputs, publishers, samples)
+    off = np.abs(np.array([each.distal for each in estimates]) - run.distal)
+    assert off[stop:].max() < 1.5 and off[stop + 28 :].max() < 0.15
+    assert inputs.stopped.frozen == ["joint_states"]
 
 
 def test_states_that_stand_still_while_commands_move_are_noticed(listener, inputs_of):
