@@ -51,7 +51,7 @@ class DriverCycle:
         self._source.poll(self.anchor)
         commands, now = self._source.commands, self.anchor.now()
         commands.take(max(stamp, now - self._period) + self._period // 2)
-        if self.zero_first and commands.first is not None:
+        if self.zero_first and commands.first is not None and not self._deaf:
             self._check_zero(commands.first)
         return commands.torque, None if self._deaf else commands.age(now)
 

@@ -151,7 +151,9 @@ def test_after_autostart_the_first_command_is_zero_or_a_fault(first):
     """A driver that was killed and started again under a stream of commands went on with the torque."""
     world = World()
     world.drive.zero_first = True
+    streamed = world.motor.at("enable", lambda: world.cycles(3, 10.0))
     world.activate()
+    assert streamed and world.guarded.enabled and world.guarded.fault is None
     world.cycles(30)
     world.send(first)
     world.send(10.0)  # of one cycle, the first counts
