@@ -10,7 +10,6 @@ from typing import NoReturn
 import numpy as np
 
 from msg_adapters import read_record
-from rsea_ros.checks.check import check_record
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, cut, topic_map
 from rsea_ros.model.prediction_errors import Comparison, predict
@@ -54,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
     record, faults = repair_stamps(record)
     record = cut(replace(record, faults=(*record.faults, *faults)), args)
     rig = load_rig(args.model)
+    from rsea_ros.checks.check import check_record  # after the bag, so that a bad bag is refused at once
+
     comparisons = predict(rig, record)
     if args.out:
         write_text(args.out, _table(comparisons), force=args.force)

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-BENCH = Path(__file__).resolve().parents[2] / "bench"
+from bench.peers import score as peers
+from bench.peers.cases import PeerRecord
+
+HERE = Path(peers.__file__).parent
 
 
 @pytest.fixture(scope="module")
-def peers():
-    spec = importlib.util.spec_from_file_location("peers", BENCH / "peers.py")
-    module = importlib.util.module_from_spec(spec)
-    before = list(sys.path)
-    spec.loader.exec_module(module)
-    sys.path[:] = before
-    return module
-
-
-@pytest.fixture(scope="module")
-def case(peers):
+def case():
     y = np.sin(np.arange(40.0))
     truth = {"inertia": 2.0, "damping": 4.0}
-    return peers.PeerRecord(
+    return PeerRecord(
         "a case", np.ones(40), y, 10.0, 30, "joint", {"inertia": 1.0}, 0.5, y, np.zeros(0), truth
     )
 
@@ -40,7 +31,7 @@ def test_a_peer_gets_no_measurement_that_is_held_out(case):
     assert "truth" not in str(case.meta) and "cause" not in case.meta
 
 
-def test_a_result_becomes_a_row(peers, case):
+def test_a_result_becomes_a_row(case):
     parameters = {"inertia": 2.2, "damping": 4.0}
     result = {
         "prediction": list(case.y[30:] + 1.0), "parameters": parameters, "cause": "", "note": "a|b",
@@ -52,14 +43,11 @@ def test_a_result_becomes_a_row(peers, case):
     assert cells == ["a case", "gp", "2", f"{fit:.3g}", off, "none named", "1.2", "a/b"]
 
 
-def test_a_peer_that_did_not_run_is_a_row_with_the_reason(peers, case):
+def test_a_peer_that_did_not_run_is_a_row_with_the_reason(case):
     assert "not run: no | wheel" not in peers._row("gp", case, {"not_run": "no | wheel"})
     assert "not run: no / wheel" in peers._row("gp", case, {"not_run": "no | wheel"})
 
 
-def test_every_peer_has_a_script_and_pinned_requirements(peers):
-    for peer in peers.PEERS:
-        assert (BENCH / "peers" / f"with_{peer}.py").is_file()
-        if peer != "rsea":
-            lines = (BENCH / "peers" / f"{peer}.txt").read_text().split()
-            assert lines and all("==" in line for line in lines)
+def test_every_peer_has_a_script_and_pinned_requirements():
+    assert all((HERE / f"with_{peer}.py").is_file() for peer in peers.PEERS)
+    assert all("==" in pin for pins in peers.PINS.values() for pin in pins.split())
