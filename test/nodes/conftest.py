@@ -121,7 +121,7 @@ class Listener:
         deadline = time.monotonic() + TIMEOUT
         while not (result := condition()):
             assert time.monotonic() < deadline, "waited in vain"
-            self._executor.spin_once(timeout_sec=0.1)
+            self._executor.spin_once(timeout_sec=0.01)  # conditions that command are heard in time
         return result
 
     def call(self, name, kind=Trigger, request=None):
