@@ -59,17 +59,24 @@ def cause_of(
     where its residual falls.
     """
     (without, with_it), effect = step, effect_named(step[1].added)
-    rule, resamples = settings.sizes, settings.acceptance.resamples
-    channel = _helped_channel(without.test, with_it.test, channel, rule)
-    held_out, interval = gain(with_it.test, without.test, channel, resamples)
+    channel, held_out, interval = own_gain(step, channel, settings)
     train, _ = gain(with_it.train, without.train, channel)
     return Cause(
         name=effect.name,
-        parameters=sizes(effect.name, parameters_of(last.solution, last.confidence), rule),
+        parameters=sizes(effect.name, parameters_of(last.solution, last.confidence), settings.sizes),
         gain_train=train, gain_holdout=held_out, gain_holdout_ci95=interval,
         times_noise=(without.test.ratio(channel), with_it.test.ratio(channel)), equation=effect.equation,
         channel=channel, status=named.status or "leading", probability=named.probability,
     )
+
+
+def own_gain(
+    step: tuple[Evaluated, Evaluated], channel: str, settings: DiagnosisSettings
+) -> tuple[str, float, tuple[float, float]]:
+    """Return the channel that a step's cause helps, and its gain there on held-out data with interval."""
+    without, with_it = step
+    channel = _helped_channel(without.test, with_it.test, channel, settings.sizes)
+    return channel, *gain(with_it.test, without.test, channel, settings.acceptance.resamples)
 
 
 def _helped_channel(without: Score, with_it: Score, channel: str, rule: SizeSettings) -> str:
@@ -245,13 +252,10 @@ def with_sure_gains(
     """
     if is_at_floor(stages[-1].test, settings.floor):
         return dict(naming)
-    resamples, fall = settings.acceptance.resamples, settings.sizes
-    sure = {}
-    for without, with_it in itertools.pairwise(stages):
-        helped = _helped_channel(without.test, with_it.test, channel, fall)
-        sure[with_it.added] = gain(with_it.test, without.test, helped, resamples)[1][0] > 0.0
+    gains = {step[1].added: own_gain(step, channel, settings) for step in itertools.pairwise(stages)}
+    unsure = {name for name, (_, _, (low, _)) in gains.items() if not low > 0.0}
     return {
-        name: by if sure.get(name, True) else replace(by, status=None, has_gain=False)
+        name: replace(by, status=None, has_gain=False) if name in unsure else by
         for name, by in naming.items()
     }
 
