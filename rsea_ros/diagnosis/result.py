@@ -77,7 +77,7 @@ class Cause:
     """An accepted cause. gain_…: 1 - RMS(residual with it) / RMS(residual without it), of `channel`.
 
     times_noise: held-out residual of the channel over its noise, without and with it.
-    probability: that it is part of the truth under this name, 0 to 1, calibrated (bench calibration).
+    probability: that it is part of the truth under this name, 0 to 1, calibrated (bench/calibration).
     """
 
     name: str

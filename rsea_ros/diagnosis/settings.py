@@ -22,7 +22,8 @@ from rsea_ros.identification.settings import IntervalSettings, NoiseSettings, Se
 T = TypeVar("T")
 CHOSEN = "chosen on the benchmark; python -m bench diagnosis settings shows the outcomes over it"
 CALIBRATED = (
-    "fixed when the coefficients of naming/status.py were fitted: after a change, `bench calibration fit`"
+    "fixed when the coefficients of naming/status.py were fitted: after a change, "
+    "`python -m bench calibration fit`"
 )
 
 
@@ -103,7 +104,7 @@ class ForwardSettings:
     paired_fits: int = number(2, "1", "pairs that are fitted to all training blocks")
     smaller_guess: float = number(
         0.1, "1", "share of a first guess that is tried where two linear steps from it led uphill",
-        "a tenth of a typical size is nearly linear; without it mild effects were lost (bench: coverage)",
+        "a tenth of a typical size is nearly linear; without it mild effects were lost (bench/diagnosis)",
     )  # fmt: skip
     screening_steps: int = number(2, "1", "Gauss-Newton steps of an effect's screening, with old derivatives")
     screening_part: float = number(
@@ -111,7 +112,7 @@ class ForwardSettings:
     )
     bent_guesses: int = number(
         2, "1", "guesses that are fitted on after those steps, where derivatives change on the way",
-        "the better of two after the steps is not always the better in the end (bench: coverage)",
+        "the better of two after the steps is not always the better in the end (bench/diagnosis)",
     )  # fmt: skip
     bent_steps: int = number(4, "1", "steps of that fit")
     clear: float = number(
