@@ -17,6 +17,7 @@ import numpy as np
 
 from rsea_ros.documents.wording import brief, quote
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import running_integral
 
 LONGEST, SIZE = 1000, 200
 """Characters, and parts of the syntax tree."""
@@ -59,7 +60,7 @@ PLAIN: Mapping[str, tuple[Callable[..., Any], int, str]] = {
 """By name: function, how many arguments, meaning."""
 TIMED: Mapping[str, tuple[Callable[[Any, FloatArray], Any], int, str]] = {
     "derivative": (lambda x, t: np.gradient(x, t), 1, "rate of change, 1/s, central differences"),
-    "integral": (lambda x, t: _integral(x, t), 1, "integral over time since the first sample, trapezoids"),
+    "integral": (running_integral, 1, "integral over time since the first sample, trapezoids"),
 }
 FUNCTIONS = {**PLAIN, **TIMED}
 DECODING = frozenset(name for name in PLAIN if "int" in name) | {"sign_magnitude", "unwrap"}
@@ -196,7 +197,3 @@ def _real(result: Any, arguments: Sequence[Any]) -> Any:
 
 def _wrapped(x: Any, bits: int) -> Any:
     return np.mod(np.asarray(x) + 2.0 ** (bits - 1), 2.0**bits) - 2.0 ** (bits - 1)
-
-
-def _integral(x: Any, t: FloatArray) -> Any:
-    return np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(t))])

@@ -27,6 +27,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.model.equations import Mechanics, gear_inertia, mechanics
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import Channel, FloatArray, Record
+from rsea_ros.records.statistics import running_integral
 
 REACH = 2.0
 """s, either way: lags that are looked for."""
@@ -329,7 +330,7 @@ def _averaged(channel: Channel, t: FloatArray, period: float) -> FloatArray:
     """Return the means of a channel over the periods about some times: what is faster does not fold."""
     if period < 1.5 / channel.rate:
         return np.interp(t, channel.t, channel.y)
-    area = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(channel.t) * (channel.y[1:] + channel.y[:-1]))])
+    area = running_integral(channel.y, channel.t)
     low, high = (np.clip(t + side * period, channel.t[0], channel.t[-1]) for side in (-0.5, 0.5))
     sums = np.diff([np.interp(v, channel.t, area) for v in (low, high)], axis=0)[0]
     return np.asarray(sums / np.maximum(high - low, 1e-300))

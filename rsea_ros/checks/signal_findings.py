@@ -32,6 +32,7 @@ from rsea_ros.records.record import (
     IntArray,
     Record,
 )
+from rsea_ros.records.statistics import running_integral, runs_of
 
 _MOSTLY = 0.5
 _WORTH_TELLING = 0.02
@@ -204,11 +205,11 @@ def _rests(channel: Channel, start: float, stop: float) -> bool:
 
 def _longest(still: BoolArray, t: FloatArray) -> tuple[int, int]:
     """Return the first and the last sample of the longest run."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
-    if not len(edges):
+    runs = runs_of(still) - (0, 1)
+    if not len(runs):
         return 0, 0
-    k = int(np.argmax(t[edges[1::2] - 1] - t[edges[::2]]))
-    return int(edges[::2][k]), int(edges[1::2][k] - 1)
+    first, last = runs[np.argmax(np.diff(t[runs])[:, 0])]
+    return int(first), int(last)
 
 
 _LARGE_JUMP = 10.0
@@ -276,7 +277,7 @@ def _is_contradicted(record: Record, at: IntArray, sizes: FloatArray) -> BoolArr
         return np.zeros(len(at), bool)
     position, velocity = record["position"], record["velocity"]
     t, speed = position.t, np.interp(position.t, velocity.t, velocity.y)
-    turned = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
+    turned = running_integral(speed, t)
     new = np.diff(position.y, prepend=np.nan) != 0.0
     since = np.maximum.accumulate(np.where(new, np.arange(len(t)), 0))[at]
     brought = np.maximum(np.abs(speed[at]), np.abs(speed[at + 1])) * (t[at + 1] - t[at])

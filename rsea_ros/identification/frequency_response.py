@@ -57,7 +57,7 @@ from rsea_ros.model.position_loop import close_loop
 from rsea_ros.model.propagator import encoder_row, read_row, state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray, Record
-from rsea_ros.records.statistics import next_fast_length
+from rsea_ros.records.statistics import next_fast_length, runs_of
 
 LONGEST_SEGMENT = 16.0
 """s. Long against what the actuator remembers, so that segments leak little."""
@@ -267,13 +267,12 @@ def _likely_lags(command: FloatArray) -> list[int]:
 def _stretch(command: FloatArray, lag: int) -> Periods | None:
     """Return the longest stretch that repeats with this lag."""
     same = np.abs(command[lag:] - command[:-lag]) <= _SAME * np.std(command)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    starts, stops = edges[::2], edges[1::2]
-    if len(starts) == 0:
+    runs = runs_of(same)
+    if not len(runs):
         return None
-    longest = int(np.argmax(stops - starts))
-    count = int((stops[longest] - starts[longest]) // lag + 1)
-    periods = Periods(int(stops[longest] + lag - count * lag), lag, count)
+    start, stop = (int(edge) for edge in runs[np.argmax(np.diff(runs)[:, 0])])
+    count = (stop - start) // lag + 1
+    periods = Periods(stop + lag - count * lag, lag, count)
     period = command[periods.first : periods.first + lag]
     return periods if np.ptp(period) > _MOVES * np.std(command) else None
 

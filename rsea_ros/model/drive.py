@@ -22,6 +22,7 @@ from rsea_ros.model.rig import Hold, Rig
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.records.holds import PERIODS, SHORTEST, lost_commands
 from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.statistics import running_integral
 
 AT_REST = 0.5
 """Of the whole record's standard deviation: a first sample below it is of a bench that started from rest."""
@@ -184,7 +185,7 @@ def mean_of_line(knots: FloatArray, y: FloatArray, count: int) -> FloatArray:
     """Return the mean over each step of the lines between the stamps (in steps), held beyond the last."""
     at = np.union1d(knots, np.arange(count + 1.0))
     line = np.interp(at, knots, y)
-    area = np.concatenate([[0.0], np.cumsum(0.5 * (line[1:] + line[:-1]) * np.diff(at))])
+    area = running_integral(line, at)
     return np.diff(np.interp(np.arange(count + 1.0), at, area))
 
 

@@ -1,4 +1,4 @@
-"""Quantiles of the normal distribution, spectra by Welch's method, and fast lengths for them.
+"""Quantiles of the normal distribution, runs and integrals of samples, spectra by Welch's method.
 
 Source: Welch, IEEE Trans. Audio Electroacoust. 15, 1967. The same as scipy.signal.welch and csd, whose import
 takes longer than a diagnosis that finds nothing wrong. scipy.fft has the lengths, but imports for 0.15 s at
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.records.record import ComplexArray, FloatArray
+from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray, IntArray
 
 Z95 = 1.959964
 """Standard deviations from the middle of a 95 % interval to its end."""
@@ -17,6 +17,17 @@ Z90 = 1.6449
 """The same of a 90 % interval."""
 MAD_TO_SD = 1.4826
 """Standard deviation of normal values over their median absolute deviation."""
+
+
+def runs_of(marked: BoolArray) -> IntArray:
+    """Return first and end (exclusive) of each run of marked samples, shape (runs, 2)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
+    return np.asarray(edges.reshape(-1, 2), np.int64)
+
+
+def running_integral(values: FloatArray, t: FloatArray) -> FloatArray:
+    """Return the integral of values from the first time, s, to each, by the trapezoidal rule, shape of t."""
+    return np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(t))])
 
 
 def segment_spectra(values: FloatArray, length: int) -> ComplexArray:
