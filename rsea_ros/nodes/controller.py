@@ -6,6 +6,7 @@ import math
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 from rclpy.node import Node
@@ -233,18 +234,16 @@ class ControllerNode:
             "desired_watchdog_trips": self._desired.expired,
             "refused_desired": self._desired.refused,
         }
+        warnings = [*self._late_words(), *self._loss_words()]
         if self._fault:
-            return NodeHealth(ERROR, self._fault, values)
-        if not self._last:
-            return NodeHealth(WARN, "waiting for joint_states and ft", values)
-        if not self._polarity.proven:
-            return NodeHealth(*self._unproven(), values)
-        new, self._late_reported = self._late - self._late_reported, self._late
-        if new:
-            return NodeHealth(WARN, f"{new} commands more than a sample late, with less feedback", values)
-        if words := self._new_loss():
-            return NodeHealth(WARN, words, values)
-        return NodeHealth(OK, "running", values)
+            level, words = ERROR, self._fault
+        elif not self._last:
+            level, words = WARN, "waiting for joint_states and ft"
+        elif not self._polarity.proven:
+            level, words = self._unproven()
+        else:
+            return NodeHealth(*((WARN, "; ".join(warnings)) if warnings else (OK, "running")), values)
+        return NodeHealth(max(level, WARN) if warnings else level, "; ".join((words, *warnings)), values)
 
     def _unproven(self) -> tuple[bytes, str]:
         """Return level and words of a controller whose signs are not proven."""
@@ -252,13 +251,18 @@ class ControllerNode:
             return OK, "waiting for desired_torque"
         return WARN, "pulses of torque without feedback: signs of ft, joint_states and motor torque are open"
 
-    def _new_loss(self) -> str:
-        """Return in words that the encoder on the link has ceased to count; empty where it has not."""
-        encoder, before = self._link.encoder, self._told_losses
-        if encoder is None or encoder.losses == before:
-            return ""
-        self._told_losses = encoder.losses
-        return f"without the link's motion: {encoder.trouble or 'deflection was lost for a moment'}"
+    def _late_words(self) -> Iterator[str]:
+        new, self._late_reported = self._late - self._late_reported, self._late
+        if new:
+            yield f"{new} commands more than a sample late, with less feedback"
+
+    def _loss_words(self) -> Iterator[str]:
+        """Yield that the encoder on the link has ceased to count, as long as a trouble of it lasts."""
+        if (encoder := self._link.encoder) is None or not encoder.losses:
+            return
+        new, self._told_losses = encoder.losses > self._told_losses, encoder.losses
+        if new or (encoder.trouble and not encoder.used):
+            yield f"without the link's motion: {encoder.trouble or 'deflection was lost for a moment'}"
 
 
 def main() -> int:

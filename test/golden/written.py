@@ -250,23 +250,28 @@ def differences(stored: str, said: str, *, limit: int = 20) -> list[str]:
     return found[:limit]
 
 
+CHAOTIC, SPREAD = re.compile("torque[_ ]ripple.*gain", re.IGNORECASE), 0.05
+"""A controlled sine over cogging: the last bit of any number in it moves its error by 1.5 % (decision 290)."""
+
+
 def _alike(a: str, b: str) -> bool:
     if NUMBER.split(a) != NUMBER.split(b):
         return False
     pairs = zip(NUMBER.findall(a), NUMBER.findall(b), strict=True)
-    return all(x == y or abs(_value(x) - _value(y)) <= max(_room(x), _room(y)) for x, y in pairs)
+    part = SPREAD if CHAOTIC.search(a) else 1e-3
+    return all(x == y or abs(_value(x) - _value(y)) <= max(_room(x, part), _room(y, part)) for x, y in pairs)
 
 
 def _value(word: str) -> float:
     return float(word.replace("−", "-"))
 
 
-def _room(word: str) -> float:
-    """Return how far a number may be off: a unit of its last digit, a thousandth, a count below 1000 not."""
+def _room(word: str, part: float) -> float:
+    """Return how far a number may be off: a unit of its last digit, a part of it, a count below 1000 not."""
     digits, _, exponent = word.replace("−", "-").partition("e")
     if "." not in digits and not exponent:
         return 0.0 if len(digits.strip("-+")) < 4 else 1.0
     unit = 10.0 ** (int(exponent or 0) - len(digits.partition(".")[2]))
-    return max(1.01 * unit, 1e-3 * abs(_value(word)))
+    return max(1.01 * unit, part * abs(_value(word)))
 
 
