@@ -41,7 +41,7 @@ def test_the_hidden_effect_is_found_with_its_size_and_its_gain():
     rng = np.random.default_rng(38)
     parameters = drawn_parameters("backlash", "medium", rng)
     bench = hide(drawn_bench(rng), "backlash", parameters)
-    record, fresh = (record_run(bench, 38000 + k, "multisine", 8.0) for k in (1, 2))
+    record, fresh = (record_run(bench, 38000 + k, "multisine", 6.0) for k in (1, 2))
     diagnosis = diagnose([record], RIG)
     (cause,) = diagnosis.causes
     assert cause.name == "backlash"
@@ -71,7 +71,7 @@ def test_both_of_two_causes_are_found_with_their_sizes():
         parameters = drawn_parameters(effect, "medium", rng)
         bench = hide(bench, effect, parameters)
         sizes[effect] = parameters[MAIN_PARAMETER[effect]]
-    diagnosis = diagnose([record_run(bench, 2, "multisine", 7.0)], RIG)
+    diagnosis = diagnose([record_run(bench, 2, "multisine", 6.0)], RIG)
     assert diagnosis.verdict == "explained"
     values = {c.name: c.parameters[MAIN_PARAMETER[c.name]].value for c in diagnosis.causes}
     assert values == pytest.approx(sizes, rel=0.1)
@@ -82,7 +82,8 @@ def test_strong_cogging_is_named_with_its_size():
     amplitude, cycles, rng = 4.0, 8.0, np.random.default_rng(2)
     ripple = {"amplitude": amplitude, "cycles_per_revolution": cycles, "phase": float(rng.uniform(-3.0, 3.0))}
     record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 6.0)
-    diagnosis = diagnose([record], RIG)
+    rivals = ("backlash", "coulomb_friction", "stribeck_friction", "load_dependent_friction")
+    diagnosis = diagnose([record], RIG, settings=only("torque_ripple", *rivals))
     assert diagnosis.causes[0].name == "torque_ripple"
     sizes = diagnosis.causes[0].parameters
     assert sizes["amplitude"].value == pytest.approx(amplitude, rel=0.02)
@@ -93,7 +94,8 @@ def test_strong_cogging_is_named_with_its_size():
 
 def test_a_resonance_is_found_in_the_noise_and_what_the_noise_hides_is_said():
     """The paper's own puzzle (section 3.2.2): out of sync at 19 Hz, a bump at 33 Hz."""
-    diagnosis = diagnose([noisy_resonance(3, 100.0)], load_rig("paper_moving_output"))
+    tried = only("structural_resonance", "command_delay")  # which turns the phase as much at 19 Hz
+    diagnosis = diagnose([noisy_resonance(3, 100.0)], load_rig("paper_moving_output"), settings=tried)
     assert [cause.name for cause in diagnosis.causes] == ["structural_resonance"]
     for name in ("frequency", "participation"):
         low, high = diagnosis.causes[0].parameters[name].ci95
@@ -103,7 +105,7 @@ def test_a_resonance_is_found_in_the_noise_and_what_the_noise_hides_is_said():
 
 
 def test_a_delay_of_one_and_a_half_samples_is_no_resonance():
-    diagnosis = diagnose([delayed_record(3, 10.0)], load_rig("paper_moving_output"))
+    diagnosis = diagnose([delayed_record(3, 6.0)], load_rig("paper_moving_output"))
     assert [cause.name for cause in diagnosis.causes] == ["command_delay"]
     assert diagnosis.causes[0].parameters["delay"].value == pytest.approx(DELAY, rel=0.02)
 
@@ -116,8 +118,7 @@ def test_a_mode_above_the_band_is_one_of_the_two_effects_that_make_one():
     assert parameters["frequency"] > 60.0
     bench = hide(drawn_bench(rng), "structural_resonance", parameters)
     record = record_command(bench, slow_sweep(30.0), rng)
-    others = ("current_loop_overshoot", "gear_compliance", "ft_gain_error", "torque_constant_error")
-    diagnosis = diagnose([record], RIG, settings=only(*alike, *others))
+    diagnosis = diagnose([record], RIG, settings=only(*alike, "current_loop_overshoot", "gear_compliance"))
     (cause,) = diagnosis.causes
     assert cause.status == "one_of"
     assert {cause.name, *(a.name for a in diagnosis.alternatives)} == alike
