@@ -1,13 +1,14 @@
-"""The layers: who may import whom (docs/architecture.md), read from the syntax tree of every module."""
+"""What the syntax tree of every module says: who imports whom (docs/architecture.md), arguments, units."""
 
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from pathlib import Path
 
 import pytest
-from import_graph import ROOT, found_in_modules, imports, name_of
+from import_graph import MODULES, ROOT, found_in_modules, imports, name_of, tree_of
 
 BASE = {"errors", "records", "documents", "outputs", "plugins", "processes", "progress", "version"}
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -149,3 +150,70 @@ def test_an_offence_is_found(place, source):
 )
 def test_an_allowed_import_passes(place, source):
     assert offences(ROOT / place, source) == []
+
+
+MOST = 9
+"""Arguments of a function: values that belong together are one value."""
+
+
+def argument_counts(tree: ast.Module) -> dict[str, int]:
+    """Return how many arguments each function of a module takes, self included."""
+    functions = (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef))
+    return {f.name: _count(f.args) for f in functions}
+
+
+def _count(args: ast.arguments) -> int:
+    return len([*args.posonlyargs, *args.args, *args.kwonlyargs, *filter(None, (args.vararg, args.kwarg))])
+
+
+def long_signatures(path: Path, tree: ast.Module) -> list[str]:
+    """Return the functions of a module that take too many arguments."""
+    return [f"{name} takes {count}" for name, count in argument_counts(tree).items() if count > MOST]
+
+
+def test_no_function_takes_ten_arguments():
+    assert found_in_modules(long_signatures) == []
+
+
+def test_every_kind_of_argument_counts():
+    source = "class A:\n    def f(self, a, /, b, *c, d, **e): ...\nasync def g(): ..."
+    assert argument_counts(ast.parse(source)) == {"f": 6, "g": 0}
+
+
+SPACED = re.compile(r"(?<![A-Za-z(])[mk]?N ?m(?![A-Za-z])|kg m\^2")
+ALONE = re.compile(r"(1/|rad/)?\(?([mk]?N ?m|kg m\^2)\)?(\^\d)?( s(\^\d)?)?((/\(?(rad|s|A)\)?)(\^\d)?){0,2}")
+READ_AS_FILES = (
+    "units.py", "effect_source.py", "column_units.py", "factors.py", "bench/inputs/tables.py",
+)  # fmt: skip
+"""Modules that read units, or write files."""
+
+
+def texts(path: Path) -> list[str]:
+    """Return the texts of a module that are no docstrings, parts of f-strings too."""
+    nodes = list(ast.walk(tree_of(path)))
+    docstrings = {id(n.value) for n in nodes if isinstance(n, ast.Expr)}
+    return [n.value for n in nodes if _is_text(n) and id(n) not in docstrings]
+
+
+def _is_text(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+
+
+def test_messages_tables_and_plots_spell_units_in_one_way():
+    """The page of `rsea control` had `N m` in its key numbers and `N·m` in its plots."""
+    wrong = {
+        f"{path.relative_to(ROOT)}: {text!r}"
+        for path in (*MODULES, *(ROOT / "bench").rglob("*.py"))
+        if not str(path).endswith(READ_AS_FILES)
+        for text in texts(path)
+        if SPACED.search(text) and not ALONE.fullmatch(text)
+    }
+    assert wrong == set()
+
+
+def test_the_docs_spell_units_in_one_way():
+    """Import maps and rigs show what a file may hold: code, and the rows that list spellings."""
+    code = re.compile(r"```(yaml|text)?\n.*?```|`[^`]*`", flags=re.DOTALL)
+    pages = {page.name: page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md")}
+    wrong = {name: SPACED.findall(code.sub("", text)) for name, text in pages.items()}
+    assert {name: found for name, found in wrong.items() if found} == {}

@@ -52,7 +52,7 @@ def played(tmp_path, capsys):
 
 
 RESULTS = {
-    "a misfitting spring rig without motor torque": ("diagnose", {"bench": "misfit", "duration": 5.0}),
+    "a misfitting spring rig without motor torque": ("diagnose", {"bench": "misfit", "duration": 4.5}),
     "a dead F/T sensor": ("identify", {"dead": "ft zero"}),
     "channels without noise": ("identify", {"noise": False, "sensors": "zero"}),
     "a clock that was set": ("identify", {"stamps": "hour forward"}),

@@ -375,7 +375,8 @@ def _fit(q: Quotient, keep: np.ndarray, law: Law, late: float, pair: Pair) -> Pa
     h = 1.0 / response if law.inverted else response
     span = min(REACH, 0.5 * math.pi * len(w) / float(w.max() - w.min() + 1e-9) + _AROUND)
     lag = np.arange(-span, span, min(0.25 / float(w.max()), 0.01))
-    turned = h * np.exp(1j * w * lag[:, None])
+    phase = w * lag[:, None]
+    turned = h * (np.cos(phase) + 1j * np.sin(phase))
     rows = np.column_stack([(1j * w) ** p for p in law.powers]) / (np.abs(h) * doubt)[:, None]
     rows = np.vstack([rows.real, rows.imag])
     right = turned / (np.abs(h) * doubt)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -120,6 +121,7 @@ def _segments(values: FloatArray, length: int) -> ComplexArray:
     return spectra[:, _FIRST : int(0.9 * spectra.shape[1])]
 
 
+@lru_cache(maxsize=64)
 def _bands(lines: int) -> IntArray:
     """Return where each band begins, shape (bands,)."""
     edges = np.geomspace(1.0, lines + 1.0, _LINES + 1)[:-1]

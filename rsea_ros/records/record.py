@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -84,7 +85,7 @@ class Channel:
     def __len__(self) -> int:
         return len(self.t)
 
-    @property
+    @cached_property
     def rate(self) -> float:
         """Sample rate, Hz, gaps aside; NaN for a single sample, infinite where most stamps repeat.
 

@@ -7,6 +7,8 @@ every start; numpy.fft transforms alike.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray, IntArray
@@ -58,14 +60,18 @@ def cross_density(
     return np.asarray(np.fft.rfftfreq(length, 1.0 / rate), np.float64), density
 
 
+@lru_cache(maxsize=64)
 def hann(length: int) -> FloatArray:
-    """Return the periodic Hann window, shape (length,)."""
-    return np.hanning(length + 1)[:-1]
+    """Return the periodic Hann window, shape (length,), for all callers: not to be written to."""
+    window = np.hanning(length + 1)[:-1]
+    window.flags.writeable = False
+    return window
 
 
 _COMPLEX, _REAL = (2, 3, 5, 7, 11), (2, 3, 5)
 
 
+@lru_cache(maxsize=64)
 def next_fast_length(least: int, *, real: bool = False) -> int:
     """Return the least fast length that is not below `least`, 1 or more. real: of a real signal."""
     length = max(1, least)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,11 @@ from rsea_ros.records.record import Channel, Record
 RIG = load_rig("paper_high_impedance")
 U = excitation("white_noise", ExcitationSettings(rate=280.0, duration=8.0, seed=1))
 T = np.arange(len(U)) / 280.0
-RUN = synthesize(RIG, Channel(T, U))
+
+
+@functools.cache
+def run():
+    return synthesize(RIG, Channel(T, U))
 
 
 def turn_joint(angle, **others):
@@ -36,9 +42,9 @@ def test_a_wrapped_angle_is_named_with_what_unwraps_it(with_velocity):
 
 
 def test_an_encoder_that_counts_anew_is_named_with_the_time():
-    position = RUN["position"]
+    position = run()["position"]
     anew = Channel(position.t, np.where(position.t > 5.0, position.y + 0.3, position.y))
-    findings = check_record(RUN.with_channels(position=anew), RIG)
+    findings = check_record(run().with_channels(position=anew), RIG)
     (jumps,) = findings.of("angle_jumps")
     assert "by 0.3" in jumps.detail and "at 5.00" in jumps.detail
     assert "angle_jumps" in {f.kind for f in findings.faults}
@@ -50,7 +56,7 @@ def test_a_motion_in_steps_is_no_jump(rate):
     steps = 0.5 * np.sign(np.sin(0.7 * stamps))
     followed = Channel(stamps, steps * (1.0 - np.exp(-30.0 * (0.1 + np.abs(np.sin(0.7 * stamps))))))
     assert jump_findings(Record({"position": followed, "command": Channel(stamps, steps)})) == []
-    assert jump_findings(RUN) == []
+    assert jump_findings(run()) == []
 
 
 @pytest.mark.parametrize("start", [2.0, 5.0])
@@ -58,15 +64,15 @@ def test_a_motor_that_is_off_for_a_while_is_said(start):
     rng = np.random.default_rng(0)
     off = {}
     for name in ("position", "velocity", "ft"):
-        t, noise = RUN[name].t, RIG.sensors[name].noise * rng.standard_normal(len(T))
-        off[name] = Channel(t, np.where(t > start, noise, RUN[name].y))
-    (jumps,) = check_record(RUN.with_channels(**off), RIG).of("standstill")
+        t, noise = run()[name].t, RIG.sensors[name].noise * rng.standard_normal(len(T))
+        off[name] = Channel(t, np.where(t > start, noise, run()[name].y))
+    (jumps,) = check_record(run().with_channels(**off), RIG).of("standstill")
     assert jumps.value == pytest.approx(8.0 - start, abs=0.25)
-    assert standstill_findings(RUN) == []
+    assert standstill_findings(run()) == []
 
 
 def test_a_sensor_that_is_not_recorded_then_does_not_stand_still():
-    short = Record({"command": RUN["command"], "ft": RUN["ft"].between(0.0, 2.0)})
+    short = Record({"command": run()["command"], "ft": run()["ft"].between(0.0, 2.0)})
     assert standstill_findings(short) == []
-    slow = {n: Channel(c.t[9::10], c.y[9::10]) for n, c in RUN.channels.items() if n != "command"}
-    assert standstill_findings(Record({"command": RUN["command"], **slow})) == []
+    slow = {n: Channel(c.t[9::10], c.y[9::10]) for n, c in run().channels.items() if n != "command"}
+    assert standstill_findings(Record({"command": run()["command"], **slow})) == []

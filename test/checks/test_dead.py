@@ -143,24 +143,25 @@ def frozen_channels(record):
 
 
 @pytest.mark.parametrize(
-    "names",
+    ("names", "span"),
     [
-        ("position", "velocity", "ft"),
-        ("position", "ft"),
-        ("ft",),
+        (("position", "velocity", "ft"), (1.0,)),
+        (("position", "velocity", "ft"), (10.5,)),
+        (("position", "ft"), (4.0, 6.0)),
+        (("ft",), (1.0,)),
     ],
 )
-@pytest.mark.parametrize("span", [(1.0,), (4.0, 6.0), (10.5,)])
 def test_every_channel_of_a_driver_that_stops_is_named(names, span):
     assert frozen_channels(freeze(run(), names, *span)) == set(names)
 
 
-@pytest.mark.parametrize("stop", [4.3, 7.0])
-@pytest.mark.parametrize("others", [(), ("motor_torque",)])
-@pytest.mark.parametrize("kind", ["white_noise", "chirp"])
+@pytest.mark.parametrize(
+    ("kind", "others", "stop"),
+    [("white_noise", (), 4.3), ("chirp", ("motor_torque",), 4.3), ("chirp", (), 7.0)],
+)
 def test_sensors_with_noise_that_hold_at_once_are_frozen_whether_or_not_the_machine_moved(kind, others, stop):
     """Nothing under 0.5 s was said; of 3 s the position was left in: 1.12 times the noise, "unexplained"."""
-    u = excitation(kind, ExcitationSettings(rate=RATE, duration=20.0, seed=1))
+    u = excitation(kind, ExcitationSettings(rate=RATE, duration=LENGTH, seed=1))
     record = synthesize(RIG, Channel(np.arange(len(u)) / RATE, u))
     names = ("position", "velocity", "ft", *others)
     checked = check(freeze(record, names, 4.0, stop), RIG)
@@ -175,12 +176,11 @@ def test_it_is_said_from_when_to_when_and_not_that_the_machine_is_another_or_a_s
     assert all("from 4.007 s to 5.996 s" in f.detail for f in findings if f.kind == "frozen_samples")
 
 
-@pytest.mark.parametrize("noise", [False, True])
-def test_a_machine_that_sticks_while_the_command_goes_on_is_not_frozen(noise):
+def test_a_machine_that_sticks_while_the_command_goes_on_is_not_frozen():
     """Dry friction of 15 N m under a slow command of 20 N m: all sensors without noise hold for seconds."""
     rig = RIG.with_effects(EffectSetting("coulomb_friction", {"torque": 15.0}))
     t = np.arange(int(20.0 * RATE)) / RATE
-    record = synthesize(rig, Channel(t, 20.0 * np.sin(2.0 * np.pi * 0.1 * t)), noise=noise)
+    record = synthesize(rig, Channel(t, 20.0 * np.sin(2.0 * np.pi * 0.1 * t)), noise=False)
     assert frozen_channels(record) == set()
 
 
@@ -197,7 +197,7 @@ def test_a_velocity_that_is_the_rate_of_the_position_is_steady():
 
 def test_a_joint_that_sticks_at_its_turns_is_neither_frozen_nor_clipped():
     """A geared joint at 33 Hz rests half a second at each turn: "clipping", then "frozen samples"."""
-    rig, rng, t = load_rig("bare_drive"), np.random.default_rng(4), np.arange(2000) / 33.0
+    rig, rng, t = load_rig("bare_drive"), np.random.default_rng(4), np.arange(1000) / 33.0
     wave = np.sin(2.0 * np.pi * 0.1 * t)
     q = np.round(0.45 * np.clip(1.05 * wave, -1.0, 1.0) / 3.81e-4) * 3.81e-4
     v = np.round((np.gradient(q, t) + 0.003 * rng.standard_normal(len(t))) / 0.0049) * 0.0049

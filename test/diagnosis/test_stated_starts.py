@@ -24,7 +24,7 @@ from rsea_ros.records.record import Channel
 
 RATE = 280.0
 LAG, DELAY = "current_loop_lag", "command_delay"
-TRIED = {LAG, DELAY, "current_loop_overshoot", "structural_resonance", "damping_drift", "base_compliance"}
+TRIED = {LAG, DELAY, "current_loop_overshoot", "structural_resonance"}
 SETTINGS = DiagnosisSettings(without=frozenset(catalogue()) - TRIED)
 INERTIA = "rotor.reflected_inertia"
 

@@ -112,7 +112,7 @@ def test_nothing_is_stored_that_is_not_played() -> None:
         ("4480 samples", "4481 samples", True),
         ("value 1.2e-05", "value -1.2e-05", False),
         ("x\ny", "x", False),
-        ("torque_ripple: error_with 0.005071, gain 0.95", "torque_ripple: error_with 0.005024, gain 0.95", True),
+        ("torque_ripple 0.5071 %, gain 0.95", "torque_ripple 0.5024 %, gain 0.95", True),
     ],
 )
 def test_a_number_may_differ_as_far_as_rounding_goes(stored: str, said: str, same: bool) -> None:

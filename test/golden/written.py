@@ -251,7 +251,7 @@ def differences(stored: str, said: str, *, limit: int = 20) -> list[str]:
 
 
 CHAOTIC, SPREAD = re.compile("torque[_ ]ripple.*gain", re.IGNORECASE), 0.05
-"""A controlled sine over cogging: the last bit of any number in it moves its error by 1.5 % (decision 290)."""
+"""A controlled sine over cogging: the last bit of any number moves its error by 1.5 % (decision 290)."""
 
 
 def _alike(a: str, b: str) -> bool:

@@ -124,7 +124,7 @@ def test_a_change_that_no_cause_explains_is_not_looked_at_closer_for_ever():
     """Looks of each second and fits that find nothing would take more of a core than a joint may have."""
     settings, rng = WatchSettings(learn=5, every=2.0, fitted=3), np.random.default_rng(1)
     monitor, looks = Monitor(rig(), noise_of(rig()), settings), []
-    for bench, start, length in ((BENCH, 0.0, 40.0), (BENCH.with_values(resonance=0.4), 40.0, 40.0)):
+    for bench, start, length in ((BENCH, 0.0, 30.0), (BENCH.with_values(resonance=0.4), 30.0, 30.0)):
         run = record_command(bench, command(length, 2), rng)
         t, kind, values = events_of(run)
         for k in range(0, len(t), 210):

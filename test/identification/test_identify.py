@@ -30,9 +30,7 @@ def standard_errors(result: Identification, true: dict[str, float]) -> dict[str,
     ("name", "kind", "duration"),
     [
         ("paper_high_impedance", "white_noise", 6.0),
-        ("paper_high_impedance", "chirp", 6.0),
         ("paper_moving_output", "white_noise", 6.0),
-        ("prototype_knee", "white_noise", 6.0),
         ("bare_drive", "chirp", 12.0),
     ],
 )

@@ -37,7 +37,7 @@ QUIET = dict.fromkeys(
 
 
 def _quiet(bench):
-    return record_run(bench.with_values(**QUIET), 3, duration=10.0)
+    return record_run(bench.with_values(**QUIET), 3, duration=8.0)
 
 
 @functools.cache

@@ -103,8 +103,7 @@ def missing(seconds, *names):
 ALL = ("command", "position", "velocity", "motor_torque")
 
 
-@pytest.mark.parametrize("names", [ALL, ("position",), ("motor_torque",)])
-@pytest.mark.parametrize("seconds", [0.5, 5.0])
+@pytest.mark.parametrize(("seconds", "names"), [(5.0, ALL), (0.5, ALL), (0.5, ("position",))])
 def test_a_gap_changes_no_result(seconds, names):
     """Half a second without rows took the prediction from 96 to 78 % and made a sound fit a misfit."""
     record, truth = missing(seconds, *names), rsea.load_rig("pendulum")

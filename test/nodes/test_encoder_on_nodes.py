@@ -106,7 +106,7 @@ def test_an_encoder_that_dies_makes_no_jump(loop, run):
 
 
 def test_diagnostics_say_that_the_encoder_died(loop, run):
-    """As long as it lasts, beside late commands: told once, it was lost behind those of a machine that stalls."""
+    """As long as it lasts, beside late commands: told once, it was lost behind those of a stall."""
     loop.listener.until(lambda: loop.values()["link"] == "not used: no deflection")
     told, said = len(loop.health), "without the link's motion: no deflection"
     loop.listener.until(lambda: any(said in m.status[0].message for m in loop.health[told:]))
