@@ -29,7 +29,13 @@ RATE = 280.0
 DEFAULTS = {p.name: p.default for p in driver.TABLE}
 EVERY = {f"{o.kind} {o.low:g}-{o.high:g} Hz": (o.kind, _settings(o, RATE)) for o in EXCITATIONS}
 CAUSES = {"backlash": {"gap": 3e-3}, "coulomb_friction": {"torque": 0.4}}
-PAIRS = [(rig, "coulomb_friction" if load_rig(rig).rigid_spring else "backlash") for rig in rig_names()]
+LIKE_OTHERS = {"cycloidal", "prototype_knee", "sea_two_encoders", "separate_stiffnesses"}
+"""Rigs of the kind of paper_high_impedance, with other numbers."""
+PAIRS = [
+    (rig, "coulomb_friction" if load_rig(rig).rigid_spring else "backlash")
+    for rig in rig_names()
+    if rig not in LIKE_OTHERS
+]
 
 
 def like(rig, amplitude=20.0):

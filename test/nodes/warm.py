@@ -23,7 +23,7 @@ MODULES = (
     "rsea_ros.nodes", "rsea_ros.hardware.simulated", "rsea_ros.hardware.dynamixel_netft",
     "rsea_ros.hardware.guarded", "rsea_ros.model.observer", "rsea_ros.model.torque_band",
     "rsea_ros.control.controller", "rsea_ros.identification.identify", "rsea_ros.health.monitor",
-    "rsea_ros.experiment.run_shape", "msg_adapters",
+    "rsea_ros.experiment.campaign", "msg_adapters",
 )  # fmt: skip
 """What most of a node's time to import goes to."""
 
@@ -113,10 +113,12 @@ def prepare() -> None:
         importlib.import_module(module)
     import numpy as np  # after rsea_ros.nodes, which keeps it from starting threads
 
+    from rsea_ros.effects.catalogue import catalogue
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.model.simulation import synthesize
     from rsea_ros.records.record import Channel
 
+    catalogue()
     synthesize(load_rig("paper_high_impedance"), Channel(np.arange(30) / 280.0, np.ones(30)))
     threads = len(list(Path("/proc/self/task").iterdir()))
     assert threads == 1, f"{threads} threads, of which a fork has one"
