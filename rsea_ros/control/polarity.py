@@ -10,6 +10,7 @@ gear does.
 from __future__ import annotations
 
 from rsea_ros.control.controller import Measurement
+from rsea_ros.control.sign_change import SignChange
 from rsea_ros.control.sign_evidence import DOUBT, MOVED, POWER, RIGHT, SIGNS, SWAY, SignEvidence
 from rsea_ros.model.rig import Rig
 
@@ -59,6 +60,7 @@ class Polarity:
         self._h, self._pulse = 1.0 / rate, min(PULSE, PART * limit)
         self._stiffest = max(self._pulse, STIFFEST * limit)
         self._seen = SignEvidence(rig, rate, self._pulse)
+        self._change = SignChange(rig, rate, (self._seen.ft_noise, self._seen.noise))
         self._calm = max(LOUD * self._pulse, 3.0 * self._seen.ft_noise)
         self.start()
 
@@ -68,6 +70,7 @@ class Polarity:
         self.proven, self.contradiction = False, ""
         self._sent, self._made = [0.0] * SENT, [0.0] * SENT
         self._friction, self._off = 0.0, 0
+        self._change.start()
         self._direction, self._level, self._beyond = -1.0, self._pulse, ENOUGH * self._pulse
         self._pulsing, self._back, self._full, self._torque = False, False, False, 0.0
         self._rested = self._broke = 0.0
@@ -95,6 +98,11 @@ class Polarity:
         """Return a contradiction under torque, in words; empty without one."""
         heard = self._seen.hear(reading, self._sent[1], missed, keep=False)
         self._made = [self._seen.made[1], *self._made[:-1]]
+        if self.contradiction:
+            return self.contradiction
+        rest = None if heard is None else self._made[0] - sum(heard)
+        if name := self._change.take(reading, rest, missed):
+            self._contradict(f"{name} has changed its sign")
         if heard is None or self.contradiction:
             return self.contradiction
         ft, motion = heard

@@ -169,6 +169,7 @@ class DrivenJoint:
             **report.values,
             "refused": self.guarded.guard.refused,
             "limits": self.guarded.guard.limits,
+            "torque_limit": f"{self.guarded.guard.limits.torque:.6g}",
             **self.guarded.device.health(),
         }
         if fault is None:

@@ -7,6 +7,7 @@ What keeps a bench from acting on commands, as its driver says on /diagnostics: 
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from typing import Any
@@ -17,8 +18,10 @@ from msg_adapters.ros import DiagnosticArray, DiagnosticStatus, JointState
 from rsea_ros.errors import DeviceError
 from rsea_ros.experiment.run_shape import read_run
 from rsea_ros.identification.excitation import KINDS, ExcitationSettings, check_limits, excitation
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_limits import derive
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
-from rsea_ros.nodes._parameters import JOINT, NodeParameter
+from rsea_ros.nodes._parameters import DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from rsea_ros.nodes._run import run_node
@@ -31,11 +34,12 @@ PATIENCE = 1.5
 class BenchStatus:
     """The status of the node that publishes joint_states, of one of its joints where it has several.
 
-    idle: why commands would have no effect now though nothing is wrong, or nothing.
+    idle: why commands would have no effect now though nothing is wrong, or nothing. largest: N m, of the
+    commands; a driver that limits them below that is a fault of the run.
     """
 
-    def __init__(self, node: Node, joint: str) -> None:
-        self._node, self._joint = node, joint
+    def __init__(self, node: Node, joint: str, largest: float) -> None:
+        self._node, self._joint, self._largest = node, joint, largest
         self._topic = node.resolve_topic_name("joint_states")
         self._heard, self._measured, self._fault, self.idle = False, 0.0, "", ""
         self._states = node.create_subscription(JointState, "joint_states", self._on_state, MEASUREMENT)
@@ -71,6 +75,11 @@ class BenchStatus:
         self._heard, self._fault = True, ""
         if fault != "none":
             self._fault = f"{status.name} has latched a fault, {fault}; rsea call {bench} clear_fault"
+        elif self._largest > (limit := float(values.get("torque_limit", math.inf))):
+            self._fault = (
+                f"largest command {self._largest:.4g} N·m, expected at most torque_limit = {limit:.4g} N·m"
+                f" of {status.name}"
+            )
         self.idle = "" if active else f"{status.name} is not active; rsea call {bench} activate"
 
     def _benches(self) -> set[str]:
@@ -91,8 +100,10 @@ TABLE = (
     NodeParameter("high", 140.0, "highest frequency, kept below 0.475 of the rate", "Hz", 1e-3, 500.0),
     NodeParameter("period", 10.0, "period of multisine and steps", "s", 0.01, 1e4),
     NodeParameter("seed", 0, "seed of noise and phases", "", 0, 1_000_000_000),
+    NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
     NodeParameter(
-        "limit", 68.0, "largest torque; the whole excitation is checked before it starts", "N m", 0.0, 1e4
+        "limit", DERIVED, "largest torque, of the whole excitation; -1: as the driver derives it", "N m",
+        DERIVED, 1e4,
     ),
     NodeParameter("ramp", 0.5, "raised cosine at either end", "s", 0.0, 100.0),
     NodeParameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
@@ -106,9 +117,10 @@ class ExciteNode:
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         command, rate = plan(values)
-        check_limits(command, values["limit"], rate)
+        stated = stated_limits({"torque_limit": values["limit"]}, ("torque",))
+        check_limits(command, derive(stated, load_rig(values["rig"]))[0]["torque"], rate)
         self._node, self._wanted = node, values["subscribers"]
-        self._bench = BenchStatus(node, values["joint"])
+        self._bench = BenchStatus(node, values["joint"], float(abs(command).max(initial=0.0)))
         self._player = Player(
             node, command, rate, lead=values["lead"], wanted=self._wanted, joint=values["joint"],
             ready=self._bench.ready,

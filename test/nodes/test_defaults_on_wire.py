@@ -88,12 +88,23 @@ def silence(wire):
     wire.torque = None
 
 
+def rename(wire):
+    wire.bench.ask("vanish")
+    wire.bench.ask("appear", name="another")
+
+
+def back(wire):
+    assert not wire.trigger("clear_fault").success
+    wire.bench.ask("vanish")
+    wire.bench.ask("appear")
+
+
 def supervisor(number):
     return lambda wire: [os.kill(pid, number) for pid in wire.children]
 
 
-CALM = ask("misbehave", silent=False, drop=0.0, delay=0.0, ft_silent=False, ft_stuck=False)
-HEALTHY = ask("set", temperature=32, voltage=240, mode=0, homing_offset=0)
+CALM = ask("misbehave", silent=False, drop=0.0, delay=0.0, twin=False, ft_silent=False, ft_stuck=False)
+HEALTHY = ask("set", temperature=32, voltage=240, mode=0, homing_offset=0, baud=3)
 MOVED = ("effort", "motor_state", "velocity", "deflection", "ft_torque")
 FAULTS = {
     "no reply": (ask("misbehave", silent=True), CALM, "no_reply", 5),
@@ -108,12 +119,19 @@ FAULTS = {
     "F/T saturated": (ask("ft_status"), ask("ft_status", bits=0), "ft", 3),
     "F/T silent": (ask("misbehave", ft_silent=True), CALM, "ft", 8),
     "F/T stands still": (ask("misbehave", ft_stuck=True), CALM, "ft: all six values", MOST_STUCK),
+    "two motors of one ID": (ask("misbehave", twin=True), CALM, "no_reply", 8),
+    "bit rate of the motor changed": (ask("set", baud=1), HEALTHY, "no_reply", None),
+    "adapter under a new name": (rename, back, "portlost", None),
+    "F/T rate falls to 50 Hz": (ask("ft_rate", rate=50.0), ask("ft_rate", rate=1000.0), "ft", 60),
     "F/T restarted": (ask("ft_restart"), CALM, "ft", 90),
     "commands cease": (silence, CALM, "command_timeout", 25),
     "supervisor killed": (supervisor(signal.SIGKILL), CALM, "supervisorlost", 8),
     "supervisor stands still": (supervisor(signal.SIGSTOP), CALM, "supervisorlost", SECOND),
 }
-"""How it is provoked and ended, the cause that is latched, the most writes of a torque until then."""
+"""How it is provoked and ended, the cause that is latched, the most writes of a torque until then.
+
+None: no write reaches the motor, which holds its torque until it hears again (docs/hardware.md).
+"""
 
 
 def test_a_driver_that_starts_under_a_stream_of_commands_makes_no_torque_by_itself(wire, listener):
@@ -132,7 +150,7 @@ def test_a_fault_ends_the_torque_within_its_cycles_and_is_over_by_its_service(wi
         since = wire.bench.ask("torque")["t"]
         provoke(wire)
         fault = listener.until(wire.latched)
-        listener.until(lambda: 0 in wire.goal())
+        listener.until(lambda: 0 in wire.goal() or most is None)
         writes = [goal != 0 and on for _, goal, on in wire.bench.log(since)["torque"]]
         end(wire)
         if fault.startswith(cause):
@@ -140,7 +158,7 @@ def test_a_fault_ends_the_torque_within_its_cycles_and_is_over_by_its_service(wi
         assert is_stall(fault) or fault.startswith("command_timeout"), fault
     assert fault.startswith(cause)
     acted = max((at for at, acts in enumerate(writes, 1) if acts), default=0)
-    assert acted <= most, writes
+    assert most is None or acted <= most, writes
     listener.until(lambda: wire.clear()[-1].success)
     wire.ready()
 

@@ -87,6 +87,14 @@ def _excite(start):
     return start("excite", remaps={"__ns": "/main"}, amplitude=3.0, noise=0.0, duration=200.0, rate=100.0)
 
 
+def test_excite_keeps_the_limit_that_its_driver_derives(wire, start):
+    """Its own was 68 N·m whatever the motor."""
+    wire.drive()
+    excite = start("excite", remaps={"__ns": "/main"}, limit=100.0, amplitude=75.0, noise=0.0, duration=9.0)
+    assert excite.wait() == 2
+    assert "largest command 75 N·m, expected at most torque_limit = 68 N·m" in excite.output[-1]
+
+
 def test_excite_plays_nothing_to_a_driver_that_has_latched_a_fault(wire, listener, start):
     """It played to the end, and the recording showed a machine that never moved."""
     wire.drive()

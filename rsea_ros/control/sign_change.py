@@ -1,0 +1,108 @@
+"""Finds the sample in which ft or joint_states turned round, from two samples on, whatever the load does.
+
+    ft      a step that its other sign undoes, beside a spring that has not moved; where its other side may
+            move, also a momentum (sign_evidence.py) that is off by twice ft from there on
+    angle   a step beside its speed that its other sign undoes
+
+Each is a test of two hypotheses on Gaussian noise, half the difference of two squares over the variance
+(Wald, Sequential Analysis, 1947), e^SURE to 1. The variance is what a sample changes anyway on this bench.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rsea_ros.control.controller import Measurement
+from rsea_ros.control.spring_encoder import spread
+from rsea_ros.model.rig import END_NAMES, Rig
+
+SURE = 8.0
+CYCLES, LOST = 2, 12
+"""Samples that a sign has turned for at least; after which what was before says nothing."""
+UNDONE = 0.4
+"""Of a step: what its other sign may leave of it."""
+USUAL = 2.0
+"""s over which steps are usual ones."""
+
+
+class SignChange:
+    """Takes samples in, and keeps what they change anyway: of ft, of the angle, of the momentum."""
+
+    def __init__(self, rig: Rig, rate: float, noise: tuple[float, float]) -> None:
+        """rate: Hz. noise: standard deviations of ft and of the momentum, N m."""
+        self._h = 1.0 / rate
+        self._clamped, stiffness = rig.clamped == set(END_NAMES), rig["spring.stiffness"]
+        self._stiffness, self._damping = stiffness, rig["spring.damping"]
+        turn = spread(rig, "velocity") / rate
+        angle = math.hypot(spread(rig, "position"), turn, noise[0] / stiffness / 10.0)
+        self._least = [noise[0] ** 2, angle**2, noise[1] ** 2]
+        self.start()
+
+    def start(self) -> None:
+        """Forget everything."""
+        self._before: tuple[Measurement, float] | None = None
+        self._usual, self._last = [*self._least], [0.0] * 3
+        self._forget()
+
+    def _forget(self) -> None:
+        self._since = self._turned = self._counted = 0
+        self._off = self._due = 0.0
+
+    def take(self, r: Measurement, rest: float | None, missed: int) -> str:
+        """Take a reading in; return what has turned round, empty where nothing surely has.
+
+        rest: N m, the momentum that nothing explains, None where it is not known. missed: samples lost.
+        """
+        self._since += 1 + missed
+        if self._before is None:
+            return self._follow(r, rest)
+        before, rest_before = self._before
+        most, time = self._since**2, 0.5 * self._since * self._h
+        turn = r.position - before.position - (0.0 if self._clamped else 2.0 * time * before.velocity)
+        bent = self._stiffness * turn + self._damping * (r.velocity - before.velocity)
+        steps = [
+            _beyond(r.ft - before.ft, bent),
+            r.position - before.position - time * (r.velocity + before.velocity),
+        ]
+        undone = [
+            _beyond(-r.ft - before.ft, bent),
+            -r.position - before.position - time * (before.velocity - r.velocity),
+        ]
+        off = 0.0 if rest is None else rest - rest_before
+        for k, name in ((1, "joint_states"), (0, "ft")):
+            if abs(undone[k]) > UNDONE * abs(steps[k]) or self._since > LOST:
+                continue
+            if self._odds(k, steps[k], undone[k], most) > SURE:
+                self._turned += 1
+                if rest is not None:
+                    self._off += off
+                    self._due -= (2.0 if self._turned > 1 else 1.0) * r.ft
+                    self._counted += 1
+                felt = self._clamped or self._odds(2, self._off, self._off - self._due, self._counted) > SURE
+                return name if self._turned >= CYCLES and (k == 1 or felt) else ""
+        if self._since == 1 and rest is not None:
+            self._last = [step**2 for step in (*steps, off)]
+            part = self._h / USUAL
+            self._usual = [
+                max(least, usual + part * (last - usual))
+                for least, usual, last in zip(self._least, self._usual, self._last, strict=True)
+            ]
+        return self._follow(r, rest)
+
+    def _odds(self, k: int, step: float, undone: float, times: float) -> float:
+        """Return the logarithm of how much better the other sign explains a step. times: its variance's."""
+        return 0.5 * (step**2 - undone**2) / (max(times, 1) * max(self._usual[k], self._last[k]))
+
+    def _follow(self, r: Measurement, rest: float | None) -> str:
+        """Compare the next samples with this one."""
+        if rest is None:
+            self._before = None if self._before is None else (r, self._before[1])
+        else:
+            self._before = r, rest
+        self._forget()
+        return ""
+
+
+def _beyond(step: float, reach: float) -> float:
+    """Return by how much a step is beyond what lies between 0 and reach."""
+    return step - min(max(step, min(reach, 0.0)), max(reach, 0.0))
