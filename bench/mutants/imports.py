@@ -14,8 +14,9 @@ PACKAGES = ("rsea_ros", "msg_adapters")
 
 
 def warm(target: str, tests: Iterable[Path]) -> None:
-    """Import what some tests import, directly or not, as far as it does not import the target."""
-    names = set()
+    """Import the package and what some tests import, directly or not, as far as it does not import the target."""
+    files = (ROOT / "rsea_ros").rglob("[!_]*.py")
+    names = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files}
     for test in tests:
         names |= set(imported(test))
     for name in sorted(names | set().union(*(reachable(n) for n in names))):

@@ -1,113 +1,157 @@
 """A random sample of faults over every module of rsea_ros, each against the tests that import its module.
 
-Called by `python -m bench mutants --random N --seed S`. The tests that are nearest come first: those that
-import the module itself, then the steps of test/golden that call it. A fault that none of them notices
-counts as unnoticed.
+Called by `python -m bench mutants --random N --seed S`. First those tests that import the module itself or
+reach it, the nearest first, and the steps of test/golden that call it; then what starts nodes and wires. A
+fault that none of them notices counts as unnoticed, also where the latter fail without one.
 """
 
 from __future__ import annotations
 
 import cProfile
+import json
 import os
 import random
 import re
 import sys
 import tempfile
 import time
-from collections import Counter, defaultdict
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TextIO
 
 from bench.mutants.imports import PACKAGES, ROOT, imported, reachable
 from bench.mutants.operators import Mutant, mutants_of
 from bench.mutants.run import SURVIVED, BenchError, outcomes
+from bench.results import append_line, read_lines
 
 WAIT = re.compile(r"^(nodes/|hardware/test_(faults|lost|port|netft|line)|watch/|cli/test_(demo|run_launch))")
-"""Tests that wait for nodes and wires: too slow, and not made for a fork."""
-DIRECT, FAR = 8, 2
-"""Files of tests that are played: those that import the module, those that reach it."""
+"""Tests that wait for nodes and wires."""
+FIRST, DIRECT, FAR, WIRES = 3, 8, 2, 3
+"""Files of tests that are played: those before the stored constants; in all, of those that import the module,
+of those that reach it, and of those that wait."""
 LIMIT = 240.0
 """s of CPU for a fault."""
 GOLDEN = "golden/test_golden.py"
+STORED = ("constants", "values")
+"""Steps that store what the code declares and what small functions return."""
+BY_STORED = "by stored values"
 
 
-def play(count: int, seed: int) -> int:
-    """Play a sample and print each survivor, the kinds that survive and the share that was noticed."""
-    chosen, steps = _sample(count, seed), _steps()
-    seen: Counter[str] = Counter()
-    kinds: Counter[str] = Counter()
-    for target, mutants in sorted(chosen.items()):
-        told: dict[Mutant, str] = {}
+def play(count: int, seed: int, minutes: float) -> int:
+    """Play a sample, or go on with it; print each fault that nobody notices, and a table by folder.
+
+    Outcomes are kept in out/mutants-COUNT-SEED.jsonl. Status 1 where under 85 % are noticed.
+    """
+    begun, log = time.monotonic(), ROOT / "out" / f"mutants-{count}-{seed}.jsonl"
+    chosen = _sample(count, seed)
+    told = {(line["target"], line["fault"]): line["outcome"] for line in read_lines(log)}
+    steps = _steps()
+    for target, mutant in chosen:
+        fault = f"{mutant.line} {mutant.where}: {mutant.text} ({mutant.place}, {mutant.choice})"
+        if (target, fault) not in told and time.monotonic() - begun < 60.0 * minutes:
+            outcome = _outcome(target, mutant, steps.get(target, ()))
+            told[target, fault] = outcome
+            append_line(log, {"target": target, "fault": fault, "outcome": outcome})
+            print(f"{target}.py:{fault}: {outcome}", file=sys.stderr, flush=True)
+    return _show(told, count, seed)
+
+
+def _show(told: Mapping[tuple[str, str], str], count: int, seed: int) -> int:
+    for (target, fault), outcome in told.items():
+        if outcome == SURVIVED:
+            print(f"  {target}.py:{fault}")
+    folders = sorted({target.split("/")[0] for target, _ in told})
+    print(f"\n| folder, seed {seed} | faults | noticed | by stored values first | % |\n|---|--:|--:|--:|--:|")
+    for folder in (*folders, "all"):
+        these = [o for (t, _), o in told.items() if folder in ("all", t.split("/")[0])]
+        seen, stored = len(these) - these.count(SURVIVED), these.count(BY_STORED)
+        print(f"| {folder} | {len(these)} | {seen} | {stored} | {100.0 * seen / max(1, len(these)):.1f} |")
+    if len(told) < count:
+        print(f"\n{count - len(told)} faults are left: the same command goes on", file=sys.stderr)
+    return int(seen < 0.85 * len(these))
+
+
+def _outcome(target: str, mutant: Mutant, steps: Sequence[str]) -> str:
+    """Play a fault against its tests, some at a time, up to the first that notices it."""
+    near, wires = tests_of(target)
+    stored = tuple(_step(name) for name in STORED)
+    for tests, limit, said in (
+        (near[:FIRST], LIMIT, ""), (stored, LIMIT, BY_STORED), ((*near[FIRST:], *steps), LIMIT, ""),
+        (wires, None, ""),
+    ):  # fmt: skip
+        found: list[str] = []
         try:
-            tests = (*tests_of(target), *steps.get(target, (GOLDEN,)))
-            outcomes(target, tests, mutants, lambda m, o, _, told=told: told.update({m: o}), LIMIT)
+            if tests:
+                outcomes(target, tests, [mutant], lambda m, o, s, found=found: found.append(o), limit)
         except BenchError as error:
-            print(error, flush=True)
-            seen["not played"] += len(mutants)
-            continue
-        for mutant, outcome in told.items():
-            seen[outcome] += 1
-            if outcome == SURVIVED:
-                kinds[target.split("/")[0]] += 1
-                print(f"  {target}.py:{mutant.line} {mutant.where}: {mutant.text}", flush=True)
-    played = sum(seen.values()) - seen["not played"]
-    share = 1.0 - seen[SURVIVED] / max(1, played)
-    print(f"survivors by folder: {dict(kinds.most_common())}")
-    print(f"{played} of {count} faults played, {seen[SURVIVED]} unnoticed: {100.0 * share:.1f} % noticed")
-    return 0 if share >= 0.85 else 1
+            print(error, file=sys.stderr, flush=True)
+        if found and found[0] != SURVIVED:
+            return said or found[0]
+    return SURVIVED
 
 
-def _sample(count: int, seed: int) -> dict[str, list[Mutant]]:
-    """Return random faults by module, each fault of the package as likely as any other."""
+def _sample(count: int, seed: int) -> list[tuple[str, Mutant]]:
+    """Return random faults with their modules, each fault of the package as likely as any other."""
     every = [
         (str(path.relative_to(ROOT / "rsea_ros").with_suffix("")), mutant)
         for path in sorted((ROOT / "rsea_ros").rglob("*.py"))
         if path.name not in ("__init__.py", "__main__.py")
         for mutant in mutants_of(path.read_text(encoding="utf-8"))
     ]
-    chosen: dict[str, list[Mutant]] = defaultdict(list)
-    for target, mutant in random.Random(seed).sample(every, count):
-        chosen[target].append(mutant)
-    return chosen
+    return random.Random(seed).sample(every, count)
 
 
-def tests_of(target: str) -> tuple[str, ...]:
-    """Return the files of tests that import a module, the nearest first, below test/."""
+def tests_of(target: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return files of tests that notice a module below test/, the nearest first; those that wait apart."""
     name = f"rsea_ros.{target.replace('/', '.')}"
-    direct, far = [], []
-    for file in sorted((ROOT / "test").rglob("test_*.py")):
-        where = str(file.relative_to(ROOT / "test"))
-        if WAIT.match(where):
-            continue
-        names = {n for n in imported(file) if n.split(".")[0] in PACKAGES}
-        if name in names:
-            direct.append(where)
-        elif any(name in reachable(n) for n in names):
-            far.append(where)
     stem, folder = Path(target).name, str(Path(target).parent)
+    nodes = [p.stem for p in (ROOT / "rsea_ros" / "nodes").glob("[!_]*.py")]
+    started = [n for n in nodes if name in {f"rsea_ros.nodes.{n}", *reachable(f"rsea_ros.nodes.{n}")}]
+    direct, far, wires = [], [], []
+    for file in sorted((ROOT / "test").rglob("test_*.py")):
+        where, text = str(file.relative_to(ROOT / "test")), file.read_text(encoding="utf-8")
+        names = {n for n in imported(file) if n.split(".")[0] in PACKAGES}
+        close = (stem.strip("_") not in where, not where.startswith(folder), name not in names, len(text))
+        if WAIT.match(where):
+            starts = folder == "nodes" and any(f'start("{n}"' in text for n in started)
+            if name in names or starts or (folder != "nodes" and close[:2] == (False, False)):
+                wires.append((close, where))
+        elif where == GOLDEN:
+            continue
+        elif name in names:
+            direct.append((close, where))
+        elif any(name in reachable(n) for n in names):
+            far.append((close, where))
+    near = (*sorted(direct)[:DIRECT], *sorted(far)[:FAR])
+    return tuple(where for _, where in near), tuple(where for _, where in sorted(wires)[:WIRES])
 
-    def distance(where: str) -> tuple[bool, bool, int]:
-        lines = len((ROOT / "test" / where).read_text(encoding="utf-8"))
-        return stem not in where, not where.startswith(folder), lines
 
-    near = sorted(direct, key=distance)[:DIRECT] + sorted(far, key=distance)[:FAR]
-    return tuple(where for where in near if where != GOLDEN)
+def _step(name: str) -> str:
+    return f"{GOLDEN}::test_it_says_what_it_said[{name}]"
 
 
 def _steps() -> dict[str, list[str]]:
-    """Return the steps of test/golden that call a module, the shortest first, by module; played in a fork."""
-    inlet, outlet = os.pipe()
-    if os.fork() == 0:
-        with os.fdopen(outlet, "w") as lines:
-            _watch_steps(lines)
-        os._exit(0)
-    os.close(outlet)
-    with os.fdopen(inlet) as lines:
-        told = [line.split() for line in lines]
-    os.wait()
+    """Return the steps of test/golden that call a module, the shortest first, by module.
+
+    They are played once in a fork, and kept in out/ until the steps change.
+    """
+    kept = ROOT / "out" / "golden-calls.json"
+    script = (ROOT / "test" / "golden" / "steps.py").read_text(encoding="utf-8")
+    known = json.loads(kept.read_text()) if kept.exists() else {}
+    if known.get("script") != script:
+        with tempfile.TemporaryFile("w+") as lines:
+            if os.fork() == 0:
+                _watch_steps(lines)
+                os._exit(0)
+            os.wait()
+            lines.seek(0)
+            known = {"script": script, "calls": [line.split() for line in lines]}
+        kept.write_text(json.dumps(known))
     found: dict[str, list[str]] = defaultdict(list)
-    for _, step, target in sorted((float(seconds), step, target) for seconds, step, target in told):
-        found[target].append(f"{GOLDEN}::test_it_says_what_it_said[{step}]")
+    for _, step, target in sorted((float(seconds), step, target) for seconds, step, target in known["calls"]):
+        found[target].append(_step(step))
     return found
 
 
@@ -122,7 +166,7 @@ def _watch_steps(lines: TextIO) -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         desk = Desk(Path(folder))
-        for step in (*VERBS, *SCRIPTS):
+        for step in (name for name in chain(VERBS, SCRIPTS) if name not in STORED):
             profile = cProfile.Profile(builtins=False)
             begun = time.process_time()
             profile.runcall(desk.play, step)
@@ -132,3 +176,4 @@ def _watch_steps(lines: TextIO) -> None:
             for file in called:
                 if file.startswith(package):
                     print(seconds, step, file.removeprefix(package).removesuffix(".py"), file=lines)
+    lines.flush()

@@ -13,17 +13,39 @@ import importlib.util
 import os
 import resource
 import signal
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
+from fnmatch import fnmatch
 from pathlib import Path
+from typing import Any
 
 from bench.mutants.imports import ROOT, warm
 from bench.mutants.operators import Mutant, mutate
+from rsea_ros.compiler import SHARED
 
 KILLED, SURVIVED, TIMEOUT = "killed", "survived", "timeout"
 MEMORY = 8 * 2**30
 """Bytes that a mutant may take."""
+CHILD = """
+import sys
+from importlib.machinery import SourceFileLoader
+from importlib.util import spec_from_file_location
+
+class Loader(SourceFileLoader):
+    def get_code(self, name):
+        return compile({source!r}, self.path, "exec")
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == {name!r}:
+            return spec_from_file_location(name, {path!r}, loader=Loader(name, {path!r}))
+
+sys.meta_path.insert(0, Finder())
+"""
+"""Python runs it first in every process that the tests start."""
 
 
 class BenchError(Exception):
@@ -114,7 +136,8 @@ def _fork(work: Callable[[], int], cpu: float, wall: float) -> tuple[str, float,
 
 
 def _play(name: str, path: Path, tree: ast.Module, files: Sequence[Path]) -> int:
-    """Import a module from a syntax tree and return pytest's status on some files, in their order."""
+    """Import a module from a syntax tree, here and in children; return pytest's status on some files."""
+    import numba
     import pytest
 
     quiet = os.open(os.devnull, os.O_WRONLY)
@@ -125,7 +148,25 @@ def _play(name: str, path: Path, tree: ast.Module, files: Sequence[Path]) -> int
     without = ("cacheprovider", "unraisableexception", "threadexception")  # the last two collect garbage
     flags = [flag for name in without for flag in ("-p", f"no:{name}")]
     flags += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of plugins that are imported already
-    return int(pytest.main(["-x", "-q", *flags, *map(str, files)]))
+    with tempfile.TemporaryDirectory() as folder:
+        child = CHILD.format(source=ast.unparse(tree), name=name, path=str(path))
+        Path(folder, "sitecustomize.py").write_text(child)
+        _start_all_with(folder)
+        if any(fnmatch(str(path.relative_to(ROOT / "rsea_ros")), pattern) for pattern in SHARED):
+            numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = folder  # compiled into other files
+        return int(pytest.main(["-x", "-q", *flags, *map(str, files)]))
+
+
+def _start_all_with(folder: str) -> None:
+    """Let every process that is started look into a folder first of all."""
+    begin: Any = subprocess.Popen.__init__
+
+    def init(self: Any, *args: Any, env: Any = None, **options: Any) -> None:
+        env = dict(os.environ if env is None else env)
+        env["PYTHONPATH"] = os.pathsep.join(filter(None, [folder, env.get("PYTHONPATH")]))
+        begin(self, *args, env=env, **options)
+
+    subprocess.Popen.__init__ = init  # type: ignore[method-assign]
 
 
 class _Loader(importlib.machinery.SourceFileLoader):

@@ -72,7 +72,7 @@ def main(argv: Sequence[str]) -> int:
     """Run the mutants and print the table; status 1 where one got through without a reason."""
     args = _arguments(argv)
     if args.random:
-        return random_sample.play(args.random, args.seed)
+        return random_sample.play(args.random, args.seed, args.minutes)
     known = _resume(args.resume)
     log = args.log.open("a") if args.log else None
     explained = yaml.safe_load(EXPLAINED.read_text()) or {}
@@ -162,6 +162,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--sample", type=int, metavar="N", help=f"so many of each module, {FEWEST} or more")
     parser.add_argument("--random", type=int, metavar="N", help="so many faults of all modules")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the sample")
+    parser.add_argument("--minutes", type=float, default=8.0, metavar="M", help="of a random sample")
     parser.add_argument("--log", type=Path, metavar="F", help="append each outcome to a file")
     parser.add_argument("--resume", type=Path, metavar="F", help="take outcomes of a log of the same tree")
     parser.add_argument("--list", action="store_true", help="print the mutants and run nothing")
