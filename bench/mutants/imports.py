@@ -14,7 +14,7 @@ PACKAGES = ("rsea_ros", "msg_adapters")
 
 
 def warm(target: str, tests: Iterable[Path]) -> None:
-    """Import the package and what some tests import, directly or not, as far as it does not import the target."""
+    """Import the package and what some tests import, as far as it does not import the target."""
     files = (ROOT / "rsea_ros").rglob("[!_]*.py")
     names = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files}
     for test in tests:

@@ -126,7 +126,8 @@ def values(folder: Path) -> Iterator[str]:
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         for called, function in _functions():
-            kinds = [p.annotation for p in inspect.signature(function).parameters.values()]
+            named = [p.annotation for p in inspect.signature(function).parameters.values()]
+            kinds = [kind if isinstance(kind, str) else getattr(kind, "__name__", "") for kind in named]
             if kinds and set(kinds) <= given.keys():
                 returned = list(_calls(function, [given[k] for k in kinds]))
                 if not all(text.endswith("Error") for text in returned):
@@ -178,6 +179,7 @@ def _grid() -> dict[str, tuple[Any, ...]]:
         "Rig": rigs, "Record": tuple(_record(rig, k) for k, rig in enumerate(rigs)),
         "Effect": effects, "Parameter": tuple(p for e in effects for p in e.parameters),
     }  # fmt: skip
+    given["ndarray"] = arrays
     return given | {f"{name} | None": (None, *each) for name, each in given.items()}
 
 
