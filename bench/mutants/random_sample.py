@@ -28,6 +28,8 @@ from bench.results import append_line, read_lines
 
 WAIT = re.compile(r"^(nodes/|hardware/test_(faults|lost|port|netft|line)|watch/|cli/test_(demo|run_launch))")
 """Tests that wait for nodes and wires."""
+WIRED = ("nodes", "hardware", "hardware/netft", "hardware/peer", "hardware/dynamixel", "watch", "cli")
+"""Folders whose faults they are played for."""
 FIRST, DIRECT, FAR, WIRES = 3, 8, 2, 3
 """Files of tests that are played: those before the stored constants; in all, of those that import the module,
 of those that reach it, and of those that wait."""
@@ -76,19 +78,18 @@ def _show(told: Mapping[tuple[str, str], str], count: int, seed: int) -> int:
 def _outcome(target: str, mutant: Mutant, steps: Sequence[str]) -> str:
     """Play a fault against its tests, some at a time, up to the first that notices it."""
     near, wires = tests_of(target)
-    stored = tuple(_step(name) for name in STORED)
-    for tests, limit, said in (
-        (near[:FIRST], LIMIT, ""), (stored, LIMIT, BY_STORED), ((*near[FIRST:], *steps), LIMIT, ""),
-        (wires, None, ""),
-    ):  # fmt: skip
+    groups = [near[:FIRST], tuple(map(_step, STORED)), (*near[FIRST:], *steps)]
+    for tests, limit in ((groups, LIMIT), ([wires], None)):
         found: list[str] = []
         try:
-            if tests:
-                outcomes(target, tests, [mutant], lambda m, o, s, found=found: found.append(o), limit)
+            if any(tests):
+                kept = [group for group in tests if group]
+                outcomes(target, kept, [mutant], lambda m, o, s, found=found: found.append(o), limit)
         except BenchError as error:
             print(error, file=sys.stderr, flush=True)
         if found and found[0] != SURVIVED:
-            return said or found[0]
+            number = int(found[0].rpartition("-")[2]) if "-by-" in found[0] else -1
+            return BY_STORED if limit and kept[number] == groups[1] else "noticed"
     return SURVIVED
 
 
@@ -116,7 +117,7 @@ def tests_of(target: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         close = (stem.strip("_") not in where, not where.startswith(folder), name not in names, len(text))
         if WAIT.match(where):
             starts = folder == "nodes" and any(f'start("{n}"' in text for n in started)
-            if name in names or starts or (folder != "nodes" and close[:2] == (False, False)):
+            if starts or (folder in WIRED and (name in names or close[:2] == (False, False))):
                 wires.append((close, where))
         elif where == GOLDEN:
             continue

@@ -54,15 +54,16 @@ class BenchError(Exception):
 
 def outcomes(
     target: str,
-    tests: Sequence[str],
+    tests: Sequence[Sequence[str]],
     mutants: Sequence[Mutant],
     tell: Callable[[Mutant, str, float], None],
     limit: float | None = None,
 ) -> None:
-    """Run the tests of a module for each mutant; yield outcome and seconds of each.
+    """Run the tests of a module for each mutant; tell outcome and seconds of each.
 
-    limit: s of CPU for a mutant, where the tests are known to pass; by default they are played without a
-    fault first. Raises BenchError where they fail without one.
+    tests: groups of them, played one after the other up to the first that notices the mutant; the outcome
+    names its number where there are several. limit: s of CPU for a mutant, where the tests are known to pass;
+    by default they are played without a fault first. Raises BenchError where they fail without one.
     """
     inlet, outlet = os.pipe()
     pid = os.fork()
@@ -76,9 +77,10 @@ def outcomes(
             if place == "baseline":
                 if outcome != SURVIVED:
                     os.waitpid(pid, 0)
+                    words = " ".join(f"test/{test}" for group in tests for test in group)
                     raise BenchError(
                         f"{target}: its tests do not pass without a fault ({outcome}), expected that of"
-                        f" ./rsea test {' '.join(f'test/{test}' for test in tests)} -n 0"
+                        f" ./rsea test {words} -n 0"
                     )
                 continue
             tell(mutants[int(place)], outcome, float(seconds))
@@ -87,26 +89,32 @@ def outcomes(
 
 
 def _serve(
-    target: str, tests: Sequence[str], mutants: Sequence[Mutant], outlet: int, limit: float | None
+    target: str, tests: Sequence[Sequence[str]], mutants: Sequence[Mutant], outlet: int, limit: float | None
 ) -> None:
     """Run all mutants of a module, write a line for each, and end this process."""
     status = 1
     try:
         name, path = f"rsea_ros.{target.replace('/', '.')}", ROOT / "rsea_ros" / f"{target}.py"
-        files = [ROOT / "test" / test for test in tests]
-        warm(name, [file for file in files if file.exists()])
+        groups = [[ROOT / "test" / test for test in group] for group in tests]
+        warm(name, [file for group in groups for file in group if file.exists()])
         gc.freeze()
         source = path.read_text()
+        outcome, cpu, wall = SURVIVED, (limit or 0.0) / 3.0, limit or 0.0
         if limit is None:
-            outcome, cpu, wall = _fork(lambda: _play(name, path, ast.parse(source), files), 600.0, 600.0)
-        else:
-            outcome, cpu, wall = SURVIVED, limit / 3.0, limit
+            every = [file for group in groups for file in group]
+            outcome, cpu, wall = _fork(lambda: _play(name, path, ast.parse(source), every), 600.0, 600.0)
         os.write(outlet, f"baseline {outcome} {cpu}\n".encode())
         for k, mutant in enumerate(mutants if outcome == SURVIVED else ()):
-            tree = mutate(source, mutant)
-            outcome, _, took = _fork(
-                lambda tree=tree: _play(name, path, tree, files), 3.0 * cpu + 3.0, 5.0 * wall + 15.0
-            )
+            tree, took = mutate(source, mutant), 0.0
+            for number, group in enumerate(groups):
+                outcome, _, seconds = _fork(
+                    lambda tree=tree, group=group: _play(name, path, tree, group),
+                    3.0 * cpu + 3.0, 5.0 * wall + 15.0,
+                )  # fmt: skip
+                took += seconds
+                if outcome != SURVIVED:
+                    outcome += f"-by-{number}" * (len(groups) > 1)
+                    break
             os.write(outlet, f"{k} {outcome} {took:.2f}\n".encode())
         status = 0
     finally:

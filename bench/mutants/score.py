@@ -131,7 +131,7 @@ def _outcomes(
 
     left = [m for m in mutants if m not in result]
     if left:
-        outcomes(target, TARGETS[target], left, tell)
+        outcomes(target, [TARGETS[target]], left, tell)
     return dict(sorted(result.items(), key=lambda item: (item[0].line, item[0].place, item[0].choice)))
 
 

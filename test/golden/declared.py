@@ -10,21 +10,36 @@ import enum
 import importlib
 import inspect
 import re
+import sys
 import warnings
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from contextlib import contextmanager
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, FrameType, ModuleType
 from typing import Any
 
 import numpy as np
+from fleet_histories import cause, history, recordings
 from written import short
 
 import rsea_ros as rsea
-from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.control import synthesis
+from rsea_ros.control.law import Gains
+from rsea_ros.control.loads import load_range
+from rsea_ros.design.motor_gear_units import unit_named
+from rsea_ros.design.requirement import Requirement
+from rsea_ros.design.spring_design import spring_design
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import RseaError
 from rsea_ros.records.record import Channel
+from rsea_ros.report.design.page import design_report
+from rsea_ros.report.diagnosis.page import diagnosis_report
+from rsea_ros.report.identification.page import identification_report
+from rsea_ros.trends.fleet_trends import fleet_trends
 
 PACKAGE = Path(rsea.__file__).parent
 PURE = re.compile(
@@ -33,12 +48,18 @@ PURE = re.compile(
     r"|hardware\.(dynamixel\.(control_tables|frames)|netft\.rdt|peer\.protocol2|limits))(\.|$)"
 )
 """Modules whose functions may be called with anything: they write nothing and wait for nothing."""
-LEFT_OUT = re.compile(r".*\.(largest_gain|with_check_faults|ours|play_mujoco|_fit|bands|sample|effect_from)$")
-"""Functions that would take more than 0.2 s, and one that names a temporary folder."""
-LONG, WHOLE, CALLS = 40, 3000, 900
+LEFT_OUT = re.compile(
+    r".*\.(largest_gain|with_check_faults|ours|play_mujoco|_fit|bands|sample|effect_from|run|limits|_simulate"
+    r"|alternative_of|_against_rig|_fold|inverse_of|robust_stiffness|pairs_of|_complete|by_train|_with_train"
+    r"|figure_15|faults\.check|least_\w+|stiffness_bounds|overlay_records|_parts)$"
+)
+"""Functions that take more than 0.1 s, name a temporary folder, or return an address."""
+LONG, WHOLE, CALLS = 40, 3000, 700
 """Characters of a text and of a constant from which on a check sum stands for them, and of calls."""
 RIGS = ("paper_high_impedance", "pendulum", "two_moving_outputs", "pd_joint")
 EFFECTS = ("coulomb_friction", "backlash", "ft_sensor_lag", "mains_interference", "structural_resonance")
+
+JOINTS = ("hip", "knee", "elbow")
 
 
 def modules() -> Iterator[tuple[str, ModuleType]]:
@@ -121,26 +142,36 @@ def _cut(text: str, longest: int) -> str:
 
 
 def values(folder: Path) -> Iterator[str]:
-    """Yield what each function returns whose arguments the grid has, as often as it has some."""
-    given = _grid()
+    """Yield what each function and each method of a frozen class returns whose arguments the grid has."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        for called, function in _functions():
-            named = [p.annotation for p in inspect.signature(function).parameters.values()]
-            kinds = [kind if isinstance(kind, str) else getattr(kind, "__name__", "") for kind in named]
+        given = _grid()
+        for called, function, owner in _functions():
+            named = list(inspect.signature(function).parameters.values())
+            kinds = [owner] * bool(owner) + [_kind(p.annotation) for p in named[bool(owner) :]]
             if kinds and set(kinds) <= given.keys():
                 returned = list(_calls(function, [given[k] for k in kinds]))
                 if not all(text.endswith("Error") for text in returned):
                     yield f"{called}: {' | '.join(returned)}"[:CALLS]
 
 
-def _functions() -> Iterator[tuple[str, Callable[..., Any]]]:
+def _kind(annotation: Any) -> str:
+    return annotation if isinstance(annotation, str) else getattr(annotation, "__name__", "")
+
+
+def _functions() -> Iterator[tuple[str, Callable[..., Any], str]]:
+    """Yield name, function and, of a method or property, the class."""
     for place, module in modules():
-        for name, each in list(vars(module).items()):
-            function, called = getattr(each, "py_func", each), f"{place}.{name}"
-            is_own = inspect.isfunction(function) and function.__module__ == module.__name__
-            if is_own and PURE.match(place) and not LEFT_OUT.match(called):
-                yield called, function
+        for name, each in list(vars(module).items()) if PURE.match(place) else ():
+            function = getattr(each, "py_func", each)
+            if getattr(function, "__module__", "") != module.__name__:
+                continue
+            found = [(f"{place}.{name}", function, "")]
+            if inspect.isclass(each):
+                parts = ((n, getattr(p, "fget", getattr(p, "func", p))) for n, p in vars(each).items())
+                is_frozen = is_dataclass(each) and each.__dataclass_params__.frozen  # type: ignore
+                found = [(f"{place}.{name}.{n}", p, name) for n, p in parts if is_frozen and n[:2] != "__"]
+            yield from (f for f in found if inspect.isfunction(f[1]) and not LEFT_OUT.match(f[0]))
 
 
 def _calls(function: Callable[..., Any], given: list[tuple[Any, ...]]) -> Iterator[str]:
@@ -180,13 +211,57 @@ def _grid() -> dict[str, tuple[Any, ...]]:
         "Effect": effects, "Parameter": tuple(p for e in effects for p in e.parameters),
     }  # fmt: skip
     given["ndarray"] = arrays
+    with _kept_arguments(given):
+        few = DiagnosisSettings(1, tuple(n for n in catalogue() if n not in EFFECTS[:2]))
+        rubbing = _record(rigs[0].with_effect("coulomb_friction", torque=3.0), 0, 2240)
+        diagnosis_report(rsea.diagnose(rubbing, rigs[0], settings=few).result)
+        identification_report(rsea.identify(given["Record"][0], rigs[0]).result)
+        rsea.check(given["Record"][2], rigs[0])
+        asked = spring_design(Requirement(), unit_named("h54-200-s500-r"), 1500.0)
+        design_report(asked, asked, asked)
+        told = recordings(JOINTS, 40, causes=lambda j, d: [cause("backlash", 2e-3)] * (j == "hip" and d > 20))
+        fleet_trends(history(np.random.default_rng(2), JOINTS, days=40, course=lambda j, d: 1e-3 * d), told)
+        gains = Gains(0.163, 0.003528, 1.173, 8.679, 39.9)
+        synthesis.check(rigs[0], load_range(rigs[0]), 280.0, gains)
     return given | {f"{name} | None": (None, *each) for name, each in given.items()}
 
 
-def _record(rig: rsea.Rig, seed: int) -> rsea.Record:
-    """Return 4 s of a rig; of all but the first, torque at half the rate that stands still for a while."""
-    u = 6.0 * np.random.default_rng(seed).standard_normal(1120)
-    u += 12.0 * np.sign(np.sin(0.0157 * np.arange(1120)))
+@contextmanager
+def _kept_arguments(given: dict[str, tuple[Any, ...]]) -> Iterator[None]:
+    """Put the objects into the grid that functions of this package are called with, and what they hold."""
+
+    seen: Counter[CodeType] = Counter()
+
+    def note(frame: FrameType, event: str, _: Any) -> None:
+        code = frame.f_code
+        if code.co_filename.startswith(str(PACKAGE)) and seen[code] < 6:
+            seen[code] += 1
+            _harvest([frame.f_locals.get(name) for name in code.co_varnames[: code.co_argcount]], given)
+
+    before = sys.gettrace()
+    sys.settrace(note)
+    try:
+        yield
+    finally:
+        sys.settrace(before)
+
+
+def _harvest(values: Iterable[Any], given: dict[str, tuple[Any, ...]]) -> None:
+    """Put the objects of this package that some hold into the grid, up to four of a class."""
+    for value in values:
+        if isinstance(value, (tuple, list, Mapping)):
+            _harvest(value.values() if isinstance(value, Mapping) else value, given)
+        elif is_dataclass(value) and not isinstance(value, type):
+            known = given.get(type(value).__name__, ())
+            if len(known) < 4 and all(value is not each for each in known):
+                given[type(value).__name__] = (*known, value)
+                _harvest([getattr(value, f.name) for f in fields(value)], given)
+
+
+def _record(rig: rsea.Rig, seed: int, count: int = 1120) -> rsea.Record:
+    """Return samples of a rig; of all seeds but 0, torque at half the rate that stands still for a while."""
+    u = 6.0 * np.random.default_rng(seed).standard_normal(count)
+    u += 12.0 * np.sign(np.sin(0.0157 * np.arange(count)))
     record = rsea.simulate(rig, u * (0.05 if "pd" in rig.name else 1.0), 280.0, seed=seed)
     if seed == 0 or "ft" not in record:
         return record
