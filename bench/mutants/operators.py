@@ -2,14 +2,16 @@
 
 A fault replaces one node: a comparison, `and` or `or`, an operator, a number, a text, a truth value, a
 condition by its opposite, min by max, a returned value by None, a statement by nothing. Left alone are
-annotations, decorators, docstrings, the words of exceptions and f-strings, and `strict=` of zip, which only
-asserts.
+annotations, decorators, docstrings, the words of exceptions and f-strings, and what changes nothing that
+anybody could notice: `strict=` of zip, which only asserts; numbers below 1e-9, which are room for rounding;
+how long one waits for what comes anyway; seeds of random numbers.
 """
 
 from __future__ import annotations
 
 import ast
 import copy
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -44,6 +46,9 @@ CALLS = {
     "argmin": "argmax",
 }
 CALLS |= {after: before for before, after in CALLS.items()}
+TINY = 1e-9
+WAITS = re.compile(r"timeout|wait|join|sleep|acquire|spin\w*|default_rng|Random")
+"""Calls and keywords whose numbers are waiting times, s, or seeds."""
 QUIET_CALLS = {"TypeVar", "NewType", "Literal", "cast"}
 """Calls and subscripts whose texts are names and types."""
 
@@ -164,6 +169,12 @@ def _quiet(tree: ast.Module) -> Iterator[ast.AST]:
                 yield node.value
             case ast.keyword(arg="strict"):
                 yield node.value
+            case ast.Constant(value=float(value)) if 0.0 < abs(value) < TINY:
+                yield node
+            case ast.keyword(arg=str(name)) if WAITS.fullmatch(name):
+                yield node.value
+            case ast.Call(func=ast.Attribute(attr=name)) if WAITS.fullmatch(name):
+                yield from (a for a in node.args if isinstance(a, ast.Constant))
             case ast.Call(func=ast.Name(id=name)) | ast.Subscript(value=ast.Name(id=name)):
                 if name in QUIET_CALLS:
                     yield from ast.walk(node)

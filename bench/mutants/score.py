@@ -1,27 +1,32 @@
-"""Mutation run: small faults are put into decision functions, and their tests must notice.
+"""Mutation run: a random sample of small faults in rsea_ros, each against the tests that are near its module.
 
-    python -m bench mutants                                  every module of targets.py
-    python -m bench mutants hardware/limits --list           its mutants
-    python -m bench mutants --sample 60 --seed 1             so many of each module
-    python -m bench mutants --random 200 --seed 4            of all modules of rsea_ros, as they come
-    python -m bench mutants --log run.jsonl --resume run.jsonl    go on after a break
+    python -m bench mutants --random 60 --seed 4              60 faults, each as likely as any other
+    python -m bench mutants --in hardware/limits              of one module or folder
+    python -m bench mutants --in hardware/limits --list       the faults themselves
 
-Prints killed, survived and timed-out mutants of each module, and every survivor with the reason why it is no
-fault, from mutants/explained.yaml. Status 1 where under 85 % of a module's mutants are noticed, a survivor
-has no reason, or a reason stands for a mutant that is noticed or is no more. docs/testing.md says more.
+It stops after some minutes, and the same command goes on: outcomes are kept in out/mutants-*.jsonl, which you
+delete after a change. Prints each fault that nobody notices, and a table by folder; status 1 where under 85 %
+are noticed.
+
+First come the tests that import the module or reach it, the nearest first, and the steps of test/golden that
+call it; then, for folders that have such, what starts nodes and wires. A fault that none of them notices is
+unnoticed, also where the latter fail without one. The column `by stored values` counts those that the nearest
+files let pass and the stored constants and values noticed.
 """
 
 from __future__ import annotations
 
-import argparse
+import cProfile
 import json
+import os
 import random
+import re
 import sys
+import tempfile
 import time
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TextIO
 
@@ -33,141 +38,176 @@ import numpy  # noqa: F401
 import pytest  # noqa: F401
 import scipy  # noqa: F401
 import xdist.scheduler  # noqa: F401
-import yaml
 
-from bench import ROOT, parser_of
-from bench.mutants import random_sample
+from bench import parser_of
+from bench.mutants.imports import PACKAGES, ROOT, imported, reachable
 from bench.mutants.operators import Mutant, mutants_of
 from bench.mutants.run import SURVIVED, BenchError, outcomes
-from bench.mutants.targets import TARGETS
-from bench.results import read_lines
+from bench.results import append_line, read_lines
 
 LEAST = 0.85
-"""Share of the mutants that tests must notice."""
-FEWEST = 60
-"""Mutants of a module in a sample, at least; all where it has fewer."""
-EXPLAINED = Path(__file__).with_name("explained.yaml")
-
-Reasons = Mapping[tuple[str, str], str]
-
-
-@dataclass(frozen=True)
-class Played:
-    """The mutants of a module that were played, with the outcome of each, and how many it has."""
-
-    target: str
-    outcomes: dict[Mutant, str]
-    total: int
-
-    @property
-    def survivors(self) -> list[Mutant]:
-        return [m for m, outcome in self.outcomes.items() if outcome == SURVIVED]
-
-    @property
-    def noticed(self) -> float:
-        return 1.0 - len(self.survivors) / max(1, len(self.outcomes))
+"""Share of the faults that tests must notice."""
+WAIT = re.compile(r"^(nodes/|hardware/test_(faults|lost|port|netft|line)|watch/|cli/test_(demo|run_launch))")
+"""Tests that wait for nodes and wires."""
+WIRED = ("nodes", "hardware", "hardware/netft", "hardware/peer", "hardware/dynamixel", "watch", "cli")
+"""Folders whose faults they are played for."""
+FIRST, DIRECT, FAR, WIRES = 3, 8, 2, 3
+"""Files of tests that are played: those before the stored constants; in all, of those that import the module,
+of those that reach it, and of those that wait."""
+LIMIT = 240.0
+"""s of CPU for a fault."""
+GOLDEN = "golden/test_golden.py"
+STORED = ("constants", "values")
+"""Steps that store what the code declares and what small functions return."""
+BY_STORED = "by stored values"
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run the mutants and print the table; status 1 where one got through without a reason."""
-    args = _arguments(argv)
-    if args.random:
-        return random_sample.play(args.random, args.seed, args.minutes)
-    known = _resume(args.resume)
-    log = args.log.open("a") if args.log else None
-    explained = yaml.safe_load(EXPLAINED.read_text()) or {}
-    failures, begun = 0, time.monotonic()
-    for target in args.modules or TARGETS:
-        mutants = mutants_of((ROOT / "rsea_ros" / f"{target}.py").read_text())
-        if args.list:
-            print(*(f"{target}.py:{m.line} {m.where}: {m.text}" for m in mutants), sep="\n")
-            continue
-        chosen = _sample(mutants, args.sample, args.seed)
-        try:
-            played = Played(target, _outcomes(target, chosen, known, log), len(mutants))
-        except BenchError as error:
-            print(error, flush=True)
-            failures += 1
-            continue
-        failures += show(played, _reasons(explained.get(target, {})))
-    if not args.list:
-        print(f"{time.monotonic() - begun:.0f} s")
-    return 1 if failures else 0
-
-
-def show(played: Played, reasons: Reasons) -> int:
-    """Print the outcomes of a module; return the number of broken promises."""
-    counts = Counter(played.outcomes.values())
-    sample = f" (sample of {played.total})" if len(played.outcomes) < played.total else ""
-    print(
-        f"{played.target}: {len(played.outcomes)} mutants{sample}, {counts['killed']} killed,"
-        f" {counts['survived']} survived, {counts['timeout']} timed out: {100 * played.noticed:.1f} % noticed"
-    )
-    broken = played.noticed < LEAST
-    for m in played.survivors:
-        reason = reasons.get((m.where, m.text))
-        broken += reason is None
-        print(f"  {played.target}.py:{m.line} {m.where}: {m.text}\n      {reason or 'NOT EXPLAINED'}")
-    alive = {(m.where, m.text) for m in played.survivors}
-    gone = [] if sample else [key for key in reasons if key not in alive]
-    for where, text in gone:
-        print(f"  {where}: {text}\n      explained, but noticed or no more: delete the reason")
-    sys.stdout.flush()
-    return broken + len(gone)
-
-
-def _outcomes(
-    target: str, mutants: Sequence[Mutant], known: Mapping[tuple[str, ...], str], log: TextIO | None
-) -> dict[Mutant, str]:
-    """Return the outcome of each mutant, those of a run before included."""
-    key = partial(_key, target)
-    result = {m: known[key(m)] for m in mutants if key(m) in known}
-
-    def tell(mutant: Mutant, outcome: str, seconds: float) -> None:
-        result[mutant] = outcome
-        if log is not None:
-            log.write(json.dumps({"key": key(mutant), "outcome": outcome, "seconds": seconds}) + "\n")
-            log.flush()
-
-    left = [m for m in mutants if m not in result]
-    if left:
-        outcomes(target, [TARGETS[target]], left, tell)
-    return dict(sorted(result.items(), key=lambda item: (item[0].line, item[0].place, item[0].choice)))
-
-
-def _key(target: str, m: Mutant) -> tuple[str, ...]:
-    """Return the key of a mutant in a log."""
-    return target, str(m.line), m.where, m.text, str(m.place), str(m.choice)
-
-
-def _sample(mutants: list[Mutant], count: int | None, seed: int) -> list[Mutant]:
-    if count is None or count >= len(mutants):
-        return mutants
-    chosen = set(random.Random(seed).sample(range(len(mutants)), max(count, min(FEWEST, len(mutants)))))
-    return [m for k, m in enumerate(mutants) if k in chosen]
-
-
-def _reasons(places: Mapping[str, Mapping[str, str]]) -> Reasons:
-    return {(where, text): reason for where, said in places.items() for text, reason in said.items()}
-
-
-def _resume(path: Path | None) -> dict[tuple[str, ...], str]:
-    entries = [] if path is None else read_lines(path)
-    return {tuple(each["key"]): each["outcome"] for each in entries}
-
-
-def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Play a sample, or go on with it."""
     parser = parser_of(__doc__)
-    parser.add_argument("modules", nargs="*", metavar="MODULE", help=f"of {', '.join(TARGETS)}")
-    parser.add_argument("--sample", type=int, metavar="N", help=f"so many of each module, {FEWEST} or more")
-    parser.add_argument("--random", type=int, metavar="N", help="so many faults of all modules")
+    parser.add_argument("--random", type=int, default=60, metavar="N", help="so many faults")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the sample")
-    parser.add_argument("--minutes", type=float, default=8.0, metavar="M", help="of a random sample")
-    parser.add_argument("--log", type=Path, metavar="F", help="append each outcome to a file")
-    parser.add_argument("--resume", type=Path, metavar="F", help="take outcomes of a log of the same tree")
-    parser.add_argument("--list", action="store_true", help="print the mutants and run nothing")
+    parser.add_argument("--in", dest="place", default="", metavar="PLACE", help="of a module or folder only")
+    parser.add_argument("--minutes", type=float, default=8.0, metavar="M", help="begin no fault after that")
+    parser.add_argument("--list", action="store_true", help="print the faults and play none")
     args = parser.parse_args(argv)
-    unknown = [m for m in args.modules if m not in TARGETS]
-    if unknown:
-        parser.error(f"{', '.join(unknown)}: expected one of {', '.join(TARGETS)}")
-    return args
+    chosen = _sample(args.random, args.seed, args.place)
+    if args.list:
+        print(*(f"{target}.py:{_text(mutant)}" for target, mutant in chosen), sep="\n")
+        return 0
+    place = args.place.replace("/", "-") or "all"
+    log = ROOT / "out" / f"mutants-{place}-{args.random}-{args.seed}.jsonl"
+    told = {(line["target"], line["fault"]): line["outcome"] for line in read_lines(log)}
+    steps, begun = _steps(), time.monotonic()
+    for target, mutant in chosen:
+        fault = _text(mutant)
+        if (target, fault) not in told and time.monotonic() - begun < 60.0 * args.minutes:
+            outcome = _outcome(target, mutant, steps.get(target, ()))
+            told[target, fault] = outcome
+            append_line(log, {"target": target, "fault": fault, "outcome": outcome})
+            print(f"{target}.py:{fault}: {outcome}", file=sys.stderr, flush=True)
+    return _show(told, len(chosen) - len(told), args.seed)
+
+
+def _text(m: Mutant) -> str:
+    return f"{m.line} {m.where}: {m.text} ({m.place}, {m.choice})"
+
+
+def _show(told: Mapping[tuple[str, str], str], left: int, seed: int) -> int:
+    for (target, fault), outcome in told.items():
+        if outcome == SURVIVED:
+            print(f"  {target}.py:{fault}")
+    print(f"\n| folder, seed {seed} | faults | noticed | by stored values | % |\n|---|--:|--:|--:|--:|")
+    for folder in (*sorted({target.split("/")[0] for target, _ in told}), "all"):
+        these = [o for (t, _), o in told.items() if folder in ("all", t.split("/")[0])]
+        seen, stored = len(these) - these.count(SURVIVED), these.count(BY_STORED)
+        print(f"| {folder} | {len(these)} | {seen} | {stored} | {100.0 * seen / max(1, len(these)):.1f} |")
+    if left:
+        print(f"{left} faults are left: the same command goes on", file=sys.stderr)
+    return int(seen < LEAST * len(these))
+
+
+def _outcome(target: str, mutant: Mutant, steps: Sequence[str]) -> str:
+    """Play a fault against its tests, some at a time, up to the first that notices it."""
+    near, wires = tests_of(target)
+    groups = [near[:FIRST], tuple(map(_step, STORED)), (*near[FIRST:], *steps)]
+    for tests, limit in ((groups, LIMIT), ([wires], None)):
+        found: list[str] = []
+        try:
+            if any(tests):
+                kept = [group for group in tests if group]
+                outcomes(target, kept, [mutant], lambda m, o, s, found=found: found.append(o), limit)
+        except BenchError as error:
+            print(error, file=sys.stderr, flush=True)
+        if found and found[0] != SURVIVED:
+            number = int(found[0].rpartition("-")[2]) if "-by-" in found[0] else -1
+            return BY_STORED if limit and kept[number] == groups[1] else "noticed"
+    return SURVIVED
+
+
+def _sample(count: int, seed: int, place: str) -> list[tuple[str, Mutant]]:
+    """Return random faults with their modules, of a place each as likely as any other; all where fewer."""
+    start = ROOT / "rsea_ros" / place
+    every = [
+        (str(path.relative_to(ROOT / "rsea_ros").with_suffix("")), mutant)
+        for path in sorted((ROOT / "rsea_ros").rglob("*.py"))
+        if path.name not in ("__init__.py", "__main__.py") and f"{path}/".startswith(str(start))
+        for mutant in mutants_of(path.read_text(encoding="utf-8"))
+    ]
+    return random.Random(seed).sample(every, min(count, len(every)))
+
+
+def tests_of(target: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return files of tests that notice a module below test/, the nearest first; those that wait apart."""
+    name = f"rsea_ros.{target.replace('/', '.')}"
+    stem, folder = Path(target).name, str(Path(target).parent)
+    nodes = [p.stem for p in (ROOT / "rsea_ros" / "nodes").glob("[!_]*.py")]
+    started = [n for n in nodes if name in {f"rsea_ros.nodes.{n}", *reachable(f"rsea_ros.nodes.{n}")}]
+    direct, far, wires = [], [], []
+    for file in sorted((ROOT / "test").rglob("test_*.py")):
+        where, text = str(file.relative_to(ROOT / "test")), file.read_text(encoding="utf-8")
+        names = {n for n in imported(file) if n.split(".")[0] in PACKAGES}
+        close = (stem.strip("_") not in where, not where.startswith(folder), name not in names, len(text))
+        if WAIT.match(where):
+            starts = folder == "nodes" and any(f'start("{n}"' in text for n in started)
+            if starts or (folder in WIRED and (name in names or close[:2] == (False, False))):
+                wires.append((close, where))
+        elif where == GOLDEN:
+            continue
+        elif name in names:
+            direct.append((close, where))
+        elif any(name in reachable(n) for n in names):
+            far.append((close, where))
+    near = (*sorted(direct)[:DIRECT], *sorted(far)[:FAR])
+    return tuple(where for _, where in near), tuple(where for _, where in sorted(wires)[:WIRES])
+
+
+def _step(name: str) -> str:
+    return f"{GOLDEN}::test_it_says_what_it_said[{name}]"
+
+
+def _steps() -> dict[str, list[str]]:
+    """Return the steps of test/golden that call a module, the shortest first, by module.
+
+    They are played once in a fork, and kept in out/ until the steps change.
+    """
+    kept = ROOT / "out" / "golden-calls.json"
+    script = (ROOT / "test" / "golden" / "steps.py").read_text(encoding="utf-8")
+    known = json.loads(kept.read_text()) if kept.exists() else {}
+    if known.get("script") != script:
+        with tempfile.TemporaryFile("w+") as lines:
+            if os.fork() == 0:
+                _watch_steps(lines)
+                os._exit(0)
+            os.wait()
+            lines.seek(0)
+            known = {"script": script, "calls": [line.split() for line in lines]}
+        kept.write_text(json.dumps(known))
+    found: dict[str, list[str]] = defaultdict(list)
+    for _, step, target in sorted((float(seconds), step, target) for seconds, step, target in known["calls"]):
+        found[target].append(_step(step))
+    return found
+
+
+def _watch_steps(lines: TextIO) -> None:
+    """Play every step, and write seconds, step and module for each module that it calls."""
+    sys.path += [str(ROOT), str(ROOT / "test" / "golden"), str(ROOT / "test" / "trends")]
+    from steps import SCRIPTS, VERBS
+    from test_golden import Desk
+
+    package = str(ROOT / "rsea_ros") + os.sep
+    os.environ["COLUMNS"] = "100"
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        desk = Desk(Path(folder))
+        for step in (name for name in chain(VERBS, SCRIPTS) if name not in STORED):
+            profile = cProfile.Profile(builtins=False)
+            begun = time.process_time()
+            profile.runcall(desk.play, step)
+            seconds = time.process_time() - begun
+            codes = (entry.code for entry in profile.getstats())
+            called = {code.co_filename for code in codes if not isinstance(code, str)}
+            for file in called:
+                if file.startswith(package):
+                    print(seconds, step, file.removeprefix(package).removesuffix(".py"), file=lines)
+    lines.flush()
