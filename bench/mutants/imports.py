@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib import import_module
@@ -10,31 +11,37 @@ from pathlib import Path
 
 from bench import ROOT
 
-PACKAGES = ("rsea_ros", "msg_adapters")
+PACKAGES = ("rsea_ros", "msg_adapters", "bench")
 
 
 def warm(target: str, tests: Iterable[Path]) -> None:
-    """Import the package and what some tests import, as far as it does not import the target."""
+    """Import the package and what some tests import, as far as it does not import the target.
+
+    Raises RuntimeError where the target is imported all the same: its faults would never be played.
+    """
     files = (ROOT / "rsea_ros").rglob("[!_]*.py")
     names = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files}
-    for test in tests:
-        names |= set(imported(test))
-    for name in sorted(names | set().union(*(reachable(n) for n in names))):
-        if target not in {name, *reachable(name)} and not name.startswith("test"):
+    names = names.union(*map(imported, tests))
+    beside = {path.stem for path in (ROOT / "test").rglob("*.py")}
+    for name in sorted(names | set().union(*map(reachable, names))):
+        if name.split(".")[0] not in beside and target not in {name, *reachable(name)}:
             try:
                 import_module(name)
-            except ImportError:  # a helper beside the tests
+            except ImportError:  # of another system
                 continue
+    if target in sys.modules:
+        raise RuntimeError(f"{target} is imported before it has a fault, expected after")
 
 
 @cache
 def reachable(name: str) -> frozenset[str]:
-    """Return the modules of this repository that a module imports, directly or not."""
+    """Return the modules of this repository that a module imports, directly or not, with their packages."""
     reached: set[str] = set()
     waiting = [name]
     while waiting:
-        path = _path(waiting.pop())
-        fresh = {n for n in imported(path) if n not in reached} if path else set()
+        of = waiting.pop()
+        path, package = _path(of), of.rpartition(".")[0]
+        fresh = {package, *(imported(path) if path else ())} - {"", *reached}
         reached |= fresh
         waiting += fresh
     return frozenset(reached)

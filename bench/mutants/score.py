@@ -97,11 +97,12 @@ def _show(told: Mapping[tuple[str, str], str], left: int, seed: int) -> int:
     for (target, fault), outcome in told.items():
         if outcome == SURVIVED:
             print(f"  {target}.py:{fault}")
-    print(f"\n| folder, seed {seed} | faults | noticed | by stored values | % |\n|---|--:|--:|--:|--:|")
+    print("\n| folder | faults | noticed | by stored values | % |\n|---|--:|--:|--:|--:|")
     for folder in (*sorted({target.split("/")[0] for target, _ in told}), "all"):
         these = [o for (t, _), o in told.items() if folder in ("all", t.split("/")[0])]
         seen, stored = len(these) - these.count(SURVIVED), these.count(BY_STORED)
-        print(f"| {folder} | {len(these)} | {seen} | {stored} | {100.0 * seen / max(1, len(these)):.1f} |")
+        name = f"all, seed {seed}" if folder == "all" else folder
+        print(f"| {name} | {len(these)} | {seen} | {stored} | {100.0 * seen / max(1, len(these)):.1f} |")
     if left:
         print(f"{left} faults are left: the same command goes on", file=sys.stderr)
     return int(seen < LEAST * len(these))
