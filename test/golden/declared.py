@@ -53,7 +53,7 @@ LEFT_OUT = re.compile(
     r"|alternative_of|_against_rig|_fold|inverse_of|robust_stiffness|pairs_of|_complete|by_train|_with_train"
     r"|figure_15|faults\.check|least_\w+|stiffness_bounds|overlay_records|_parts|_matched)$"
 )
-"""Functions that take more than 0.1 s, name a temporary folder, return an address or hang on the last digit."""
+"""Functions that take over 0.1 s, name a temporary folder, return an address or hang on the last digit."""
 LONG, WHOLE, CALLS = 40, 3000, 700
 """Characters of a text and of a constant from which on a check sum stands for them, and of calls."""
 RIGS = ("paper_high_impedance", "pendulum", "two_moving_outputs", "pd_joint")
@@ -147,7 +147,7 @@ def values(folder: Path) -> Iterator[str]:
         warnings.simplefilter("ignore")
         for _, module in modules():
             for each in vars(module).values():
-                getattr(each, "cache_clear", int)()  # a kept answer is no call, and its arguments are not seen
+                getattr(each, "cache_clear", int)()  # a kept answer calls nothing
         given = _grid()
         for called, function, owner in _functions():
             named = list(inspect.signature(function).parameters.values())
