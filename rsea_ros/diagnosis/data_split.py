@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings, DiagnosisSettings
 from rsea_ros.identification.problem import Case
@@ -67,13 +68,14 @@ def short_pieces_of(
     """Return pieces of a case, each a run-up and a pair of training blocks, about 14 s of data in all.
 
     Half are spread evenly; half are where a model's `outputs` are worst, for effects that act rarely.
-    A case of a measured motion (inverse model) costs little and is returned whole.
+    A case of a measured motion (inverse model) costs little and is returned whole, and so is one without a
+    position: nothing says in which state a piece of it begins.
     """
     rule, blocks = settings.pieces, settings.blocks
     fit = part(case, TRAIN, blocks)
     thinner = as_often_as_commands(fit)
     drive = thinner.drive
-    if not isinstance(drive, Drive) or drive.duration < 2.0 * rule.enough:
+    if not isinstance(drive, Drive) or drive.duration < 2.0 * rule.enough or "position" not in case.measured:
         return (thinner,)
     length = 2.0 * block_length(case, blocks)
     pairs = train_starts(case, blocks)[1:]
@@ -84,7 +86,12 @@ def short_pieces_of(
     misfit[spread] = -1.0
     worst = np.argsort(misfit)[len(spread) - 2 * half :]
     chosen = starts[np.sort(np.concatenate([spread, worst]))]
-    return tuple(_piece(thinner, drive, float(t), float(t) + length, rule.run_up) for t in chosen)
+    begins = [_piece_start(drive, float(t), rule.run_up) for t in chosen]
+    states = [state_at(case, drive.start + k * drive.step, outputs) for k in begins]
+    return tuple(
+        _piece(thinner, drive, k, float(t) + length, rule.run_up, state)
+        for k, t, state in zip(begins, chosen, states, strict=True)
+    )
 
 
 def as_often_as_commands(case: Case) -> Case:
@@ -129,27 +136,56 @@ def misfit_between(case: Case, outputs: Mapping[str, FloatArray], begin: float, 
     return total
 
 
-def _piece(case: Case, drive: Drive, begin: float, end: float, run_up: float) -> Case:
-    """Return the part of a case between two times since its start, s; its run-up begins with a whole hold."""
-    first, last = int((begin - run_up) / drive.step) // drive.hold * drive.hold, math.ceil(end / drive.step)
-    start = drive.start + first * drive.step
+def _piece_start(drive: Drive, begin: float, run_up: float) -> int:
+    """Return the step, the first of a command period, with which the run-up of a piece begins."""
+    return int((begin - run_up) / drive.step) // drive.hold * drive.hold
+
+
+def _piece(
+    case: Case, drive: Drive, first: int, end: float, run_up: float, state: tuple[float, float]
+) -> Case:
+    """Return the part of a case from a step with a state to a time since its start, s."""
+    last, start = math.ceil(end / drive.step), drive.start + first * drive.step
     compared = start + run_up
     inside = {n: (t >= start) & (t < drive.start + end) for n, t in case.t.items()}
     cut = replace(
         drive, start=start, command=drive.command[first:last],
         at={n: drive.at[n][keep] - first for n, keep in inside.items()},
         impulse={n: drive.impulse[n][keep] for n, keep in inside.items()},
-        reference=drive.reference[first:last], angle=drive.angle[first:last], initial=state_at(case, start),
+        reference=drive.reference[first:last], angle=drive.angle[first:last], initial=state,
         origin=drive.origin + first * drive.step, whole=drive.drift_time,
         restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last), spans=(),
     )
     return case.within({n: t >= compared for n, t in case.t.items()}).keep(inside, cut)
 
 
-def state_at(case: Case, t: float) -> tuple[float, float]:
-    """Return measured position (rad) and velocity (rad/s) at a time."""
-    position, velocity = (
-        float(np.interp(t, case.t[n], case.measured[n])) if n in case.measured else 0.0
-        for n in ("position", "velocity")
-    )
-    return position, velocity
+_SLOPE = 8
+"""Samples on either side that show a speed: at 280 Hz 3 % is missing at 4 Hz, of what a model leaves."""
+
+
+def state_at(
+    case: Case, t: float, outputs: Mapping[str, FloatArray] | None = None
+) -> tuple[float, float]:
+    """Return position (rad) and velocity (rad/s) at a time, zero where nothing shows them.
+
+    A velocity that is not measured is the slope of a model's position, of `outputs`, and of what that leaves.
+    """
+    if "position" not in case.measured:
+        return 0.0, _at(case, "velocity", t) if "velocity" in case.measured else 0.0
+    position = _at(case, "position", t)
+    if "velocity" in case.measured:
+        return position, _at(case, "velocity", t)
+    stamps, simulated = case.t["position"], (outputs or {}).get("position")
+    middle = int(np.searchsorted(stamps, t))
+    near = slice(max(middle - _SLOPE, 0), middle + _SLOPE + 1)
+    off, rest = stamps[near] - t, case.measured["position"][near]
+    if len(off) < 2:
+        return position, 0.0
+    if simulated is None:
+        return position, float(np.polyfit(off, rest, 1)[0])
+    slope = float(CubicSpline(off, simulated[near])(0.0, 1))
+    return position, slope + float(np.polyfit(off, rest - simulated[near], 1)[0])
+
+
+def _at(case: Case, channel: str, t: float) -> float:
+    return float(np.interp(t, case.t[channel], case.measured[channel]))

@@ -50,6 +50,7 @@ class Signature:
     time: float
     frequency: float
     carried: float = 0.0
+    lasting: float = 0.0
 
 
 def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence) -> Signature:
@@ -63,6 +64,7 @@ def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence)
         time=_spread(*_sums(_parts_by(rows.block.astype(float), cc, rule.parts), cc, cr)),
         frequency=_over_frequency(rows, c, r, rule.bands),
         carried=_serial_correlation(*every),
+        lasting=_lasting(*every),
     )
 
 
@@ -87,6 +89,18 @@ def _serial_correlation(cc: FloatArray, cr: FloatArray) -> float:
     off = (cr - cr.sum() / max(float(cc.sum()), 1e-300) * cc) / np.sqrt(cc)
     power = float(off @ off)
     return float(off[1:] @ off[:-1]) / power * float(np.sqrt(len(off))) if power > 0.0 else 0.0
+
+
+def _lasting(cc: FloatArray, cr: FloatArray) -> float:
+    """Return the standard deviation of the part of lambda that lasts from a block to the next."""
+    used = cc > 1e-12 * max(float(cc.sum()), 1e-300)
+    cc, cr = cc[used], cr[used]
+    if len(cc) < 2:
+        return 0.0
+    off = cr - cr.sum() / cc.sum() * cc
+    shared = np.sqrt(cc[1:] * cc[:-1])
+    covariance = float(np.sum(off[1:] * off[:-1] / shared) / shared.sum())
+    return float(np.sqrt(max(covariance, 0.0)))
 
 
 def _parts_by(values: FloatArray, cc: FloatArray, parts: int) -> IntArray:
