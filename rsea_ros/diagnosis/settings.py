@@ -135,7 +135,7 @@ class FitSettings:
     first_iterations: int = number(25, "1", "Gauss-Newton steps of the nominal model's first fit")
     iterations: int = number(12, "1", "steps of a fit that begins near its end")
     present_iterations: int = number(5, "1", "steps of the present model's fit to the short pieces")
-    piece_iterations: int = number(12, "1", "steps of an effect's fit to the short pieces")
+    piece_iterations: int = number(25, "1", "steps of an effect's fit to the short pieces")
     full_iterations: int = number(6, "1", "steps of an effect's first fit to all training blocks")
     gain: float = number(2e-4, "1", "relative fall of the cost, at the noise, below which a fit is done")
     farthest: float = number(
