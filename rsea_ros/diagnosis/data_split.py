@@ -159,8 +159,10 @@ def _piece(
     return case.within({n: t >= compared for n, t in case.t.items()}).keep(inside, cut)
 
 
-_SLOPE = 8
-"""Samples on either side that show a speed: at 280 Hz 3 % is missing at 4 Hz, of what a model leaves."""
+_NEAR = 0.03
+"""s on either side that show a speed: of 4 Hz 10 % is missing, of what a model leaves."""
+_FEWEST = 4
+"""Samples on either side at least."""
 
 
 def state_at(
@@ -172,19 +174,17 @@ def state_at(
     """
     if "position" not in case.measured:
         return 0.0, _at(case, "velocity", t) if "velocity" in case.measured else 0.0
-    position = _at(case, "position", t)
     if "velocity" in case.measured:
-        return position, _at(case, "velocity", t)
-    stamps, simulated = case.t["position"], (outputs or {}).get("position")
-    middle = int(np.searchsorted(stamps, t))
-    near = slice(max(middle - _SLOPE, 0), middle + _SLOPE + 1)
-    off, rest = stamps[near] - t, case.measured["position"][near]
-    if len(off) < 2:
-        return position, 0.0
-    if simulated is None:
-        return position, float(np.polyfit(off, rest, 1)[0])
-    slope = float(CubicSpline(off, simulated[near])(0.0, 1))
-    return position, slope + float(np.polyfit(off, rest - simulated[near], 1)[0])
+        return _at(case, "position", t), _at(case, "velocity", t)
+    stamps, simulated = case.t["position"], (outputs or {}).get("position", np.zeros(len(case.t["position"])))
+    first, last = np.searchsorted(stamps, (t - _NEAR, t + _NEAR))
+    near = slice(max(min(first, last - _FEWEST), 0), max(last, first + _FEWEST))
+    off, model = stamps[near] - t, simulated[near]
+    if len(off) < _FEWEST:
+        return _at(case, "position", t), 0.0
+    slope, level = np.polyfit(off, case.measured["position"][near] - model, 1)
+    curve = CubicSpline(off, model)
+    return float(curve(0.0) + level), float(curve(0.0, 1) + slope)
 
 
 def _at(case: Case, channel: str, t: float) -> float:

@@ -300,9 +300,9 @@ class NamingSettings:
     rival: float = number(0.05, "1", "probability from which a rival is an alternative", "one in twenty")
     carried: float = number(
         2.6, "1", "standard deviations by which a cause's misfit lasts from block to block, above which it "
-        "is not confirmed although only noise is left (naming/evidence.py)",
-        "chance exceeds it for one right cause in 200; in simulated records 0 of 88 right causes did, "
-        "and 6 of 8 drifts that were named for a wandering sensor",
+        "is not confirmed although only noise is left, where its size wanders by more than two right "
+        "simulations differ (sizes.model_error)",
+        "chance exceeds it for one right cause in 200",
     )  # fmt: skip
     clear: float = number(
         0.8, "1", "share of the probability of a cause and its rivals, below which it is `one_of` them",

@@ -11,8 +11,8 @@ SETTLING = Parameter(
     reason="from a drift that settles within a run to one that is a straight line",
 )
 """With which a drift settles; one that is hundreds of records long is a straight line."""
-_STRAIGHT = 300.0
-"""Records: a drift with a longer time constant departs from its chord by less than 1/2400 of itself."""
+_STRAIGHT = 1e8
+"""Records: a drift with a longer time constant is its chord to the last digit."""
 
 
 @njit(inline="always")

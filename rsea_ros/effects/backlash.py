@@ -44,7 +44,8 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     half, h, k, b = 0.5 * p[0], s[STEP], s[K_S], s[B_S]
     if half == 0.0 or k == 0.0:
         return
-    j = max((1.0 - p[1]) * s[J_SC], FASTEST * k * h * h)
+    least = FASTEST * k * h * h
+    j = p[1] * least + (1.0 - p[1]) * max(s[J_SC], least)
     d, w = s[DEFLECTION] + 0.5 * s[DEFLECTION_SPAN], s[DEFLECTION_RATE]
     if x[STARTED] == 0.0:
         x[D], x[W], x[STARTED] = s[DEFLECTION] - 0.5 * s[DEFLECTION_SPAN], w, 1.0

@@ -73,6 +73,11 @@ class Parameter:
         return self.shapes or not self.optional
 
     @property
+    def is_share(self) -> bool:
+        """Whether it is a share, whose bounds are none and all."""
+        return self.unit == "1" and (self.low, self.high) == (0.0, 1.0)
+
+    @property
     def possible(self) -> tuple[float, float]:
         """Return the range that a person may state: the bounds on the smallest and the largest machine."""
         width = 1.0 if self.is_fixed else widest(self.unit)

@@ -33,13 +33,14 @@ _RUN_AWAY = 1e100
 """Noises from which a simulation is unstable, not wrong."""
 _AS_PROMISED = 0.5
 """Of the fall of the cost that the derivatives promise: a step that brings so much speaks for them."""
+_WEAK = 1e-6
+"""Of the curvature: damping that shortens no step of unknowns that show."""
 _AHEAD, _MOST_BENT = 0.1, 1.5
 """Share of a step over which its second derivative is taken; how large the correction may be beside the step.
 
 Where two unknowns compensate for each other (a base's stiffness and inertia, beside a spring) the cost is a
 bent valley, in which Marquardt's steps become tiny: the correction to second order follows it (geodesic
 acceleration: Transtrum, Sethna, arXiv 1201.5885, 2012, with these numbers)."""
-_DAMPING_UP, _DAMPING_DOWN = 30.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -174,41 +175,41 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
     is_fresh = matrix is None
     matrix = jacobian(problem, theta, residual, run) if matrix is None else matrix
     for _ in range(iterations):
+        more = 2.0
         normal = matrix.T @ matrix + np.diag(weight**2)
         slope = matrix.T @ residual + weight**2 * (theta - start)
-        accepted = False
-        for _ in range(8 if is_fresh else 1):
+        accepted = kept = False
+        for _ in range(9 if is_fresh else 1):
             scaled = normal + damping * np.diag(np.diag(normal) + 1e-12)
             trial = bounded_step(problem, theta, scaled, slope)
             trial_residual = problem.residual(trial)
-            trial_cost = cost_of(trial_residual, trial)
-            step = trial - theta
-            promised = cost - cost_of(residual + matrix @ step, trial)
-            if is_fresh and cost - trial_cost < _AS_PROMISED * promised:
-                bend = _bend(problem, theta, residual, matrix @ step, step)
-                bent = _along_the_bend(problem, trial, step, scaled, matrix.T @ bend)
-                if bent is not None:
-                    bent_residual = problem.residual(bent)
-                    bent_cost = cost_of(bent_residual, bent)
-                    if bent_cost < trial_cost:
-                        trial, trial_residual, trial_cost = bent, bent_residual, bent_cost
-            if trial_cost < cost:
-                accepted = True
+            trial_cost, along = cost_of(trial_residual, trial), matrix @ (trial - theta)
+            kept = cost - trial_cost > _AS_PROMISED * (cost - cost_of(residual + along, trial))
+            if is_fresh and not kept:
+                bent = _along_the_bend(problem, theta, residual, trial, along, matrix, scaled)
+                bent_residual = problem.residual(bent)
+                bent_cost = cost_of(bent_residual, bent)
+                if bent_cost < trial_cost:
+                    trial, trial_residual, trial_cost = bent, bent_residual, bent_cost
+            accepted = trial_cost < cost
+            if accepted:
                 break
-            damping *= _DAMPING_UP if is_fresh else 1.0
+            if is_fresh:
+                damping, more = damping * more, 2.0 * more
         if not accepted and is_fresh:
             break
         if not accepted:
             matrix, is_fresh = jacobian(problem, theta, residual, run), True
             continue
-        step = trial - theta
-        promised = cost - cost_of(residual + matrix @ step, trial)
-        enough = cost - trial_cost < max(gain * cost, _SMALLEST_FALL)
-        kept = cost - trial_cost > _AS_PROMISED * promised
+        least = max(gain * cost, _SMALLEST_FALL)
+        enough = cost - trial_cost < least
+        if enough and damping > _WEAK:  # a tiny step of a bent valley says nothing of its end
+            whole = bounded_step(problem, theta, normal, slope)
+            enough = cost - cost_of(residual + matrix @ (whole - theta), whole) < least
         if kept:
-            matrix = broyden_update(matrix, step, trial_residual - residual)
+            matrix = broyden_update(matrix, trial - theta, trial_residual - residual)
         theta, residual, cost = trial, trial_residual, trial_cost
-        damping = max(damping / _DAMPING_DOWN, 1e-10)
+        damping = max(damping / (10.0 if kept else 3.0), 1e-10)
         if enough:  # and too small a step to change the derivatives
             break
         if not kept:
@@ -267,27 +268,30 @@ def descend(
     return best
 
 
-def _bend(
-    problem: Problem, theta: FloatArray, residual: FloatArray, along: FloatArray, step: FloatArray
+def _along_the_bend(
+    problem: Problem,
+    theta: FloatArray,
+    residual: FloatArray,
+    trial: FloatArray,
+    along: FloatArray,
+    matrix: FloatArray,
+    normal: FloatArray,
 ) -> FloatArray:
-    """Return the second derivative of the residual along a step, shape (m,). along: the first one."""
+    """Return the end of a step from theta moved to where the valley bends, or `trial` where that is too far.
+
+    along: change of the residual by the derivatives.
+    """
+    step = trial - theta
     ahead = problem.residual(theta + _AHEAD * step)
     if power(ahead) == np.inf:
-        return np.zeros(len(residual))
-    bend: FloatArray = 2.0 / _AHEAD * ((ahead - residual) / _AHEAD - along)
-    return bend
-
-
-def _along_the_bend(
-    problem: Problem, trial: FloatArray, step: FloatArray, normal: FloatArray, slope: FloatArray
-) -> FloatArray | None:
-    """Return a step's end moved to where the valley bends; None where it bends too much to be followed."""
+        return trial
+    bend = 2.0 / _AHEAD * ((ahead - residual) / _AHEAD - along)
+    aside = -0.5 * np.linalg.lstsq(normal, matrix.T @ bend, rcond=None)[0]
     size = np.sqrt(np.diag(normal))
-    aside = -0.5 * np.linalg.lstsq(normal, slope, rcond=None)[0]
     if np.linalg.norm(size * aside) > _MOST_BENT * np.linalg.norm(size * step):
-        return None
+        return trial
     low, high = (np.array([u.inner(b(u)) for u in problem.unknowns]) for b in (_lowest, _highest))
-    return np.clip(trial + aside, low, high)
+    return np.asarray(np.clip(trial + aside, low, high))
 
 
 def broyden_update(matrix: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:

@@ -55,6 +55,7 @@ class Unknown:
     name: `rotor.reflected_inertia`, `coulomb_friction.torque`, `clock.ft`. low, high: bounds, SI.
     logarithmic: the fit works on its logarithm. doubt: one sigma of the prior around `start`, in the
     coordinate that the fit works in; inf for none. scale: a step of that coordinate that matters.
+    inverse: the fit works on -1 / value, for what vanishes at infinity and has no slope there.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Unknown:
     logarithmic: bool
     doubt: float
     scale: float
+    inverse: bool = False
 
     @property
     def spread(self) -> float:
@@ -126,11 +128,15 @@ class Unknown:
 
     def inner(self, value: float) -> float:
         """Return the coordinate that the fit works in."""
+        if self.inverse:
+            return -1.0 / value
         return math.log(value) if self.logarithmic else value
 
     def outer(self, coordinate: float) -> float:
         """Return the value in SI, inside the bounds; 0 where 0 is allowed and only rounding is left."""
         value = math.exp(min(coordinate, 700.0)) if self.logarithmic else coordinate
+        if self.inverse:
+            value = -1.0 / coordinate if coordinate < 0.0 else math.inf
         value = math.remainder(value, TURN) if self.is_cyclic else min(max(value, self.low), self.high)
         return 0.0 if abs(value) < LEAST_SIZE and self.low <= 0.0 else value
 
@@ -166,9 +172,12 @@ def unknowns_of_effect(
 
 
 def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
+    start, name = min(max(start, p.low), p.high), f"{effect.name}.{p.name}"
+    if p.logarithmic and math.isinf(p.null):
+        scale = 1.0 / min((p.typical, *p.starts))
+        return Unknown(name, start, p.unit, p.low, p.high, False, p.spread, scale, inverse=True)
     scale = 1.0 if p.logarithmic else abs(p.typical) or 1.0
-    start = min(max(start, p.low), p.high)
-    return Unknown(f"{effect.name}.{p.name}", start, p.unit, p.low, p.high, p.logarithmic, p.spread, scale)
+    return Unknown(name, start, p.unit, p.low, p.high, p.logarithmic, p.spread, scale)
 
 
 def idle(effect: Effect, rig: Rig) -> frozenset[str]:

@@ -153,7 +153,7 @@ def test_the_controller_compensates_an_outside_effect_by_the_law_of_the_step():
 
 
 def test_a_joint_reports_play_of_another_name_that_its_data_do_not_show():
-    (gap,) = unknowns_of_effect(effect_named("worn_key"), {"gap": 2e-3})
+    gap, _ = unknowns_of_effect(effect_named("worn_key"), {"gap": 2e-3})
     problem = SimpleNamespace(unknowns=(gap,))
     trial = SimpleNamespace(name="worn_key", problem=problem, theta=start_vector((gap,)))
     rejected = SimpleNamespace(name="worn_key", gain_holdout=0.004)

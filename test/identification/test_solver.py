@@ -46,6 +46,25 @@ def test_a_cliff_behind_the_minimum_is_avoided():
     assert solve(Decay(cliff=3.1)).theta == pytest.approx([2.0, 3.0], rel=1e-5)
 
 
+@dataclass(frozen=True)
+class Bent(Decay):
+    """Rosenbrock's valley y = x^2: Marquardt's steps along it are tiny."""
+
+    truth: tuple[float, float] = (40.0, 1600.0)
+    start: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def unknowns(self):
+        return tuple(Unknown(n, 1.0, "1", 0.0, 1e4, False, np.inf, 1.0) for n in ("a", "b"))
+
+    def residual(self, theta):
+        return np.array([10.0 * (theta[1] - theta[0] ** 2), theta[0] - self.truth[0]])
+
+
+def test_a_bent_valley_is_followed():
+    assert solve(Bent(), iterations=25).theta == pytest.approx([40.0, 1600.0], rel=1e-2)
+
+
 def test_a_start_beyond_the_cliff_is_returned_at_an_infinite_cost():
     solution = solve(Decay(start=(1.0, 5.0), cliff=4.0))
     assert solution.cost == np.inf and solution.theta == pytest.approx([1.0, 5.0])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -191,6 +192,10 @@ def _gap(trial: Trial) -> float:
     return next(u.outer(float(value)) for u, value in unknowns if u.name == main)
 
 
+SURE_OF_BOUND = 0.25
+"""Half an interval over the span between a parameter's bounds, below which the data hold it at one."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """The outcome of weighing the causes.
@@ -263,14 +268,41 @@ def with_sure_gains(
 def with_sizes_known(
     naming: Mapping[str, Named], stages: Sequence[Evaluated], settings: DiagnosisSettings
 ) -> dict[str, Named]:
-    """Return the naming with no cause confirmed whose size the last model leaves open."""
-    rule = settings.sizes
-    sized = {s.added: size_of(s.added, stages[-1], rule) for s in stages[1:] if is_named(s, naming)}
-    unknown = {name for name, size in sized.items() if not is_known(size, rule)}
+    """Return the naming with no cause confirmed whose law the last model leaves open.
+
+    That is one of unknown size, one with a parameter at a bound, and every cause where the clock of a sensor
+    is at its bound: there the fit would go on, and another law may be what it lacks.
+    """
+    last, near = stages[-1], settings.acceptance.near_bound
+    known = zip(last.solution.problem.unknowns, last.solution.theta, strict=True)
+    is_clock_bound = any(u.is_clock and u.is_near_bound(float(t), near) for u, t in known)
+
+    def is_open(name: str) -> bool:
+        is_sized = is_known(size_of(name, last, settings.sizes), settings.sizes)
+        return is_clock_bound or not is_sized or is_held_by_bound(name, last, near)
+
+    unclear = {s.added for s in stages[1:] if is_named(s, naming) and is_open(s.added)}
     return {
-        name: replace(by, status="leading") if name in unknown and by.status == "confirmed" else by
+        name: replace(by, status="leading") if name in unclear and by.status == "confirmed" else by
         for name, by in naming.items()
     }
+
+
+def is_held_by_bound(effect: str, last: Evaluated, near: float) -> bool:
+    """Return whether a parameter of an effect ended at a bound although the data determine it.
+
+    Not a share, which may be none and all, nor what vanishes there or is typical.
+    """
+    laws = {f"{effect}.{p.name}": p for p in effect_named(effect).parameters if not p.is_share}
+    theta, doubts = last.solution.theta, np.sqrt(last.confidence.covariance.diagonal())
+    fitted = zip(last.solution.problem.unknowns, theta, doubts, strict=True)
+    return any(
+        u.is_near_bound(float(at), near)
+        and not any(math.isclose(u.outer(float(at)), v) for v in (laws[u.name].null, laws[u.name].typical))
+        and Z95 * doubt < SURE_OF_BOUND * (u.inner(u.high) - u.inner(u.low))
+        for u, at, doubt in fitted
+        if u.name in laws
+    )
 
 
 def is_named(stage: Evaluated, naming: Mapping[str, Named]) -> bool:

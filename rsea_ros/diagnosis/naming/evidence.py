@@ -43,6 +43,7 @@ class Signature:
     overall: over all blocks. amplitude, time, frequency: over parts of these.
     carried: how surely the misfit of lambda lasts from block to block, in standard deviations: near 0 where
     only noise is left, also coloured noise shorter than a block, and large where a sensor wanders.
+    lasting: the standard deviation of the part of lambda that does: by how much the cause's size wanders.
     """
 
     overall: float

@@ -25,6 +25,7 @@ from rsea_ros.diagnosis.naming.evidence import Evidence
 from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, Weighed
 from rsea_ros.diagnosis.result import Status
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, EvidenceSettings, NamingSettings
+from rsea_ros.records.statistics import Z95
 
 COEFFICIENTS = MappingProxyType(
     {
@@ -136,7 +137,8 @@ def probabilities_and_status(
     rivals = [p for p in likely[1:] if p >= settings.naming.rival]
     is_named = at_floor or takes_most or _helps(likely[0] + sum(rivals), evidence[0], settings)
     status = status_of(likely[0], rivals, at_floor, settings.naming) if is_named else None
-    wanders = at_floor and evidence[0].signature.carried > settings.naming.carried
+    sign, errors = evidence[0].signature, Z95 * settings.sizes.model_error
+    wanders = at_floor and sign.carried > settings.naming.carried and sign.lasting > errors
     return likely, "leading" if wanders and status == "confirmed" else status
 
 

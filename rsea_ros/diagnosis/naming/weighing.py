@@ -67,9 +67,12 @@ def contests(
 
 
 def beside(selection: Selection, model: Candidate) -> list[Trial]:
-    """Return the trials beside a model that were fitted to all training blocks, the last of each effect."""
+    """Return the trials beside a model that were fitted to all training blocks, the last of each effect.
+
+    Not those that ended at a bound: such an effect imitates another one.
+    """
     full = {t.name: t for t in selection.trials if t.is_full and t.beside.causes == model.causes}
-    return list(full.values())
+    return [t for t in full.values() if t.reason != "at_bound"]
 
 
 def weigh_rivals(

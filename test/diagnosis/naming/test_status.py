@@ -26,9 +26,13 @@ from rsea_ros.diagnosis.naming.status import (
 from rsea_ros.diagnosis.result import CauseParameter
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.result import ParameterEstimate
+from rsea_ros.identification.unknowns import clocks, unknowns_of_effect
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.diagnosis.words import diagnosis_sentence
 
+RIG = load_rig("paper_high_impedance")
 SHARE = st.floats(0.0, 1.0)
 SPREAD = st.floats(0.0, 10.0)
 SIGNATURES = st.builds(Signature, *[SPREAD] * 4)
@@ -103,10 +107,11 @@ def score(**ratios):
 
 
 def test_a_cause_whose_misfit_lasts_from_block_to_block_is_not_confirmed():
-    wandering = replace(RIGHT, signature=replace(RIGHT.signature, carried=4.0))
-    _, right = probabilities_and_status([RIGHT], at_floor=True, takes_most=True)
-    _, status = probabilities_and_status([wandering], at_floor=True, takes_most=True)
-    assert (right, status) == ("confirmed", "leading")
+    """But for what two right simulations differ by: 1e-4 of the contribution also lasts."""
+    wandering = replace(RIGHT, signature=replace(RIGHT.signature, carried=4.0, lasting=0.1))
+    alike = replace(wandering, signature=replace(wandering.signature, lasting=1e-3))
+    every = [probabilities_and_status([e], at_floor=True, takes_most=True) for e in (RIGHT, alike, wandering)]
+    assert [status for _, status in every] == ["confirmed", "confirmed", "leading"]
 
 
 @pytest.mark.parametrize(
@@ -143,10 +148,34 @@ def test_the_models_error_leads_no_interval_below_zero(effect, parameter, value,
 
 
 class Stage:
-    """The part of an evaluated model that the naming reads."""
+    """The part of an evaluated model that the naming reads: its fit ended at `values` of some unknowns."""
 
-    def __init__(self, added):
+    def __init__(self, added, unknowns=(), values=(), sd=1e-3):
         self.added = added
+        theta = np.array([u.inner(v) for u, v in zip(unknowns, values, strict=True)])
+        self.solution = SimpleNamespace(problem=SimpleNamespace(unknowns=unknowns), theta=theta)
+        self.confidence = SimpleNamespace(covariance=np.diag(np.full(len(theta), sd**2)))
+
+
+BASE = unknowns_of_effect(effect_named("base_compliance"), effect_named("base_compliance").typical)
+DRIFT = unknowns_of_effect(effect_named("ft_drift"), effect_named("ft_drift").typical)
+
+
+@pytest.mark.parametrize(
+    ("effect", "unknowns", "values", "sd", "status"),
+    [
+        ("base_compliance", BASE, (3e4, 0.5, 0.02, 0.0), 1e-3, "confirmed"),  # a share may be none
+        ("base_compliance", BASE, (3e4, 0.5, 1.0, 0.0), 1e-3, "leading"),  # a spring creeps
+        ("base_compliance", BASE, (3e4, 0.5, 1.0, 0.0), 10.0, "confirmed"),  # the data say nothing of it
+        ("base_compliance", (*BASE, *clocks(["ft"], RIG)), (3e4, 0.5, 0.02, 0.0, 3e-4), 1e-6, "leading"),
+        ("ft_drift", DRIFT, (0.5, 1e5), 1e-9, "confirmed"),  # a straight line
+    ],
+)  # fmt: skip
+def test_a_cause_at_a_bound_leads_at_most(monkeypatch, effect, unknowns, values, sd, status):
+    monkeypatch.setattr(outcome, "size_of", lambda *_: CauseParameter(1.5, "1", (1.4, 1.6)))
+    stages = [Stage(""), Stage(effect, unknowns, values, sd)]
+    naming = outcome.with_sizes_known({effect: Named(None, 0.99, "confirmed", ())}, stages, DEFAULT)
+    assert naming[effect].status == status
 
 
 @pytest.mark.parametrize(
