@@ -133,19 +133,24 @@ class Hypothesis:
     def _with_size(self, steps: FloatArray) -> FloatArray:
         """Return the values with the size of the cause moved by some steps, shape (m, n).
 
-        What a cause adds takes the place of the rest of it, and stops where a parameter meets its bound.
+        What a cause adds takes the place of the rest of it, and stops where a parameter meets its bound;
+        where that is at once, it goes the other way.
         """
         spread = np.linalg.inv(self.information)[:, self._main]
         moves = np.outer(steps, spread / spread[self._main])
         low, high = self.bounds()
         if self.addition is not None:
-            own = self.cause_indices
-            room = np.where(moves > 0.0, high - self.theta, self.theta - low)[:, own]
-            size = np.abs(moves[:, own])
-            share = np.min(np.divide(room, size, np.ones_like(size), where=size > room), axis=1)
-            moves = share[:, None] * moves
+            share, back = self._room(moves), self._room(-moves)
+            moves = np.where(share > 0.0, share, -back)[:, None] * moves
         result: FloatArray = np.clip(self.theta + moves, low, high)
         return result
+
+    def _room(self, moves: FloatArray) -> FloatArray:
+        """Return how much of each move, up to 1, the bounds of the cause leave, shape (m,)."""
+        (low, high), own = self.bounds(), self.cause_indices
+        room = np.where(moves > 0.0, high - self.theta, self.theta - low)[:, own]
+        size = np.abs(moves[:, own])
+        return np.asarray(np.divide(room, size, np.ones_like(size), where=size > room).min(axis=1))
 
     @property
     def _main(self) -> int:

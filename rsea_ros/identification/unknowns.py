@@ -55,7 +55,7 @@ class Unknown:
     name: `rotor.reflected_inertia`, `coulomb_friction.torque`, `clock.ft`. low, high: bounds, SI.
     logarithmic: the fit works on its logarithm. doubt: one sigma of the prior around `start`, in the
     coordinate that the fit works in; inf for none. scale: a step of that coordinate that matters.
-    inverse: the fit works on -1 / value, for what vanishes at infinity and has no slope there.
+    inverse: the fit works on -1 / value, for what is infinite as a rule and has no slope there.
     """
 
     name: str
@@ -173,8 +173,8 @@ def unknowns_of_effect(
 
 def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
     start, name = min(max(start, p.low), p.high), f"{effect.name}.{p.name}"
-    if p.logarithmic and math.isinf(p.null):
-        scale = 1.0 / min((p.typical, *p.starts))
+    if math.isinf(p.null) and p.typical == p.high:
+        scale = 1.0 / min(p.starts)
         return Unknown(name, start, p.unit, p.low, p.high, False, p.spread, scale, inverse=True)
     scale = 1.0 if p.logarithmic else abs(p.typical) or 1.0
     return Unknown(name, start, p.unit, p.low, p.high, p.logarithmic, p.spread, scale)

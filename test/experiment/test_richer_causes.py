@@ -1,5 +1,6 @@
 """A cause that another contains is confirmed only after a run that could have shown the other."""
 
+import itertools
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -128,7 +129,8 @@ def test_what_a_richer_cause_adds_is_rated_within_what_is_known(stuck):
     parts = [names.index(f"stribeck_friction.{n}") for n in ("coulomb_torque", "stribeck_torque")]
     assert rich.addition == parts[1]
     values = rich.likely_values()[:, parts]
-    assert (np.diff(values[:, 1]) > 0.0).all() and (np.diff(values[:, 0]) < 0.0).all()
+    for added, rest in itertools.pairwise(sorted(values.tolist(), key=lambda v: v[1])):
+        assert added[1] < rest[1] and added[0] > rest[0], "what it adds takes the place of the rest"
     held = next(h for h in stuck.hypotheses() if h.name == "coulomb_friction")
     sd = held.sd()[held.cause_indices[0]]
     assert values.sum(axis=1) == pytest.approx(held.theta[held.cause_indices[0]], abs=3.0 * sd)
