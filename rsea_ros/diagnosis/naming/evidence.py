@@ -59,13 +59,14 @@ def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence)
     c, r = (project_out(rows, v) for v in (rows.contribution, rows.residual))
     cc, cr = c * c, c * r
     every = _sums(rows.block, cc, cr)
+    carried, lasting = _lasting(*every)
     return Signature(
         overall=_spread(*every),
         amplitude=_spread(*_sums(_parts_by(np.abs(c), cc, rule.parts), cc, cr)),
         time=_spread(*_sums(_parts_by(rows.block.astype(float), cc, rule.parts), cc, cr)),
         frequency=_over_frequency(rows, c, r, rule.bands),
-        carried=_serial_correlation(*every),
-        lasting=_lasting(*every),
+        carried=carried,
+        lasting=lasting,
     )
 
 
@@ -83,25 +84,19 @@ def _spread(cc: FloatArray, cr: FloatArray) -> float:
     return float(np.sqrt(np.sum(cc * (cr / cc - mean) ** 2) / cc.sum()))
 
 
-def _serial_correlation(cc: FloatArray, cr: FloatArray) -> float:
-    """Return the correlation of (cr - mean cc) / sqrt(cc) of neighbouring blocks over its standard error."""
+def _lasting(cc: FloatArray, cr: FloatArray) -> tuple[float, float]:
+    """Return how surely the misfit of lambda lasts from block to block, and the size of what lasts.
+
+    The covariance of neighbouring blocks of (cr - mean cc) / sqrt(cc), over its standard error where some
+    blocks scatter more than others (White, Econometrica 48, 1980), and as a standard deviation of lambda.
+    """
     used = cc > 1e-12 * max(float(cc.sum()), 1e-300)
     cc, cr = cc[used], cr[used]
     off = (cr - cr.sum() / max(float(cc.sum()), 1e-300) * cc) / np.sqrt(cc)
-    power = float(off @ off)
-    return float(off[1:] @ off[:-1]) / power * float(np.sqrt(len(off))) if power > 0.0 else 0.0
-
-
-def _lasting(cc: FloatArray, cr: FloatArray) -> float:
-    """Return the standard deviation of the part of lambda that lasts from a block to the next."""
-    used = cc > 1e-12 * max(float(cc.sum()), 1e-300)
-    cc, cr = cc[used], cr[used]
-    if len(cc) < 2:
-        return 0.0
-    off = cr - cr.sum() / cc.sum() * cc
-    shared = np.sqrt(cc[1:] * cc[:-1])
-    covariance = float(np.sum(off[1:] * off[:-1] / shared) / shared.sum())
-    return float(np.sqrt(max(covariance, 0.0)))
+    products, weights = off[1:] * off[:-1], np.sqrt(cc[1:] * cc[:-1])
+    scatter = float(np.sqrt(products @ products))
+    sure = float(products.sum()) / scatter if scatter > 0.0 else 0.0
+    return sure, float(np.sqrt(max(products.sum(), 0.0) / max(float(weights.sum()), 1e-300)))
 
 
 def _parts_by(values: FloatArray, cc: FloatArray, parts: int) -> IntArray:
