@@ -21,6 +21,7 @@ from rsea_ros.diagnosis.candidate import (
     fit_candidate,
     in_units_of,
     leaves_only_noise,
+    paid_for,
     refit,
     with_clocks,
     with_doubled_step,
@@ -391,8 +392,8 @@ class StepFits:
     def _surely_helps(self, screened: ScreenedEffect) -> bool:
         """Return whether an effect with its fit to the pieces does better on the validation blocks."""
         scores = self._scores(screened)
-        _, theta = self.complete(screened)
-        extra, rule = len(theta) - self.current.parameters, self.settings.acceptance
+        problem, _ = self.complete(screened)
+        extra, rule = paid_for(problem) - self.current.parameters, self.settings.acceptance
         return any(preference(s, self.current.validation, extra, rule).sure for s in scores)
 
     def _leaves_little(self, model: Candidate) -> bool:

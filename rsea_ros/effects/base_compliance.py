@@ -68,9 +68,10 @@ EFFECT = Effect(
             "not show",
         ),
         Parameter(
-            "inertia", "kg m^2", null=0.5, low=1e-3, high=100.0, typical=0.5, starts=(0.05, 3.0),
+            "inertia", "kg m^2", null=0.5, low=1e-3, high=10.0, typical=0.5, starts=(0.05, 3.0),
             logarithmic=True,
-            reason="from a thousandth of the rotor's to a hundred times it",
+            reason="from a thousandth of the rotor's to ten times it: a heavier one stands still, which a "
+            "sensor above it sees as `structural_resonance`",
         ),
         Parameter(
             "damping_ratio", "1", null=0.02, low=1e-3, high=1.0, typical=0.02, logarithmic=True,

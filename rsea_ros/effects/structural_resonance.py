@@ -3,7 +3,8 @@
     T_ft = T · (1 - participation · s² / (s² + 2 damping_ratio Ω s + Ω²)), Ω = 2π frequency
 
 that is ÿ + 2 damping_ratio · Ω · ẏ + Ω² · y = T and T_ft = T - participation · ÿ, integrated exactly for a
-torque that goes straight from step to step. Source: Ewins, Modal Testing, 2000, section 2.4.
+torque that goes straight from step to step. A sensor that does not feel the mode's damper, with beside = 1,
+sees T - participation · (ÿ + 2 damping_ratio · Ω · ẏ). Source: Ewins, Modal Testing, 2000, section 2.4.
 """
 
 import math
@@ -29,7 +30,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     x[Y] = e * (u * (c + decay * n) + v * n) + torque / (w * w) - lag
     x[RATE] = e * (v * (c - decay * n) - u * w * w * n) + slope
     x[LAST] = torque
-    s[FT] -= p[2] * (torque - 2.0 * decay * x[RATE] - w * w * x[Y])
+    s[FT] -= p[2] * (torque - 2.0 * decay * (1.0 - p[3]) * x[RATE] - w * w * x[Y])
 
 
 EFFECT = Effect(
@@ -48,6 +49,10 @@ EFFECT = Effect(
         Parameter(
             "participation", "1", null=0.0, low=-5.0, high=5.0, typical=0.3,
             reason="five times the spring's own torque at rest: the sensor would see little else",
+        ),
+        Parameter(
+            "beside", "1", null=0.0, low=0.0, high=1.0, typical=0.0, optional=True,
+            reason="a share of the damper",
         ),
     ),
     claims=Claims("ft", "odd", amplitude_exponent=1.0),

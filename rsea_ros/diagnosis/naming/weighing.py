@@ -29,6 +29,7 @@ from rsea_ros.diagnosis.candidate import (
     FitSetup,
     effect_size,
     fit_candidate,
+    paid_for,
     prior_cost,
     refit,
 )
@@ -258,5 +259,5 @@ def promote_best(
 
 def _helps(trial: Trial, score: Score, test_blocks: HeldOut) -> bool:
     """Return whether a trial surely does better than the model that it was tried beside."""
-    extra, rule = len(trial.theta) - trial.beside.parameters, trial.beside.settings.acceptance
+    extra, rule = paid_for(trial.problem) - trial.beside.parameters, trial.beside.settings.acceptance
     return preference(score, test_blocks.score_of(trial.beside), extra, rule).better
