@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import declared
 import numpy as np
 from fleet_histories import cause, history, recordings
 from written import short, sums, text_of
@@ -255,7 +254,6 @@ def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
 
 SCRIPTS: dict[str, Callable[[Path], Iterator[str]]] = {
     "effects_in_motion": effects_in_motion, "observed": observed, "worn_fleet": worn_fleet,
-    "few_days": few_days, "helps": helps, "constants": declared.constants,
-    "values": declared.values,
+    "few_days": few_days, "helps": helps,
 }  # fmt: skip
 """What no line of the command line shows."""
