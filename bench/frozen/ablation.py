@@ -73,7 +73,6 @@ def _was_dropped(result: Candidate | None, self: ReducedModels, model: Candidate
 FITS, FORWARD = "step_fits:StepFits", "stepwise:ForwardStep"
 BRANCHES: Mapping[str, Branch] = {
     "overlooked by the pieces": Branch({f"{FITS}.find_overlooked": _nothing}),
-    "nearly as good, fitted on": Branch({f"{FITS}.nearly_as_good": _nothing}),
     "modes again from typical values": Branch({f"{FITS}.fit_modes_again": lambda self, models: list(models)}),
     "ripple on the measured angle": Branch({f"{FITS}.on_measured_angle": _nothing}),
     "starts from stated values": Branch({f"{FITS}._from_stated_values": _nothing}),
@@ -81,9 +80,7 @@ BRANCHES: Mapping[str, Branch] = {
     "pairs nearer the rig": Branch({f"{FORWARD}._pairs_nearer_the_rig": _nothing}),
     "replacement step": Branch({"stepwise:replacement_step": lambda step: importlib.import_module(
         "rsea_ros.diagnosis.stepwise").NO_STEP}),
-    "bent guesses": Branch({"step_fits:continue_fit": lambda screened, rule: screened}),
     "a tenth of the guess": Branch({"step_fits:_other_guesses": _nothing}),
-    "rough effects": Branch({"step_fits:_rough": lambda effect: effect}),
     "common clock into the delay": Branch({"candidate:with_common_clock_in_delay": lambda solution: None}),
     "a time within the clocks is no cause": Branch({
         "candidate:is_within_clocks": _no, "backward_elimination:is_within_clocks": _no}),

@@ -10,8 +10,7 @@ are noticed.
 
 First come the tests that import the module or reach it, the nearest first, and the steps of test/golden that
 call it; then, for folders that have such, what starts nodes and wires. A fault that none of them notices is
-unnoticed, also where the latter fail without one. The column `by stored values` counts those that the nearest
-files let pass and the stored constants and values noticed.
+unnoticed, also where the latter fail without one.
 """
 
 from __future__ import annotations
@@ -52,14 +51,10 @@ WAIT = re.compile(r"^(nodes/|hardware/test_(faults|lost|port|netft|line)|watch/|
 WIRED = ("nodes", "hardware", "hardware/netft", "hardware/peer", "hardware/dynamixel", "watch", "cli")
 """Folders whose faults they are played for."""
 FIRST, DIRECT, FAR, WIRES = 3, 8, 2, 3
-"""Files of tests that are played: those before the stored constants; in all, of those that import the module,
-of those that reach it, and of those that wait."""
+"""Files of tests that are played: first; in all, of those that import the module, reach it, and wait."""
 LIMIT = 240.0
 """s of CPU for a fault."""
 GOLDEN = "golden/test_golden.py"
-STORED = ("constants", "values")
-"""Steps that store what the code declares and what small functions return."""
-BY_STORED = "by stored values"
 
 
 def main(argv: Sequence[str]) -> int:
@@ -97,12 +92,12 @@ def _show(told: Mapping[tuple[str, str], str], left: int, seed: int) -> int:
     for (target, fault), outcome in told.items():
         if outcome == SURVIVED:
             print(f"  {target}.py:{fault}")
-    print("\n| folder | faults | noticed | by stored values | % |\n|---|--:|--:|--:|--:|")
+    print("\n| folder | faults | noticed | % |\n|---|--:|--:|--:|")
     for folder in (*sorted({target.split("/")[0] for target, _ in told}), "all"):
         these = [o for (t, _), o in told.items() if folder in ("all", t.split("/")[0])]
-        seen, stored = len(these) - these.count(SURVIVED), these.count(BY_STORED)
+        seen = len(these) - these.count(SURVIVED)
         name = f"all, seed {seed}" if folder == "all" else folder
-        print(f"| {name} | {len(these)} | {seen} | {stored} | {100.0 * seen / max(1, len(these)):.1f} |")
+        print(f"| {name} | {len(these)} | {seen} | {100.0 * seen / max(1, len(these)):.1f} |")
     if left:
         print(f"{left} faults are left: the same command goes on", file=sys.stderr)
     return int(seen < LEAST * len(these))
@@ -111,7 +106,7 @@ def _show(told: Mapping[tuple[str, str], str], left: int, seed: int) -> int:
 def _outcome(target: str, mutant: Mutant, steps: Sequence[str]) -> str:
     """Play a fault against its tests, some at a time, up to the first that notices it."""
     near, wires = tests_of(target)
-    groups = [near[:FIRST], tuple(map(_step, STORED)), (*near[FIRST:], *steps)]
+    groups = [near[:FIRST], (*near[FIRST:], *steps)]
     for tests, limit in ((groups, LIMIT), ([wires], None)):
         found: list[str] = []
         try:
@@ -121,8 +116,7 @@ def _outcome(target: str, mutant: Mutant, steps: Sequence[str]) -> str:
         except BenchError as error:
             print(error, file=sys.stderr, flush=True)
         if found and found[0] != SURVIVED:
-            number = int(found[0].rpartition("-")[2]) if "-by-" in found[0] else -1
-            return BY_STORED if limit and kept[number] == groups[1] else "noticed"
+            return "noticed"
     return SURVIVED
 
 
@@ -201,7 +195,7 @@ def _watch_steps(lines: TextIO) -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         desk = Desk(Path(folder))
-        for step in (name for name in chain(VERBS, SCRIPTS) if name not in STORED):
+        for step in chain(VERBS, SCRIPTS):
             profile = cProfile.Profile(builtins=False)
             begun = time.process_time()
             profile.runcall(desk.play, step)

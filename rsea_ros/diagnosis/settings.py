@@ -89,10 +89,6 @@ class ForwardSettings:
     )
     behind_first: float = number(4.0, "1", "of the best cost on pieces: how close the first of them must be")
     behind_next: float = number(1.1, "1", "of the best cost on pieces: how close the others must be")
-    undecided: float = number(
-        0.1, "1", "of what the chosen effect brings: how much less another may bring and still be fitted on",
-        "as `room`: so much a simpler law may lose beside a larger one",
-    )  # fmt: skip
     hope_one: float = number(
         0.98, "1", "of the current cost on pieces: no hope above it, while far", flat("0.8", "1")
     )
@@ -110,11 +106,6 @@ class ForwardSettings:
     screening_part: float = number(
         0.3, "1", "share of such a step that is tried where the whole one does not lower the cost"
     )
-    bent_guesses: int = number(
-        2, "1", "guesses that are fitted on after those steps, where derivatives change on the way",
-        "the better of two after the steps is not always the better in the end (bench/diagnosis)",
-    )  # fmt: skip
-    bent_steps: int = number(4, "1", "steps of that fit")
     clear: float = number(
         0.5, "1", "of the current cost on pieces: where an effect leaves less, none is fitted on"
     )

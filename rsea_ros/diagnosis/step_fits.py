@@ -27,7 +27,7 @@ from rsea_ros.diagnosis.candidate import (
     with_doubled_step,
     without_clocks,
 )
-from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, loss_excess, preference
+from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, preference
 from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses, stated_starts
 from rsea_ros.diagnosis.score import Score, score_on
@@ -41,7 +41,7 @@ from rsea_ros.identification.confidence import is_off_rig
 from rsea_ros.identification.fit import add_effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Pools, Solution, bounded_step, jacobian_columns, power, solve
-from rsea_ros.identification.unknowns import apply, idle, start_vector, theta_with, unknowns_of_effect
+from rsea_ros.identification.unknowns import apply, start_vector, theta_with
 from rsea_ros.records.record import FloatArray
 
 _DAMPING = 1e-6
@@ -50,17 +50,12 @@ _DAMPING = 1e-6
 
 @dataclass(frozen=True)
 class ScreenedEffect:
-    """An effect beside the current model, with the start of a full fit and the cost already reached.
-
-    unsure: the best of its guesses whose derivatives change on the way, as far as two steps led, which does
-    not show where a fit leads.
-    """
+    """An effect beside the current model, with the start of a full fit and the cost already reached."""
 
     effect: Effect
     problem: Problem
     theta: FloatArray
     cost: float
-    unsure: tuple[ScreenedEffect, ...] = ()
 
     @property
     def name(self) -> str:
@@ -103,7 +98,7 @@ def _best_of(
     current: Solution, effect: Effect, guesses: Iterable[Mapping[str, float]], rule: ForwardSettings
 ) -> ScreenedEffect | None:
     """Return the best of some guesses."""
-    tried_all, unsure = [], []
+    tried_all = []
     for guess in guesses:
         parameters = {name: value for name, value in guess.items() if "." not in name}
         base = with_values(current, {name: value for name, value in guess.items() if "." in name})
@@ -115,11 +110,7 @@ def _best_of(
             continue
         if tried is not None:
             tried_all.append(tried)
-            unsure += [tried] if is_bent and 0.0 < tried.cost < math.inf else []
-    best = min(tried_all, key=lambda s: s.cost, default=None)
-    apart = {round(math.log(s.cost), 3): s for s in reversed(unsure)}
-    least = tuple(apart[k] for k in sorted(apart)[: rule.bent_guesses])
-    return None if best is None else replace(best, unsure=least)
+    return min(tried_all, key=lambda s: s.cost, default=None)
 
 
 def best_guess(
@@ -131,13 +122,6 @@ def best_guess(
     """
     tried = (_with_present_derivatives(current, effect, guess, rule) for guess in guesses)
     return min((t for t in tried if t is not None), key=lambda s: s.cost, default=None)
-
-
-def continue_fit(screened: ScreenedEffect, rule: ForwardSettings) -> ScreenedEffect:
-    """Return the best of an effect's guesses after more steps of those that were unsure."""
-    longer = [solve(s.problem, s.theta, iterations=rule.bent_steps) for s in screened.unsure]
-    ends = [ScreenedEffect(screened.effect, s.problem, s.theta, s.cost) for s in longer]
-    return min([screened, *ends], key=lambda s: s.cost)
 
 
 def with_values(current: Solution, values: Mapping[str, float]) -> Solution:
@@ -254,12 +238,9 @@ class StepFits:
 
         def try_effect(i: int) -> ScreenedEffect | None:
             self.say(effects[i].name, 0.4 * i / len(effects))
-            return screen(solution, _rough(effects[i]), guesses[effects[i].name], self.settings.forward)
+            return screen(solution, effects[i], guesses[effects[i].name], self.settings.forward)
 
         screened = [s for s in self.pools.fits.map(try_effect, range(len(effects))) if s is not None]
-        rule = self.settings.forward
-        if all(s.cost > rule.clear * solution.cost for s in screened):
-            screened = list(self.pools.fits.map(lambda s: continue_fit(s, rule), screened))
         return sorted(screened, key=lambda s: s.cost)
 
     def with_typical(self, screened: ScreenedEffect) -> Solution:
@@ -299,17 +280,6 @@ class StepFits:
         helps = self.pools.fits.map(self._surely_helps, left_out)
         return [s for s, is_sure in zip(left_out, helps, strict=True) if is_sure]
 
-    def nearly_as_good(self, left_out: Sequence[ScreenedEffect], chosen: Candidate) -> list[ScreenedEffect]:
-        """Return those of the effects left out that remove nearly as much as the chosen one.
-
-        On the validation blocks, as fitted so far. In a part of the band many laws are one; which of them was
-        fitted on is then chance.
-        """
-        gained = loss_excess(self.current, chosen)
-        least = self.settings.forward.undecided * gained
-        excesses = self.pools.fits.map(lambda s: self._least_loss(s, chosen), left_out)
-        return [s for s, excess in zip(left_out, excesses, strict=True) if excess < least]
-
     def on_measured_angle(self) -> list[Candidate]:
         """Return models with an effect of the rotor's angle, simulated on the measured angle.
 
@@ -331,7 +301,7 @@ class StepFits:
         theta = screened.theta
         if self.is_far:
             problem, theta = with_clocks(problem, theta, self.current.problem)
-        return _free_all_parameters(problem, theta, screened.effect)
+        return problem, theta
 
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
         self.say(f"fitting {screened.name}", 0.5)
@@ -401,12 +371,6 @@ class StepFits:
         near = self.is_far and not is_far_from_floor(model, self.settings)
         return near or leaves_only_noise(model, self.settings.floor.only_noise)
 
-    def _least_loss(self, screened: ScreenedEffect, chosen: Candidate) -> float:
-        """Return how much more an effect with its fit to the pieces loses than the chosen model."""
-        against = chosen.validation
-        losses = [float(s.loss(against).sum()) for s in self._scores(screened)]
-        return min(losses) - float(against.loss(against).sum())
-
     def _scores(self, screened: ScreenedEffect) -> list[Score]:
         """Return the scores on the validation blocks of an effect with its fit to the pieces."""
         problem, theta = self.complete(screened)
@@ -429,17 +393,3 @@ class StepFits:
         scores, channels = (model.validation, self.current.validation), model.validation.sums
         now, before = (np.array([max(s.ratio(n), 1.0) for n in channels]) for s in scores)
         return bool(np.any(np.abs(now / before - 1.0) > self.settings.forward.moved))
-
-
-def _rough(effect: Effect) -> Effect:
-    """Return an effect whose parameters with a prior stay at it: from afar they lead a fit astray."""
-    held = tuple(p.name for p in effect.parameters if math.isfinite(p.spread))
-    return replace(effect, idle=lambda rig: held) if held else effect
-
-
-def _free_all_parameters(problem: Problem, theta: FloatArray, effect: Effect) -> tuple[Problem, FloatArray]:
-    """Return a problem with all parameters of a rough effect free that its rig has, and its theta."""
-    known = {u.name for u in problem.unknowns} | idle(effect_named(effect.name), problem.rig)
-    more = unknowns_of_effect(effect, effect.typical, known)
-    larger = replace(problem, unknowns=(*problem.unknowns, *more))
-    return larger, np.concatenate([theta, start_vector(more)])

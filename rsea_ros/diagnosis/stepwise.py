@@ -85,12 +85,6 @@ class ForwardStep:
             models += self.fits.on_measured_angle()
         contenders = self._acceptable(models) or self._pairs(finalists)
         chosen, equals = self._choose(contenders)
-        if chosen is not None and any(m is chosen for m in models):
-            undecided = self.fits.nearly_as_good(_others(close, finalists), chosen)
-            finalists += undecided
-            models += self.fits.fit_all(undecided)
-            contenders = self._acceptable(models)
-            chosen, equals = self._choose(contenders)
         if chosen is not None and is_off_rig(chosen.solution):
             contenders += self._pairs_nearer_the_rig(chosen, close)
             chosen, equals = self._choose(contenders)

@@ -70,8 +70,7 @@ EFFECT = Effect(
         Parameter(
             "inertia", "kg m^2", null=0.5, low=1e-3, high=10.0, typical=0.5, starts=(0.05, 3.0),
             logarithmic=True,
-            reason="from a thousandth of the rotor's to ten times it: a heavier one stands still, which a "
-            "sensor above it sees as `structural_resonance`",
+            reason="a thousandth of the rotor's to ten times it: a heavier one is `structural_resonance`",
         ),
         Parameter(
             "damping_ratio", "1", null=0.02, low=1e-3, high=1.0, typical=0.02, logarithmic=True,

@@ -1,10 +1,11 @@
 """Resonance of the structure that carries the F/T sensor: a mode that the spring's torque shakes.
 
-    T_ft = T · (1 - participation · s² / (s² + 2 damping_ratio Ω s + Ω²)), Ω = 2π frequency
+    T_ft = T · (1 - participation · (s² + beside · d s) / (s² + d s + Ω²)), d = 2 damping_ratio Ω,
+    Ω = 2π frequency
 
-that is ÿ + 2 damping_ratio · Ω · ẏ + Ω² · y = T and T_ft = T - participation · ÿ, integrated exactly for a
-torque that goes straight from step to step. A sensor that does not feel the mode's damper, with beside = 1,
-sees T - participation · (ÿ + 2 damping_ratio · Ω · ẏ). Source: Ewins, Modal Testing, 2000, section 2.4.
+that is ÿ + d · ẏ + Ω² · y = T and T_ft = T - participation · (ÿ + beside · d · ẏ), integrated exactly for a
+torque that goes straight from step to step. With beside = 1 the sensor does not feel the mode's damper.
+Source: Ewins, Modal Testing, 2000, section 2.4.
 """
 
 import math
