@@ -31,7 +31,7 @@ from bench.calibration.score import (
 )
 from bench.results import append_line, read_lines
 from rsea_ros.checks.faults import check
-from rsea_ros.diagnosis.criteria import is_at_floor, takes_most
+from rsea_ros.diagnosis.criteria import is_at_floor
 from rsea_ros.diagnosis.diagnose import nominal_problem, search
 from rsea_ros.diagnosis.evaluation import held_out_data
 from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, weigh
@@ -144,14 +144,11 @@ def _weigh(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
             if kept:
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 kept.write_bytes(pickle.dumps((selection, stages)))
-        accepted, held_out = len(stages), held_out_data(selection, None)
-        weighing = weigh(selection, stages, held_out, pools, settings)
+        weighing = weigh(selection, stages, held_out_data(selection, None), pools, settings)
     first, last = weighing.stages[0].test, weighing.stages[-1].test
     return {
         "nothing_wrong": is_at_floor(first),
         "at_floor": is_at_floor(last),
-        "takes_most": takes_most(first, last),
-        "promoted": len(weighing.stages) > accepted,
         "places": [_place(p) for p in weighing.places],
     }
 

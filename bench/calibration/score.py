@@ -95,11 +95,7 @@ def probabilities_of(
     for record in entries:
         for place in record["places"]:
             evidence = [evidence_from(e) for e in place]
-            is_late = record["promoted"] and place is record["places"][-1]
-            takes_most = record["takes_most"] and not is_late
-            likely, status = probabilities_and_status(
-                evidence, record["at_floor"], takes_most, coefficients=coefficients
-            )
+            likely, status = probabilities_and_status(evidence, record["at_floor"], coefficients=coefficients)
             rights = [e.name in record["truth"] for e in evidence]
             rest = any(rights[1:])
             for k, (e, p, right) in enumerate(zip(evidence, likely, rights, strict=True)):

@@ -26,7 +26,6 @@ CURVES: Mapping[str, Sequence[float]] = {
     "acceptance.fall": (0.03, 0.1, 0.2, 0.3),
     "acceptance.matters": (0.005, 0.05, 0.1),
     "acceptance.fall_in_doubt": (0.1, 0.2, 0.5),
-    "floor.misfit": (1.2, 2.0, 3.0),
     "floor.reached": (1.05, 1.2, 1.4),
     "forward.piece_fits": (3, 5, 15),
     "forward.full_fits": (1, 2, 6),

@@ -86,8 +86,6 @@ BRANCHES: Mapping[str, Branch] = {
         "candidate:is_within_clocks": _no, "backward_elimination:is_within_clocks": _no}),
     "quick replacement dropped": Branch(
         {"backward_elimination:ReducedModels._with": _fitted_on}, acts=_was_dropped),
-    "one late cause promoted": Branch(
-        {"naming.weighing:promote_best": lambda selection, stages, *_: (selection, stages)}, late=True),
     "close rivals fitted to the end": Branch(
         {"naming.weighing:_with_close_ones_fitted": lambda tried, *_: tried}, late=True),
     "a cause that changes nothing": Branch(
@@ -101,7 +99,6 @@ BRANCHES: Mapping[str, Branch] = {
     "known values that pay": Branch({
         "criteria:keeps_known_values": _no, "backward_elimination:keeps_known_values": _no}),
     "play remark": Branch({"naming.conclusion:undetermined_play": lambda *_: ()}, late=True),
-    "takes_most": Branch({"naming.conclusion:takes_most": _no}, late=True),
     "missed response by coherence": Branch({"score:missed_response": lambda *_: 0.0}),
 }  # fmt: skip
 """By the names of the list in the issue that asked for the table."""

@@ -216,20 +216,3 @@ def verdict_of(
 def is_at_floor(test: Score, levels: FloorSettings = DEFAULT.floor) -> bool:
     """Return whether every channel is at its noise floor."""
     return all(test.ratio(n) <= levels.reached for n in test.sums)
-
-
-def takes_most(first: Score, last: Score, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Return whether causes take half of the residual in every channel that misfits, or all of one.
-
-    The latter counts where that one misfits much and no other gets materially worse.
-    """
-    levels, unchanged = settings.floor, 1.0 + settings.acceptance.matters
-    misfitting = [n for n in first.sums if first.ratio(n) > levels.misfit]
-    shares_left = [last.ratio(n) / first.ratio(n) for n in misfitting]
-    is_explained = any(
-        first.ratio(n) > levels.large_misfit and last.ratio(n) < levels.misfit for n in misfitting
-    )
-    if not shares_left:
-        return False
-    most_left = max(shares_left)
-    return most_left < levels.share_left or (is_explained and most_left <= unchanged)

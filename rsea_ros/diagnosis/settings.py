@@ -218,11 +218,6 @@ class FloorSettings:
         AT_NOISE, "1", "up to it on the test blocks a channel has reached its floor",
         "at 1.05 a record with nothing wrong is unexplained; no change up to 1.4 (docs/settings.md)",
     )  # fmt: skip
-    misfit: float = number(
-        1.5, "1", "above it a channel misfits: causes must take half of that away", flat("1.2", "3")
-    )
-    large_misfit: float = number(3.0, "1", "above it a channel misfits much: causes may explain it alone")
-    share_left: float = number(0.5, "1", "of a misfit: what may be left where causes are named")
     far: float = number(
         5.0, "1", "from it on, in the worst channel, a model is far from the floor",
         "the residual is not noise there: priors mean little, and more parameters always gain a little",

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.criteria import is_at_floor, takes_most, verdict_of
+from rsea_ros.diagnosis.criteria import is_at_floor, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined, HeldOut, Selection, Trial, held_out_data
 from rsea_ros.diagnosis.naming.status import Named, name_causes
 from rsea_ros.diagnosis.naming.weighing import Weighed, Weighing, weigh
@@ -243,9 +243,8 @@ def with_rivals(cause: Cause, selection: Selection) -> Cause:
 
 def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Named]:
     """Return the naming of each cause."""
-    first, last = weighing.stages[0].test, weighing.stages[-1].test
-    at_floor, most = is_at_floor(last, settings.floor), takes_most(first, last, settings)
-    return {n.cause.evidence.name: n for n in name_causes(weighing.places, at_floor, most, settings)}
+    at_floor = is_at_floor(weighing.stages[-1].test, settings.floor)
+    return {n.cause.evidence.name: n for n in name_causes(weighing.places, at_floor, settings)}
 
 
 def with_sure_gains(

@@ -2,8 +2,8 @@
 
 A cause and its rivals share the probability that one of them is right; the rest is "none of these". A cause
 that surely takes a material part is named unless "none of these" is four times as likely; one that helps
-less, where it is likelier than that. Causes that together take most of the residual, or all of it, are always
-named, but as `confirmed` only where they are likely.
+less, where it is likelier than that. Causes that together leave only noise are always named, but as
+`confirmed` only where they are likely.
 
 p = 1 / (1 + exp(-(a_0 + sum_i a_i f_i)))
 
@@ -103,19 +103,18 @@ class Named:
 def name_causes(
     places: Sequence[CauseAndRivals],
     at_floor: bool,
-    takes_most: bool,
     settings: DiagnosisSettings = DEFAULT,
 ) -> list[Named]:
     """Return the naming of the cause in each place.
 
-    at_floor, takes_most: all causes together leave only noise, or take most of the residual (criteria.py).
+    at_floor: all causes together leave only noise (criteria.py).
     """
-    return [_name_one(p, at_floor, takes_most and not p.is_late, settings) for p in places]
+    return [_name_one(p, at_floor, settings) for p in places]
 
 
-def _name_one(place: CauseAndRivals, at_floor: bool, takes_most: bool, settings: DiagnosisSettings) -> Named:
+def _name_one(place: CauseAndRivals, at_floor: bool, settings: DiagnosisSettings) -> Named:
     every = [place.cause, *place.rivals]
-    likely, status = probabilities_and_status([w.evidence for w in every], at_floor, takes_most, settings)
+    likely, status = probabilities_and_status([w.evidence for w in every], at_floor, settings)
     others = zip(every[1:], likely[1:], strict=True)
     rivals = tuple((w, p) for w, p in others if p >= settings.naming.rival)
     return Named(place.cause, likely[0], status, rivals)
@@ -124,7 +123,6 @@ def _name_one(place: CauseAndRivals, at_floor: bool, takes_most: bool, settings:
 def probabilities_and_status(
     evidence: Sequence[Evidence],
     at_floor: bool,
-    takes_most: bool,
     settings: DiagnosisSettings = DEFAULT,
     coefficients: Mapping[str, float] = COEFFICIENTS,
 ) -> tuple[list[float], Status | None]:
@@ -135,7 +133,7 @@ def probabilities_and_status(
     likely = [probability(e, k == 0, coefficients, settings) for k, e in enumerate(evidence)]
     likely = [p / max(1.0, sum(likely)) for p in likely]
     rivals = [p for p in likely[1:] if p >= settings.naming.rival]
-    is_named = at_floor or takes_most or _helps(likely[0] + sum(rivals), evidence[0], settings)
+    is_named = at_floor or _helps(likely[0] + sum(rivals), evidence[0], settings)
     status = status_of(likely[0], rivals, at_floor, settings.naming) if is_named else None
     sign, errors = evidence[0].signature, Z95 * settings.sizes.model_error
     wanders = at_floor and sign.carried > settings.naming.carried and sign.lasting > errors

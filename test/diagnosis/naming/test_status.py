@@ -55,9 +55,9 @@ RIGHT = Evidence(
 )  # fmt: skip
 
 
-@given(st.lists(EVIDENCE, min_size=1, max_size=4), st.booleans(), st.booleans())
-def test_a_cause_and_its_rivals_share_one_probability(evidence, at_floor, takes_most):
-    likely, _ = probabilities_and_status(evidence, at_floor, takes_most)
+@given(st.lists(EVIDENCE, min_size=1, max_size=4), st.booleans())
+def test_a_cause_and_its_rivals_share_one_probability(evidence, at_floor):
+    likely, _ = probabilities_and_status(evidence, at_floor)
     assert all(0.0 <= p <= 1.0 for p in likely)
     assert sum(likely) <= 1.0 + 1e-9
 
@@ -75,7 +75,7 @@ def test_only_what_is_likely_is_confirmed(p, rivals, at_floor):
 @given(EVIDENCE)
 def test_a_cause_that_the_data_speak_against_is_not_named(evidence):
     """Away from the floor, an effect that takes less than most must be probable and surely useful."""
-    (p,), status = probabilities_and_status([evidence], at_floor=False, takes_most=False)
+    (p,), status = probabilities_and_status([evidence], at_floor=False)
     brings = evidence.gain_low >= DEFAULT.acceptance.fall and not evidence.at_edge
     assert (status is None) == (not evidence.is_sure or p < (0.2 if brings else 0.5))
 
@@ -110,7 +110,7 @@ def test_a_cause_whose_misfit_lasts_from_block_to_block_is_not_confirmed():
     """But for what two right simulations differ by: 1e-4 of the contribution also lasts."""
     wandering = replace(RIGHT, signature=replace(RIGHT.signature, carried=4.0, lasting=0.1))
     alike = replace(wandering, signature=replace(wandering.signature, lasting=1e-3))
-    every = [probabilities_and_status([e], at_floor=True, takes_most=True) for e in (RIGHT, alike, wandering)]
+    every = [probabilities_and_status([e], at_floor=True) for e in (RIGHT, alike, wandering)]
     assert [status for _, status in every] == ["confirmed", "confirmed", "leading"]
 
 
