@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import gc
 import os
 import signal
 import sys
@@ -128,9 +127,5 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 
 
 def pytest_collection_finish() -> None:
-    """Leave the bytecode of what the tests import to the environment, and what now exists to itself.
-
-    Else the collector of garbage looks through all modules and items again and again, 4 % of the time.
-    """
-    gc.freeze()
+    """Leave the bytecode of what the tests themselves import to the environment again."""
     sys.dont_write_bytecode, sys.pycache_prefix = BYTECODE

@@ -14,7 +14,6 @@ from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import Trigger
 from rsea_ros.nodes import driver
-from rsea_ros.nodes._mailbox import Polled
 from test.nodes.stalls import every
 from test.nodes.warm import Nodes
 
@@ -103,10 +102,10 @@ class Listener:
 
     def __init__(self):
         rclpy.init()
-        self.node = rclpy.create_node("listener", start_parameter_services=False)
+        self.node = rclpy.create_node("listener")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
-        self._heard, self._clients = [], {}
+        self._subscriptions, self._clients = [], {}
 
     def serve(self, node):
         """Spin another node of this process too, until it is dropped."""
@@ -123,15 +122,7 @@ class Listener:
         while not (result := condition()):
             assert time.monotonic() < deadline, "waited in vain"
             self._executor.spin_once(timeout_sec=0.01)  # conditions that command are heard in time
-            self._take()
         return result
-
-    def _take(self):
-        """Take all that has arrived: an executor, which serves it one by one, took half of a test's time."""
-        for subscription, messages in self._heard:
-            with subscription.handle:
-                while (taken := subscription.handle.take_message(subscription.msg_type, False)) is not None:
-                    messages.append(taken[0])
 
     def call(self, name, kind=Trigger, request=None):
         """Call a service; return its answer.
@@ -158,15 +149,15 @@ class Listener:
 
     def hear(self, kind, topic, qos):
         """Return a list that fills with the messages of a topic."""
-        subscription = self.node.create_subscription(kind, topic, id, qos, callback_group=Polled())
-        self._heard.append((subscription, []))
-        return self._heard[-1][1]
+        heard = []
+        self._subscriptions.append(self.node.create_subscription(kind, topic, heard.append, qos))
+        return heard
 
     def forget(self):
         """Hear nothing any more."""
-        for subscription, _ in self._heard:
+        for subscription in self._subscriptions:
             self.node.destroy_subscription(subscription)
-        self._heard = []
+        self._subscriptions = []
 
     def close(self):
         """Take the node away."""
