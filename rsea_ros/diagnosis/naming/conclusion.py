@@ -252,9 +252,11 @@ def with_sure_gains(
 ) -> dict[str, Named]:
     """Return the naming with no cause named whose own gain on held-out data may be none.
 
-    Except where all causes together leave only noise: of two that act together each may gain nothing alone.
+    Except where only all causes together leave nothing but noise: of two that act together each may gain
+    nothing alone.
     """
-    if is_at_floor(stages[-1].test, settings.floor):
+    without, with_all = (is_at_floor(stages[k].test, settings.floor) for k in (0, -1))
+    if with_all and not without:
         return dict(naming)
     gains = {step[1].added: own_gain(step, channel, settings) for step in itertools.pairwise(stages)}
     unsure = {name for name, (_, _, (low, _)) in gains.items() if not low > 0.0}

@@ -207,6 +207,15 @@ def score_of(ratios):
     return Score(sums, {n: np.full(4, 100.0) for n in ratios})
 
 
+@pytest.mark.parametrize(("before", "status"), [(1.0, None), (3.0, "leading")])
+def test_beside_a_rig_that_leaves_only_noise_a_cause_is_named_only_for_a_sure_gain(before, status):
+    """A drift of -0.002 % was named in a clean record, as all causes were that together leave only noise."""
+    levels = (("", before), ("backlash", 1.0), ("damping_drift", 1.0))
+    stages = [SimpleNamespace(added=n, test=score_of({"ft": level})) for n, level in levels]
+    naming = {"damping_drift": Named(None, 0.2, "leading", ())}
+    assert outcome.with_sure_gains(naming, stages, "ft", DEFAULT)["damping_drift"].status == status
+
+
 @given(RATIOS | NEAR)
 def test_the_sentence_speaks_of_a_channel_that_bears_the_verdict_out(ratios):
     score = score_of(ratios)
