@@ -144,12 +144,11 @@ def _weigh(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
             if kept:
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 kept.write_bytes(pickle.dumps((selection, stages)))
-        weighing = weigh(selection, stages, held_out_data(selection, None), pools, settings)
-    first, last = weighing.stages[0].test, weighing.stages[-1].test
+        places = weigh(selection, stages, held_out_data(selection, None), pools, settings)
     return {
-        "nothing_wrong": is_at_floor(first),
-        "at_floor": is_at_floor(last),
-        "places": [_place(p) for p in weighing.places],
+        "nothing_wrong": is_at_floor(stages[0].test),
+        "at_floor": is_at_floor(stages[-1].test),
+        "places": [_place(p) for p in places],
     }
 
 

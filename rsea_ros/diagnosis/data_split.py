@@ -15,7 +15,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings, DiagnosisSettings
 from rsea_ros.identification.problem import Case
@@ -162,7 +161,7 @@ def _piece(
 _NEAR = 0.03
 """s on either side that show a speed: of 4 Hz 10 % is missing, of what a model leaves."""
 _FEWEST = 4
-"""Samples on either side at least."""
+"""Samples that it takes at least."""
 
 
 def state_at(
@@ -182,6 +181,8 @@ def state_at(
     off, model = stamps[near] - t, simulated[near]
     if len(off) < _FEWEST:
         return _at(case, "position", t), 0.0
+    from scipy.interpolate import CubicSpline  # half a second at every start, which a velocity sensor saves
+
     slope, level = np.polyfit(off, case.measured["position"][near] - model, 1)
     curve = CubicSpline(off, model)
     return float(curve(0.0) + level), float(curve(0.0, 1) + slope)

@@ -107,7 +107,7 @@ class ForwardSettings:
         0.3, "1", "share of such a step that is tried where the whole one does not lower the cost"
     )
     clear: float = number(
-        0.5, "1", "of the current cost on pieces: where an effect leaves less, none is fitted on"
+        0.5, "1", "of the current cost on pieces: how much the first of a pair nearer the rig may leave"
     )
     nearer: float = number(
         0.5, "1", "of the prior's cost of the chosen effect: how near to the rig another keeps its values",

@@ -15,7 +15,7 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian, serial
-from rsea_ros.identification.unknowns import apply
+from rsea_ros.identification.unknowns import apply, bounds_of
 from rsea_ros.model.drive import coarser, drive_from
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import simulate_drive
@@ -175,9 +175,7 @@ class Hypothesis:
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and highest coordinates, shape (n,) each."""
-        unknowns = self.problem.unknowns
-        low = [u.inner(max(u.low, 1e-300) if u.logarithmic else u.low) for u in unknowns]
-        return np.array(low), np.array([u.inner(u.high) for u in unknowns])
+        return bounds_of(self.problem.unknowns)
 
     @property
     def cause_indices(self) -> list[int]:

@@ -20,7 +20,7 @@ from scipy.linalg.blas import dger
 from threadpoolctl import threadpool_limits
 
 from rsea_ros.identification.problem import Problem, simulate_cases
-from rsea_ros.identification.unknowns import Unknown, apply, start_vector
+from rsea_ros.identification.unknowns import Unknown, apply, bounds_of, start_vector
 from rsea_ros.records.record import FloatArray
 
 _DIFFERENCE = 1e-4
@@ -290,8 +290,7 @@ def _along_the_bend(
     size = np.sqrt(np.diag(normal))
     if np.linalg.norm(size * aside) > _MOST_BENT * np.linalg.norm(size * step):
         return trial
-    low, high = (np.array([u.inner(b(u)) for u in problem.unknowns]) for b in (_lowest, _highest))
-    return np.asarray(np.clip(trial + aside, low, high))
+    return np.asarray(np.clip(trial + aside, *bounds_of(problem.unknowns)))
 
 
 def broyden_update(matrix: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
@@ -310,7 +309,7 @@ def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope:
 
     An unknown that reaches a bound stays at it, and the others compensate.
     """
-    low, high = (np.array([u.inner(b(u)) for u in problem.unknowns]) for b in (_lowest, _highest))
+    low, high = bounds_of(problem.unknowns)
     step, free = np.zeros(len(theta)), np.ones(len(theta), bool)
     for _ in range(4):
         right = slope[free] - normal[np.ix_(free, ~free)] @ -step[~free]
@@ -321,14 +320,6 @@ def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope:
         step[beyond] = np.clip(theta + step, low, high)[beyond] - theta[beyond]
         free &= ~beyond
     return np.clip(theta + step, low, high)
-
-
-def _lowest(unknown: Unknown) -> float:
-    return max(unknown.low, 1e-300) if unknown.logarithmic else unknown.low
-
-
-def _highest(unknown: Unknown) -> float:
-    return unknown.high
 
 
 @contextmanager

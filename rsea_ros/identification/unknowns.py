@@ -221,6 +221,12 @@ def _move(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:
     return replace(setting, parameters=moved)
 
 
+def bounds_of(unknowns: Sequence[Unknown]) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of a fit in its coordinates; a logarithm has one far below every value."""
+    low = [u.inner(max(u.low, 1e-300) if u.logarithmic else u.low) for u in unknowns]
+    return np.array(low), np.array([u.inner(u.high) for u in unknowns])
+
+
 def start_vector(unknowns: Sequence[Unknown]) -> FloatArray:
     """Return the start of the fit in its coordinates."""
     return np.array([u.inner(u.start) for u in unknowns])

@@ -13,7 +13,7 @@ import numpy as np
 from rsea_ros.diagnosis.criteria import is_at_floor, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined, HeldOut, Selection, Trial, held_out_data
 from rsea_ros.diagnosis.naming.status import Named, name_causes
-from rsea_ros.diagnosis.naming.weighing import Weighed, Weighing, weigh
+from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, Weighed, weigh
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating_run
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
 from rsea_ros.diagnosis.result import (
@@ -212,14 +212,20 @@ class Outcome:
     named: Mapping[str, Named]
 
 
-def outcome_of(weighing: Weighing, examined: Examined, settings: DiagnosisSettings) -> Outcome:
+def outcome_of(
+    places: Sequence[CauseAndRivals],
+    selection: Selection,
+    stages: Sequence[Evaluated],
+    examined: Examined,
+    settings: DiagnosisSettings,
+) -> Outcome:
     """Return the verdict on weighed causes, those that are named, and those that may not be."""
-    selection, stages, levels = weighing.selection, weighing.stages, settings.floor
+    levels = settings.floor
     channel = next((n for n in MEASURED if n in stages[0].test.sums), None)
     if channel is None:
         source = examined.records[0].source
         raise IdentificationError(f"{source}: no sample is left to test on, expected a longer record")
-    naming = with_sure_gains(naming_of(weighing, settings), stages, channel, settings)
+    naming = with_sure_gains(naming_of(places, stages, settings), stages, channel, settings)
     steps = itertools.pairwise(stages)
     dropped = tuple(dropped_cause(a, b, naming, channel) for a, b in steps if not is_named(b, naming))
     stages = without_unnamed_end(stages, naming)
@@ -241,10 +247,12 @@ def with_rivals(cause: Cause, selection: Selection) -> Cause:
     return replace(cause, confusable_with=tuple(m.newest for m in selection.rivals_of(cause.name)))
 
 
-def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Named]:
+def naming_of(
+    places: Sequence[CauseAndRivals], stages: Sequence[Evaluated], settings: DiagnosisSettings
+) -> dict[str, Named]:
     """Return the naming of each cause."""
-    at_floor = is_at_floor(weighing.stages[-1].test, settings.floor)
-    return {n.cause.evidence.name: n for n in name_causes(weighing.places, at_floor, settings)}
+    at_floor = is_at_floor(stages[-1].test, settings.floor)
+    return {n.cause.evidence.name: n for n in name_causes(places, at_floor, settings)}
 
 
 def with_sure_gains(
@@ -332,9 +340,9 @@ def conclude(
     settings: DiagnosisSettings,
 ) -> Diagnosis:
     """Weigh and name the causes of a selection. stages: its models, evaluated."""
-    weighing = weigh(selection, stages, held_out_data(selection, examined.holdout), pools, settings)
-    outcome = outcome_of(weighing, examined, settings)
-    return _diagnosis(weighing.selection, outcome, examined, pools, settings)
+    places = weigh(selection, stages, held_out_data(selection, examined.holdout), pools, settings)
+    outcome = outcome_of(places, selection, stages, examined, settings)
+    return _diagnosis(selection, outcome, examined, pools, settings)
 
 
 def _diagnosis(

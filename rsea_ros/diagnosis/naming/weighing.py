@@ -189,23 +189,14 @@ class CauseAndRivals:
     rivals: tuple[Weighed, ...]
 
 
-@dataclass(frozen=True)
-class Weighing:
-    """The selection, its stages, and the evidence by place."""
-
-    selection: Selection
-    stages: list[Evaluated]
-    places: list[CauseAndRivals]
-
-
 def weigh(
     selection: Selection,
     stages: Sequence[Evaluated],
     held_out: HeldOut,
     pools: Pools,
     settings: DiagnosisSettings,
-) -> Weighing:
-    """Weigh every accepted cause and its rivals."""
+) -> list[CauseAndRivals]:
+    """Return every accepted cause and its rivals with the evidence for each, in the order of the stages."""
     contested = contests(selection, stages, held_out, pools)
     claims = [c for contest in contested for c in (contest.cause, *contest.rivals)]
     weigh_claim = partial(evidence_for, cases=selection.cases, settings=settings, run=pools.run)
@@ -214,9 +205,8 @@ def weigh(
     def with_evidence(group: Sequence[Claim]) -> tuple[Weighed, ...]:
         return tuple(Weighed(c, e) for c in group if (e := evidence_by_claim[id(c)]) is not None)
 
-    places = [
+    return [
         CauseAndRivals(cause[0], with_evidence(contest.rivals))
         for contest in contested
         if (cause := with_evidence([contest.cause]))
     ]
-    return Weighing(selection, list(stages), places)
