@@ -16,7 +16,7 @@ from msg_adapters.ros import (
 )
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig, save_rig
-from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._qos import COMMAND, RECORD_RELIABLE
 from test.nodes.torque_loop import PERIOD, RATE, Loop
 
 HZ, AMPLITUDE = 5.0, 10.0
@@ -83,7 +83,7 @@ def test_a_reversed_axis_is_a_fault_before_there_is_torque(start, listener):
     spaces = {"__ns": "/turned"}
     start("plant", remaps=spaces, rate=RATE)
     start("controller", remaps=spaces, axis="-torque.z")
-    commands = listener.hear(JointState, "/turned/torque_command", COMMAND)
+    commands = listener.hear(JointState, "/turned/torque_command", RECORD_RELIABLE)
     health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
     desired = listener.node.create_publisher(JointState, "/turned/desired_torque", COMMAND)
     told = lambda: [m.status[0].message for m in health if m.status[0].name == "/turned/controller"]  # noqa: E731
@@ -95,6 +95,7 @@ def test_a_reversed_axis_is_a_fault_before_there_is_torque(start, listener):
         return any("ft is reversed" in words for words in told())
 
     listener.until(contradicted)
+    listener.until(lambda: any(effort_of(m)[1] for m in commands))  # they may be heard after what they showed
     assert 0.0 < max(abs(effort_of(m)[1]) for m in commands) < 5.0
 
 
