@@ -229,6 +229,7 @@ def test_with_the_defaults_a_fault_ends_the_torques_that_it_concerns(leg, wrong,
         leg.listener.until(lambda: all(leg.faults()[place] != "none" for place in causes))
         writes, faults = [leg.acting(place, since) for place in range(3)], leg.faults()
         leg.bench.ask(right[0], **right[1])
+        leg.call("clear_fault")
         spared = all(all(writes[place]) for place in set(range(3)) - causes.keys())
         if spared and all(faults[place].startswith(causes.get(place, "none")) for place in range(3)):
             break
