@@ -177,6 +177,7 @@ def _steps() -> dict[str, list[str]]:
             os.wait()
             lines.seek(0)
             known = {"script": script, "calls": [line.split() for line in lines]}
+        kept.parent.mkdir(exist_ok=True)
         kept.write_text(json.dumps(known))
     found: dict[str, list[str]] = defaultdict(list)
     for _, step, target in sorted((float(seconds), step, target) for seconds, step, target in known["calls"]):
