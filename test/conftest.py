@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import signal
 import sys
@@ -20,6 +21,8 @@ import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting th
 from rsea_ros.compiler import trusted_cache
 
 sys.path.append(str(Path(__file__).parent))  # import_graph, which is no test
+
+gc.disable()  # until all is collected: it finds nothing in what tests are made of, in a second of each worker
 
 BYTECODE = sys.dont_write_bytecode, sys.pycache_prefix
 if sys.dont_write_bytecode:  # then pytest would rewrite 3000 asserts anew in each worker, 10 s each
@@ -127,5 +130,10 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 
 
 def pytest_collection_finish() -> None:
-    """Leave the bytecode of what the tests themselves import to the environment again."""
+    """Leave the bytecode of what the tests import to the environment again, and what now exists in memory.
+
+    Else the collector of garbage looks through all modules and items again and again, 4 % of the time.
+    """
+    gc.freeze()
+    gc.enable()
     sys.dont_write_bytecode, sys.pycache_prefix = BYTECODE

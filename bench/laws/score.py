@@ -130,7 +130,7 @@ def _score(fitted: tuple[Rig, object], fresh: Record, rig: Rig) -> Score:
     """Return the score on all of a fresh record."""
     model, clocks = fitted
     problem = nominal_problem([check(fresh, rig)], rig)
-    outputs = simulate_cases(problem.cases, model, clocks)  # type: ignore[arg-type]
+    (outputs,) = simulate_cases(problem.cases, model, clocks)  # type: ignore[arg-type]
     return score(replace(problem, rig=rig), problem.cases, outputs, DEFAULT.blocks)
 
 

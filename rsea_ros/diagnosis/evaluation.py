@@ -145,7 +145,7 @@ class HeldOut:
             return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta), rule)
         rig, offsets = apply(problem.rig, problem.unknowns, theta)
         phased = in_phase(rig, self.record.record)
-        outputs = simulate_cases((case,), phased, offsets, on_angle=problem.on_angle)
+        (outputs,) = simulate_cases((case,), phased, offsets, on_angle=problem.on_angle)
         return score(problem, (case,), outputs, rule)
 
     def score_of(self, model: Candidate) -> Score:

@@ -146,7 +146,7 @@ class RequiredClocks:
         return (Remark("clocks_taken_as_right", (name,), (times,)),) if times >= WORTH else ()
 
 
-def required_clocks(solution: Solution, run: Map = serial) -> RequiredClocks:
+def required_clocks(solution: Solution) -> RequiredClocks:
     """Return the clocks that a fit without any must move, offsets and rates."""
     problem = solution.problem
     if is_inverse(problem.rig):
@@ -154,7 +154,7 @@ def required_clocks(solution: Solution, run: Map = serial) -> RequiredClocks:
     channels = sorted({n for case in problem.cases for n in problem.present(case)})
     free = {u.name for u in problem.unknowns}
     fixed = [u for u in (*clocks(channels, problem.rig), *clock_rates(channels)) if u.name not in free]
-    columns = clock_columns(problem, solution.theta, fixed, run)
+    columns = clock_columns(problem, solution.theta, fixed)
     blocks = sample_blocks(problem, INTERVALS.block)
     chosen: list[int] = []
     for _ in fixed:

@@ -105,7 +105,7 @@ def fit(
         solution, problem = drifting, drifting.problem
         outputs = problem.outputs(solution.theta)
         known = with_noise_of(problem, outputs)
-    required = required_clocks(solution, run)
+    required = required_clocks(solution)
     if required.clocks:
         solution = solve(*free_clocks(solution, required), run=run)
         solution = solve(*without_needless(solution), run=run)

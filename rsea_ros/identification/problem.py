@@ -172,20 +172,22 @@ def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
 
 
 def simulate_cases(
-    cases: Sequence[Case], rig: Rig, clocks: Clocks, *, on_angle: bool = False
-) -> list[dict[str, FloatArray]]:
-    """Return the simulated channels of cases, sensors read as their clocks have it.
+    cases: Sequence[Case], rig: Rig, *clocks: Clocks, on_angle: bool = False
+) -> list[list[dict[str, FloatArray]]]:
+    """Return for each of some clocks the channels of cases, simulated once and read as the clocks have it.
 
     A channel whose zero is unknown comes with the measured mean.
     """
-    drives = [_shift(c.drive, clocks) for c in cases if isinstance(c.drive, Drive)]
-    simulations = iter(simulate_drives(rig, drives, on_angle=on_angle))
-    return [
-        {"motor_torque": inverse_torque(rig, c.drive)}
+    drives = [c.drive for c in cases if isinstance(c.drive, Drive)]
+    at = [[_instants(drive, one) for one in clocks] for drive in drives]
+    simulations = iter(simulate_drives(rig, drives, at, on_angle=on_angle))
+    by_case = [
+        [{"motor_torque": inverse_torque(rig, c.drive)}] * len(clocks)
         if isinstance(c.drive, Motion)
-        else _on_measured_zero(c, next(simulations))
+        else [_on_measured_zero(c, outputs) for outputs in next(simulations)]
         for c in cases
     ]
+    return [[outputs[k] for outputs in by_case] for k in range(len(clocks))]
 
 
 def _on_measured_zero(case: Case, outputs: dict[str, FloatArray]) -> dict[str, FloatArray]:
@@ -195,11 +197,14 @@ def _on_measured_zero(case: Case, outputs: dict[str, FloatArray]) -> dict[str, F
     return outputs
 
 
-def _shift(drive: Drive, clocks: Clocks) -> Drive:
+def _instants(drive: Drive, clocks: Clocks) -> Mapping[str, FloatArray]:
+    """Return when the channels of a drive are read by some clocks, in steps since its start."""
     if clocks.are_right:
-        return drive
-    late = {n: clocks.later(n, drive.origin + drive.step * at) for n, at in drive.at.items()}
-    return replace(drive, at={n: at + late[n] / drive.step for n, at in drive.at.items()})
+        return drive.at
+    return {
+        n: at + clocks.later(n, drive.origin + drive.step * at if n in clocks.rate else 0.0) / drive.step
+        for n, at in drive.at.items()
+    }
 
 
 def weighted_residual(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
@@ -242,7 +247,7 @@ class Problem:
     def outputs(self, theta: FloatArray) -> list[dict[str, FloatArray]]:
         """Return the simulated channels of every case at theta."""
         rig, clocks = apply(self.rig, self.unknowns, theta)
-        return simulate_cases(self.cases, rig, clocks, on_angle=self.on_angle)
+        return simulate_cases(self.cases, rig, clocks, on_angle=self.on_angle)[0]
 
     def residual_of(self, outputs: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
         """Return the weighted residuals of all cases, shape (m,)."""

@@ -106,16 +106,17 @@ def jacobian_columns(
 
     columns = dict(zip(others, run(column, others), strict=True))
     if clocks:
-        of_clocks = clock_columns(problem, theta, tuple(clocks.values()), run)
+        of_clocks = clock_columns(problem, theta, tuple(clocks.values()))
         columns |= dict(zip(clocks, of_clocks.T, strict=True))
     return np.column_stack([columns[i] for i in which]) if len(which) else np.empty((len(residual), 0))
 
 
-def clock_columns(
-    problem: Problem, theta: FloatArray, clocks: Sequence[Unknown], run: Map = serial
-) -> FloatArray:
+def clock_columns(problem: Problem, theta: FloatArray, clocks: Sequence[Unknown]) -> FloatArray:
     """Return d residual / d clock for unknown clocks, be they among the problem's or not, shape (m, n)."""
-    later, earlier = run(lambda sign: _read_later(problem, theta, sign * _CLOCK_DIFFERENCE), (1, -1))
+    rig, read = apply(problem.rig, problem.unknowns, theta)
+    moved = [read.move(sign * _CLOCK_DIFFERENCE, problem.channels) for sign in (1, -1)]
+    outputs = simulate_cases(problem.cases, rig, *moved, on_angle=problem.on_angle)
+    later, earlier = map(problem.residual_of, outputs)
     slope = (later - earlier) / (2.0 * _CLOCK_DIFFERENCE)
     channel = problem.by_row(lambda case, n: problem.channels.index(n))
     since = 1e-6 * problem.since_start()
@@ -131,13 +132,6 @@ def clock_columns(
 def power(residual: FloatArray) -> float:
     """Return the sum of squares of a residual; infinite where the simulation ran away."""
     return float(residual @ residual) if np.max(np.abs(residual), initial=0.0) < _RUN_AWAY else np.inf
-
-
-def _read_later(problem: Problem, theta: FloatArray, delay: float) -> FloatArray:
-    """Return the weighted residuals with every sensor read `delay` s later than it was."""
-    rig, clocks = apply(problem.rig, problem.unknowns, theta)
-    shifted = clocks.move(delay, problem.channels)
-    return problem.residual_of(simulate_cases(problem.cases, rig, shifted, on_angle=problem.on_angle))
 
 
 def central_jacobian(problem: Problem, theta: FloatArray, run: Map = serial) -> FloatArray:

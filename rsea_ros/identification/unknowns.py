@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect, Parameter
-from rsea_ros.model.rig import FIELDS, LEAST_SIZE, EffectSetting, Rig
+from rsea_ros.model.rig import FIELDS, LEAST_SIZE, EffectSetting, Quantity, Rig
 from rsea_ros.records.record import FloatArray
 
 TURN = 2.0 * math.pi
@@ -29,10 +29,9 @@ class Clocks:
     offset: Mapping[str, float]
     rate: Mapping[str, float]
 
-    def later(self, channel: str, since: FloatArray) -> FloatArray:
+    def later(self, channel: str, since: FloatArray | float) -> FloatArray | float:
         """Return how much later than stamped a channel is read at times since the start of the record, s."""
-        late: FloatArray = self.offset.get(channel, 0.0) + 1e-6 * self.rate.get(channel, 0.0) * since
-        return late
+        return self.offset.get(channel, 0.0) + 1e-6 * self.rate.get(channel, 0.0) * since
 
     def move(self, delay: float, channels: Iterable[str]) -> Clocks:
         """Return the clocks with some channels read `delay` s later still."""
@@ -206,13 +205,16 @@ def clock_rates(channels: Iterable[str]) -> tuple[Unknown, ...]:
 def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig, Clocks]:
     """Return the rig with the values of theta, effects included, and the clocks of its sensors."""
     values = {u.name: u.outer(float(t)) for u, t in zip(unknowns, theta, strict=True)}
-    of_rig = {n: v for n, v in values.items() if n in FIELDS}
+    quantities = {
+        n: replace(rig.quantities.get(n, Quantity(v)), value=v) for n, v in values.items() if n in FIELDS
+    }
     offset, rate = (
         {u.name.split(".")[1]: values[u.name] for u in unknowns if u.is_clock and u.is_rate == of_rate}
         for of_rate in (False, True)
     )
     effects = tuple(_move(e, values) for e in rig.effects)
-    return rig.with_values(of_rig).with_effects(*effects), Clocks(offset, rate)
+    moved = replace(rig, quantities={**rig.quantities, **quantities}, effects=effects)
+    return moved, Clocks(offset, rate)
 
 
 def _move(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:

@@ -143,7 +143,7 @@ def actuator_matrices(rig: Rig) -> tuple[FloatArray, FloatArray, FloatArray]:
     mass, stiffness = np.zeros((COORDINATES, COORDINATES)), np.zeros((COORDINATES, COORDINATES))
     n = train_ratio(rig)
     rotor = np.array([0.0 if rig.train == "lumped" else 1.0 - n, n])  # its speed by those of h and g
-    mass[np.ix_((H, G), (H, G))] = rotor_inertia(rig) * np.outer(rotor, rotor)
+    mass[H : G + 1, H : G + 1] = rotor_inertia(rig) * np.outer(rotor, rotor)
     mass[C, C] += rig["chassis.inertia"]
     mass[H, H] += rig["housing.inertia"]
     damping = _between(H, G, rig["rotor.reflected_damping"]) + _between(C, D, rig["spring.damping"])
@@ -173,5 +173,6 @@ def _load_matrices(rig: Rig, linear_gravity: bool) -> tuple[FloatArray, FloatArr
 
 def _between(a: int, b: int, value: float) -> FloatArray:
     matrix = np.zeros((COORDINATES, COORDINATES))
-    matrix[np.ix_((a, b), (a, b))] = value * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    matrix[a, a] = matrix[b, b] = value
+    matrix[a, b] = matrix[b, a] = -value
     return matrix

@@ -39,7 +39,10 @@ class StateSpace:
 
 def state_space(rig: Rig, *, linear_gravity: bool = True) -> StateSpace:
     """Return A, shape (2n, 2n), and B, shape (2n, 5), of a rig."""
-    m = mechanics(rig, linear_gravity=linear_gravity)
+    return _space_of(mechanics(rig, linear_gravity=linear_gravity))
+
+
+def _space_of(m: Mechanics) -> StateSpace:
     n = m.order
     a = np.zeros((2 * n, 2 * n))
     a[:n, n:] = np.eye(n)
@@ -70,14 +73,22 @@ def encoder_row(rig: Rig, m: Mechanics, *, is_rate: bool = False) -> FloatArray:
     return row
 
 
-def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
+def propagators(rig: Rig, h: float, reads: Iterable[int]) -> tuple[Linear, FloatArray]:
+    """Return the propagators of a step of h seconds, and the map to the state at its start (start_map)."""
+    falling = mechanics(rig, linear_gravity=False)
+    hangs = any(rig[f"{end}.gravity"] for end in END_NAMES)
+    return propagator(rig, h, reads, falling), start_map(rig, mechanics(rig) if hangs else falling)
+
+
+def propagator(rig: Rig, h: float, reads: Iterable[int], m: Mechanics | None = None) -> Linear:
     """Return the propagators of a step of h seconds, by one matrix exponential.
 
+    m: the equations of motion without gravity, where they are known already.
     expm of [[A h, B h], [0, 0]] holds e^{Ah} and G (Van Loan, IEEE TAC 23, 1978).
     """
-    system = state_space(rig, linear_gravity=False)
-    n, m = system.b.shape
-    block = np.zeros((n + m, n + m))
+    system = _space_of(m or mechanics(rig, linear_gravity=False))
+    n, ports = system.b.shape
+    block = np.zeros((n + ports, n + ports))
     block[:n, :n], block[:n, n:] = system.a * h, system.b * h
     exponential = expm(block)
     reads = set(reads)
@@ -97,12 +108,11 @@ def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
     )
 
 
-def start_map(rig: Rig) -> FloatArray:
+def start_map(rig: Rig, m: Mechanics) -> FloatArray:
     """Return the map from output angle (rad) and speed (rad/s) to the state of least energy, shape (2n, 2).
 
     An initial angle other than zero thus turns the free parts and does not load the spring.
     """
-    m = mechanics(rig)
     row = encoder_row(rig, m)[: m.order]
     start = np.zeros((2 * m.order, 2))
     if row.any():

@@ -92,16 +92,18 @@ def unit_of(name: str) -> str:
 
 def check_value(name: str, value: float, where: str = "rig") -> None:
     """Raise RigError when a value is not a possible one for its field."""
-    unit, stated = unit_of(name), f"{where}: {name} = {value:g}"
+    unit = unit_of(name)
     low, allowed = FIELDS[name].low, FIELDS[name].low_allowed
     infinite_ok = FIELDS[name].default == math.inf
     possible = (value >= low if allowed else value > low) and (math.isfinite(value) or infinite_ok)
-    if possible and math.isfinite(value) and value != 0.0 and not LEAST_SIZE <= abs(value) <= GREATEST_SIZE:
+    if possible and (LEAST_SIZE <= abs(value) <= GREATEST_SIZE or value == 0.0 or not math.isfinite(value)):
+        return
+    stated = f"{where}: {name} = {value:g}"
+    if possible:
         sizes = with_unit(f"a size between {LEAST_SIZE:g} and {GREATEST_SIZE:g}", unit)
         raise RigError(f"{with_unit(stated, unit)}, expected {sizes}", name)
-    if not possible:
-        bound = with_unit(f">= {low:g}" if allowed else f"> {low:g}", unit)
-        raise RigError(f"{with_unit(stated, unit)}, expected a finite value {bound}", name)
+    bound = with_unit(f">= {low:g}" if allowed else f"> {low:g}", unit)
+    raise RigError(f"{with_unit(stated, unit)}, expected a finite value {bound}", name)
 
 
 MOTOR_TORQUE = 68.0

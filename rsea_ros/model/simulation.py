@@ -22,7 +22,7 @@ from rsea_ros.model.drive import Drive, drive_from, zero_unknown
 from rsea_ros.model.equations import train_ratio, with_structure
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
-from rsea_ros.model.propagator import propagator, start_map
+from rsea_ros.model.propagator import propagators
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
 from rsea_ros.records.record import Channel, FloatArray, Record
@@ -85,6 +85,8 @@ def sample(name: str, values: FloatArray, at: FloatArray, command: FloatArray) -
 
 _AFTER_DELAY = 1
 """Order of a position loop at its port: its targets come late, and what it asks is limited and lags."""
+_AT_FIRST = (st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE)
+"""Signals that are the first row of OUTPUTS."""
 _SENSORS = 1
 """Stream of the random numbers of sensor noise."""
 
@@ -105,7 +107,8 @@ class Machine:
         self.x[:] = self.start_map @ np.array(initial)
         self.effect_x[:] = 0.0
         self.table[st.FIRST_READ : st.VELOCITY + 1] = 0.0
-        self.table[[st.POSITION, st.OUTPUT_ANGLE]], self.table[[st.VELOCITY, st.OUTPUT_VELOCITY]] = initial
+        self.table[st.POSITION] = self.table[st.OUTPUT_ANGLE] = initial[0]
+        self.table[st.VELOCITY] = self.table[st.OUTPUT_VELOCITY] = initial[1]
         self.table[st.FT] = self.linear.outputs[2] @ self.x
         self.table[st.PLAY], self.table[st.SPRING_ANGLE] = 0.0, self.linear.outputs[3] @ self.x
 
@@ -131,40 +134,58 @@ def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
 
 def simulate_drive(rig: Rig, drive: Drive) -> dict[str, FloatArray]:
     """Return each channel of a drive at its sampling instants."""
-    return simulate_drives(rig, (drive,))[0]
+    return simulate_drives(rig, (drive,))[0][0]
+
+
+Instants = Mapping[str, FloatArray]
+"""By channel when it is read, in steps since the start of a drive."""
 
 
 def simulate_drives(
-    rig: Rig, drives: Sequence[Drive], *, on_angle: bool = False
-) -> list[dict[str, FloatArray]]:
-    """Return the channels of several drives of one rig, prepared once. on_angle: use the rotor angle."""
+    rig: Rig, drives: Sequence[Drive], at: Sequence[Sequence[Instants]] = (), *, on_angle: bool = False
+) -> list[list[dict[str, FloatArray]]]:
+    """Return the channels of several drives of one rig, prepared once, and simulated once for all readings.
+
+    at: for each drive the instants of its readings; without, its own are the only ones. on_angle: use the
+    rotor angle.
+    """
     machines: dict[tuple[float, float, bool], Machine] = {}
     results = []
-    for drive in drives:
+    for drive, readings in zip(drives, at or [[drive.at] for drive in drives], strict=True):
         kind = (drive.step, drive.drift_time, len(drive.reference) > 0 or rig.loop is not None)
         if kind not in machines:
             machines[kind] = build(rig, kind[0], kind[1], in_loop=kind[2])
-        results.append(_drive_outputs(machines[kind], rig, drive, on_angle))
+        results.append(_drive_outputs(machines[kind], rig, drive, readings, on_angle))
     return results
 
 
-def _drive_outputs(machine: Machine, rig: Rig, drive: Drive, on_angle: bool) -> dict[str, FloatArray]:
-    """Return the channels of a drive at their sampling instants, from its own beginning."""
+def _drive_outputs(
+    machine: Machine, rig: Rig, drive: Drive, readings: Sequence[Instants], on_angle: bool
+) -> list[dict[str, FloatArray]]:
+    """Return the channels of a drive at the instants of each reading, from its own beginning."""
     ridden = _middles(drive.angle) * rig["gear.ratio"] if on_angle else np.empty(0)
-    channels = [n for n in drive.at if rig.measures(n)]
-    at = {n: _instants(rig, drive, n) for n in channels}
-    sampled = {n: np.empty(len(at[n])) for n in channels}
+    channels = [(n, OUTPUTS.index(n)) for n in drive.at if rig.measures(n)]
+    wanted = [{n: _instants(rig, drive, n, at[n]) for n, _ in channels} for at in readings]
     spans = drive.simulated
-    edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
-    for k, (first, end) in enumerate(spans):
-        out = _over_span(machine, rig, drive, ridden, first, end)
-        for n in channels:
-            inside = np.searchsorted(edges, at[n]) == k if edges else slice(None)
-            values, kinks = out[:, OUTPUTS.index(n)], drive.kinks[first:end]
-            sampled[n][inside] = sample(n, values, at[n][inside] - first, kinks)
-    for n in drive.impulsive.intersection(channels):
-        sampled[n] += _kick(machine, n) * drive.impulse[n]
-    return sampled
+    if len(spans) == 1:
+        ((first, end),) = spans
+        out, kinks = _over_span(machine, rig, drive, ridden, first, end), drive.kinks[first:end]
+        results = [{n: sample(n, out[:, k], at[n] - first, kinks) for n, k in channels} for at in wanted]
+    else:
+        results = [{n: np.empty(len(times)) for n, times in at.items()} for at in wanted]
+        edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
+        for part, (first, end) in enumerate(spans):
+            out, kinks = _over_span(machine, rig, drive, ridden, first, end), drive.kinks[first:end]
+            for at, sampled in zip(wanted, results, strict=True):
+                for n, k in channels:
+                    inside = np.searchsorted(edges, at[n]) == part
+                    sampled[n][inside] = sample(n, out[:, k], at[n][inside] - first, kinks)
+    for n, _ in channels if drive.impulsive else ():
+        if n in drive.impulsive:
+            kick = _kick(machine, n) * drive.impulse[n]
+            for sampled in results:
+                sampled[n] += kick
+    return results
 
 
 def _over_span(
@@ -178,19 +199,20 @@ def _over_span(
     anew = [r for r in drive.restarts if r[0] > 0 and first <= r[0] < end]
     begins = [*([(first, drive.initial)] if first == 0 else []), *anew]
     ends = [*(k for k, _ in begins[1:]), end]
-    for (k, state), stop in zip(begins, ends, strict=True):
-        machine.begin(state)
+    state = StepState(machine.x, machine.table, machine.effect_x)
+    for (k, initial), stop in zip(begins, ends, strict=True):
+        machine.begin(initial)
         start = k - first
-        out[start] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
-        run(machine, torque[k:stop], out[start + 1 : stop - first + 1], start=drive.origin + k * drive.step,
-            reference=reference[k:stop], ridden=ridden[k:stop])  # fmt: skip
+        for column, signal in enumerate(_AT_FIRST):
+            out[start, column] = machine.table[signal]
+        inputs = StepInputs(torque[k:stop], reference[k:stop], ridden[k:stop], drive.origin + k * drive.step)
+        advance(machine.linear, machine.calls, inputs, state, out[start + 1 : stop - first + 1])
         out[start, 2] = out[start + 1, 2]
     return out
 
 
-def _instants(rig: Rig, drive: Drive, channel: str) -> FloatArray:
-    """Return when a channel is read, in steps since the start of the drive."""
-    at = drive.at[channel]
+def _instants(rig: Rig, drive: Drive, channel: str, at: FloatArray) -> FloatArray:
+    """Return when a channel with a clock of its own is read, in steps since the start of the drive."""
     if rig.is_on_time(channel):
         return at
     return np.asarray(at + rig.clock(channel, drive.origin + drive.step * at) / drive.step)
@@ -226,7 +248,7 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     rig = with_structure(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
-    linear = propagator(rig, step, {r for e, _ in active for r in e.reads})
+    linear, at_start = propagators(rig, step, {r for e, _ in active for r in e.reads})
     calls, states = _calls(rig, active, in_loop)
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
@@ -234,7 +256,7 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table[st.TARGETED] = float(rig.loop is not None)
     table[[st.MOBILITY, st.TURNS]] = linear.spans[0] @ linear.g[:, 0], train_ratio(rig)
     table[st.SENSED] = 1.0 - rig["spring_end.above_sensor"]
-    return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), start_map(rig))
+    return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), at_start)
 
 
 def _check_sensor(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]]) -> None:

@@ -1,6 +1,5 @@
 """The loop: its formula against the code that runs, its margins against python-control and a bench."""
 
-import control
 import numpy as np
 import pytest
 
@@ -68,6 +67,8 @@ def test_the_controller_answers_a_sine_as_the_formula_says(hz):
 
 
 def test_margins_are_those_of_python_control():
+    import control  # imported here: it brings matplotlib, a second in each worker
+
     loop = control.TransferFunction([4.0], [1.0, 3.0, 3.0, 1.0])
     hz = np.geomspace(1e-3, 10.0, 5000)
     ours = margins(np.asarray(loop(2j * np.pi * hz)), hz, period=0.01)

@@ -131,7 +131,7 @@ class World:
     def __init__(self, monkeypatch):
         self.z, self.left, self.inverse, self.cost = {}, 1.0, False, None
         for name, stand_in in {
-            "clock_columns": lambda problem, theta, left, run: np.arange(4.0).reshape(1, 4),
+            "clock_columns": lambda problem, theta, left: np.arange(4.0).reshape(1, 4),
             "sample_blocks": lambda problem, length: ("blocks", length),
             "clocks": lambda channels, rig: [unknown(f"clock.{n}") for n in channels],
             "clock_rates": lambda channels: [unknown(f"clock_rate.{n}") for n in channels],

@@ -310,7 +310,7 @@ def test_white_noise_of_a_short_record_is_not_called_coloured(duration):
     rig = load_rig("paper_high_impedance")
     for seed in range(15):
         case = case_from(record_bench(rig, seed, duration), rig)
-        known = reestimate_noise(case, simulate_cases((case,), rig, Clocks({}, {}))[0])
+        known = reestimate_noise(case, simulate_cases((case,), rig, Clocks({}, {}))[0][0])
         assert known.coloured == frozenset(), seed
 
 
