@@ -227,17 +227,9 @@ def _matched(y: Channel, x: Channel, pair: Pair) -> Pair:
     clear = bool(alike[k] > _RELATED and rival < _BESIDE * alike[k])
     factor = float((b[k] @ a) / power[k]) / (pair.law.expected[0] or 1.0)
     return replace(
-        pair,
-        factor=abs(factor),
-        sign=int(np.sign(factor)),
-        lag=float(lag[k]),
-        coherence=float(alike[k]),
-        ratios=(factor,),
-        sds=(_MODEL_ERROR,),
-        left=1.0 - float(alike[k]),
-        fits=clear,
-        clear=clear,
-    )
+        pair, factor=abs(factor), sign=int(np.sign(factor)), lag=float(lag[k]), coherence=float(alike[k]),
+        ratios=(factor,), sds=(_MODEL_ERROR,), left=1.0 - float(alike[k]), fits=clear, clear=clear,
+    )  # fmt: skip
 
 
 def _followed(y: Channel, x: Channel, law: Law, start: float, stop: float) -> list[Pair]:
@@ -358,13 +350,9 @@ def _correlated(y: Channel, x: Channel, pair: Pair) -> Pair:
     sensors = pair.law.powers[-1] < 2
     factor = abs(float(both[k] / power[k]) / (pair.law.expected[0] or 1.0)) if sensors else math.nan
     return replace(
-        pair,
-        lag=float(lag[k]),
-        factor=factor,
-        sign=int(np.sign(both[k])) if sensors else 0,
-        coherence=float(alike[k]),
-        clear=rival < _BESIDE * float(alike[k]),
-    )
+        pair, lag=float(lag[k]), factor=factor, sign=int(np.sign(both[k])) if sensors else 0,
+        coherence=float(alike[k]), clear=rival < _BESIDE * float(alike[k]),
+    )  # fmt: skip
 
 
 def _fit(q: Quotient, keep: np.ndarray, law: Law, late: float, pair: Pair) -> Pair:
@@ -400,13 +388,6 @@ def _fit(q: Quotient, keep: np.ndarray, law: Law, late: float, pair: Pair) -> Pa
     factor = ratios[sure[0]] if sure else math.nan
     fits &= len({np.sign(c[i]) for i in sure}) < 2  # no machine has a mass and a negative damping
     return replace(
-        pair,
-        factor=abs(factor),
-        sign=int(np.sign(factor)) if sure else 0,
-        lag=late + float(lag[k]),
-        ratios=ratios,
-        sds=tuple(relative.tolist()),
-        left=share,
-        fits=bool(fits),
-        clear=bool(clear),
-    )
+        pair, factor=abs(factor), sign=int(np.sign(factor)) if sure else 0, lag=late + float(lag[k]),
+        ratios=ratios, sds=tuple(relative.tolist()), left=share, fits=bool(fits), clear=bool(clear),
+    )  # fmt: skip

@@ -73,13 +73,6 @@ def encoder_row(rig: Rig, m: Mechanics, *, is_rate: bool = False) -> FloatArray:
     return row
 
 
-def propagators(rig: Rig, h: float, reads: Iterable[int]) -> tuple[Linear, FloatArray]:
-    """Return the propagators of a step of h seconds, and the map to the state at its start (start_map)."""
-    falling = mechanics(rig, linear_gravity=False)
-    hangs = any(rig[f"{end}.gravity"] for end in END_NAMES)
-    return propagator(rig, h, reads, falling), start_map(rig, mechanics(rig) if hangs else falling)
-
-
 def propagator(rig: Rig, h: float, reads: Iterable[int], m: Mechanics | None = None) -> Linear:
     """Return the propagators of a step of h seconds, by one matrix exponential.
 

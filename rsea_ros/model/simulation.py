@@ -19,10 +19,10 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from, zero_unknown
-from rsea_ros.model.equations import train_ratio, with_structure
+from rsea_ros.model.equations import mechanics, train_ratio, with_structure
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
-from rsea_ros.model.propagator import propagators
+from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
 from rsea_ros.records.record import Channel, FloatArray, Record
@@ -137,13 +137,10 @@ def simulate_drive(rig: Rig, drive: Drive) -> dict[str, FloatArray]:
     return simulate_drives(rig, (drive,))[0][0]
 
 
-Instants = Mapping[str, FloatArray]
-"""By channel when it is read, in steps since the start of a drive."""
-
-
 def simulate_drives(
-    rig: Rig, drives: Sequence[Drive], at: Sequence[Sequence[Instants]] = (), *, on_angle: bool = False
-) -> list[list[dict[str, FloatArray]]]:
+    rig: Rig, drives: Sequence[Drive], at: Sequence[Sequence[Mapping[str, FloatArray]]] = (), *,
+    on_angle: bool = False,
+) -> list[list[dict[str, FloatArray]]]:  # fmt: skip
     """Return the channels of several drives of one rig, prepared once, and simulated once for all readings.
 
     at: for each drive the instants of its readings; without, its own are the only ones. on_angle: use the
@@ -160,31 +157,24 @@ def simulate_drives(
 
 
 def _drive_outputs(
-    machine: Machine, rig: Rig, drive: Drive, readings: Sequence[Instants], on_angle: bool
+    machine: Machine, rig: Rig, drive: Drive, readings: Sequence[Mapping[str, FloatArray]], on_angle: bool
 ) -> list[dict[str, FloatArray]]:
     """Return the channels of a drive at the instants of each reading, from its own beginning."""
     ridden = _middles(drive.angle) * rig["gear.ratio"] if on_angle else np.empty(0)
-    channels = [(n, OUTPUTS.index(n)) for n in drive.at if rig.measures(n)]
-    wanted = [{n: _instants(rig, drive, n, at[n]) for n, _ in channels} for at in readings]
+    channels = {n: OUTPUTS.index(n) for n in drive.at if rig.measures(n)}
+    wanted = [{n: _instants(rig, drive, n, at[n]) for n in channels} for at in readings]
+    results = [{n: np.empty(len(at[n])) for n in channels} for at in wanted]
     spans = drive.simulated
-    if len(spans) == 1:
-        ((first, end),) = spans
+    edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
+    for part, (first, end) in enumerate(spans):
         out, kinks = _over_span(machine, rig, drive, ridden, first, end), drive.kinks[first:end]
-        results = [{n: sample(n, out[:, k], at[n] - first, kinks) for n, k in channels} for at in wanted]
-    else:
-        results = [{n: np.empty(len(times)) for n, times in at.items()} for at in wanted]
-        edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
-        for part, (first, end) in enumerate(spans):
-            out, kinks = _over_span(machine, rig, drive, ridden, first, end), drive.kinks[first:end]
-            for at, sampled in zip(wanted, results, strict=True):
-                for n, k in channels:
-                    inside = np.searchsorted(edges, at[n]) == part
-                    sampled[n][inside] = sample(n, out[:, k], at[n][inside] - first, kinks)
-    for n, _ in channels if drive.impulsive else ():
-        if n in drive.impulsive:
-            kick = _kick(machine, n) * drive.impulse[n]
-            for sampled in results:
-                sampled[n] += kick
+        for at, sampled in zip(wanted, results, strict=True):
+            for n, k in channels.items():
+                inside = np.searchsorted(edges, at[n]) == part if edges else slice(None)
+                sampled[n][inside] = sample(n, out[:, k], at[n][inside] - first, kinks)
+    for n in drive.impulsive.intersection(channels):
+        for sampled in results:
+            sampled[n] += _kick(machine, n) * drive.impulse[n]
     return results
 
 
@@ -248,7 +238,9 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     rig = with_structure(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
-    linear, at_start = propagators(rig, step, {r for e, _ in active for r in e.reads})
+    falling = mechanics(rig, linear_gravity=False)
+    linear = propagator(rig, step, {r for e, _ in active for r in e.reads}, falling)
+    at_start = start_map(rig, mechanics(rig) if any(rig[f"{e}.gravity"] for e in END_NAMES) else falling)
     calls, states = _calls(rig, active, in_loop)
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0

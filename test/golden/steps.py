@@ -46,8 +46,8 @@ VERBS: dict[str, tuple[str, ...]] = {
     "spoiled": ("check imported --rig pendulum", "check imported", "identify imported --json"),
     "spoiled_diagnosis": (f"diagnose imported --json --max-causes 2 --without {BUT_PLAY}",),
     "fleet": (
-        "fleet run bag left --map joints.yaml --serial --out months",
-        "fleet run bag left --map joints.yaml --serial --out months",
+        "fleet run right left --map joints.yaml --serial --out months",
+        "fleet run right left --map joints.yaml --serial --out months",
         "fleet sql SELECT+joint,verdict,residual,faults+FROM+recordings+ORDER+BY+joint --store months",
         "fleet sql SELECT+parameter,value,low,high+FROM+parameters+ORDER+BY+value --store months --json",
         "fleet report months --out fleet",
@@ -109,7 +109,7 @@ channels:
   rig: paper_high_impedance
 joints:
   left: {bags: left}
-  right: {bags: bag}
+  right: {bags: right}
 """,
     "answers.jsonl": "\n".join(
         f'{{"record": "r000{k}", "causes": [{{"name": "{name}", "probability": 0.7}}], "seconds": 2.0}}'
@@ -118,7 +118,8 @@ joints:
     "spoiled.csv": lambda: spoiled(),
     "play.yaml": lambda: rig_text(rsea.load_rig(RIG).with_effect("backlash", gap=0.004)),
     "drag.yaml": lambda: rig_text(rsea.load_rig(RIG).with_effect("coulomb_friction", torque=2.0)),
-    "left": f"simulate {RIG} --duration 16 --seed 2 --out left",
+    "left": f"simulate {RIG} --duration 8 --seed 2 --out left",
+    "right": f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 8 --seed 5 --out right",
 }
 """Files that steps read: their text, or the line that makes them."""
 

@@ -21,6 +21,8 @@ from rosbags.typesys import Stores, get_typestore
 
 LONG = 8
 """Numbers of a list from which on it is summed up."""
+TENTH = 10
+"""Of the messages of a bag, one in so many is decoded: by pure Python, which is slow."""
 NOTHING = 1e-9
 """A computed number below this is what rounding has left of 0."""
 NUMBER = re.compile(r"(?<![\w.])[-−+]?(?:\d+\.?\d*|\.\d+)(?:e[-−+]?\d+)?", re.ASCII)
@@ -214,13 +216,15 @@ def _number(cell: str) -> float | None:
 
 
 def _bag(path: Path) -> str:
-    """Return the sums of every number of every topic, read by another library."""
+    """Return the sums of every tenth message's numbers, topic by topic, read by another library."""
     lines = []
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
         for connection in sorted(reader.connections, key=lambda c: c.topic):
             stamps, fields = [], {}
-            for _, stamp, raw in reader.messages([connection]):
+            for k, (_, stamp, raw) in enumerate(reader.messages([connection])):
                 stamps.append(stamp)
+                if k % TENTH:
+                    continue
                 for name, value in _fields(reader.deserialize(raw, connection.msgtype)):
                     fields.setdefault(name, []).append(value)
             span = (stamps[-1] - stamps[0]) * 1e-9 if stamps else 0.0

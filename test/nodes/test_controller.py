@@ -43,9 +43,9 @@ def loop(start, listener, model):
 
 def test_a_sine_is_followed_through_friction_that_the_model_has(loop):
     """Without the model's friction no period is below 0.05; a machine that stalls spoils many."""
-    errors = loop.sine(AMPLITUDE, HZ, 3.0)
+    errors = loop.sine(AMPLITUDE, HZ, 2.0)
     while sorted(errors)[2] >= 0.025 and len(errors) < 60:
-        errors += loop.sine(AMPLITUDE, HZ, 3.0)
+        errors += loop.sine(AMPLITUDE, HZ, 2.0)
     assert sorted(errors)[2] < 0.025, errors
 
 

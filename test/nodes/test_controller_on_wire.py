@@ -76,7 +76,7 @@ def test_the_controller_runs_on_the_drivers_measurements_and_reaches_the_torque(
     """It divided by zero at the first late cycle that was followed by one in time."""
     wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
     heard = len(wire.wrenches)
-    wire.hold(10.0, lambda: len(wire.wrenches) > heard + 700)
+    wire.hold(10.0, lambda: len(wire.wrenches) > heard + 420)
     assert wire.controller.is_running() and wire.driver.is_running()
     wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
 
@@ -89,7 +89,7 @@ def test_the_controller_never_becomes_unstable(wire):
     off = [abs(wrench_of(message)[1] - 10.0) > ERROR_LIMIT for message in wire.wrenches]
     window = round(2 * ERROR_TIME * RATE)
     counts = np.convolve(off, np.ones(window), "valid")
-    assert len(off) > 700 and counts.max() <= 0.5 * window + 0.1 * RATE
+    assert len(off) > 420 and counts.max() <= 0.5 * window + 0.1 * RATE
     assert max(abs(wrench_of(message)[1]) for message in wire.wrenches) < FT_LIMIT
 
 

@@ -78,7 +78,7 @@ def until_it_plays(listener, session):
 
 
 def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(session, ask, listener):
-    asked = session(longest=4.0)
+    asked = session(longest=4.0, shortest=4.0)
     commands = asked.commands
     assert not commands, asked.node.output
     assert ask("approve").success
@@ -115,7 +115,7 @@ def test_excite_plays_the_file_of_a_run(tmp_path):
 
 def test_an_approval_without_a_bench_expires_and_a_run_that_is_declined_is_not_played(session, ask, listener):
     """An approved run waited without limit, and began when a driver appeared."""
-    asked = session(approval=0.2)
+    asked = session(approval=0.2, longest=4.0, shortest=4.0)
     asked.plant.kill()
     assert ask("approve").success
     listener.until(lambda: any("the approval has expired" in line for line in asked.node.output))
@@ -155,4 +155,5 @@ def test_a_run_confirms_the_cause(session, ask, listener):
     run = first.out / "run-1.mcap"
     listener.until(lambda: run.is_file() or not first.node.is_running())
     assert first.node.wait() == 0, first.node.output
-    assert told(first.out)["end"] == "confirmed"
+    said = told(first.out)
+    assert said["end"] == "confirmed", said["why"]

@@ -16,7 +16,7 @@ from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.records.record import Channel
 
 RIG = "paper_high_impedance"
-RATE, DURATION = 280.0, 12.0
+RATE, DURATION = 280.0, 6.0
 FRICTION = 3.0
 
 
