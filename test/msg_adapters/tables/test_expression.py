@@ -58,12 +58,12 @@ HOSTILE = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
-def test_text_that_is_not_arithmetic_is_refused_before_it_is_evaluated(text):
-    with pytest.raises(ValueError, match=r"^(has|is|calls) ") as error:
-        parse(text)
-    assert "\n" not in str(error.value)
-    assert len(str(error.value)) < 300
+def test_text_that_is_not_arithmetic_is_refused_before_it_is_evaluated():
+    for text in HOSTILE:
+        with pytest.raises(ValueError, match=r"^(has|is|calls) ") as error:
+            parse(text)
+        assert "\n" not in str(error.value), text
+        assert len(str(error.value)) < 300, text
 
 
 @pytest.mark.parametrize(
