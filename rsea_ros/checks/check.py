@@ -232,15 +232,9 @@ def _another(
 
 def _other_size(name: str, times: float) -> Finding:
     return Finding(
-        "amber",
-        "wrong_rig",
-        name,
-        times,
-        "1",
-        expected="about 1",
-        detail="times what the rig would give",
+        "amber", "wrong_rig", name, times, "1", expected="about 1", detail="times what the rig would give",
         remedy=RIGHT_RIG,
-    )
+    )  # fmt: skip
 
 
 def _is_elsewhere(findings: list[Finding]) -> bool:

@@ -342,15 +342,10 @@ def _late(of: Sequence[Verdict], where: str) -> Finding:
     if grows or where:
         remedy = "read the sensor until its buffer is empty, and stamp at acquisition"
     return Finding(
-        "red",
-        "clock_offset",
-        name,
-        late,
-        "s",
-        expected="0",
+        "red", "clock_offset", name, late, "s", expected="0",
         detail=", ".join(filter(None, (f"stamped {size.rstrip(',')} against {against}", where))),
         remedy=remedy,
-    )
+    )  # fmt: skip
 
 
 def _turned(name: str, axis: str, where: str) -> Finding:
@@ -392,16 +387,10 @@ def _of_rig(name: str, stated: float, moved: float, rig: Rig) -> list[Finding]:
     light: Light = "red" if max(factor, 1.0 / factor) > _FAR and not soft else "amber"
     return [
         Finding(
-            light,
-            "wrong_rig",
-            name,
-            factor * stated,
-            rig.unit(name),
-            expected=f"{stated:.4g}",
-            detail=f"{factor:.2g} times the rig's value",
-            remedy=RIGHT_RIG,
+            light, "wrong_rig", name, factor * stated, rig.unit(name), expected=f"{stated:.4g}",
+            detail=f"{factor:.2g} times the rig's value", remedy=RIGHT_RIG,
         )
-    ]
+    ]  # fmt: skip
 
 
 def _springs(pairs: Sequence[Pair]) -> list[Finding]:
@@ -413,16 +402,10 @@ def _springs(pairs: Sequence[Pair]) -> list[Finding]:
         return []
     return [
         Finding(
-            "red",
-            "wrong_rig",
-            name,
-            float(np.median(sure)),
-            "N m/rad",
-            expected="0",
-            detail="a spring or pendulum holds the output",
-            remedy=RIGHT_RIG,
+            "red", "wrong_rig", name, float(np.median(sure)), "N m/rad", expected="0",
+            detail="a spring or pendulum holds the output", remedy=RIGHT_RIG,
         )
-    ]
+    ]  # fmt: skip
 
 
 def _open_clock(p: Pair) -> Finding:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect, Parameter
-from rsea_ros.model.rig import FIELDS, LEAST_SIZE, EffectSetting, Quantity, Rig
+from rsea_ros.model.rig import FIELDS, LEAST_SIZE, EffectSetting, Rig
 from rsea_ros.records.record import FloatArray
 
 TURN = 2.0 * math.pi
@@ -205,16 +205,13 @@ def clock_rates(channels: Iterable[str]) -> tuple[Unknown, ...]:
 def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig, Clocks]:
     """Return the rig with the values of theta, effects included, and the clocks of its sensors."""
     values = {u.name: u.outer(float(t)) for u, t in zip(unknowns, theta, strict=True)}
-    quantities = {
-        n: replace(rig.quantities.get(n, Quantity(v)), value=v) for n, v in values.items() if n in FIELDS
-    }
+    of_rig = {n: v for n, v in values.items() if n in FIELDS}
     offset, rate = (
         {u.name.split(".")[1]: values[u.name] for u in unknowns if u.is_clock and u.is_rate == of_rate}
         for of_rate in (False, True)
     )
     effects = tuple(_move(e, values) for e in rig.effects)
-    moved = replace(rig, quantities={**rig.quantities, **quantities}, effects=effects)
-    return moved, Clocks(offset, rate)
+    return rig.with_values(of_rig).with_effects(*effects), Clocks(offset, rate)
 
 
 def _move(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:

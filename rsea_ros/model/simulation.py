@@ -85,8 +85,6 @@ def sample(name: str, values: FloatArray, at: FloatArray, command: FloatArray) -
 
 _AFTER_DELAY = 1
 """Order of a position loop at its port: its targets come late, and what it asks is limited and lags."""
-_AT_FIRST = (st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE)
-"""Signals that are the first row of OUTPUTS."""
 _SENSORS = 1
 """Stream of the random numbers of sensor noise."""
 
@@ -193,8 +191,7 @@ def _over_span(
     for (k, initial), stop in zip(begins, ends, strict=True):
         machine.begin(initial)
         start = k - first
-        for column, signal in enumerate(_AT_FIRST):
-            out[start, column] = machine.table[signal]
+        out[start] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
         inputs = StepInputs(torque[k:stop], reference[k:stop], ridden[k:stop], drive.origin + k * drive.step)
         advance(machine.linear, machine.calls, inputs, state, out[start + 1 : stop - first + 1])
         out[start, 2] = out[start + 1, 2]
