@@ -35,11 +35,7 @@ def evaluate(root: Path, cache: Path) -> float:
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     environment |= {"PYTHONPATH": str(root), "XDG_CACHE_HOME": str(cache)}
     done = subprocess.run(
-        [sys.executable, "-c", EVALUATE],
-        env=environment,
-        cwd=root,
-        capture_output=True,
-        text=True,
+        [sys.executable, "-c", EVALUATE], env=environment, cwd=root, capture_output=True, text=True,
         check=True,
     )
     return float(done.stdout)

@@ -232,12 +232,8 @@ def test_a_full_disk_is_one_error_and_loses_nothing_recorded(tmp_path, storage, 
         "    print(error); sys.exit(2)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program, str(tmp_path / "bag"), storage],
-        preexec_fn=_full_disk,
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=os.getcwd(),
+        [sys.executable, "-c", program, str(tmp_path / "bag"), storage], preexec_fn=_full_disk,
+        capture_output=True, text=True, check=False, cwd=os.getcwd(),
     )
     assert (done.returncode, done.stderr) == (2, "")
     assert done.stdout.startswith(f"{tmp_path}/bag: cannot be written: ")

@@ -29,12 +29,9 @@ CONTRIBUTION = 5.0 * np.sin(2.0 * np.pi * 0.21 * TIME**1.4)
 def rows(residual):
     """Return rows of one channel whose nominal model has one derivative, a ramp."""
     return ContributionRows(
-        contribution=CONTRIBUTION,
-        residual=residual + RNG.normal(size=len(TIME)),
-        others=TIME[:, None] - TIME.mean(),
-        prior=np.array([1e-3]),
-        block=np.repeat(np.arange(BLOCKS), LENGTH),
-        tests=np.repeat(np.arange(BLOCKS) % 4 == 3, LENGTH),
+        contribution=CONTRIBUTION, residual=residual + RNG.normal(size=len(TIME)),
+        others=TIME[:, None] - TIME.mean(), prior=np.array([1e-3]),
+        block=np.repeat(np.arange(BLOCKS), LENGTH), tests=np.repeat(np.arange(BLOCKS) % 4 == 3, LENGTH),
         runs=(slice(0, len(TIME)),),
     )
 
