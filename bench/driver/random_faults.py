@@ -71,13 +71,13 @@ class Watched:
         time.sleep(1.0 / RATE)
 
     def look(self) -> None:
-        """Judge the torque that acts now."""
+        """Judge the torque that acts, at the instant at which the bench saw it: the answer may wait."""
         active, fault, since, commanded = (
             self.loop.guarded.enabled, self.loop.guarded.fault, self.since, self.commanded,
         )  # fmt: skip
         stopped, cleared = self.stopped, self.cleared
-        goal, on = self.bench.torque()
-        now = time.monotonic_ns()
+        acting = self.bench.ask("torque")
+        (goal, on), now = acting["result"], acting["t"]
         held_up, self.looked = now - self.looked, now
         served = self.service is not None and self.service.is_alive()
         if (served or self.unheard) and now - self.mode_changed < MODE_SEEN:

@@ -142,8 +142,8 @@ class GuardedDevice:
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
         self.lifted: list[str] = []
-        self._taring = self.away = self._inferred = self._off_due = False
-        self._turn = threading.Lock()
+        self.away = self._inferred = self._off_due = False
+        self._turn, self._tare = threading.Lock(), threading.Lock()
         self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
 
     @property
@@ -256,7 +256,7 @@ class GuardedDevice:
 
     def write(self, wanted: float, age: float | None) -> float:
         """Write a torque (N m) within the limits, zero when not enabled; return it. age: see Guard."""
-        torque = self.guard.allowed_torque(wanted, age if self.enabled and not self._taring else None)
+        torque = self.guard.allowed_torque(wanted, age if self.enabled and not self._tare.locked() else None)
         try:
             if torque != 0.0:
                 self.device.protection.beat(True)
@@ -298,23 +298,25 @@ class GuardedDevice:
                 self._switch_off()
 
     def zero_ft(self) -> None:
-        """Tare the F/T sensor, beside the cycles. Raises DeviceError while torque is commanded."""
+        """Tare the F/T sensor, beside the cycles. Raises DeviceError under torque and beside another one."""
         if self.guard.torque != 0.0:
             raise DeviceError(f"zero_ft: {self.guard.torque:.4g} N·m is commanded, expected 0 N·m")
-        self._taring = True
+        if not self._tare.acquire(blocking=False):
+            raise DeviceError("zero_ft: another one is under way, expected it to be over")
         try:
             self.device.zero_ft()
         finally:
-            self._taring = False
+            self._tare.release()
 
-    def clear(self) -> bool:
+    def clear(self, asked: int | None = None) -> bool:
         """Reconnect if necessary, end fault and stop; return whether there was one.
 
+        asked: the interlock's number of the request, which ends no later stop; None: now.
         Raises DeviceError while the cause is present, checked by a reading, and for what came meanwhile.
         """
         if self.fault is None:
             return False
-        asked = self.interlock.number()
+        asked = self.interlock.number() if asked is None else asked
         self._alone(self._recover)
         self.interlock.end_stop(asked)
         return True

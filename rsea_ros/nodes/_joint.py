@@ -115,13 +115,14 @@ class DrivenJoint:
         """Return a line of the log with the name of the joint if there are several."""
         return f"{self.part}: {text}" if self.part else text
 
-    def clear_fault(self) -> str:
-        """End a fault whose cause is over. Raises DeviceError."""
+    def clear_fault(self, asked: int | None = None) -> str:
+        """End a fault whose cause is over. asked: see GuardedDevice.clear. Raises DeviceError."""
         assert self.drive is not None
+        asked = self.guarded.interlock.number() if asked is None else asked
         if self.guarded.fault is None:
             return "there is no fault; nothing was done"
         with self.drive.deaf():
-            self.guarded.clear()
+            self.guarded.clear(asked)
         return "done"
 
     def stop(self) -> str:

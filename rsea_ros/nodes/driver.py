@@ -221,12 +221,15 @@ class DriverNode(ManagedEntity):
         return "torque of all joints zero until clear_fault"
 
     def _clear_faults(self) -> str:
-        """Clear every joint's fault; one that cannot be cleared does not affect the others."""
+        """Clear every joint's fault; one that cannot be cleared does not affect the others.
+
+        A joint waits for those before it, and may be stopped meanwhile: that is later than this request.
+        """
         self._check_configured()
         done, failed = [], []
-        for joint in self.joints:
+        for joint, asked in [(joint, joint.guarded.interlock.number()) for joint in self.joints]:
             try:
-                done.append(f"{joint.part} {joint.clear_fault()}")
+                done.append(f"{joint.part} {joint.clear_fault(asked)}")
             except RseaError as error:
                 failed.append(f"{joint.part}: {error}")
         if failed:

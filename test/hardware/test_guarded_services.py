@@ -73,7 +73,13 @@ def test_a_cycle_does_not_wait_for_another_user_of_the_device(joint):
 
 def test_the_sensor_is_tared_only_without_torque_and_none_is_made_meanwhile(joint, device):
     written = []
-    device.during = {"zero_ft": lambda: written.append(joint.write(9.0, 0.0))}
+
+    def meanwhile():
+        with pytest.raises(DeviceError, match="zero_ft: another one is under way"):
+            joint.zero_ft()  # the end of which let the torque through, under which the first one tared
+        written.append(joint.write(9.0, 0.0))
+
+    device.during = {"zero_ft": meanwhile}
     joint.zero_ft()
     assert written == [0.0]
     assert joint.write(9.0, 0.0) == 4.0, "a soft start begins anew"

@@ -8,7 +8,7 @@ import pytest
 from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import DiagnosticArray, JointState, stamp_of, torque_command_message
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._joints import joint_table
@@ -192,6 +192,19 @@ def test_stop_and_clear_fault_of_the_node_act_on_all_joints(leg):
     answer = leg.call("clear_fault")
     assert answer.success and answer.message == "clear_fault: hip done, knee done, ankle done"
     leg.ready()
+
+
+def test_a_joint_that_is_stopped_while_another_one_is_cleared_stays_stopped(make_driver, monkeypatch):
+    """The clear of all joints reached it later than its stop, and ended that: 10 N m after an answer."""
+    spies = {"hip": Spy(), "knee": Spy()}
+    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"]]})
+    program, _ = make_driver("held", values_of(joints=["hip", "knee"], autostart=True, resume=True))
+    hip, knee = program.joints
+    program._stop()
+    monkeypatch.setattr(spies["hip"], "recover", knee.stop)
+    with pytest.raises(DeviceError, match="knee: stopped: ~/stop was called meanwhile"):
+        program._clear_faults()
+    assert hip.guarded.interlock.is_free and knee.guarded.interlock.stopped
 
 
 def test_all_torques_are_zero_before_the_first_motor_is_closed(listener, monkeypatch):
