@@ -9,6 +9,7 @@ import struct
 from collections.abc import Sequence
 
 from msg_adapters.cdr import STAMP, MessageLayout, layout_of
+from msg_adapters.topic_map import JOINT_STATE
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import ParameterError
 
@@ -55,6 +56,9 @@ class RawReader:
         except ValueError as error:
             raise ParameterError(f"no {self._msgtype}: {error}") from None
         place = self._place(layout.names)
+        for name in {name for name, _ in self._fields if self._msgtype == JOINT_STATE}:
+            if (count := layout.fields[name][1]) > max(len(layout.names), self._most):
+                raise ParameterError(f"{count} numbers of {name}, expected at most one for each joint")
         self._at = [_position(layout, name, place + index) for name, index in self._fields]
         self._fixed = [(a, b, raw[a:b]) for a, b in _join_runs(layout.structure)]
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))

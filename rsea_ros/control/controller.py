@@ -141,14 +141,15 @@ class TorqueController:
         desired: N m, at this sample's place in the grid, or two samples later with preview. missed: samples
         lost before it. offset: samples by which the reading was taken after its place in the grid.
         A reading with a value that is not measured, or beyond NONSENSE times the largest torque, is a lost
-        sample; for such a desired torque the one that was expected counts.
+        sample, as with a trust or an offset that is no number; for such a desired torque the one that was
+        expected counts.
         desired_offset: samples by which desired is for later than that place; with preview it does not count.
         late: the torque will act later than the margins allow; then it is feed-forward alone.
         trust: part of the feedback that counts, as lateness.py has it.
         """
         if not is_measured(desired, self._most):
             desired = self._prediction.expected(missed + 1)
-        if not self._is_usable(reading):
+        if not (self._is_usable(reading) and math.isfinite(trust + offset + desired_offset)):
             return self._bridge(missed)
         if self._skipped * self._law.period > STALE:
             self.start(reading, desired)
@@ -182,7 +183,9 @@ class TorqueController:
         return torque
 
     def _is_usable(self, r: Measurement) -> bool:
-        return is_measured(r.ft, self._most) and all(is_measured(v, HUGE) for v in (r.velocity, r.position))
+        return is_measured(r.ft, self._most) and all(
+            is_measured(v, HUGE) for v in (r.velocity, r.position, r.ft_age)
+        )
 
     def _bridge(self, missed: int) -> float:
         """Return the torque, N m, for a sample that says nothing: the last one, zero once it is stale."""

@@ -228,7 +228,7 @@ class Guard:
 
     def allowed_torque(self, wanted: float, age: float | None) -> float:
         """Return the torque to write now (N m). age: of the command, s; None without a command."""
-        limits = self.limits
+        limits, age = self.limits, age if is_measured(age) else None
         if self.fault is None and age is not None and age > limits.command_timeout and self.torque != 0.0:
             self.trip(DeviceFault(COMMAND_TIMEOUT, 1e3 * age, 1e3 * limits.command_timeout, "ms"))
         if self.interlock.halted or self.interlock.stopped:

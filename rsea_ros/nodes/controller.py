@@ -58,7 +58,7 @@ class ControllerNode:
         self._polarity = Polarity(load_rig(values["rig"]), values["rate"], values["torque_limit"])
         self._last, self._heard, self._watched, self._until, self._torque = 0, 0, 0, 0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
-        self._wished = False
+        self._wished = self._held = False
         self._steps = self._missed = self._limited = self._late = self._late_reported = self._restarts = 0
         self._told_losses = 0
         self._squares: list[float] = []
@@ -125,8 +125,12 @@ class ControllerNode:
         self._squares.append((reading.ft - self._desired.torque) ** 2)
 
     def _next_torque(self, reading: Measurement, missed: int, trust: float, off: float) -> float:
-        """Return the torque that acts next: none before a desired torque, then pulses, then control."""
+        """Return the torque that acts next: none before a desired torque, then pulses, then control.
+
+        A desired torque that ceases or comes back is nobody's step: its error comes in as at a start.
+        """
         desired = self._desired.torque if self._wished else None
+        before, self._held = self._held, self._desired.age(0) is not None
         if not self._polarity.proven:
             torque = self._polarity.probe(reading, desired, missed)
             if torque is not None:
@@ -135,6 +139,9 @@ class ControllerNode:
             missed = 0
         elif self._polarity.watch(reading, missed):
             return 0.0
+        elif self._held != before:
+            self._controller.start(reading, self._desired.torque)
+            missed = 0
         torque = self._controller.step(
             reading,
             self._desired.torque,

@@ -26,6 +26,7 @@ RATE = 280.0
 GAINS = Gains(0.2575, 0.003029, 1.195, 6.99, 42.9)
 RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
 DESIGN = ControllerDesign(GAINS, RATE, {}, math.nan)
+TIMING = ("trust", "offset", "desired_offset")
 
 
 def test_a_sine_is_followed_without_knowing_the_load():
@@ -243,19 +244,20 @@ def test_a_restart_under_a_desired_torque_lets_the_error_in_slowly(lost):
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 1e300, -1e4])
-@pytest.mark.parametrize("name", ["ft", "velocity", "position", "motor_torque", "desired"])
+@pytest.mark.parametrize("name", ["ft", "velocity", "position", "motor_torque", "ft_age", "desired", *TIMING])
 def test_one_value_that_is_no_measurement_is_a_lost_sample(name, bad):
     """One ft of 1e300 was full torque for 20 samples, one NaN a torque of NaN for ever."""
-    if abs(bad) < 1e6 and name in ("velocity", "position"):
+    large = math.inf if name in TIMING else 1e6 if name in ("velocity", "position", "ft_age") else 0.0
+    if abs(bad) < large:
         return  # finite, and of some actuator
     plant, controller, torque, torques = Plant(RIG, RATE), TorqueController(RIG, RATE, GAINS), 0.0, []
     for k in range(400):
         reading, desired = _reading(plant.step(torque)), 10.0 * math.sin(2.0 * math.pi * k / RATE)
         if k == 250 and name == "desired":
             desired = bad
-        elif k == 250:
+        elif k == 250 and name not in TIMING:
             reading = replace(reading, **{name: bad})
-        torque = controller.step(reading, desired)
+        torque = controller.step(reading, desired, **({name: bad} if k == 250 and name in TIMING else {}))
         torques.append(torque)
     assert np.isfinite(torques).all() and np.abs(torques).max() < 16.0
 

@@ -210,14 +210,14 @@ def test_the_default_slew_limit_is_that_of_the_driver():
     assert Limits(1.0).slew == parameters["slew_limit"]
 
 
-@pytest.mark.parametrize("wanted", [math.nan, math.inf, -1e6])
-def test_a_command_that_is_none_leads_to_zero_within_the_slew_limit(wanted):
-    """NaN was returned, and dropped the slew limit; -1e6 N m was obeyed as -68."""
+@pytest.mark.parametrize(("wanted", "age"), [(math.nan, 0.0), (math.inf, 0.0), (-1e6, 0.0), (10.0, math.nan)])
+def test_a_command_that_is_none_leads_to_zero_within_the_slew_limit(wanted, age):
+    """NaN was returned, and dropped the slew limit; -1e6 N m was obeyed as -68; an age of NaN was none."""
     limited = guard(slew=300.0)
     for _ in range(5):
         limited.allowed_torque(10.0, 0.0)
-    assert [limited.allowed_torque(wanted, 0.0) for _ in range(4)] == [7.0, 4.0, 1.0, 0.0]
-    assert limited.refused == 4 and limited.allowed_torque(10.0, 0.0) == 3.0
+    assert [limited.allowed_torque(wanted, age) for _ in range(4)] == [7.0, 4.0, 1.0, 0.0]
+    assert limited.refused == (4 if age == 0.0 else 0) and limited.allowed_torque(10.0, 0.0) == 3.0
 
 
 @pytest.mark.parametrize("nothing", [None, (0.0, 0.0, 0.0, 0.0, 0.0, math.nan), (0.0,) * 5 + (math.inf,)])

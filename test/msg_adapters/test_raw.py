@@ -93,6 +93,14 @@ def test_a_text_of_megabytes_is_refused_unread(reader, message):
     assert Counted.cut == 0 and len(str(caught.value)) < 200
 
 
+@pytest.mark.parametrize("names", [["hip"], []])
+def test_more_numbers_than_joints_are_refused(names):
+    """The first one was obeyed: 10 N m of a message that may mean 20."""
+    raw = serialize_message(JointState(name=names, effort=[10.0, 20.0]))
+    with pytest.raises(ParameterError, match="2 numbers of effort, expected at most one for each joint"):
+        RawReader(JOINT_STATE, [("effort", 0)], "hip").read(raw)
+
+
 def test_a_frame_is_neither_read_nor_compared():
     """A sender that puts a counter into the frame costs no walk of each message."""
     reader = RawReader(WRENCH, [("wrench", 5)])

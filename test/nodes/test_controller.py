@@ -59,10 +59,21 @@ def test_a_command_acts_one_sample_after_its_measurement(loop):
 
 
 def test_steps_stay_within_the_limit_and_reach_their_value(loop):
+    begun = len(loop.commands)
+    loop.hold(0.0, lambda: len(loop.commands) > begun + RATE)  # the first one after a pause is no step
     loop.hold(40.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 40.0) < 0.5)
     torques = np.array([effort_of(m)[1] for m in loop.commands])
     assert np.abs(torques).max() == pytest.approx(60.0)
     loop.hold(0.0, lambda: abs(wrench_of(loop.wrenches[-1])[1]) < 0.5)
+
+
+def test_a_desired_torque_that_ceases_and_comes_back_is_no_step(loop, listener):
+    """50 to 61 N m at the motor for 10 N m, when their sender died or was held up for 50 ms."""
+    loop.hold(10.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 10.0) < 0.5)
+    loop.commands.clear()
+    listener.until(lambda: abs(wrench_of(loop.wrenches[-1])[1]) < 0.5)
+    loop.hold(10.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 10.0) < 0.5)
+    assert max(abs(effort_of(m)[1]) for m in loop.commands) < 20.0
 
 
 def test_without_measurements_the_torque_ends_until_the_fault_is_cleared(loop, start, model, listener):
