@@ -24,8 +24,9 @@ PARTS: Mapping[str, Parts] = {
     "driver": Parts(
         {"timing": "timing:timing", "loss": "loss:loss", "faults": "faults:faults",
          "random": "random_faults:random_faults", "controller": "controller:controller",
+         "restarts": "controller:restarts",
          "stream": "stream:stream", "fuzz": "fuzz:fuzz"},
-        {"seconds": 30.0, **NODES, "strings": 1_000_000, "minutes": 1.0, "seed": 1, "patient": False},
+        {"seconds": 30.0, **NODES, "strings": 1_000_000, "minutes": 1.0, "seed": 1},
     ),
     "observer": Parts(
         {"rigs": "errors:rigs", "effects": "errors:effects", "walk": "errors:walk", "noise": "flag:noise",

@@ -83,12 +83,12 @@ def to_zero(
     """Hold 10 N m, delay the controller, and return the measured torques and the fault."""
     faults = file.read_text().splitlines()
     end = time.monotonic() + LONGEST
-    _hold(outside, lambda: torques.newest() > REACHED or time.monotonic() > end)
+    hold(outside, lambda: torques.newest() > REACHED or time.monotonic() > end)
     if time.monotonic() > end:
         return "torque not reached", "none"
     end = time.monotonic() + LONGEST
     with _held_up(process):
-        _hold(outside, lambda: len(file.read_text().splitlines()) > len(faults) or time.monotonic() > end)
+        hold(outside, lambda: len(file.read_text().splitlines()) > len(faults) or time.monotonic() > end)
         for _ in range(30):
             time.sleep(0.01)
             torques.newest()
@@ -107,13 +107,15 @@ def to_zero(
     return f"{(after[last + 1][0] - latched) / 1e6:.0f}", fault
 
 
-def _hold(outside: Outside, condition: object) -> None:
-    def hold() -> bool:
+def hold(outside: Outside, condition: object) -> None:
+    """Desire 10 N m until a condition holds."""
+
+    def done() -> bool:
         outside.desired.publish(torque_command_message(time.time_ns(), 10.0))
         time.sleep(2e-3)
         return bool(condition())  # type: ignore[operator]
 
-    outside.until(hold)
+    outside.until(done)
 
 
 def row(label: str, runs: list[tuple[str, str]]) -> tuple[str, str, str]:
