@@ -64,7 +64,6 @@ class RawReader:
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))
         self._length = len(raw)
 
-
     def _place(self, joints: Sequence[str]) -> int:
         """Return the place of the joint in a message. Raises ParameterError where it is not, or twice."""
         if len(joints) > self._most:

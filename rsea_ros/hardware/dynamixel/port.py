@@ -77,19 +77,6 @@ class SerialPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         if self.ser is not None:
             self.ser.close()
 
-    def getCFlagBaud(self, baudrate: int) -> int:
-        """Return the baud rate when the motors can do it, else -1."""
-        return baudrate if baudrate in BAUD_RATES else -1
-
-    def setBaudRate(self, baudrate: int) -> bool:
-        """Reopen the port at another rate; return whether it is one of BAUD_RATES."""
-        if self.getCFlagBaud(baudrate) < 0:
-            return False
-        self.close()
-        self.baudrate = baudrate
-        self.open()
-        return True
-
     def writePort(self, packet: bytes) -> int:
         """Send bytes; return how many went out. Raises PortLost."""
         try:
