@@ -18,8 +18,8 @@ from rsea_ros.effects.effect import AgainstMotion, Parameter, Parameters
 from rsea_ros.effects.signal_table import CREEP, GEAR_VELOCITY, GEAR_VELOCITY_SPAN, MOBILITY
 
 PRESLIDING = Parameter(
-    "creep_velocity", "rad/s", null=2e-3, low=3e-4, high=2e-2, typical=2e-3, logarithmic=True, optional=True,
-    reason="from 1/2000 of the largest speed, which no sample shows, to 1/30, where friction is viscous",
+    "creep_velocity", "rad/s", null=2e-3, low=1e-5, high=2e-2, typical=2e-3, logarithmic=True, optional=True,
+    reason="from 1/60000 of the largest speed, as good as rest, to 1/30, where friction is viscous",
 )
 """Below it a gear with friction creeps instead of standing still; every friction effect has it."""
 

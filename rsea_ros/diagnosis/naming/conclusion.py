@@ -298,7 +298,7 @@ def with_sizes_known(
 
 
 def is_held_by_bound(effect: str, last: Evaluated, near: float) -> bool:
-    """Return whether a parameter of an effect ended at a bound although the data determine it.
+    """Return whether a parameter of an effect ended at a bound that the law needs or the data determine.
 
     Not a share, which may be none and all, nor what vanishes there or is typical.
     """
@@ -308,7 +308,7 @@ def is_held_by_bound(effect: str, last: Evaluated, near: float) -> bool:
     return any(
         u.is_near_bound(float(at), near)
         and not any(math.isclose(u.outer(float(at)), v) for v in (laws[u.name].null, laws[u.name].typical))
-        and Z95 * doubt < SURE_OF_BOUND * (u.inner(u.high) - u.inner(u.low))
+        and (not laws[u.name].optional or Z95 * doubt < SURE_OF_BOUND * (u.inner(u.high) - u.inner(u.low)))
         for u, at, doubt in fitted
         if u.name in laws
     )

@@ -30,7 +30,7 @@ from rsea_ros.diagnosis.candidate import (
 )
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, Selection, Trial
-from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for
+from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for, is_at_edge
 from rsea_ros.diagnosis.score import Score, tempered_loss
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.identification.confidence import is_off_rig
@@ -64,10 +64,15 @@ def contests(
 def beside(selection: Selection, model: Candidate) -> list[Trial]:
     """Return the trials beside a model that were fitted to all training blocks, the last of each effect.
 
-    Not those that ended at a bound: such an effect imitates another one.
+    Not those whose size ended at a bound.
     """
     full = {t.name: t for t in selection.trials if t.is_full and t.beside.causes == model.causes}
     return [t for t in full.values() if t.reason != "at_bound"]
+
+
+def _in_the_open(tried: Sequence[Trial], kept: str, near: float) -> list[Trial]:
+    """Return trials without those, one kept apart, that ended at a bound: such a law imitates another."""
+    return [t for t in tried if t.name == kept or not is_at_edge(t.problem, t.theta, t.name, near)]
 
 
 def weigh_rivals(
@@ -80,11 +85,13 @@ def weigh_rivals(
     """
     accepted, settings = selection.last.causes, selection.last.settings
     rule = settings.evidence
+    near = settings.acceptance.near_bound
     tried = [t for t in tried if t.name == claim.name or t.name not in accepted]
+    tried = _in_the_open(tried, claim.name, near)
     trust = 0.0 if is_off_rig(selection.last.solution) else 1.0
     scores, weights = _race(tried, held_out, pools, settings, trust)
     if sum(w >= rule.close_weight for w in weights) > 1:
-        tried = _with_close_ones_fitted(tried, weights, selection, pools)
+        tried = _in_the_open(_with_close_ones_fitted(tried, weights, selection, pools), claim.name, near)
         scores, weights = _race(tried, held_out, pools, settings, trust)
     weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
