@@ -18,7 +18,7 @@ import numpy as np
 
 from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings, DiagnosisSettings
 from rsea_ros.identification.problem import Case
-from rsea_ros.model.drive import Drive
+from rsea_ros.model.drive import Drive, SpringStart
 from rsea_ros.records.record import BoolArray, FloatArray, IntArray
 
 TRAIN, VALIDATION, TEST = (0, 1), (2,), (3,)
@@ -86,11 +86,18 @@ def short_pieces_of(
     worst = np.argsort(misfit)[len(spread) - 2 * half :]
     chosen = starts[np.sort(np.concatenate([spread, worst]))]
     begins = [_piece_start(drive, float(t), rule.run_up) for t in chosen]
-    states = [state_at(case, drive.start + k * drive.step, outputs) for k in begins]
     return tuple(
-        _piece(thinner, drive, k, float(t) + length, rule.run_up, state)
-        for k, t, state in zip(begins, chosen, states, strict=True)
+        _piece(thinner, drive, k, float(t) + length, rule.run_up, *_start(case, drive, k, outputs))
+        for k, t in zip(begins, chosen, strict=True)
     )
+
+
+def _start(
+    case: Case, drive: Drive, k: int, outputs: Mapping[str, FloatArray]
+) -> tuple[tuple[float, float], SpringStart | None]:
+    """Return state and spring at the begin of a step."""
+    t = drive.start + k * drive.step
+    return state_at(case, t, outputs), spring_at(case, t, outputs)
 
 
 def as_often_as_commands(case: Case) -> Case:
@@ -141,9 +148,10 @@ def _piece_start(drive: Drive, begin: float, run_up: float) -> int:
 
 
 def _piece(
-    case: Case, drive: Drive, first: int, end: float, run_up: float, state: tuple[float, float]
-) -> Case:
-    """Return the part of a case from a step with a state to a time since its start, s."""
+    case: Case, drive: Drive, first: int, end: float, run_up: float, state: tuple[float, float],
+    spring: SpringStart | None,
+) -> Case:  # fmt: skip
+    """Return the part of a case from a step with a state and a spring to a time since its start, s."""
     last, start = math.ceil(end / drive.step), drive.start + first * drive.step
     compared = start + run_up
     inside = {n: (t >= start) & (t < drive.start + end) for n, t in case.t.items()}
@@ -151,7 +159,7 @@ def _piece(
         drive, start=start, command=drive.command[first:last],
         at={n: drive.at[n][keep] - first for n, keep in inside.items()},
         impulse={n: drive.impulse[n][keep] for n, keep in inside.items()},
-        reference=drive.reference[first:last], angle=drive.angle[first:last], initial=state,
+        reference=drive.reference[first:last], angle=drive.angle[first:last], initial=state, spring=spring,
         origin=drive.origin + first * drive.step, whole=drive.drift_time,
         restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last), spans=(),
     )
@@ -164,9 +172,7 @@ _FEWEST = 4
 """Samples that it takes at least."""
 
 
-def state_at(
-    case: Case, t: float, outputs: Mapping[str, FloatArray] | None = None
-) -> tuple[float, float]:
+def state_at(case: Case, t: float, outputs: Mapping[str, FloatArray] | None = None) -> tuple[float, float]:
     """Return position (rad) and velocity (rad/s) at a time, zero where nothing shows them.
 
     A velocity that is not measured is the slope of a model's position, of `outputs`, and of what that leaves.
@@ -175,15 +181,29 @@ def state_at(
         return 0.0, _at(case, "velocity", t) if "velocity" in case.measured else 0.0
     if "velocity" in case.measured:
         return _at(case, "position", t), _at(case, "velocity", t)
-    stamps, simulated = case.t["position"], (outputs or {}).get("position", np.zeros(len(case.t["position"])))
+    return _beside(case, "position", t, outputs)
+
+
+def spring_at(case: Case, t: float, outputs: Mapping[str, FloatArray]) -> SpringStart | None:
+    """Return what a sensor of the spring shows at a time, beside a model's outputs; None without a sensor."""
+    channel = next((n for n in ("deflection", "ft") if n in case.measured), None)
+    return SpringStart(channel, *_beside(case, channel, t, outputs)) if channel else None
+
+
+def _beside(
+    case: Case, channel: str, t: float, outputs: Mapping[str, FloatArray] | None
+) -> tuple[float, float]:
+    """Return value and rate of a channel at a time: a model's, and a line through what that leaves."""
+    stamps, measured = case.t[channel], case.measured[channel]
+    simulated = (outputs or {}).get(channel, np.zeros(len(stamps)))
     first, last = np.searchsorted(stamps, (t - _NEAR, t + _NEAR))
     near = slice(max(min(first, last - _FEWEST), 0), max(last, first + _FEWEST))
     off, model = stamps[near] - t, simulated[near]
     if len(off) < _FEWEST:
-        return _at(case, "position", t), 0.0
+        return _at(case, channel, t), 0.0
     from scipy.interpolate import CubicSpline  # half a second at every start, which a velocity sensor saves
 
-    slope, level = np.polyfit(off, case.measured["position"][near] - model, 1)
+    slope, level = np.polyfit(off, measured[near] - model, 1)
     curve = CubicSpline(off, model)
     return float(curve(0.0) + level), float(curve(0.0, 1) + slope)
 

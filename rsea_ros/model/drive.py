@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -225,6 +226,14 @@ LONGEST_OF_JOINTS = 1e-3
 """s, where targets at tens of Hz command a position loop, whose firmware samples about as often."""
 
 
+class SpringStart(NamedTuple):
+    """What a sensor of the spring shows at the start: F/T torque (N m) or deflection (rad), and its rate."""
+
+    channel: str
+    value: float
+    rate: float
+
+
 @dataclass(frozen=True)
 class Drive:
     """The command on the step grid and the instants at which channels are wanted.
@@ -234,7 +243,8 @@ class Drive:
     empty. angle: measured position at the end of each step, rad, or empty. at: for each channel the
     sampling instants in steps since `start`.
     impulse: of the held command up to each instant beyond its mean over the step, N m s.
-    initial: position (rad) and velocity (rad/s) at the start. hold: steps in a command period.
+    initial: position (rad) and velocity (rad/s) at the start; spring: what its sensor shows there, where that
+    counts. hold: steps in a command period.
     origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
     `duration` when the drive is a piece of one. jumps: the command is held, not a line between its stamps.
     restarts: where it begins anew, behind gaps of the whole record and with each span.
@@ -256,6 +266,7 @@ class Drive:
     jumps: bool = True
     restarts: tuple[Restart, ...] = ()
     spans: tuple[tuple[int, int], ...] = ()
+    spring: SpringStart | None = None
 
     @property
     def simulated(self) -> tuple[tuple[int, int], ...]:

@@ -106,18 +106,53 @@ def start_map(rig: Rig, m: Mechanics) -> FloatArray:
 
     An initial angle other than zero thus turns the free parts and does not load the spring.
     """
-    row = encoder_row(rig, m)[: m.order]
+    encoder = encoder_row(rig, m)[None, : m.order]
     start = np.zeros((2 * m.order, 2))
-    if row.any():
-        stiff = m.stiffness + 1e-9 * np.trace(m.stiffness + m.mass) * np.eye(m.order)
-        for i, energy in enumerate((stiff, m.mass)):
-            least = np.linalg.solve(energy, row)
-            start[i * m.order : (i + 1) * m.order, i] = least / (row @ least)
+    if encoder.any():
+        start[: m.order, :1], start[m.order :, 1:] = _least(_stiff(m), encoder), _least(m.mass, encoder)
     return start
 
 
+def sprung_start_map(m: Mechanics, encoder: FloatArray, spring: FloatArray) -> FloatArray:
+    """Return the map to the state of least energy where a sensor of the spring is known too, shape (2n, 4).
+
+    From output angle (rad), speed (rad/s), and the value of F/T torque (N m) or deflection (rad) with its
+    rate. encoder, spring: rows of both sensors in the state. Where the angle alone says all of the spring, as
+    between clamped ends, the sensor is not needed and its columns are zero.
+    """
+    n, start = m.order, np.zeros((2 * m.order, 4))
+    rows = np.array([encoder[:n], spring[:n]])
+    unit = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+    if np.linalg.matrix_rank(unit, tol=_ALIKE) < 2:
+        rows = rows[:1]
+    known = len(rows)
+    start[n:, 1::2][:, :known] = _least(m.mass, rows)
+    start[:n, 0::2][:, :known] = level = _least(_stiff(m), rows)
+    if known == 2:
+        start[:n] -= np.outer(level[:, 1], spring[n:] @ start[n:])
+    return start
+
+
+_ALIKE = 1e-6
+"""Sine of the angle between the rows of two sensors that show the same."""
+
+
+def _stiff(m: Mechanics) -> FloatArray:
+    return np.asarray(m.stiffness + 1e-9 * np.trace(m.stiffness + m.mass) * np.eye(m.order))
+
+
+def _least(energy: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return the map from readings of rows to what has them with the least of a quadratic energy."""
+    along = np.linalg.solve(energy, rows.T)
+    return np.asarray(along @ np.linalg.inv(rows @ along))
+
+
+OUTPUT_ROWS = ("position", "velocity", "ft", "deflection")
+"""What the rows of `Linear.outputs` show."""
+
+
 def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
-    """Return the rows of position, velocity, the linear torque at the F/T sensor, and deflection."""
+    """Return OUTPUT_ROWS: position, velocity, the linear torque at the F/T sensor, and deflection."""
     position, velocity = encoder_row(rig, m), encoder_row(rig, m, is_rate=True)
     deflection, rate = (read_row(rig, m, s) for s in (st.DEFLECTION, st.DEFLECTION_RATE))
     if rig.ft_end == "housing_end":

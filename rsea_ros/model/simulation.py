@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,11 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
-from rsea_ros.model.drive import Drive, drive_from, zero_unknown
-from rsea_ros.model.equations import mechanics, train_ratio, with_structure
+from rsea_ros.model.drive import Drive, SpringStart, drive_from, zero_unknown
+from rsea_ros.model.equations import Mechanics, mechanics, train_ratio, with_structure
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
-from rsea_ros.model.propagator import propagator, start_map
+from rsea_ros.model.propagator import OUTPUT_ROWS, propagator, sprung_start_map, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
 from rsea_ros.records.record import Channel, FloatArray, Record
@@ -99,16 +99,30 @@ class Machine:
     table: FloatArray
     effect_x: FloatArray
     start_map: FloatArray
+    mechanics: Mechanics
+    sprung_maps: dict[str, FloatArray] = field(default_factory=dict)
 
-    def begin(self, initial: tuple[float, float] = (0.0, 0.0)) -> None:
-        """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history."""
-        self.x[:] = self.start_map @ np.array(initial)
+    def begin(self, initial: tuple[float, float] = (0.0, 0.0), spring: SpringStart | None = None) -> None:
+        """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history.
+
+        spring: what its sensor shows at that time, where it is known.
+        """
+        if spring is None:
+            self.x[:] = self.start_map @ np.array(initial)
+        else:
+            self.x[:] = self._sprung_map(spring.channel) @ np.array([*initial, spring.value, spring.rate])
         self.effect_x[:] = 0.0
         self.table[st.FIRST_READ : st.VELOCITY + 1] = 0.0
         self.table[st.POSITION] = self.table[st.OUTPUT_ANGLE] = initial[0]
         self.table[st.VELOCITY] = self.table[st.OUTPUT_VELOCITY] = initial[1]
         self.table[st.FT] = self.linear.outputs[2] @ self.x
         self.table[st.PLAY], self.table[st.SPRING_ANGLE] = 0.0, self.linear.outputs[3] @ self.x
+
+    def _sprung_map(self, channel: str) -> FloatArray:
+        if channel not in self.sprung_maps:
+            encoder, spring = self.linear.outputs[[0, OUTPUT_ROWS.index(channel)]]
+            self.sprung_maps[channel] = sprung_start_map(self.mechanics, encoder, spring)
+        return self.sprung_maps[channel]
 
 
 def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArray]:
@@ -189,7 +203,7 @@ def _over_span(
     ends = [*(k for k, _ in begins[1:]), end]
     state = StepState(machine.x, machine.table, machine.effect_x)
     for (k, initial), stop in zip(begins, ends, strict=True):
-        machine.begin(initial)
+        machine.begin(initial, drive.spring if k == 0 else None)
         start = k - first
         out[start] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
         inputs = StepInputs(torque[k:stop], reference[k:stop], ridden[k:stop], drive.origin + k * drive.step)
@@ -209,8 +223,7 @@ def _kick(machine: Machine, channel: str) -> float:
     """Return the immediate response of a channel to an impulse of the command, its unit per N m s."""
     if channel == "motor_torque" or machine.table[st.TARGETED] != 0.0:
         return 0.0
-    row = ("position", "velocity", "ft", "deflection").index(channel)
-    at_once = machine.linear.outputs[row] @ machine.linear.g[:, 0]
+    at_once = machine.linear.outputs[OUTPUT_ROWS.index(channel)] @ machine.linear.g[:, 0]
     return float(at_once / machine.table[st.STEP])
 
 
@@ -237,7 +250,7 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     _check_sensor(rig, active)
     falling = mechanics(rig, linear_gravity=False)
     linear = propagator(rig, step, {r for e, _ in active for r in e.reads}, falling)
-    at_start = start_map(rig, mechanics(rig) if any(rig[f"{e}.gravity"] for e in END_NAMES) else falling)
+    hanging = mechanics(rig) if any(rig[f"{end}.gravity"] for end in END_NAMES) else falling
     calls, states = _calls(rig, active, in_loop)
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
@@ -245,7 +258,8 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table[st.TARGETED] = float(rig.loop is not None)
     table[[st.MOBILITY, st.TURNS]] = linear.spans[0] @ linear.g[:, 0], train_ratio(rig)
     table[st.SENSED] = 1.0 - rig["spring_end.above_sensor"]
-    return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), at_start)
+    x, starts = np.zeros(len(linear.phi)), start_map(rig, hanging)
+    return Machine(linear, calls, x, table, np.zeros(states), starts, hanging)
 
 
 def _check_sensor(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]]) -> None:
