@@ -39,7 +39,7 @@ from rsea_ros.effects.signal_table import ROTOR_ANGLE
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.confidence import is_off_rig
 from rsea_ros.identification.fit import add_effect
-from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.problem import Problem, with_unknown_start
 from rsea_ros.identification.solver import Pools, Solution, bounded_step, jacobian_columns, power, solve
 from rsea_ros.identification.unknowns import apply, start_vector, theta_with
 from rsea_ros.records.record import FloatArray
@@ -219,6 +219,7 @@ class StepFits:
         problem, theta = replace(solution.problem, cases=cases), solution.theta
         if self.is_far:
             problem, theta = without_clocks(with_doubled_step(problem), theta)
+        problem = with_unknown_start(problem, theta)
         return solve(problem, theta, iterations=self.settings.fits.present_iterations)
 
     @cached_property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -13,7 +13,7 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
 from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
-from rsea_ros.model.drive import Drive, outside_gaps, zero_unknown
+from rsea_ros.model.drive import Drive, SpringStart, outside_gaps, zero_unknown
 from rsea_ros.model.extent import SKIPPED_START
 from rsea_ros.model.inverse import CUT_OFF, Motion, acting_torque, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.position_loop import with_command
@@ -32,7 +32,8 @@ class Case:
 
     floating: channels whose zero is unknown; they are compared without their means.
     least: by channel its least noise. coloured: channels whose entire residual was
-    taken for noise of the sensor after a fit (noise_level.py).
+    taken for noise of the sensor after a fit (noise_level.py). start_shows: what the state at the start does
+    to the residual, orthonormal, shape (m, k), where that state is not known; the residual is without it.
     """
 
     drive: Drive | Motion
@@ -44,6 +45,7 @@ class Case:
     floating: frozenset[str] = frozenset()
     least: Mapping[str, float] = field(default_factory=dict)
     coloured: frozenset[str] = frozenset()
+    start_shows: FloatArray | None = None
 
     def within(self, mask: Mapping[str, BoolArray]) -> Case:
         """Return the case with only samples that are also in `mask`."""
@@ -214,7 +216,58 @@ def weighted_residual(case: Case, outputs: Mapping[str, FloatArray], channels: S
     """
     with np.errstate(over="ignore", invalid="ignore"):
         parts = [((outputs[n] - case.measured[n]) / case.noise[n])[case.mask[n]] for n in channels]
-    return np.concatenate(parts)
+        residual = np.concatenate(parts)
+        if case.start_shows is not None:
+            residual -= case.start_shows @ (residual @ case.start_shows)
+    return residual
+
+
+def with_unknown_start(problem: Problem, theta: FloatArray) -> Problem:
+    """Return a problem whose residuals are without what an error of the state at the start of a case makes.
+
+    To first order, about the motion at theta: of position, speed, and the spring as its sensor shows it.
+    """
+    rig, clocks = apply(problem.rig, problem.unknowns, theta)
+    cases = tuple(replace(c, start_shows=_start_shows(c, rig, clocks, problem)) for c in problem.cases)
+    return replace(problem, cases=cases)
+
+
+def _start_shows(case: Case, rig: Rig, clocks: Clocks, problem: Problem) -> FloatArray | None:
+    if not isinstance(case.drive, Drive):
+        return None
+    drives = (case.drive, *_other_starts(case.drive, case.noise))
+    moved = [replace(case, drive=drive, start_shows=None) for drive in drives]
+    outputs = simulate_cases(moved, rig, clocks, on_angle=problem.on_angle)[0]
+    channels = problem.present(case)
+    base, *others = [weighted_residual(c, out, channels) for c, out in zip(moved, outputs, strict=True)]
+    columns = np.column_stack([other - base for other in others])
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns[:, np.isfinite(size) & (size > 0.0)]
+    left, shares, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.asarray(left[:, shares > _SAME])
+
+
+_SAME = 1e-3
+"""Share of the largest below which two states at the start do the same to the residual."""
+
+
+def _other_starts(drive: Drive, noise: Mapping[str, float]) -> Iterator[Drive]:
+    """Yield a drive from states that are off by what its sensors' noise shows."""
+    q, w = drive.initial
+    off = noise.get("position", _OFF)
+    yield replace(drive, initial=(q + off, w))
+    yield replace(drive, initial=(q, w + off / _APART))
+    if drive.spring is not None:
+        channel, value, rate = drive.spring
+        off = noise[channel]
+        yield replace(drive, spring=SpringStart(channel, value + off, rate))
+        yield replace(drive, spring=SpringStart(channel, value, rate + off / _APART))
+
+
+_OFF = 1e-4
+"""rad, where the position is not measured."""
+_APART = 0.03
+"""s, over which a rate is known to the noise of its sensor."""
 
 
 @dataclass(frozen=True)
