@@ -11,7 +11,8 @@ import pytest
 from rsea_ros.diagnosis.candidate import with_doubled_step
 from rsea_ros.diagnosis.data_split import short_pieces_of
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
-from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.identification.problem import Problem, case_from, with_unknown_start
+from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate, synthesize
 from rsea_ros.records.record import MEASURED, Channel, Record
@@ -72,4 +73,19 @@ def test_pieces_sample_a_channel_about_as_often_as_commands_at_most(times, kept,
     counts = {n: sum(np.count_nonzero(p.mask[n]) for p in pieces.cases) for n in ("ft", "position")}
     assert counts["position"] == pytest.approx(kept * counts["ft"], rel=0.02)
     residual = pieces.residual(np.zeros(0))
+    assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)
+
+
+def test_pieces_of_a_load_that_swings_cost_one_whatever_the_current_model_and_the_spring_sensor_say():
+    """Nothing told how the load moved where a piece began: the true model cost 2800 times the samples."""
+    swings = {"spring_end.inertia": 1.1, "spring_end.gravity": 14.0, "spring_end.damping": 0.5}
+    rig = load_rig("paper_moving_output").with_values(swings)
+    true = rig.with_effects(EffectSetting("ft_gain_error", {"gain": 1.15}))
+    command = excitation("white_noise", ExcitationSettings(rate=250.0, duration=32.0, seed=5))
+    record = synthesize(true, Channel(np.arange(len(command)) / 250.0, command), seed=5)
+    case = with_stated_noise(case_from(record, rig), rig)
+    wrong = rig.with_values({"spring_end.inertia": 1.4})
+    pieces = short_pieces_of(case, Problem((case,), wrong, (), MEASURED).outputs(np.zeros(0))[0])
+    problem = with_unknown_start(Problem(pieces, true, (), MEASURED), np.zeros(0))
+    residual = problem.residual(np.zeros(0))
     assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)
