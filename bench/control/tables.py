@@ -22,11 +22,11 @@ import numpy as np
 
 from bench import parser_of
 from bench.control.baselines import baselines
+from bench.control.human import Virtual, measure_impedance, passive_to, stiffest
 from bench.control.stiffest import stiffest as limited
 from rsea_ros.cli.control import motors
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.harness import Arrivals, irregular
-from rsea_ros.control.human import Virtual, measure_impedance, passive_to, stiffest
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.link import LinkShare, link_share, linked_set
 from rsea_ros.control.loads import LOCKED, load_range, lock

@@ -111,7 +111,7 @@ def _join_domain() -> None:
 
 
 def restarts(args: argparse.Namespace, folder: Path) -> Iterator[tuple[str, str, str]]:
-    """Start the controller anew under 10 N m beside processes that burn every core: torque at the motor."""
+    """Start the controller anew under 10 N·m beside processes that burn every core: torque at the motor."""
     _join_domain()
     for share in SHARES:
         outside = Outside()

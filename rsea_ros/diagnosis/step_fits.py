@@ -20,7 +20,6 @@ from rsea_ros.diagnosis.candidate import (
     FitSetup,
     fit_candidate,
     in_units_of,
-    leaves_only_noise,
     paid_for,
     refit,
     with_clocks,
@@ -32,7 +31,6 @@ from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses, stated_starts
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.settings import DiagnosisSettings, ForwardSettings
-from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
@@ -111,17 +109,6 @@ def _best_of(
         if tried is not None:
             tried_all.append(tried)
     return min(tried_all, key=lambda s: s.cost, default=None)
-
-
-def best_guess(
-    current: Solution, effect: Effect, guesses: Iterable[dict[str, float]], rule: ForwardSettings
-) -> ScreenedEffect | None:
-    """Return the best of some guesses after two steps with the derivatives that are known.
-
-    None for an effect that shows in no channel.
-    """
-    tried = (_with_present_derivatives(current, effect, guess, rule) for guess in guesses)
-    return min((t for t in tried if t is not None), key=lambda s: s.cost, default=None)
 
 
 def with_values(current: Solution, values: Mapping[str, float]) -> Solution:
@@ -261,18 +248,6 @@ class StepFits:
         """Fit screened effects to all training blocks."""
         return list(self.pools.fits.map(self._fit_all, screened))
 
-    def fit_modes_again(self, models: Sequence[Candidate]) -> list[Candidate]:
-        """Return models, those of a mode fitted again from typical values where that leads further.
-
-        A peak of the residual may lie beside the mode: between two of them, or at an edge of the band. A fit
-        that begins at it ends in a poor minimum. Where some model leaves little, nothing is fitted again.
-        """
-        if any(self._leaves_little(m) for m in models):
-            return list(models)
-        again = [m for m in models if "mode" in effect_named(m.newest).tags]
-        better = {m.newest: m for m in self.pools.fits.map(self._fit_mode_again, again)}
-        return [better.get(m.newest, m) for m in models]
-
     def find_overlooked(self, left_out: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
         """Return those of the effects left out that surely help on the validation blocks, as fitted so far.
 
@@ -342,16 +317,6 @@ class StepFits:
         is_quick = is_far_from_floor(first, self.settings)
         return refit(first, replace(self._setup, iterations=None, is_quick=is_quick))
 
-    def _fit_mode_again(self, model: Candidate) -> Candidate:
-        """Return the fit of a mode from the best of its typical values, where it is better than the model."""
-        self.say(f"fitting {model.newest} from other values", 0.8)
-        (mode,) = (e for e in self.effects if e.name == model.newest)
-        best = best_guess(self.current.solution, mode, mode.default_guesses, self.settings.forward)
-        if best is None:
-            return model
-        other = self._fit_from(replace(best.problem, cases=self.current.cases), best.theta)
-        return min(model, other, key=lambda m: float(m.validation.loss(self.current.validation).sum()))
-
     @property
     def _setup(self) -> FitSetup:
         """How effects are fitted beside the current model."""
@@ -366,11 +331,6 @@ class StepFits:
         problem, _ = self.complete(screened)
         extra, rule = paid_for(problem) - self.current.parameters, self.settings.acceptance
         return any(preference(s, self.current.validation, extra, rule).sure for s in scores)
-
-    def _leaves_little(self, model: Candidate) -> bool:
-        """Return whether a model leaves only noise, or has come near it from afar."""
-        near = self.is_far and not is_far_from_floor(model, self.settings)
-        return near or leaves_only_noise(model, self.settings.floor.only_noise)
 
     def _scores(self, screened: ScreenedEffect) -> list[Score]:
         """Return the scores on the validation blocks of an effect with its fit to the pieces."""

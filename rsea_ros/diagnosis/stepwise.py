@@ -74,7 +74,7 @@ class ForwardStep:
         screened = self.fits.screen(self.fits.on_pieces)
         close = self._fit_to_pieces(screened)
         finalists = self._finalists(screened, close)
-        models = self.fits.fit_modes_again(self.fits.fit_all(finalists))
+        models = self.fits.fit_all(finalists)
         if not self._acceptable(models):
             overlooked = self.fits.find_overlooked(_others(screened, finalists))
             finalists += overlooked

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from bench.control.human import Virtual, measure_impedance
 from rsea_ros.control.controller import TorqueController
 from rsea_ros.control.harness import closed_loop
-from rsea_ros.control.human import Virtual, measure_impedance
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.control.human import Virtual, felt_impedance, measure_impedance, passive_to, stiffest
+from bench.control.human import Virtual, felt_impedance, measure_impedance, passive_to, stiffest
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import Gains
 from rsea_ros.control.synthesis import ControllerDesign
