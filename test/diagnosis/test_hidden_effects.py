@@ -111,7 +111,7 @@ def test_a_delay_of_one_and_a_half_samples_is_no_resonance():
 
 
 def test_a_mode_above_the_band_is_told_from_a_base_that_moves():
-    """Beside a base of up to ten rotors. With its damper on either side it may have 39 to 71 Hz: uncertain."""
+    """Beside a base of up to ten rotors. With its damper on either side it has 39 to 71 Hz."""
     rng = np.random.default_rng([5, *map(ord, "structural_resonancesweepmedium")])
     parameters = drawn_parameters("structural_resonance", "strong", rng)
     assert parameters["frequency"] > 60.0
