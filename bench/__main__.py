@@ -59,8 +59,8 @@ def _run_parts(topic: str, parts: Parts, argv: Sequence[str]) -> int:
         with tempfile.TemporaryDirectory() as folder:
             for row in section(args, Path(folder)) if topic == "driver" else section(args):
                 rows.append(Row(*row) if isinstance(row, tuple) else Row(row, "", ""))
-                print("".join(f"{text:{width}} " for text, width in zip(rows[-1], (58, 22, 0), strict=True)),
-                      flush=True)  # fmt: skip
+                widths = zip(rows[-1], (58, 22, 0), strict=True)
+                print("".join(f"{text!s:{width}} " for text, width in widths), flush=True)
         add_run(topic, name, [rows], time.monotonic() - begin)
     return 0
 

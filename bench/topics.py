@@ -29,7 +29,7 @@ PARTS: Mapping[str, Parts] = {
         {"seconds": 30.0, **NODES, "strings": 1_000_000, "minutes": 1.0, "seed": 1},
     ),
     "observer": Parts(
-        {"rigs": "errors:rigs", "effects": "errors:effects", "walk": "errors:walk", "noise": "flag:noise",
+        {"rigs": "errors:rigs", "lacks": "lacks:lacks", "noise": "flag:noise",
          "flag": "flag_error:flag", "tight": "tight:tight", "timing": "timing:timing"},
         {"hours": 10.0, "seconds": 20.0, **NODES},
     ),

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rsea_ros.library.identified import identify
     from rsea_ros.library.read_bag import read_bag
     from rsea_ros.library.simulating import simulate
-    from rsea_ros.model.observer.observer import Observer
+    from rsea_ros.model.observer.observer import Observer, observe
     from rsea_ros.model.prediction_errors import predict
     from rsea_ros.model.rig import Rig
     from rsea_ros.model.rig_file import load_rig
@@ -40,6 +40,7 @@ DOOR = {
     "effects": "effects",
     "identify": "library.identified",
     "load_rig": "model.rig_file",
+    "observe": "model.observer.observer",
     "predict": "model.prediction_errors",
     "read_bag": "library.read_bag",
     "simulate": "library.simulating",
@@ -48,7 +49,7 @@ DOOR = {
 
 __all__ = [
     "DiagnosisSettings", "Observer", "Record", "Rig", "RseaError", "TorqueController", "check", "diagnose",
-    "effects", "identify", "load_rig", "predict", "read_bag", "simulate",
+    "effects", "identify", "load_rig", "observe", "predict", "read_bag", "simulate",
 ]  # fmt: skip
 
 

@@ -28,7 +28,7 @@ from rsea_ros.control.following import UNLIMITED
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import law_of
 from rsea_ros.control.link import LinkShare
-from rsea_ros.control.prediction import prediction_response, smoothed_response
+from rsea_ros.control.prediction import AHEAD, SMOOTH, prediction_response, z_of
 from rsea_ros.control.settings import CORNER, ControllerSettings
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model import outputs
@@ -41,6 +41,14 @@ from rsea_ros.records.record import ComplexArray, FloatArray
 
 SMALLEST = 0.02
 """Hz, from which on passivity is looked at."""
+
+
+def smoothed_response(period: float, hz: FloatArray) -> ComplexArray:
+    """Return the response of an untrusted torque at the end of the hold, at hz."""
+    back = 1.0 / z_of(period, hz)
+    pole = math.exp(-2.0 * math.pi * SMOOTH * period)
+    response: ComplexArray = ((1.0 - pole) / (1.0 - pole * back)) ** 2 * back**AHEAD
+    return response
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from typing import Any
 
@@ -26,7 +27,8 @@ from bench.control.human import Virtual, measure_impedance, passive_to, stiffest
 from bench.control.stiffest import stiffest as limited
 from rsea_ros.cli.control import motors
 from rsea_ros.control.controller import Measurement, TorqueController
-from rsea_ros.control.harness import Arrivals, irregular
+from rsea_ros.control.grid import Grid, Lateness
+from rsea_ros.control.harness import ControlTrace, reading
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.link import LinkShare, link_share, linked_set
 from rsea_ros.control.loads import LOCKED, load_range, lock
@@ -36,13 +38,75 @@ from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
 from rsea_ros.control.trials import LEARNED, sine, tracking_error
 from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, corners
+from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report.control import tables
 
 DAMPED = (33.0, 0.3, 1.0)
 """Hz, damping ratio, participation: the other reading of a mode of 0.3."""
 SWEEP = np.array([0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 45.0])
+
+
+PARTS = 10
+"""Of a period, between which the simulation distinguishes instants."""
+LONG_AGO = 10**12
+"""ns, stamp of the first measurement."""
+
+
+@dataclass(frozen=True)
+class Arrivals:
+    """When measurements are taken and commands act, of n samples, in periods.
+
+    taken: by how much each measurement is taken after its place; nan for one that is lost. acting: by how
+    much the resulting command acts after its sample. ft_age: by how much its
+    torque is older than the rest of it. Each of shape (n,); ft_age may be one number.
+    """
+
+    taken: FloatArray
+    acting: FloatArray
+    ft_age: FloatArray | float = 0.0
+
+
+def irregular(
+    rig: Rig,
+    rate: float,
+    controller: TorqueController,
+    desired: FloatArray,
+    arrivals: Arrivals,
+) -> ControlTrace:
+    """Run a controller on a simulated rig with measurements and commands that come when they come.
+
+    As the node does it: a grid gives each stamp its place, lateness fades the feedback. Held to a part
+    PARTS of a period.
+    """
+    plant, grid, lateness = Plant(rig, rate * PARTS), Grid(1e9 / rate), Lateness(rate)
+    due = {round((k + off) * PARTS): k for k, off in enumerate(arrivals.taken) if np.isfinite(off)}
+    acting: dict[int, float] = {}
+    ages = np.broadcast_to(arrivals.ft_age, len(desired))
+    rows, torque, command, numbers = [], 0.0, 0.0, np.arange(len(desired))
+    sample = plant.step(0.0)
+    torques = [sample.ft]
+    controller.start(reading(sample), float(desired[0]))
+    for part in range(len(desired) * PARTS):
+        if part in due:
+            periods = grid.place(round(part / PARTS / rate * 1e9 + LONG_AGO))
+            late = float(arrivals.acting[due[part]])
+            trust = lateness.take(max(late, periods - 1), max(1, periods))
+            if periods:
+                wanted = float(np.interp((grid.at - LONG_AGO) * 1e-9 * rate, numbers, desired))
+                back = min(round(ages[due[part]] * PARTS), part)
+                read = replace(reading(sample), ft=torques[part - back], ft_age=back / PARTS)
+                command = controller.step(read, wanted, periods - 1, trust=trust, offset=grid.offset)
+                acting[part + round((1.0 + late) * PARTS)] = command
+        if part % PARTS == 0:
+            rows.append((sample.ft, command, sample.velocity))
+        torque = acting.pop(part, torque)
+        sample = plant.step(torque)
+        torques.append(sample.ft)
+    n = np.array(rows)
+    return ControlTrace(np.arange(len(n)) / rate, np.asarray(desired), n[:, 0], n[:, 1], n[:, 2])
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -7,6 +7,7 @@ text of a seed; the seed of a hidden half is in a file that is not in the reposi
 from __future__ import annotations
 
 import hashlib
+import json
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -27,13 +28,13 @@ from independent.severities import SEVERITIES, drawn_parameters
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # `rsea benchmark make` runs this file
 
 from bench.diagnosis.coverage_cases import COMMANDS
-from rsea_ros.benchmark.dataset import MANIFEST, VERSION, manifest_text, table_text, truth_path
-from rsea_ros.benchmark.scoring import RecordTruth, truth_hash, truth_text
+from rsea_ros.benchmark.dataset import COLUMNS, LIMIT, MANIFEST, VERSION, truth_path
+from rsea_ros.benchmark.scoring import RecordTruth, truth_hash
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_text
 from rsea_ros.progress import Progress
-from rsea_ros.records.record import FloatArray, Record
+from rsea_ros.records.record import UNITS, FloatArray, Record
 
 RIG = "paper_high_impedance"
 GROUPS = {
@@ -42,6 +43,53 @@ GROUPS = {
 """Share of the records by how many effects of the list are hidden, and whether a law beyond it is."""
 TRIES = 100
 """Draws of effects until every one of a record shows; most records take one or two."""
+
+
+RULES = (
+    "Use anything in this folder, any software and any knowledge of physics; not the truth file, its seed, "
+    "or records made with that seed.",
+    "Tune on data sets of other seeds, never on the one that is scored; no hand work on single records.",
+    "Name effects of `effects` with the probability that the record hides each; an effect that is not named "
+    "has the probability 0. An effect counts as named from a probability of 0.5.",
+    "Every hidden effect changes some channel by at least its noise, RMS. A record may hide none, or a law "
+    "that is not in `effects`: then the other effects that it hides are right, and nothing else.",
+    "The values of the rigs are off: inertia up to 15 %, damping 10 %, stiffness 3 %. That is no effect.",
+    f"{LIMIT:g} s for a record on two cores. A record without an answer, or one that took longer, counts as "
+    "answered with no effect.",
+    "Equal probabilities share the mean of their ranks.",
+)
+
+
+def table_text(record: Record) -> str:
+    """Return a record's table."""
+    stamps = {"t_command": record["command"].t, "t": record["ft"].t}
+    columns = [stamps[n] if n in stamps else record[n].y for n in COLUMNS]
+    rows = (",".join(f"{value:.12g}" for value in row) for row in np.column_stack(columns))
+    return "\n".join([",".join(COLUMNS), *rows]) + "\n"
+
+
+def manifest_text(hashes: Mapping[str, str], effects: Mapping[str, str]) -> str:
+    """Return the manifest. effects: what each does, by name."""
+    units = {n: UNITS.get(n, "s") for n in COLUMNS}
+    contents = {
+        "schema": 1,
+        "benchmark": "cause naming of rotary series elastic actuators",
+        "version": VERSION,
+        "licence": "BSD-3-Clause, The rsea_ros authors",
+        "seconds": LIMIT,
+        "columns": units,
+        "holds": "a command acts from its stamp to the next; measurements are taken at theirs",
+        "effects": dict(effects),
+        "rules": list(RULES),
+        "records": dict(hashes),
+    }
+    return json.dumps(contents, indent=1) + "\n"
+
+
+def truth_text(truths: Mapping[str, RecordTruth]) -> str:
+    """Return the truth file."""
+    records = {name: truth.document for name, truth in truths.items()}
+    return json.dumps({"schema": 1, "records": records}, indent=1) + "\n"
 
 
 @dataclass(frozen=True)

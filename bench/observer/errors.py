@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from bench.observer.truth import Truth, true_run
-from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.model.observer import Noise, Observer, noise_of, observe
-from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.model.observer import Observer, observe
+from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.rival_models import lumped_rig
 from rsea_ros.records.record import FloatArray
@@ -29,17 +28,16 @@ def command(amplitude: float = 12.0) -> FloatArray:
     return amplitude * np.sin(phase) + 3.0 * np.random.default_rng(1).standard_normal(len(t))
 
 
-def errors(model: Rig, truth: Truth, noise: Noise | None = None) -> tuple[float, float, str]:
-    """Return the RMS errors of T_d and T_p, N m, and the channels that contradict the model."""
-    observer = Observer(model, noise, duration=SECONDS)
+def errors(model: Rig, truth: Truth) -> tuple[float, float]:
+    """Return the RMS errors of T_d and T_p, N m."""
+    observer = Observer(model, duration=SECONDS)
     _, estimates = observe(observer, truth.record)
     skip = round(SETTLE * RATE)
     distal, proximal = (
         float(np.sqrt(np.mean((estimates[skip:, k] - true[skip:]) ** 2)))
         for k, true in enumerate((truth.distal, truth.proximal))
     )
-    told = [f"{name} {test.ratio:.1f}" for name, test in observer.consistency().items() if test.broken]
-    return distal, proximal, ", ".join(told) or "none"
+    return distal, proximal
 
 
 def rigs(args: argparse.Namespace) -> Iterator[str]:
@@ -62,31 +60,3 @@ def rigs(args: argparse.Namespace) -> Iterator[str]:
             by_ft = errors(blind, truth)
             line += f"{by_ft[0]:12.3f}{by_ft[1]:9.3f}"
         yield line
-
-
-def effects(args: argparse.Namespace) -> Iterator[str]:
-    """Compare the nominal with the extended model, with each effect of the catalogue at its typical size."""
-    rig = load_rig("paper_moving_output")
-    heads = f"{'nominal T_d':>12}{'T_p':>8}{'extended T_d':>14}{'T_p':>8}"
-    yield f"{'RMS error, N·m':24}{heads}  nominal is denied by"
-    for name, effect in catalogue().items():
-        extended = rig.with_effects(EffectSetting(name, effect.typical))
-        truth = true_run(extended, command(), RATE, seed=2)
-        n, e = errors(rig, truth), errors(extended, truth)
-        yield f"{name:24}{n[0]:12.4f}{n[1]:8.4f}{e[0]:14.4f}{e[1]:8.4f}  {n[2]}"
-
-
-def walk(args: argparse.Namespace) -> Iterator[str]:
-    """Vary the intensity of the disturbance's random walk about the one that is derived."""
-    rig = load_rig("paper_moving_output")
-    friction = rig.with_effects(EffectSetting("coulomb_friction", {"torque": 2.0}))
-    runs = {
-        "right model": true_run(rig, command(), RATE),
-        "2 N·m friction unmodelled": true_run(friction, command(), RATE),
-    }
-    yield f"{'RMS error of T_p, N·m':24}" + "".join(f"{name:>28}" for name in runs)
-    for factor in (0.01, 0.1, 1.0, 10.0, 100.0):
-        noise = noise_of(rig)
-        noise = replace(noise, disturbance=noise.disturbance * factor**0.5)
-        cells = [errors(rig, truth, noise)[1] for truth in runs.values()]
-        yield f"intensity times {factor:<8g}" + "".join(f"{cell:28.4f}" for cell in cells)

@@ -10,12 +10,11 @@ import plotly.graph_objects as go
 from scipy.signal import chirp
 
 import rsea_ros as rsea
-from rsea_ros.model.observer.observer import observe
 
 rig = rsea.load_rig("paper_high_impedance")
 t = np.arange(2800) / 280.0  # s
 run = rsea.simulate(rig, 10.0 * chirp(t, 10.0, 10.0, 60.0), rate=280.0)
-_, estimates = observe(rsea.Observer(rig), run)
+_, estimates = rsea.observe(rsea.Observer(rig), run)
 distal, proximal = estimates[:, 0].reshape(20, 140), estimates[:, 1].reshape(20, 140)  # N·m, by half seconds
 share = np.sqrt(np.mean((proximal - distal) ** 2, axis=1) / np.mean(distal**2, axis=1))
 frequency = 10.0 + 5.0 * (0.25 + 0.5 * np.arange(20))  # Hz

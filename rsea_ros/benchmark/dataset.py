@@ -13,7 +13,7 @@ import numpy as np
 
 from rsea_ros.documents.wording import did_you_mean, no_utf_8, quote
 from rsea_ros.errors import BenchmarkError
-from rsea_ros.records.record import UNITS, Channel, Record
+from rsea_ros.records.record import Channel, Record
 
 text_of = quote
 
@@ -52,19 +52,6 @@ LIMIT = 120.0
 """s for a record on two cores; an answer that took longer counts as none."""
 COLUMNS = ("t_command", "command", "t", "ft", "position", "velocity", "motor_torque")
 """Of a record's table: stamps of the command, s, the command, stamps of the measurements, s, and these."""
-RULES = (
-    "Use anything in this folder, any software and any knowledge of physics; not the truth file, its seed, "
-    "or records made with that seed.",
-    "Tune on data sets of other seeds, never on the one that is scored; no hand work on single records.",
-    "Name effects of `effects` with the probability that the record hides each; an effect that is not named "
-    "has the probability 0. An effect counts as named from a probability of 0.5.",
-    "Every hidden effect changes some channel by at least its noise, RMS. A record may hide none, or a law "
-    "that is not in `effects`: then the other effects that it hides are right, and nothing else.",
-    "The values of the rigs are off: inertia up to 15 %, damping 10 %, stiffness 3 %. That is no effect.",
-    f"{LIMIT:g} s for a record on two cores. A record without an answer, or one that took longer, counts as "
-    "answered with no effect.",
-    "Equal probabilities share the mean of their ranks.",
-)
 _NAME = re.compile(r"r[0-9]{4,6}")
 
 
@@ -131,32 +118,6 @@ def read_dataset(folder: Path) -> Dataset:
     if not isinstance(limit, (int, float)) or isinstance(limit, bool) or not limit > 0.0:
         raise BenchmarkError(f"{path}: seconds = {text_of(limit)}, expected a number > 0")
     return Dataset(folder, hashes, tuple(effects), float(limit))
-
-
-def table_text(record: Record) -> str:
-    """Return a record's table."""
-    stamps = {"t_command": record["command"].t, "t": record["ft"].t}
-    columns = [stamps[n] if n in stamps else record[n].y for n in COLUMNS]
-    rows = (",".join(f"{value:.12g}" for value in row) for row in np.column_stack(columns))
-    return "\n".join([",".join(COLUMNS), *rows]) + "\n"
-
-
-def manifest_text(hashes: Mapping[str, str], effects: Mapping[str, str]) -> str:
-    """Return the manifest. effects: what each does, by name."""
-    units = {n: UNITS.get(n, "s") for n in COLUMNS}
-    contents = {
-        "schema": 1,
-        "benchmark": "cause naming of rotary series elastic actuators",
-        "version": VERSION,
-        "licence": "BSD-3-Clause, The rsea_ros authors",
-        "seconds": LIMIT,
-        "columns": units,
-        "holds": "a command acts from its stamp to the next; measurements are taken at theirs",
-        "effects": dict(effects),
-        "rules": list(RULES),
-        "records": dict(hashes),
-    }
-    return json.dumps(contents, indent=1) + "\n"
 
 
 @dataclass(frozen=True)

@@ -54,12 +54,6 @@ def truth_hash(record: str, truth: RecordTruth) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def truth_text(truths: Mapping[str, RecordTruth]) -> str:
-    """Return the truth file."""
-    records = {name: truth.document for name, truth in truths.items()}
-    return json.dumps({"schema": 1, "records": records}, indent=1) + "\n"
-
-
 def read_truth(path: Path, dataset: Dataset) -> dict[str, RecordTruth]:
     """Return the truth of every record of a data set.
 

@@ -122,14 +122,6 @@ def prediction_response(corner: float, period: float, hz: FloatArray) -> Complex
     return response
 
 
-def smoothed_response(period: float, hz: FloatArray) -> ComplexArray:
-    """Return the response of an untrusted torque at the end of the hold, at hz."""
-    back = 1.0 / z_of(period, hz)
-    pole = math.exp(-2.0 * math.pi * SMOOTH * period)
-    response: ComplexArray = ((1.0 - pole) / (1.0 - pole * back)) ** 2 * back**AHEAD
-    return response
-
-
 MEMORY = 0.5
 """s of changes, as of the controller's learning (learning.py)."""
 CHANGES = 0.3

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from bench.control.tables import Arrivals, irregular
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.grid import Lateness, Tolerance
-from rsea_ros.control.harness import Arrivals, irregular
 from rsea_ros.control.law import Gains
 from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig_file import load_rig

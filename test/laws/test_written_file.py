@@ -61,8 +61,7 @@ def test_it_holds_the_contract_of_the_effects(written):
     contract.test_the_simulation_is_finite_beside_a_soft_gear(written)
     contract.test_every_effect_is_described_for_people_and_for_fits(written)
     contract.test_wrong_parameters_are_refused(written)
-    contract.test_the_simulation_is_finite_over_the_whole_bounds(written, "bare_drive")
-    contract.test_the_simulation_is_finite_over_the_whole_bounds(written, "paper_high_impedance")
+    contract.test_the_simulation_is_finite_over_the_whole_bounds(written)
 
 
 def test_its_measured_claims_hold(written):

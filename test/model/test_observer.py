@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from bench.observer.lacks import actuators, cases, measure, played
 from bench.observer.truth import true_run
 from rsea_ros.errors import RigError
 from rsea_ros.model.observer import Observer, noise_of, observe
@@ -19,7 +22,7 @@ from rsea_ros.paper.rival_models import lumped_rig
 RATE = 280.0
 SETTLE = 100
 RIGS = ("paper_high_impedance", "paper_moving_output", "prototype_knee")
-FRICTION = EffectSetting("coulomb_friction", {"torque": 3.0})
+CASES = tuple(name for name in cases(actuators()["bench"]) if "zero" not in name)
 
 
 def rms(values):
@@ -59,8 +62,9 @@ def test_the_unlumped_observer_errs_as_it_says_and_the_lumped_one_much_more(name
                          (estimates[:, 1] - truth.proximal, estimates[:, 4])):  # fmt: skip
         assert rms((error / sigma)[SETTLE:]) < 1.9
     _, rival = observe(Observer(lumped_rig(rig)), truth.record)
-    unlumped_error, lumped_error = (rms((e[:, 1] - truth.proximal)[SETTLE:]) for e in (estimates, rival))
-    assert unlumped_error < 0.03 < 50.0 * unlumped_error < lumped_error
+    ends = np.column_stack([truth.distal, truth.proximal])
+    unlumped_error, lumped_error = (rms((e[:, :2] - ends)[SETTLE:]) for e in (estimates, rival))
+    assert unlumped_error < 0.01 and 100.0 * unlumped_error < lumped_error
 
 
 def test_the_order_of_arrival_changes_nothing(moving):
@@ -103,7 +107,7 @@ def test_without_ft_the_doubt_grows_and_its_return_is_no_surprise(moving):
             assert abs(after.distal - held.distal) < 3.0 * held.sigma_distal
             assert abs(after.proximal - held.proximal) < 3.0 * held.sigma_proximal
     assert during.sigma_distal > 1.5 * before.sigma_distal
-    assert after.sigma_distal == pytest.approx(before.sigma_distal, rel=0.05)
+    assert after.sigma_distal < 1.05 * before.sigma_distal
 
 
 def test_the_innovation_test_names_the_channel_and_passes_a_right_model(moving):
@@ -119,16 +123,42 @@ def test_the_innovation_test_names_the_channel_and_passes_a_right_model(moving):
     assert told["ft"].broken and told["ft"].ratio > 2.0 and not told["motor_torque"].broken
 
 
-def test_an_effect_of_the_extended_model_is_a_known_torque():
-    rig = load_rig("paper_moving_output").with_effects(FRICTION)
-    truth = true_run(rig, chirp(3.0), RATE, seed=2)
-    errors, disturbances = [], []
-    for model in (rig.with_effects(), rig):
-        _, estimates = observe(Observer(model), truth.record)
-        errors.append(rms((estimates[:, 1] - truth.proximal)[SETTLE:]))
-        disturbances.append(rms(estimates[SETTLE:, 2]))
-    assert errors[1] < 0.5 * errors[0]
-    assert disturbances[1] < 0.2 * disturbances[0] and disturbances[0] > 1.0
+@pytest.mark.parametrize("case", CASES)
+def test_the_torque_is_never_worse_than_the_sensor_and_lies_within_its_sigma(case):
+    """On plants of another hand; 93 to 97 % in long runs: `python -m bench observer lacks`."""
+    for actuator in actuators().values():
+        error, sensor, inside = measure(actuator, case, 3.0, (1, 2, 3))
+        assert error < 1.05 * sensor and inside > 0.92
+        assert error < 0.25 * sensor or case not in ("nothing", "friction, stated", "F/T noise 5 times")
+        assert inside < 0.98 or case.startswith(("free", "samples late"))
+
+
+def test_friction_that_the_model_lacks_is_in_the_disturbance_within_50_ms():
+    for actuator in actuators().values():
+        t = np.arange(round(3.0 * actuator.rate)) / actuator.rate
+        command = actuator.size[0] * np.sin(2.0 * np.pi * 3.0 * t)
+        run = played(actuator.clamped, command, actuator.rate, 4, friction=actuator.friction)
+        d = observe(Observer(actuator.clamped), run.record)[1][:, 2]
+        slides, back = np.abs(run.friction) > 0.9 * actuator.friction, round(0.05 * actuator.rate)
+        since = [k for k in range(len(t) // 6, len(t)) if slides[k - back : k + 1].all()]
+        told = d[since] / run.friction[since]
+        assert len(told) > 0.1 * len(t) and np.quantile(told, 0.05) > 0.7 and 0.95 < told.mean() < 1.05
+
+
+def test_samples_that_no_sensor_gives_leave_no_trace(moving):
+    """Nothing is nan for ever: not after nan, infinity, a wild value, or a sensor that gives zeros only."""
+    rig, rate = load_rig("paper_moving_output"), 1.0 / RATE
+    observer, record = Observer(rig), moving.record
+    for k in range(300):
+        observer.state(k * rate - 10.0, 0.0, 0.0)
+        assert np.isfinite(observer.ft(k * rate - 10.0, 0.0)).all()
+    for k, t in enumerate(record["ft"].t):
+        wild = {200: math.nan, 220: math.inf, 240: 1e4, 260: -1e300}.get(k, 0.0)
+        observer.command(t - rate, record["command"].y[k])
+        observer.state(t, record["position"].y[k] + (wild if k < 250 else 0.0), wild)
+        estimate = observer.ft(t, record["ft"].y[k] + wild)
+        assert np.isfinite(estimate).all()
+        assert k < 400 or abs(estimate.proximal - moving.proximal[k]) < 0.15
 
 
 def test_a_drive_that_does_not_follow_its_command_is_believed_for_its_current():
@@ -159,3 +189,10 @@ def test_gains_come_from_what_identification_measured():
     assert (told.ft, told.position, told.disturbance) == (0.3, 1e-4, pytest.approx(0.4))
     with pytest.raises(RigError, match=r"sensors\.ft\.noise = 0 N·m, expected > 0"):
         noise_of(replace(rig, sensors={"ft": Sensor()}))
+
+
+def test_the_lines_of_the_page_run_as_they_stand():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "observer.md").read_text(encoding="utf-8")
+    said = {}
+    exec(page.split("```python\n")[1].split("```")[0], said)
+    assert said["estimate"].distal == pytest.approx(said["sample"].ft, abs=0.15)

@@ -100,7 +100,7 @@ def test_sensor_noise_alone_is_no_torque_and_as_strong_as_predicted():
         estimate = observer.ft(k / rate, sample.ft)
         assert not band.take(k / rate, estimate)
         heard.append(powers(pair, band.edge, k / rate, estimate.distal, 1e-4))
-    error = error_model(rate, rig.name)
+    error = observer.error_model(1.0 / rate)
     foretold = split(error.a, error.k, error.c, error.r, band.edge, 1.0 / rate)
     assert np.mean(heard[280:], axis=0) == pytest.approx(foretold, rel=0.3)
 

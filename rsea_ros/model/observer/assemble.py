@@ -18,7 +18,17 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model import outputs
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.equations import PORTS, with_structure
-from rsea_ros.model.observer.filter import CLOCK, SIGMA, FilterModel, FilterState, disturbance
+from rsea_ros.model.observer.filter import (
+    BRIEF,
+    CLOCK,
+    FIXED,
+    SIGMA,
+    WALK,
+    WINDOWS,
+    FilterModel,
+    FilterState,
+    disturbance,
+)
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
@@ -83,8 +93,10 @@ def without_delay(rig: Rig) -> tuple[Rig, float]:
     return rig.with_effects(*(e for e in rig.effects if e not in delays)), float(delay)
 
 
-def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[FilterModel, FilterState]:
-    """Return the model and the state at rest with nothing known. hold, duration: s."""
+def assemble(
+    rig: Rig, noise: Noise, *, hold: float, duration: float, learns: bool
+) -> tuple[FilterModel, FilterState]:
+    """Return the model and the state at rest with nothing known. hold, duration: s; learns: filter.py."""
     machine, linear = build(rig, LONGEST_STEP, duration), linear_model(with_structure(rig))
     n, size = linear.order, len(linear.start)
     measured = np.zeros((2, size))
@@ -100,13 +112,22 @@ def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[F
         calls=_with_disturbance(machine.calls),
         block=block, block_scale=block_scale, a=a, walk=walk, scale=scale,
         f=np.eye(size), q=np.zeros((size, size)), measured=measured,
+        spreads=learns * _spreads(rig, machine.linear.outputs[3]),
         noise=np.array([noise.position, noise.ft, noise.motor_torque]) ** 2,
         estimated=estimated, torques=linear.torques, held=np.zeros(2), hold=hold,
     )  # fmt: skip
     state = _state(n, size, machine)
     state.p[:] = np.diag(linear.start**2)
     state.p[n, n] = noise.disturbance**2
+    state.learnt[FIXED] = not learns
     return model, state
+
+
+def _spreads(rig: Rig, deflection: FloatArray) -> FloatArray:
+    """Return rows on the mechanics of the torques that one sigma of K_s and b_s makes, shape (2, n), N m."""
+    stiffness, damping = (rig[name] * rig.spread(name) if name in rig.quantities else 0.0
+                          for name in ("spring.stiffness", "spring.damping"))  # fmt: skip
+    return np.array([stiffness * deflection, damping * np.roll(deflection, len(deflection) // 2)])
 
 
 def _balance(a: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -132,9 +153,10 @@ def _with_disturbance(calls: Calls) -> Calls:
 def _state(n: int, size: int, machine: Machine) -> FilterState:
     """Return a state of zeros, all its parts views of one array."""
     states = len(machine.effect_x)
-    sizes = (n, size - n, size * size, st.SIZE, states, n, 3, SIGMA + 3, CLOCK, 9)
+    sizes = (n, size - n, size * size, st.SIZE, states, n, 3, SIGMA + 3, CLOCK, 9, BRIEF + len(WINDOWS))
     whole = np.zeros(sum(sizes))
     parts = np.split(whole, np.cumsum(sizes)[:-1])
     state = FilterState(whole, *parts)
     state.table[:] = machine.table
+    state.learnt[WALK] = 1.0
     return state._replace(p=state.p.reshape(size, size))

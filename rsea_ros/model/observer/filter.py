@@ -5,6 +5,17 @@
 
 F and Q are exact for any time between stamps (transition.py). g is the response to a motor torque held for
 that time, s_u its doubt. Source: Anderson, Moore, Optimal Filtering, 1979, sections 3.1 and 6.7.
+
+What the model lacks is learnt from the innovations nu, by channel; r is the stated variance of the noise:
+
+    position   Q and s_u^2 times phi,  phi *= 1 + (h P h' / S) (nu^2 / S - 1) / n: the score of ln phi
+               (Creal, Koopman, Lucas, Journal of Applied Econometrics 28, 2013)
+    ft         ft = h z + m + v, m of variance M, which lacks: S = h P h' + M + r', T_d = h z + M / S nu.
+               M: the mean of nu^2 over h P h' + r' (covariance matching: Myers, Tapley, IEEE Trans. Automatic
+               Control 21, 1976); r' = r, or more where nu is white (Mehra, ibid. 15, 1970)
+
+So T_d becomes the reading, of variance r', as M grows. M is at least kappa times what the stated spreads
+of the spring make (consider parameters: Schmidt, 1966); kappa: the share that nu confirms, 1 at first.
 """
 
 from __future__ import annotations
@@ -26,6 +37,22 @@ POSITION, WRENCH, TORQUE = range(3)
 NOW, FORCED, SINCE, ERROR, STARTED, CLOCK = range(6)
 """In `clock`: time (s), command in force (N m), since when (s), what the drive makes beside it (N m)."""
 SIGMA = 3
+FIXED, WALK, LACK, STATED, LEFT, _, COUNT, POWER, FIRST, SECOND, LAST, BEFORE, DOUBT, BRIEF = range(14)
+"""In `learnt`: 1 where nothing is learnt; phi; M, N^2 m^2; what the spreads make of it; what of it the last
+ft has left in T_d and in T_p; of the innovations of ft over sqrt(S): number, means of their squares and of
+one times the last and the one before, these two; mean of the doubt by spreads; from BRIEF on: means of
+squares over WINDOWS."""
+LONG, START = 2048.0, 16.0
+"""Samples: 2048 tell a variance to 3 %; 16 are 50 ms at 280 Hz, in which friction has to show."""
+WINDOWS, LIMITS = (128.0, 16.0, 1.0), (1.38, 2.28, 16.0)
+"""Samples of shorter means of nu^2, and the part of S that these pass by chance in 6 of 10^5 (chi-square)."""
+WHITE = 2.0 * np.log(LONG)
+"""Of n (rho_1^2 + rho_2^2), up to which the innovations are white: Schwarz, Annals of Statistics 6, 1978, for
+two coefficients. Beyond twice of it they are not, and from fewer samples than that nobody can tell."""
+LEAST, MOST = 1e-2, 1e8
+"""Of phi. Below a hundredth the walk is less than an encoder shows within a minute; 1e8 follows any drive."""
+USUAL = 100.0
+"""Of sqrt(S): a larger nu counts as this one, so that one wrong sample is forgotten within 2 LONG."""
 SAME = 1e-6
 SHORTEST = 1e-7
 """s. Stamps nearer than this are the same instant."""
@@ -45,8 +72,9 @@ once: Any = partial(njit, cache=True, nogil=True, error_model="numpy", inline="a
 class FilterModel(NamedTuple):
     """The constants of the filter; only `held` changes: step for which linear.phi, f and q hold, s.
 
-    measured: rows of position and ft on z, shape (2, n). noise: variances of position, ft, motor torque.
-    hold: how long a command stays in force, s.
+    measured: rows of position and ft on z, shape (2, n). spreads: rows of the torques by one sigma of the
+    spring's values. noise: variances of position, ft, motor torque. hold: how long a command stays in
+    force, s.
     """
 
     linear: Linear
@@ -59,6 +87,7 @@ class FilterModel(NamedTuple):
     f: FloatArray
     q: FloatArray
     measured: FloatArray
+    spreads: FloatArray
     noise: FloatArray
     estimated: FloatArray
     torques: FloatArray
@@ -84,6 +113,7 @@ class FilterState(NamedTuple):
     estimate: FloatArray
     clock: FloatArray
     score: FloatArray
+    learnt: FloatArray
 
 
 @compiled
@@ -151,7 +181,8 @@ def _set_step(model, table, h):  # type: ignore[no-untyped-def]
 @inner
 def _spread(model, state):  # type: ignore[no-untyped-def]
     """Let the covariance grow over the time of f and q."""
-    p, n = state.p, len(state.p)
+    p, n, walk = state.p, len(state.p), state.learnt[WALK]
+    torque = min(walk, 1.0) * model.noise[TORQUE]
     fp = np.zeros((n, n))
     for i in range(n):
         for k in range(n):
@@ -160,11 +191,11 @@ def _spread(model, state):  # type: ignore[no-untyped-def]
                     fp[i, j] += model.f[i, k] * p[k, j]
     for i in range(n):
         for j in range(i + 1):
-            value = model.q[i, j]
+            value = walk * model.q[i, j]
             for k in range(n):
                 value += fp[i, k] * model.f[j, k]
             if i < len(state.reach):
-                value += model.noise[TORQUE] * state.reach[i] * state.reach[j]
+                value += torque * state.reach[i] * state.reach[j]
             p[i, j] = p[j, i] = value
 
 
@@ -180,18 +211,36 @@ def _estimate(model, state):  # type: ignore[no-untyped-def]
             value += model.estimated[k, i] * state.x[i]
         state.estimate[k] = value
     state.estimate[2] = state.extra[0]
+    learnt, stated = state.learnt, 0.0
+    for k in range(len(model.spreads)):
+        torque = 0.0
+        for i in range(n):
+            torque += model.spreads[k, i] * state.x[i]
+        stated += torque * torque
+    learnt[STATED] = stated
+    learnt[LEFT] = learnt[LEFT + 1] = _lack(learnt, model.noise[WRENCH])
+
+
+@inner
+def _lack(learnt, r):  # type: ignore[no-untyped-def]
+    """Return M, N^2 m^2: learnt, or stated so far as the innovations of ft confirm it."""
+    n = min(learnt[COUNT], LONG)
+    kappa = (r + n * learnt[LACK]) / (r + n * learnt[DOUBT]) if n > 0.0 else 1.0
+    return max(learnt[LACK], min(kappa, 1.0) * learnt[STATED])
 
 
 @inner
 def doubt(model, state):  # type: ignore[no-untyped-def]
     """Put the sigmas of the estimates beside them; the doubt in the motor's torque is part of both."""
-    n, x = len(state.p), len(state.x)
+    n, x, walk = len(state.p), len(state.x), state.learnt[WALK]
+    # where phi is small the true walk lies between none and phi's, which makes half of P: 3/4 of P count
+    share = 1.0 if state.learnt[FIXED] == 1.0 else 1.0 - 0.25 * min(1.0, 0.1 / walk)
     for k in range(2):
-        variance = model.noise[TORQUE] * model.torques[k, 0] ** 2
+        variance = min(walk, 1.0) * model.noise[TORQUE] * model.torques[k, 0] ** 2
         for i in range(n):
             for j in range(n):
                 variance += model.estimated[k, i] * state.p[i, j] * model.estimated[k, j]
-        state.estimate[SIGMA + k] = np.sqrt(variance)
+        state.estimate[SIGMA + k] = np.sqrt(share * variance + state.learnt[LEFT + k])
     state.estimate[SIGMA + 2] = np.sqrt(state.p[x, x])
 
 
@@ -207,11 +256,50 @@ def update(model, state, channel, value):  # type: ignore[no-untyped-def]
             ph[i] += p[i, j] * h[j]
     for i in range(n):
         s += h[i] * ph[i]
-    error = value - state.predicted[channel]
-    _score(state, channel, error, s)
+    error, own, learnt, lack = value - state.predicted[channel], s - r, state.learnt, 0.0
+    _score(state, channel, error, r + own / max(learnt[WALK], 1.0))
+    if learnt[FIXED] == 0.0:
+        if channel == POSITION or not np.isfinite(model.noise[POSITION]):
+            surprise = min(error * error / s, USUAL * USUAL) - 1.0
+            learnt[WALK] = min(max(learnt[WALK] * (1.0 + own / s * surprise / START), LEAST), MOST)
+        else:
+            r = _learn(learnt, error, own, r)
+            lack = _lack(learnt, model.noise[WRENCH])
+            s = own + lack + r
+            for k in range(2):
+                shared = 0.0
+                for i in range(n):
+                    shared += model.estimated[k, i] * ph[i]
+                state.estimate[k] += lack / s * error
+                learnt[LEFT + k] = lack - lack * (2.0 * shared + lack) / s
     gain = ph / s
-    _joseph(p, gain, h, r)
+    _joseph(p, gain, h, r + lack)
     _shift(model, state, gain * error)
+
+
+@inner
+def _learn(learnt, error, own, r):  # type: ignore[no-untyped-def]
+    """Learn M from an innovation of ft (N m). own: h P h', r: stated noise, N^2 m^2. Return the noise r'."""
+    learnt[COUNT] += 1.0
+    n, known = min(learnt[COUNT], LONG), own + r
+    error = min(max(error / np.sqrt(known), -USUAL), USUAL)
+    learnt[POWER] += (error * error - learnt[POWER]) / n
+    learnt[FIRST] += (error * learnt[LAST] - learnt[FIRST]) / n
+    learnt[SECOND] += (error * learnt[BEFORE] - learnt[SECOND]) / n
+    learnt[BEFORE], learnt[LAST] = learnt[LAST], error
+    learnt[DOUBT] += (learnt[STATED] - learnt[DOUBT]) / n
+    power = max(learnt[POWER], 1e-9)  # of a sensor that repeats one value
+    correlation = n * (learnt[FIRST] ** 2 + learnt[SECOND] ** 2) / (power * power)
+    white = min(max(2.0 - correlation / WHITE, 0.0), 1.0) if n > 2.0 * WHITE else 0.0
+    excess = max(power - 1.0, 0.0) * known
+    noise, lack = r + white * excess, (1.0 - white) * max(excess, learnt[FIRST] * known)
+    for i in range(len(WINDOWS)):
+        learnt[BRIEF + i] += (error * error - learnt[BRIEF + i]) / min(n, WINDOWS[i])
+        size, expected = learnt[BRIEF + i] * known, own + noise + (lack if WINDOWS[i] == 1.0 else 0.0)
+        if size > LIMITS[i] * expected:
+            lack = max(lack, size - own - noise)
+    learnt[LACK] = lack
+    return noise
 
 
 @inner

@@ -201,7 +201,7 @@ class BatchObserver:
 
     def __init__(self, rig: Rig, noise: Noise, *, hold: float = math.inf, duration: float = 60.0) -> None:
         plain, self._delay = without_delay(rig)
-        self._model, self._state = assemble(plain, noise, hold=hold, duration=duration)
+        self._model, self._state = assemble(plain, noise, hold=hold, duration=duration, learns=False)
         self._start = self._state.whole.copy()
 
     def innovations(self, t: FloatArray, kind: IntArray, values: FloatArray) -> FloatArray:

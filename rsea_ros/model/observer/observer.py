@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 
 from rsea_ros.compiler import njit
 from rsea_ros.model.observer.assemble import assemble, without_delay
-from rsea_ros.model.observer.filter import SIGMA, FilterModel, FilterState, inner
+from rsea_ros.model.observer.filter import LACK, SIGMA, FilterModel, FilterState, inner
 from rsea_ros.model.observer.log import (
     COMMAND,
     FT,
@@ -96,20 +96,20 @@ def _model(h, rest, reads_load, hold):  # type: ignore[no-untyped-def]
     linear = Linear(m(h, 0), m(h, 1), n(h, 2), m(h, 3), m(h, 4), m(h, 5), v(h, 6), reads_load, rest)
     calls = Calls(n(h, 7), n(h, 8), n(h, 9), n(h, 10), v(h, 11), True)
     return FilterModel(linear, calls, m(h, 12), v(h, 13), m(h, 14), m(h, 15), v(h, 16), m(h, 17), m(h, 18),
-                 m(h, 19), v(h, 20), m(h, 21), m(h, 22), v(h, 23), hold)  # fmt: skip
+                 m(h, 19), m(h, 20), v(h, 21), m(h, 22), m(h, 23), v(h, 24), hold)  # fmt: skip
 
 
 @inner
 def _state(h):  # type: ignore[no-untyped-def]
     m, v = _matrix, _vector
-    return FilterState(v(h, 24), v(h, 25), v(h, 26), m(h, 27), v(h, 28), v(h, 29), v(h, 30), v(h, 31),
-                       v(h, 32), v(h, 33), v(h, 34))  # fmt: skip
+    return FilterState(v(h, 25), v(h, 26), v(h, 27), m(h, 28), v(h, 29), v(h, 30), v(h, 31), v(h, 32),
+                       v(h, 33), v(h, 34), v(h, 35), v(h, 36))  # fmt: skip
 
 
 @inner
 def _log(h):  # type: ignore[no-untyped-def]
     m, v, n = _matrix, _vector, _numbers
-    return Log(v(h, 35), n(h, 36), m(h, 37), m(h, 38), n(h, 39), v(h, 40))
+    return Log(v(h, 37), n(h, 38), m(h, 39), m(h, 40), n(h, 41), v(h, 42))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -119,7 +119,7 @@ def receive(handle, rest, reads_load, hold, t, kind, a, b, estimate):  # type: i
     row = take_in(model, state, log, t, kind, a, b)
     if row == NONE:
         return False
-    at = len(state.whole) - len(state.score) - len(state.clock) - len(state.estimate)
+    at = len(state.whole) - len(state.learnt) - len(state.score) - len(state.clock) - len(state.estimate)
     for i in range(len(state.estimate)):
         estimate[i] = log.saved[row, at + i]
     return True
@@ -157,7 +157,8 @@ class Observer:
     """A Kalman filter on the unlumped model of a rig, one sample at a time. Stamps are s since any epoch.
 
     noise: of the sensors, by default from the rig. hold: time that a command stays in force, s. duration:
-    time in which drifts reach their full size, s. Estimates are torques on both ends, N m, with one sigma.
+    of drifts to their full size, s. learns: whether noise and missing torque follow the innovations, or are
+    as stated. Estimates are torques on both ends, N m, with one sigma.
     `observe` runs it over a record. Method: docs/observer.md.
     Not to be confused with the disturbance observer inside TorqueController.
     """
@@ -166,10 +167,10 @@ class Observer:
     _newest: float
 
     def __init__(self, rig: Rig, noise: Noise | None = None, *, hold: float = math.inf,
-                 duration: float = 60.0) -> None:  # fmt: skip
+                 duration: float = 60.0, learns: bool = True) -> None:  # fmt: skip
         self._rig, self._delay = without_delay(rig)
         self._noise = noise_of(rig) if noise is None else noise
-        self._hold, self._duration = hold, duration
+        self._hold, self._duration, self._learns = hold, duration, learns
         self._estimate = np.zeros(2 * SIGMA)
         self.restarts = -1
         self._begin()
@@ -213,13 +214,19 @@ class Observer:
         m, p, size = self._model, self._state.p, len(self._state.p)
         f, q = np.empty((size, size)), np.empty((size, size))
         transition(m.a, m.walk, m.scale, dt, f, q)
-        k = p @ m.measured.T / m.noise[:2]
+        lack = float(self._state.learnt[LACK])
+        k = p @ m.measured.T / (m.noise[:2] + np.array([0.0, lack]))
+        a, c = (np.eye(size) - k @ m.measured) @ f, m.estimated[0]
+        if lack > 0.0:  # then a part of the reading itself is in T_d: of its noise, one more state
+            part = lack / (float(m.measured[1] @ p @ m.measured[1]) + lack + m.noise[1])
+            a, k, c = np.pad(a, (0, 1)), np.vstack([k, [0.0, 1.0]]), np.append(c, part)
         heard = np.where(np.isfinite(m.noise[:2]), m.noise[:2], 0.0)
-        sigma = float(self._state.estimate[SIGMA])
-        return ErrorModel((np.eye(size) - k @ m.measured) @ f, k, heard, m.estimated[0], sigma)
+        return ErrorModel(a, k, heard, c, float(self._state.estimate[SIGMA]))
 
     def _begin(self) -> None:
-        self._model, self._state = assemble(self._rig, self._noise, hold=self._hold, duration=self._duration)
+        self._model, self._state = assemble(
+            self._rig, self._noise, hold=self._hold, duration=self._duration, learns=self._learns
+        )
         self._log = empty_log(len(self._state.whole))
         self._handle = handle_of(self._model, self._state, self._log)
         self._rest, self._reads_load = self._model.linear.rest, self._model.linear.reads_load
