@@ -326,7 +326,8 @@ class RecordView:
         """Return the highest peaks of a residual's spectrum, Hz. is_sharp: as sharp as the record is long."""
         t, residual = self.case.t[channel], residual_of(self.case, self.outputs, channel)
         rate = 1.0 / float(np.median(np.diff(t)))
-        if is_sharp and isinstance(self.case.drive, Drive) and self.case.drive.spans:
+        is_whole = not (isinstance(self.case.drive, Drive) and self.case.drive.spans)
+        if (is_sharp or is_whole) and np.abs((t - t[0]) * rate - np.arange(len(t))).max() > 0.5:
             residual = on_even_clock(t, residual, rate)
         if is_sharp:
             bins, level = power_density(residual, rate, len(residual))

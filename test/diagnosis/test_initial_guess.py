@@ -12,6 +12,7 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect
+from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import MEASURED, Channel
@@ -63,3 +64,19 @@ def test_a_time_that_a_clocks_error_may_make_is_at_its_bound(name, value, expect
     problem = Problem((), load_rig("paper_high_impedance"), unknowns, ("ft", "position"))
     solution = Solution(problem, start_vector(unknowns), np.zeros(0), np.zeros((0, len(unknowns))), 0.0)
     assert is_at_bound(solution, name, 1e-6) is expected
+
+
+@pytest.mark.parametrize("late", ["by_chance", "rounded"])
+def test_the_frequency_of_a_hum_is_read_off_the_stamps_and_not_off_their_number(late):
+    """The median interval is no clock: 50 Hz were 53.5 in an event log, 44.6 with stamps rounded to 2 ms."""
+    intervals = (0.7 + np.random.default_rng(1).exponential(0.3, 4000)) / 400.0
+    t = np.cumsum(intervals) if late == "by_chance" else np.round(np.arange(4000) / 280.0 / 2e-3) * 2e-3
+    rig = load_rig("paper_high_impedance")
+    hum = EffectSetting("mains_interference", {"amplitude": 0.3, "frequency": 50.0, "phase": 1.0})
+    command = Channel(t, np.random.default_rng(2).normal(0.0, 3.0, 4000))
+    record = synthesize(rig.with_effects(hum), command, seed=3)
+    case = case_from(record, rig)
+    (outputs,) = Problem((case,), rig, (), MEASURED).outputs(np.zeros(0))
+    guess, *_ = initial_guesses(effect_named("mains_interference"), RecordView(case, rig, outputs))
+    assert guess["frequency"] == pytest.approx(50.0, abs=0.1)
+    assert guess["amplitude"] == pytest.approx(0.3, rel=0.1)
