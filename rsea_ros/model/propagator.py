@@ -101,44 +101,33 @@ def propagator(rig: Rig, h: float, reads: Iterable[int], m: Mechanics | None = N
     )
 
 
-def start_map(rig: Rig, m: Mechanics) -> FloatArray:
+def start_map(m: Mechanics, encoder: FloatArray, spring: FloatArray | None = None) -> FloatArray:
     """Return the map from output angle (rad) and speed (rad/s) to the state of least energy, shape (2n, 2).
 
-    An initial angle other than zero thus turns the free parts and does not load the spring.
+    An initial angle other than zero thus turns the free parts and does not load the spring. encoder: row of
+    its angle in the state; spring: of F/T torque (N m) or deflection (rad), where that and its rate are known
+    too, shape (2n, 4) then. Where the angle alone says all of the spring, as between clamped ends, its
+    columns are zero.
     """
-    encoder = encoder_row(rig, m)[None, : m.order]
-    start = np.zeros((2 * m.order, 2))
-    if encoder.any():
-        start[: m.order, :1], start[m.order :, 1:] = _least(_stiff(m), encoder), _least(m.mass, encoder)
-    return start
-
-
-def sprung_start_map(m: Mechanics, encoder: FloatArray, spring: FloatArray) -> FloatArray:
-    """Return the map to the state of least energy where a sensor of the spring is known too, shape (2n, 4).
-
-    From output angle (rad), speed (rad/s), and the value of F/T torque (N m) or deflection (rad) with its
-    rate. encoder, spring: rows of both sensors in the state. Where the angle alone says all of the spring, as
-    between clamped ends, the sensor is not needed and its columns are zero.
-    """
-    n, start = m.order, np.zeros((2 * m.order, 4))
-    rows = np.array([encoder[:n], spring[:n]])
-    unit = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
-    if np.linalg.matrix_rank(unit, tol=_ALIKE) < 2:
-        rows = rows[:1]
+    n, rows = m.order, encoder[None, : m.order]
+    start = np.zeros((2 * n, 2 if spring is None else 4))
+    if not rows.any():
+        return start
+    if spring is not None:
+        both = np.array([encoder[:n], spring[:n]])
+        unit = both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-300)
+        rows = both if np.linalg.matrix_rank(unit, tol=_ALIKE) == 2 else rows
     known = len(rows)
     start[n:, 1::2][:, :known] = _least(m.mass, rows)
-    start[:n, 0::2][:, :known] = level = _least(_stiff(m), rows)
-    if known == 2:
+    stiff = m.stiffness + 1e-9 * np.trace(m.stiffness + m.mass) * np.eye(n)
+    start[:n, 0::2][:, :known] = level = _least(stiff, rows)
+    if spring is not None and known == 2:
         start[:n] -= np.outer(level[:, 1], spring[n:] @ start[n:])
     return start
 
 
 _ALIKE = 1e-6
 """Sine of the angle between the rows of two sensors that show the same."""
-
-
-def _stiff(m: Mechanics) -> FloatArray:
-    return np.asarray(m.stiffness + 1e-9 * np.trace(m.stiffness + m.mass) * np.eye(m.order))
 
 
 def _least(energy: FloatArray, rows: FloatArray) -> FloatArray:

@@ -22,7 +22,7 @@ from rsea_ros.model.drive import Drive, SpringStart, drive_from, zero_unknown
 from rsea_ros.model.equations import Mechanics, mechanics, train_ratio, with_structure
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
-from rsea_ros.model.propagator import OUTPUT_ROWS, propagator, sprung_start_map, start_map
+from rsea_ros.model.propagator import OUTPUT_ROWS, propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
 from rsea_ros.records.record import Channel, FloatArray, Record
@@ -98,9 +98,8 @@ class Machine:
     x: FloatArray
     table: FloatArray
     effect_x: FloatArray
-    start_map: FloatArray
     mechanics: Mechanics
-    sprung_maps: dict[str, FloatArray] = field(default_factory=dict)
+    start_maps: dict[str, FloatArray] = field(default_factory=dict)
 
     def begin(self, initial: tuple[float, float] = (0.0, 0.0), spring: SpringStart | None = None) -> None:
         """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history.
@@ -108,9 +107,9 @@ class Machine:
         spring: what its sensor shows at that time, where it is known.
         """
         if spring is None:
-            self.x[:] = self.start_map @ np.array(initial)
+            self.x[:] = self._start_map() @ np.array(initial)
         else:
-            self.x[:] = self._sprung_map(spring.channel) @ np.array([*initial, spring.value, spring.rate])
+            self.x[:] = self._start_map(spring.channel) @ np.array([*initial, spring.value, spring.rate])
         self.effect_x[:] = 0.0
         self.table[st.FIRST_READ : st.VELOCITY + 1] = 0.0
         self.table[st.POSITION] = self.table[st.OUTPUT_ANGLE] = initial[0]
@@ -118,11 +117,12 @@ class Machine:
         self.table[st.FT] = self.linear.outputs[2] @ self.x
         self.table[st.PLAY], self.table[st.SPRING_ANGLE] = 0.0, self.linear.outputs[3] @ self.x
 
-    def _sprung_map(self, channel: str) -> FloatArray:
-        if channel not in self.sprung_maps:
-            encoder, spring = self.linear.outputs[[0, OUTPUT_ROWS.index(channel)]]
-            self.sprung_maps[channel] = sprung_start_map(self.mechanics, encoder, spring)
-        return self.sprung_maps[channel]
+    def _start_map(self, channel: str = "") -> FloatArray:
+        if channel not in self.start_maps:
+            rows = self.linear.outputs
+            spring = rows[OUTPUT_ROWS.index(channel)] if channel else None
+            self.start_maps[channel] = start_map(self.mechanics, rows[0], spring)
+        return self.start_maps[channel]
 
 
 def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArray]:
@@ -258,8 +258,7 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table[st.TARGETED] = float(rig.loop is not None)
     table[[st.MOBILITY, st.TURNS]] = linear.spans[0] @ linear.g[:, 0], train_ratio(rig)
     table[st.SENSED] = 1.0 - rig["spring_end.above_sensor"]
-    x, starts = np.zeros(len(linear.phi)), start_map(rig, hanging)
-    return Machine(linear, calls, x, table, np.zeros(states), starts, hanging)
+    return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), hanging)
 
 
 def _check_sensor(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]]) -> None:
