@@ -12,7 +12,7 @@ from typing import Protocol
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
-from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.hardware.interlock import DeviceFault, event
 from rsea_ros.hardware.limits import (
     UNRATED,
     Guard,
@@ -271,7 +271,7 @@ class GuardedDevice:
 
     def enable(self) -> None:
         """Switch the torque on, at zero. Raises DeviceError with a fault or a stop, also one that comes."""
-        asked = self.interlock.number()
+        asked = event()
         self.interlock.check()
         with self._turn:
             if self.away:
@@ -311,12 +311,12 @@ class GuardedDevice:
     def clear(self, asked: int | None = None) -> bool:
         """Reconnect if necessary, end fault and stop; return whether there was one.
 
-        asked: the interlock's number of the request, which ends no later stop; None: now.
+        asked: the number of the request's event, which ends no later stop; None: now.
         Raises DeviceError while the cause is present, checked by a reading, and for what came meanwhile.
         """
         if self.fault is None:
             return False
-        asked = self.interlock.number() if asked is None else asked
+        asked = event() if asked is None else asked
         self._alone(self._recover)
         self.interlock.end_stop(asked)
         return True
@@ -384,7 +384,7 @@ class GuardedDevice:
         with self._turn:
             if self.away:
                 raise DeviceError(BUSY)
-            self.away, began = True, self.interlock.number()
+            self.away, began = True, event()
         try:
             work()
             self._off_due = False

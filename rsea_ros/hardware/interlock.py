@@ -1,11 +1,12 @@
 """What keeps the torque of a joint away, and what of it a request that takes time may end.
 
 clear_fault, reboot and an activation take up to seconds, and anything may be requested or fail meanwhile. All
-events have a number, from one count: a request ends only what came before it.
+events of all joints have a number, from one count: a request ends only what came before it.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import threading
 from dataclasses import dataclass
@@ -13,7 +14,14 @@ from dataclasses import dataclass
 from rsea_ros.documents.units import plain
 from rsea_ros.errors import DeviceError
 
+_EVENTS = itertools.count(1)
+
 MEANWHILE = "stopped: ~/stop was called meanwhile, expected a clear_fault after it"
+
+
+def event() -> int:
+    """Return the number of what happens now."""
+    return next(_EVENTS)
 
 
 @dataclass(frozen=True)
@@ -43,7 +51,7 @@ class Interlock:
         self.fault: DeviceFault | None = None
         self.stopped = self.enabled = self.halted = False
         self._lock = threading.Lock()
-        self._count = self._stopped_at = self._disabled_at = 0
+        self._stopped_at = self._disabled_at = 0
         self._newest: tuple[int, DeviceFault] | None = None
 
     @property
@@ -51,27 +59,22 @@ class Interlock:
         """Whether there may be torque."""
         return self.enabled and not (self.halted or self.stopped) and self.fault is None
 
-    def number(self) -> int:
-        """Return the number of what begins now."""
-        with self._lock:
-            return self._next()
-
     def trip(self, fault: DeviceFault) -> bool:
         """Latch a fault; return whether none was latched before."""
         with self._lock:
-            self._newest, is_first = (self._next(), fault), self.fault is None
+            self._newest, is_first = (event(), fault), self.fault is None
             self.fault = self.fault or fault
             return is_first
 
     def stop(self) -> None:
         """Let there be no torque until a clear that is asked for later."""
         with self._lock:
-            self._stopped_at, self.stopped = self._next(), True
+            self._stopped_at, self.stopped = event(), True
 
     def disable(self) -> None:
         """End the activity."""
         with self._lock:
-            self._disabled_at, self.enabled = self._next(), False
+            self._disabled_at, self.enabled = event(), False
 
     def end_fault(self, began: int) -> None:
         """End the faults from before a number. Raises DeviceError where there are later ones, which stay."""
@@ -101,7 +104,3 @@ class Interlock:
             if self._disabled_at > asked:
                 raise DeviceError("deactivated meanwhile, expected another activation after it")
             self.enabled = True
-
-    def _next(self) -> int:
-        self._count += 1
-        return self._count

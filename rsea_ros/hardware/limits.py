@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.interlock import DeviceFault, Interlock
+from rsea_ros.hardware.interlock import DeviceFault, Interlock, event
 from rsea_ros.records.record import NONSENSE, is_measured
 
 COMMAND_TIMEOUT = "command_timeout"
@@ -174,7 +174,7 @@ class Guard:
 
     def clear(self) -> None:
         """Clear the faults until now. The torque restarts softly from zero."""
-        self.interlock.end_fault(self.interlock.number())
+        self.interlock.end_fault(event())
         self.restart()
 
     def restart(self) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -12,7 +13,7 @@ from msg_adapters.ros import Trigger
 from rsea_ros.errors import RseaError
 from rsea_ros.hardware.device import Device, State
 from rsea_ros.hardware.guarded import GuardedDevice
-from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.hardware.interlock import DeviceFault, event
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import check_travel
 from rsea_ros.nodes._anchor import Anchor
@@ -24,7 +25,10 @@ from rsea_ros.nodes._health import ERROR, OK, Health, NodeHealth
 from rsea_ros.nodes._joints import Jobs
 
 LOST = {"failed_reads": "reads lost", "failed_writes": "writes lost"}
-Work = Callable[[], str]
+OVERTAKING = 0.05
+"""s for which a stop waits with its answer: requests that were sent before it may still be on their way."""
+Work = Callable[[int], str]
+"""What a service does; it is given the number of the request's event."""
 
 
 class DrivenJoint:
@@ -48,7 +52,7 @@ class DrivenJoint:
         self._health = Health(node, self.report, part=part)
         for name, work in (
             ("zero_ft", self._zero_ft), ("clear_fault", self.clear_fault), ("reboot", self._reboot),
-            ("stop", self.stop),
+            ("stop", self._stop),
         ):  # fmt: skip
             offer(node, jobs, f"{part}/{name}" if part else name, self._guard(work), self._health.publish)
 
@@ -115,39 +119,35 @@ class DrivenJoint:
         """Return a line of the log with the name of the joint if there are several."""
         return f"{self.part}: {text}" if self.part else text
 
-    def clear_fault(self, asked: int | None = None) -> str:
+    def clear_fault(self, asked: int) -> str:
         """End a fault whose cause is over. asked: see GuardedDevice.clear. Raises DeviceError."""
         assert self.drive is not None
-        asked = self.guarded.interlock.number() if asked is None else asked
         if self.guarded.fault is None:
             return "there is no fault; nothing was done"
         with self.drive.deaf():
             self.guarded.clear(asked)
         return "done"
 
-    def stop(self) -> str:
-        """End the torque until clear_fault."""
-        assert self.drive is not None
-        self.drive.stop()
-        return "torque zero until clear_fault"
+    def _stop(self, asked: int) -> str:
+        return stop([self])
 
-    def _zero_ft(self) -> str:
+    def _zero_ft(self, asked: int) -> str:
         self.guarded.zero_ft()
         return "done"
 
-    def _reboot(self) -> str:
+    def _reboot(self, asked: int) -> str:
         assert self.drive is not None
         with self.drive.deaf():
             self.guarded.reboot()
-        return "done"
+        return "done" if self.guarded.fault is None else f"done; fault {self.guarded.fault}"
 
     def _guard(self, work: Work) -> Work:
         """Return work that is refused while there is no open device."""
 
-        def done() -> str:
+        def done(asked: int) -> str:
             if self.drive is None:
                 raise RseaError("the driver is not configured, expected it to be")
-            return work()
+            return work(asked)
 
         return done
 
@@ -179,12 +179,28 @@ class DrivenJoint:
         return NodeHealth(ERROR, f"fault {fault}{besides}", values)
 
 
+def stop(joints: Sequence[DrivenJoint]) -> str:
+    """End the torque until a clear_fault that is asked for after the answer.
+
+    The middleware hands requests of several clients over in any order, within ms: a clear that is taken up
+    between a stop and its answer may have been sent before the stop, so it ends nothing.
+    """
+    for joint in joints:
+        assert joint.drive is not None
+        joint.drive.stop()
+    time.sleep(OVERTAKING)
+    for joint in joints:
+        joint.guarded.stop()
+    return "torque zero until clear_fault"
+
+
 def offer(node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[], None]) -> None:
     """Offer a service ~/NAME that does some work in a thread, and answers with the error where it fails."""
 
     async def serve(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        asked = event()
         try:
-            response.success, response.message = True, f"{name}: {await jobs.do(work)}"
+            response.success, response.message = True, f"{name}: {await jobs.do(partial(work, asked))}"
         except RseaError as error:
             response.success, response.message = False, f"{name}: {' '.join(str(error).split())}"
         node.get_logger().info(response.message)

@@ -25,7 +25,7 @@ from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
 from rsea_ros.nodes._devices import DEVICES
 from rsea_ros.nodes._drive import SignalListener, step
-from rsea_ros.nodes._joint import DrivenJoint, offer
+from rsea_ros.nodes._joint import DrivenJoint, offer, stop
 from rsea_ros.nodes._joints import JOINTS, Jobs, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
@@ -214,20 +214,18 @@ class DriverNode(ManagedEntity):
             self._close_devices()
             raise
 
-    def _stop(self) -> str:
+    def _stop(self, asked: int) -> str:
         self._check_configured()
-        for joint in self.joints:
-            joint.stop()
-        return "torque of all joints zero until clear_fault"
+        return stop(self.joints)
 
-    def _clear_faults(self) -> str:
+    def _clear_faults(self, asked: int) -> str:
         """Clear every joint's fault; one that cannot be cleared does not affect the others.
 
         A joint waits for those before it, and may be stopped meanwhile: that is later than this request.
         """
         self._check_configured()
         done, failed = [], []
-        for joint, asked in [(joint, joint.guarded.interlock.number()) for joint in self.joints]:
+        for joint in self.joints:
             try:
                 done.append(f"{joint.part} {joint.clear_fault(asked)}")
             except RseaError as error:

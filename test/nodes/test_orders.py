@@ -14,7 +14,7 @@ import pytest
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply
-from rsea_ros.hardware.interlock import DeviceFault, Interlock
+from rsea_ros.hardware.interlock import DeviceFault, Interlock, event
 from test.nodes.monitor import World
 
 FAULT = DeviceFault("ft", detail="silent")
@@ -87,10 +87,10 @@ class Both:
     def step(self, name, kind, part):
         """A part of a request: it is asked for, has the device, ends. One has the device at a time."""
         if part == 0:
-            self.asked[name] = self.lock.number(), self.history.happens(kind)
+            self.asked[name] = event(), self.history.happens(kind)
         elif part == 1 and self.away is None:
             self.away = name
-            self.began[name] = self.lock.number(), self.history.happens(kind)
+            self.began[name] = event(), self.history.happens(kind)
         elif part == 2 and self.away == name:
             self.away = None
             self.end(name, kind)

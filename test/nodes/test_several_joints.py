@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from rclpy.lifecycle import LifecycleNode
 
-from msg_adapters.ros import DiagnosticArray, JointState, stamp_of, torque_command_message
+from msg_adapters.ros import DiagnosticArray, JointState, Trigger, stamp_of, torque_command_message
 from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.hardware.interlock import event
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._joints import joint_table
@@ -194,16 +195,34 @@ def test_stop_and_clear_fault_of_the_node_act_on_all_joints(leg):
     leg.ready()
 
 
+@pytest.mark.parametrize("order", [("clear_fault", "hip/stop"), ("hip/stop", "clear_fault")])
+def test_of_a_stop_and_a_clear_in_the_same_ms_the_stop_holds(leg, order):
+    """Requests of two services are taken up in any order: an acknowledged stop was ended, 7 of 9 times."""
+    node = leg.listener.node
+    clients = [node.create_client(Trigger, f"/leg/driver/{service}") for service in order]
+    leg.until(lambda: all(client.service_is_ready() for client in clients))
+    for _ in range(3):
+        leg.ready()
+        assert leg.call("stop").success
+        answers = [client.call_async(Trigger.Request()) for client in clients]
+        leg.until(lambda answers=answers: all(answer.done() for answer in answers))
+        leg.until(lambda: leg.faults()[0].startswith("stopped") and leg.goals()[2] != 0)
+        assert leg.goals()[0] == 0
+        assert leg.call("clear_fault").success
+    for client in clients:
+        node.destroy_client(client)
+
+
 def test_a_joint_that_is_stopped_while_another_one_is_cleared_stays_stopped(make_driver, monkeypatch):
     """The clear of all joints reached it later than its stop, and ended that: 10 N m after an answer."""
     spies = {"hip": Spy(), "knee": Spy()}
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"]]})
     program, _ = make_driver("held", values_of(joints=["hip", "knee"], autostart=True, resume=True))
     hip, knee = program.joints
-    program._stop()
-    monkeypatch.setattr(spies["hip"], "recover", knee.stop)
+    program._stop(event())
+    monkeypatch.setattr(spies["hip"], "recover", lambda: knee._stop(event()))
     with pytest.raises(DeviceError, match="knee: stopped: ~/stop was called meanwhile"):
-        program._clear_faults()
+        program._clear_faults(event())
     assert hip.guarded.interlock.is_free and knee.guarded.interlock.stopped
 
 
