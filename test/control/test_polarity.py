@@ -96,7 +96,10 @@ def test_a_drive_that_is_off_is_neither_right_nor_wrong_and_gets_no_more():
     assert not polarity.proven and not polarity.contradiction and largest < 4.2
 
 
-TURNED = {"ft": ("ft", 2), "position and velocity": ("joint_states", 2), "velocity": ("joint_states", 28)}
+TURNED = {
+    "ft": ("ft", 2), "position and velocity": ("joint_states", 2), "velocity": ("joint_states", 28),
+    "motor_torque": ("motor torque", 2),
+}  # fmt: skip
 """What changes its sign, its name in the contradiction, the most samples until then."""
 
 
