@@ -43,7 +43,7 @@ EXPLAINED = 0.4
 SENT = 4
 """Commands that a measured motor torque may belong to."""
 SURELY_MADE, FELT = 0.02, 0.25
-"""s after which a drive makes a torque that is commanded, and of PULSE, how much of it surely shows a sign."""
+"""s after which a drive makes a torque that is commanded; of PULSE, how much of it surely shows a sign."""
 TIMES = 2.5
 """Times the command that the motor torque may be."""
 REVERSED = {
@@ -66,7 +66,8 @@ class Polarity:
         self._seen = SignEvidence(rig, rate, self._pulse)
         self._change = SignChange(rig, rate, (self._seen.ft_noise, self._seen.noise))
         self._calm = max(LOUD * self._pulse, 3.0 * self._seen.ft_noise)
-        self._orders: deque[float] = deque(maxlen=max(SENT, round(SURELY_MADE * rate)))
+        self._sure = max(SENT, round(SURELY_MADE * rate))
+        self._orders: deque[float] = deque(maxlen=self._sure)
         self.start()
 
     def start(self) -> None:
@@ -74,7 +75,8 @@ class Polarity:
         self._seen.start()
         self.proven, self.contradiction = False, ""
         self._sent, self._made = [0.0] * SENT, [0.0] * SENT
-        self._friction, self._off = 0.0, 0
+        self._friction, self._off, self._alike = 0.0, 0, 0
+        self._state = (0.0, 0.0, 0.0)
         self._orders.clear()
         self._change.start()
         self._direction, self._level, self._beyond = -1.0, self._pulse, ENOUGH * self._pulse
@@ -105,11 +107,13 @@ class Polarity:
         """Return a contradiction under torque, in words; empty without one."""
         heard = self._seen.hear(reading, self._sent[1], missed, keep=False)
         self._made = [self._seen.made[1], *self._made[:-1]]
+        before, self._state = self._state, (reading.position, reading.velocity, reading.motor_torque)
+        self._alike = self._alike + 1 if self._state == before else 0
         if self.contradiction:
             return self.contradiction
         rest = None if heard is None else self._made[0] - sum(heard)
         if name := "motor torque" if self._defied() else self._change.take(reading, rest, missed):
-            self._contradict(f"{name} has changed its sign")
+            self._contradict(self._changed(name))
         if heard is None or self.contradiction:
             return self.contradiction
         ft, motion = heard
@@ -124,14 +128,18 @@ class Polarity:
         self._off = self._off + 1 if off > allowed and flipped[name] < EXPLAINED * off else 0
         self._friction += self._h / LONG * (min(off, allowed) - self._friction)
         if self._off >= CYCLES:
-            self._contradict(f"{name} has changed its sign")
+            self._contradict(self._changed(name))
         return self.contradiction
+
+    def _changed(self, name: str) -> str:
+        """Return in words what changed; a signal that stands still beside one that moves looks so, too."""
+        return f"{name} has changed its sign" if self._alike < CYCLES else "joint_states repeat one value"
 
     def _defied(self) -> bool:
         """Return whether the last two motor torques are against every command that they may belong to."""
         low, high = min(self._orders, default=0.0), max(self._orders, default=0.0)
         least = max(low, 0.0) + min(high, 0.0)
-        if len(self._orders) < self._orders.maxlen or abs(least) < FELT * self._pulse:
+        if len(self._orders) < self._sure or abs(least) < FELT * self._pulse:
             return False
         return all(made * least < -0.5 * least**2 for made in self._seen.made)
 

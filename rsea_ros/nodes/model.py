@@ -70,7 +70,7 @@ class ModelNode:
         self._estimates = node.create_publisher(JointState, "torque_estimate", COMMAND)
         template = serialize_message(efforts_message(0, dict.fromkeys(NAMES, 0.0)))
         self._writer = RawWriter(template, TYPES["joint_states"], "effort")
-        self._flags = Flags(node)
+        self._flags, self._has_ft = Flags(node), "ft" in rig.sensors
         read = InputSettings(**{n: values[n] for n in ("ft_timeout", "axis", "reliable", "joint")})
         self._stopped = stopped_sensors(rig, noise)
         self._inputs = ModelInputs(node, observer, self._stopped, read)
@@ -94,8 +94,9 @@ class ModelNode:
 
     @property
     def _doubted(self) -> bool:
-        """Whether a sensor has stopped or is wrong: nobody knows the torque then."""
-        return bool(self._stopped.frozen or self._stopped.unmoved or self._assess.contradictions)
+        """Whether a sensor is silent, has stopped or is wrong: nobody knows the torque then."""
+        stopped = self._stopped.frozen or self._stopped.unmoved or (self._has_ft and self._inputs.ft_silent)
+        return bool(stopped or self._assess.contradictions)
 
     def _report(self) -> NodeHealth:
         with self._lock:

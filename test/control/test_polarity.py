@@ -128,6 +128,23 @@ def test_a_sign_that_changes_under_torque_is_a_fault_within_two_samples(changed,
     assert 292 < k <= 292 + most
 
 
+def test_states_that_stand_still_are_named_and_not_the_sensor_that_is_right():
+    plant, polarity, torque = Plant(RIG, RATE), Polarity(RIG, RATE, LIMIT), 0.0
+    controller = TorqueController(RIG, RATE, GAINS)
+    polarity.proven = True
+    for k in range(600):
+        reading = measured(plant.step(torque), {})
+        if k < 285:
+            last = reading
+        else:
+            reading = replace(last, ft=reading.ft)
+        if polarity.watch(reading):
+            break
+        torque = controller.step(reading, 10.0 * math.sin(8.0 * math.pi * k / RATE))
+        polarity.sent(torque)
+    assert "joint_states repeat one value" in polarity.contradiction
+
+
 def test_a_blow_to_a_free_load_is_no_changed_sign():
     """ft goes from 2 to -2 N m in a sample, and the gear feels it."""
     change, damping = SignChange(FREE, RATE, (0.03, 0.1)), FREE["rotor.reflected_damping"]

@@ -138,8 +138,10 @@ def test_the_estimate_survives_a_loss_of_ft_and_its_return_without_a_jump(heard,
 
     play(range(300))
     newest(299)
+    listener.until(lambda: heard.flags[-1].data)
     play(range(300, 400), with_ft=False)
     assert newest(399) == pytest.approx(truth.distal[399], abs=0.06)
+    listener.until(lambda: not heard.flags[-1].data)
     told = listener.until(lambda: "no ft for" in heard.status().message and heard.values())
     assert heard.status().level == b"\x01" and float(told["sigma_distal"]) > 0.004
     doubt = float(told["sigma_distal"])

@@ -94,6 +94,9 @@ class LineRequests:
     def _set(self, now: int, request: Request) -> None:
         """Set items; a mode begins at rest unless its goal is set, too. The torque acts at once."""
         if "mode" in request:
+            most = self._motor.model.registers["mode"].high
+            if not 0 <= int(request["mode"]) <= most:
+                raise ValueError(f"mode {request['mode']}, expected 0 to {most}")
             self._motor.hold(now)
         for name in set(request) - {"do"}:
             self._motor.put(name, int(request[name]))
