@@ -9,8 +9,6 @@ gear does.
 
 from __future__ import annotations
 
-from collections import deque
-
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.sign_change import SignChange
 from rsea_ros.control.sign_evidence import DOUBT, MOVED, POWER, RIGHT, SIGNS, SWAY, SignEvidence
@@ -42,8 +40,6 @@ EXPLAINED = 0.4
 """Of that, what a changed sign may leave of it."""
 SENT = 4
 """Commands that a measured motor torque may belong to."""
-SURELY_MADE, FELT = 0.02, 0.25
-"""s after which a drive makes a torque that is commanded; of PULSE, how much of it surely shows a sign."""
 TIMES = 2.5
 """Times the command that the motor torque may be."""
 REVERSED = {
@@ -66,8 +62,6 @@ class Polarity:
         self._seen = SignEvidence(rig, rate, self._pulse)
         self._change = SignChange(rig, rate, (self._seen.ft_noise, self._seen.noise))
         self._calm = max(LOUD * self._pulse, 3.0 * self._seen.ft_noise)
-        self._sure = max(SENT, round(SURELY_MADE * rate))
-        self._orders: deque[float] = deque(maxlen=self._sure)
         self.start()
 
     def start(self) -> None:
@@ -77,7 +71,6 @@ class Polarity:
         self._sent, self._made = [0.0] * SENT, [0.0] * SENT
         self._friction, self._off, self._alike = 0.0, 0, 0
         self._state = (0.0, 0.0, 0.0)
-        self._orders.clear()
         self._change.start()
         self._direction, self._level, self._beyond = -1.0, self._pulse, ENOUGH * self._pulse
         self._pulsing, self._back, self._full, self._torque = False, False, False, 0.0
@@ -101,7 +94,6 @@ class Polarity:
     def sent(self, torque: float) -> None:
         """Note the torque, N m, that acts from the next sample on."""
         self._sent = [torque, *self._sent[:-1]]
-        self._orders.append(torque)
 
     def watch(self, reading: Measurement, missed: int = 0) -> str:
         """Return a contradiction under torque, in words; empty without one."""
@@ -112,7 +104,7 @@ class Polarity:
         if self.contradiction:
             return self.contradiction
         rest = None if heard is None else self._made[0] - sum(heard)
-        if name := "motor torque" if self._defied() else self._change.take(reading, rest, missed):
+        if name := self._change.take(reading, rest, missed):
             self._contradict(self._changed(name))
         if heard is None or self.contradiction:
             return self.contradiction
@@ -134,14 +126,6 @@ class Polarity:
     def _changed(self, name: str) -> str:
         """Return in words what changed; a signal that stands still beside one that moves looks so, too."""
         return f"{name} has changed its sign" if self._alike < CYCLES else "joint_states repeat one value"
-
-    def _defied(self) -> bool:
-        """Return whether the last two motor torques are against every command that they may belong to."""
-        low, high = min(self._orders, default=0.0), max(self._orders, default=0.0)
-        least = max(low, 0.0) + min(high, 0.0)
-        if len(self._orders) < self._sure or abs(least) < FELT * self._pulse:
-            return False
-        return all(made * least < -0.5 * least**2 for made in self._seen.made)
 
     def _outside(self, torque: float) -> float:
         """Return by how much a torque is outside of what the motor made over the last SENT samples, N m.
@@ -199,7 +183,9 @@ class Polarity:
         decisive = any(power.values())
         needed = SURE if decisive else SHAKEN * SURE
         agree = fit[best] - fit[RIGHT] < 0.5 * SURE and (power[RIGHT] >= POWER or not decisive)
-        if whole[RIGHT] - whole[best] > needed and agree:
+        if words := self._seen.turned():
+            self._contradict(words)
+        elif whole[RIGHT] - whole[best] > needed and agree:
             self._contradict(REVERSED[best])
         elif words := self._wrong_drive() or self._seen.wrong_size():
             self._contradict(words)

@@ -84,7 +84,7 @@ class SignEvidence:
         """Count power and ways from here on."""
         assert self._before is not None
         self._pulsing, self._restless = True, self.unrest
-        self._work, self.most, self.way = np.zeros(5), 0.0, 0.0
+        self._work, self.most, self.way, self._driven = np.zeros(5), 0.0, 0.0, 0.0
         self._ft, self._from = self._fast, self._before.position
 
     def end_pulse(self) -> None:
@@ -113,6 +113,7 @@ class SignEvidence:
             taken = (ft - self._ft) * turn
             self._work += np.array([made * turn, abs(made * turn), taken, turn * turn, abs(turn)])
             self.most = max(self.most, abs(ft - self._ft))
+            self._driven += speed * self._h * (1 + missed)
             self.way = max(self.way, self._stiffness * abs(r.position - self._from))
         self._settle(ft, speed)
         if missed:
@@ -138,6 +139,13 @@ class SignEvidence:
     def powers(self) -> dict[Signs, float]:
         """Return what the powers of this pulse and the last ones say against each pair of signs."""
         return {signs: self._past[signs] + self._wrong_power(*signs) for signs in SIGNS}
+
+    def turned(self) -> str:
+        """Return in words that position and velocity went opposite ways in this pulse; empty where not."""
+        gone = 0.0 if self._before is None else self._before.position - self._from
+        is_far = self._stiffness * abs(gone) > MOVED * self._pulse
+        opposite = is_far and self._driven * gone < 0.0 and abs(self._driven) > 0.5 * abs(gone)
+        return "position and velocity of joint_states go opposite ways" if opposite else ""
 
     def wrong_size(self) -> str:
         """Return in words which quantity is of the wrong size; empty where none is known to be.

@@ -32,6 +32,8 @@ WRONG = {
     "ft is reversed": {"ft": -1.0},
     "joint_states are reversed": {"position": -1.0, "velocity": -1.0},
     "motor torque is reversed": {"motor_torque": -1.0},
+    "position and velocity of joint_states go opposite ways": {"velocity": -1.0},
+    "position": {"position": -1.0},
     "motor and axis": {"position": -1.0, "velocity": -1.0, "motor_torque": -1.0},
 }
 
@@ -67,7 +69,8 @@ def test_a_wrong_sign_is_a_fault_before_feedback_acts(name, wrong):
     polarity, largest = probe(BENCHES[name], WRONG[wrong])
     assert polarity.contradiction and not polarity.proven
     assert largest < 6.0
-    assert wrong not in ("ft is reversed", "joint_states are reversed") or wrong in polarity.contradiction
+    named = wrong in polarity.contradiction
+    assert named or wrong in ("motor torque is reversed", "motor and axis", "position")
 
 
 @pytest.mark.parametrize(("factors", "command"), [({"ft": 0.1}, 1.0), ({"ft": 10.0}, 1.0), ({}, 10.0)])
@@ -98,7 +101,6 @@ def test_a_drive_that_is_off_is_neither_right_nor_wrong_and_gets_no_more():
 
 TURNED = {
     "ft": ("ft", 2), "position and velocity": ("joint_states", 2), "velocity": ("joint_states", 28),
-    "motor_torque": ("motor torque", 2),
 }  # fmt: skip
 """What changes its sign, its name in the contradiction, the most samples until then."""
 
