@@ -285,9 +285,9 @@ class GuardedDevice:
                     self._switch_off()
                 raise
 
-    def stop(self) -> None:
-        """End the torque with the next cycle, until a clear that is called later."""
-        self.interlock.stop()
+    def stop(self, *, is_answered: bool = True) -> None:
+        """End the torque with the next cycle, until a clear that is called later. See Interlock.stop."""
+        self.interlock.stop(is_answered=is_answered)
 
     def disable(self) -> None:
         """Command zero torque and switch it off. The thread that uses the device does it while it is away."""

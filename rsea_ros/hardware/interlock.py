@@ -51,7 +51,7 @@ class Interlock:
         self.fault: DeviceFault | None = None
         self.stopped = self.enabled = self.halted = False
         self._lock = threading.Lock()
-        self._stopped_at = self._disabled_at = 0
+        self._stopped_at = self._disabled_at = self._unanswered = 0
         self._newest: tuple[int, DeviceFault] | None = None
 
     @property
@@ -66,10 +66,16 @@ class Interlock:
             self.fault = self.fault or fault
             return is_first
 
-    def stop(self) -> None:
-        """Let there be no torque until a clear that is asked for later."""
+    def stop(self, *, is_answered: bool = True) -> None:
+        """Let there be no torque until a clear that is asked for later; not answered: later than `answer`."""
         with self._lock:
             self._stopped_at, self.stopped = event(), True
+            self._unanswered += not is_answered
+
+    def answer(self) -> None:
+        """Note that a stop is answered now."""
+        with self._lock:
+            self._stopped_at, self._unanswered = event(), self._unanswered - 1
 
     def disable(self) -> None:
         """End the activity."""
@@ -86,7 +92,7 @@ class Interlock:
     def end_stop(self, asked: int) -> None:
         """End the stops from before a number. Raises DeviceError where there is a later one, which stays."""
         with self._lock:
-            self.stopped = self.stopped and self._stopped_at > asked
+            self.stopped = self.stopped and (self._unanswered > 0 or self._stopped_at > asked)
             if self.stopped:
                 raise DeviceError(MEANWHILE)
 

@@ -68,10 +68,10 @@ class DriverCycle:
                 self._source.commands.clear(self.anchor.now())
                 self._deaf -= 1
 
-    def stop(self) -> None:
+    def stop(self, *, is_answered: bool = True) -> None:
         """End the torque with the next cycle, until a later clear; commands so far are forgotten."""
         with self.deaf():
-            self.guarded.stop()
+            self.guarded.stop(is_answered=is_answered)
 
     def _check_zero(self, torque: float) -> None:
         """Latch a fault where the first command since autostart is a torque."""

@@ -26,7 +26,7 @@ from rsea_ros.nodes._joints import Jobs
 
 LOST = {"failed_reads": "reads lost", "failed_writes": "writes lost"}
 OVERTAKING = 0.05
-"""s for which a stop waits with its answer: requests that were sent before it may still be on their way."""
+"""s for which a stop waits with its answer: requests that were sent before may still be on their way."""
 Work = Callable[[int], str]
 """What a service does; it is given the number of the request's event."""
 
@@ -35,12 +35,15 @@ class DrivenJoint:
     """values: parameters of this joint.
 
     part: its name among others, the namespace of its topics and services.
-    jobs: threads of services. drive, topics: present while the device is open.
+    jobs: threads of services. offers: the services of the node, to which those of this joint are added.
+    drive, topics: present while the device is open.
     """
 
     def __init__(
-        self, node: Node, jobs: Jobs, part: str, values: Mapping[str, Any], device: Device
-    ) -> None:
+        self, node: Node, jobs: Jobs, part: str, values: Mapping[str, Any], device: Device,
+        offers: list[Offer],
+    ) -> None:  # fmt: skip
+        self._offers = offers
         self._node, self._jobs, self.part, self._values = node, jobs, part, values
         limits = partial(limits_of, values)
         self.guarded = GuardedDevice(device, limits(), values["rate"], spring_of(values), limits)
@@ -54,7 +57,8 @@ class DrivenJoint:
             ("zero_ft", self._zero_ft), ("clear_fault", self.clear_fault), ("reboot", self._reboot),
             ("stop", self._stop),
         ):  # fmt: skip
-            offer(node, jobs, f"{part}/{name}" if part else name, self._guard(work), self._health.publish)
+            after = self._answered if name == "stop" else self._told
+            offers.append(Offer(node, jobs, f"{part}/{name}" if part else name, self._guard(work), after))
 
     def open(self, anchor: Anchor) -> None:
         """Open the device and make its topics. Raises RseaError, OSError; nothing stays open then."""
@@ -102,7 +106,8 @@ class DrivenJoint:
         fault, limited = now = self.guarded.fault, self.guarded.guard.limited
         before, self._reported = self._reported, now
         if fault is not None and fault != before[0]:
-            text = f"fault {fault}; torque zero until clear_fault or reboot"
+            end = "clear_fault" if self.guarded.interlock.stopped else "clear_fault or reboot"
+            text = f"fault {fault}; torque zero until {end}"
             self._node.get_logger().error(self.with_name(text))
             self._health.publish()
         if limited > before[1]:
@@ -130,6 +135,14 @@ class DrivenJoint:
 
     def _stop(self, asked: int) -> str:
         return stop([self])
+
+    def _answered(self, is_done: bool) -> None:
+        if is_done:
+            answer_stop([self], self._offers)
+        self._told(is_done)
+
+    def _told(self, is_done: bool) -> None:
+        self._health.publish()
 
     def _zero_ft(self, asked: int) -> str:
         self.guarded.zero_ft()
@@ -180,34 +193,62 @@ class DrivenJoint:
 
 
 def stop(joints: Sequence[DrivenJoint]) -> str:
-    """End the torque until a clear_fault that is asked for after the answer.
-
-    The middleware hands requests of several clients over in any order, within ms: a clear that is taken up
-    between a stop and its answer may have been sent before the stop, so it ends nothing.
-    """
+    """End the torque until a clear_fault that is asked for after the answer."""
     for joint in joints:
         assert joint.drive is not None
-        joint.drive.stop()
+        joint.drive.stop(is_answered=False)
     time.sleep(OVERTAKING)
-    for joint in joints:
-        joint.guarded.stop()
     return "torque zero until clear_fault"
 
 
-def offer(node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[], None]) -> None:
-    """Offer a service ~/NAME that does some work in a thread, and answers with the error where it fails."""
+def answer_stop(joints: Sequence[DrivenJoint], offers: Sequence[Offer]) -> None:
+    """Note that a stop is answered now. offers: the services whose requests may have come before that.
 
-    async def serve(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        asked = event()
+    The middleware hands the requests of several services over in any order, and a busy executor late.
+    """
+    for offer in offers:
+        offer.take_up()
+    for joint in joints:
+        joint.guarded.interlock.answer()
+
+
+class Offer:
+    """A service ~/NAME that does some work in a thread, and answers with the error where it fails.
+
+    after: called before the answer, with whether the work is done.
+    """
+
+    def __init__(
+        self, node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[bool], None]
+    ) -> None:
+        self._node, self._jobs, self._name, self._work, self._after = node, jobs, name, work, after
+        self._service = node.create_service(Trigger, f"~/{name}", self._serve, callback_group=jobs.group)
+
+    def take_up(self) -> None:
+        """Take up the requests that wait, in the executor's thread."""
+        while True:
+            with self._service.handle:
+                _, header = self._service.handle.service_take_request(Trigger.Request)
+            if header is None:
+                return
+            assert self._node.executor is not None
+            self._node.executor.create_task(self._reply, event(), header)
+
+    async def _reply(self, asked: int, header: Any) -> None:
+        self._service.send_response(await self._answer(asked, Trigger.Response()), header)
+
+    async def _serve(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return await self._answer(event(), response)
+
+    async def _answer(self, asked: int, response: Trigger.Response) -> Trigger.Response:
         try:
-            response.success, response.message = True, f"{name}: {await jobs.do(partial(work, asked))}"
+            told = await self._jobs.do(partial(self._work, asked))
+            response.success, response.message = True, f"{self._name}: {told}"
         except RseaError as error:
-            response.success, response.message = False, f"{name}: {' '.join(str(error).split())}"
-        node.get_logger().info(response.message)
-        after()
+            response.success, response.message = False, f"{self._name}: {' '.join(str(error).split())}"
+        self._node.get_logger().info(response.message)
+        self._after(response.success)
         return response
-
-    node.create_service(Trigger, f"~/{name}", serve, callback_group=jobs.group)
 
 
 def _hardware(values: Mapping[str, Any], health: Mapping[str, object]) -> str:

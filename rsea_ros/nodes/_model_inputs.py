@@ -12,12 +12,14 @@ from statistics import median
 from rclpy.node import Node
 
 from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
+from rsea_ros.model.extent import LARGEST
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
 from rsea_ros.model.rig import Rig
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
+from rsea_ros.records.record import is_measured
 
 SAMPLES, TIME, LONG = 10, 50_000_000, 500_000_000
 """Equal samples, and ns of them, that are no chance; ns of alike ones, which a gear that sticks makes too."""
@@ -209,6 +211,9 @@ class ModelInputs:
     def _measure(self, stamp: int, a: float, b: float, kind: int) -> TorqueEstimate | None:
         """Give a sample to the observer, unless its sensor has stopped. ft outvotes a state."""
         if kind == _FT:
+            if not is_measured(a, LARGEST):
+                self._refuse()
+                return None
             self._ft_stamp = stamp
             if self.stopped.take_ft(stamp, a):
                 return None

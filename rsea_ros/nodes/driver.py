@@ -25,7 +25,7 @@ from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
 from rsea_ros.nodes._devices import DEVICES
 from rsea_ros.nodes._drive import SignalListener, step
-from rsea_ros.nodes._joint import DrivenJoint, offer, stop
+from rsea_ros.nodes._joint import DrivenJoint, Offer, answer_stop, stop
 from rsea_ros.nodes._joints import JOINTS, Jobs, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
@@ -72,13 +72,17 @@ class DriverNode(ManagedEntity):
             node.get_logger().warning(text)
         devices, self._buses = devices_of([joint for _, joint in named], DEVICES)
         self._jobs, self._alarm = Jobs(node), SignalListener(self._halt)
+        self._offers: list[Offer] = []
         self.joints = [
-            DrivenJoint(node, self._jobs, name, joint, device)
+            DrivenJoint(node, self._jobs, name, joint, device, self._offers)
             for (name, joint), device in zip(named, devices, strict=True)
         ]
         if named[0][0]:
-            for service, work in (("stop", self._stop), ("clear_fault", self._clear_faults)):
-                offer(node, self._jobs, service, work, lambda: None)
+            for service, work, after in (
+                ("stop", self._stop, self._answered),
+                ("clear_fault", self._clear_faults, lambda is_done: None),
+            ):
+                self._offers.append(Offer(node, self._jobs, service, work, after))
         self._cycle: Cycle | None = None
         self._combined: Combined | None = None
         node.add_managed_entity(self)
@@ -218,6 +222,10 @@ class DriverNode(ManagedEntity):
         self._check_configured()
         return stop(self.joints)
 
+    def _answered(self, is_done: bool) -> None:
+        if is_done:
+            answer_stop(self.joints, self._offers)
+
     def _clear_faults(self, asked: int) -> str:
         """Clear every joint's fault; one that cannot be cleared does not affect the others.
 
@@ -231,7 +239,7 @@ class DriverNode(ManagedEntity):
             except RseaError as error:
                 failed.append(f"{joint.part}: {error}")
         if failed:
-            raise DeviceError("; ".join(failed))
+            raise DeviceError("; ".join((*failed, *done)))
         return ", ".join(done)
 
     def _check_configured(self) -> None:

@@ -104,6 +104,19 @@ def test_the_estimate_follows_ft_as_soon_as_joint_states_stand_still(listener, i
     assert inputs.stopped.frozen == ["joint_states"]
 
 
+def test_a_torque_that_is_no_number_is_none(listener, inputs_of):
+    """The flag of pure torque stayed up over 1.8 s of NaN: the sensor had spoken."""
+    inputs, publishers = inputs_of()
+    feed(listener, inputs, publishers, [(0.0, (0.0, 0.0), 0.01 * k) for k in range(20)])
+    assert not inputs.ft_silent
+    for k, torque in enumerate([math.nan] * 15 + [1e300] * 15, 20):
+        stamp = round(EPOCH + k * PERIOD)
+        publishers["joint_states"].publish(joint_state_message(stamp, 0.0, 0.0, 0.0))
+        publishers["ft"].publish(wrench_message(stamp, torque))
+    listener.until(lambda: [*inputs.take()] and inputs.refused >= 30)
+    assert inputs.ft_silent
+
+
 def test_states_that_stand_still_while_commands_move_are_noticed(listener, inputs_of):
     """Both sensors had stopped, the one under its own noise, and the flag stayed up."""
     inputs, publishers = inputs_of()

@@ -102,7 +102,7 @@ def slow(drive, monkeypatch):
 
 def test_a_deactivation_gets_through_while_a_service_takes_long(slow, listener):
     device, program, node = slow
-    program.joints[0].stop()
+    program.joints[0].drive.stop()
     client = listener.node.create_client(Trigger, "/slow/slow/clear_fault")
     listener.until(client.service_is_ready)
     future = client.call_async(Trigger.Request())

