@@ -1,6 +1,5 @@
 """Benchmarks, by topic: `python -m bench` lists them."""
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -10,8 +9,3 @@ SHARED = ROOT.parent / "shared"
 # The second bench is a part of the tests.
 if str(ROOT / "test") not in sys.path:
     sys.path += [str(ROOT / "test"), str(ROOT / "test" / "effects")]
-
-
-def parser_of(text: str | None) -> argparse.ArgumentParser:
-    """Return a parser that shows a module's text as it stands."""
-    return argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)

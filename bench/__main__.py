@@ -3,66 +3,124 @@
 Each run appends its rows to out/results.jsonl, a line of JSON each: topic, section, row, required, measured,
 seconds, machine, commit, date. `python -m bench keep TOPIC SECTION` takes the rows of the last run into
 bench/kept.jsonl, and `python -m bench pages` writes the tables of docs/ from there.
+
+The signature of a section's function is its command line: keywords are options, the others arguments, and the
+lines `name: …` of its text are their help.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import importlib
+import inspect
 import io
+import re
 import sys
 import tempfile
 import time
+import typing
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from bench import parser_of
+import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
+
+# isort: split
 from bench.results import Row, add_run, keep_last, tables_of, write_pages
-from bench.topics import COMMANDS, PARTS, Parts, index
+from bench.topics import DRIVER, EVERY, TOPICS, index
 
 
 def main(argv: Sequence[str]) -> int:
     """Run what is asked for; status 1 where a benchmark says that a requirement is not met."""
     topic, *rest = argv or ["-h"]
-    if topic in PARTS:
-        return _run_parts(topic, PARTS[topic], rest)
-    if topic in COMMANDS:
-        name = rest.pop(0) if rest and rest[0] in COMMANDS[topic] else COMMANDS[topic][0]
-        return _run_command(topic, name, rest)
     if topic == "keep" and len(rest) == 2:
         return keep_last(*rest)
     if topic == "pages":
         return write_pages("--check" in rest)
-    print(f"{__doc__}\n" + "\n".join(f"{t:12} {section:16} {what}" for t, section, what in index()))
-    return 0 if topic in ("-h", "--help") else 2
+    if topic not in TOPICS:
+        print(f"{__doc__}\n" + "\n".join(f"{t:12} {section:16} {what}" for t, section, what in index()))
+        return 0 if topic in ("-h", "--help") else 2
+    sections = TOPICS[topic]
+    most = len(rest) if topic in EVERY else 1
+    names = [rest.pop(0) for _ in range(most) if rest and rest[0] in sections]
+    names = names or [*sections][: None if topic in EVERY else 1]
+    functions = {name: _function(topic, sections[name]) for name in names}
+    args = _parser(topic, functions).parse_args(rest)
+    return max(_run(topic, name, function, args) for name, function in functions.items())
 
 
-def _run_parts(topic: str, parts: Parts, argv: Sequence[str]) -> int:
-    parser = parser_of(f"{topic}: {', '.join(parts.functions)}; all of them without a name")
-    parser.add_argument("sections", nargs="*", metavar="SECTION")
-    for name, default in parts.options.items():
-        if isinstance(default, bool):
-            parser.add_argument(f"--{name}", action="store_true")
-        elif isinstance(default, tuple):
-            parser.add_argument(f"--{name}", type=type(default[0]), nargs="+", default=list(default))
-        else:
-            parser.add_argument(f"--{name}", type=type(default), default=default)
-    args = parser.parse_args(argv)
-    if unknown := set(args.sections) - set(parts.functions):
-        parser.error(f"section {', '.join(unknown)}, expected some of {', '.join(parts.functions)}")
-    for name in args.sections or parts.functions:
-        begin, (module, function) = time.monotonic(), parts.functions[name].split(":")
-        section: Callable[..., Iterable[Any]] = getattr(_module(topic, module), function)
-        print(f"== {name}")
-        rows: list[Row] = []
-        with tempfile.TemporaryDirectory() as folder:
-            for row in section(args, Path(folder)) if topic == "driver" else section(args):
-                rows.append(Row(*row) if isinstance(row, tuple) else Row(row, "", ""))
-                widths = zip(rows[-1], (58, 22, 0), strict=True)
-                print("".join(f"{text!s:{width}} " for text, width in widths), flush=True)
-        add_run(topic, name, [rows], time.monotonic() - begin)
-    return 0
+def _function(topic: str, place: str) -> Callable[..., Any]:
+    module, _, function = place.partition(":")
+    return typing.cast(
+        Callable[..., Any], getattr(importlib.import_module(f"bench.{topic}.{module}"), function or "main")
+    )
+
+
+def _parser(topic: str, functions: dict[str, Callable[..., Any]]) -> argparse.ArgumentParser:
+    """Return the parser of what some functions take."""
+    texts = [
+        sys.modules[f.__module__].__doc__ if f.__name__ == "main" else f.__doc__ for f in functions.values()
+    ]
+    parser = argparse.ArgumentParser(
+        f"python -m bench {topic} {' '.join(functions)}",
+        description="\n".join([*filter(None, texts), f"sections: {', '.join(TOPICS[topic])}"]),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    known: set[str] = set()
+    for function in functions.values():
+        told = dict(re.findall(r"^ *(\w+): (.+)$", function.__doc__ or "", re.MULTILINE))
+        kinds = typing.get_type_hints(function, include_extras=True)
+        for name, p in _parameters(function).items():
+            if name not in known:
+                _add(parser, p, kinds.get(name, type(p.default)), told.get(name, ""))
+                known.add(name)
+    return parser
+
+
+def _parameters(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    """Return what a function takes; the sections of the driver take all of DRIVER as one namespace."""
+    taken = dict(inspect.signature(function).parameters)
+    if "args" not in taken:
+        return taken
+    option = inspect.Parameter.KEYWORD_ONLY
+    return {n: inspect.Parameter(n, option, default=value) for n, value in DRIVER.items()}
+
+
+def _add(parser: argparse.ArgumentParser, p: inspect.Parameter, kind: Any, told: str) -> None:
+    """Add an option or argument. kind: its type; Annotated with its choices where it has some."""
+    is_option, has_default = p.kind is p.KEYWORD_ONLY, p.default is not p.empty
+    name = p.name.rstrip("_").replace("_", "-")
+    more: dict[str, Any] = {"dest": p.name} if is_option else {}
+    if p.default is False:
+        parser.add_argument(f"--{name}", action="store_true", help=told, **more)
+        return
+    choices: Iterable[str] = ()
+    if typing.get_origin(kind) is typing.Annotated:
+        kind, choices = typing.get_args(kind)
+    kind = next((k for k in typing.get_args(kind) if isinstance(k, type)), kind)
+    kind = type(p.default[0]) if kind is tuple else kind
+    several = isinstance(p.default, tuple)
+    if several or not has_default:
+        more["nargs"] = "+" if is_option and several else "*" if several else None
+    elif not is_option:
+        more["nargs"] = "?"
+    more |= {"default": p.default} if has_default else {"required": True} if is_option else {}
+    if p.default not in (None, "", (), p.empty):
+        told += f" (default {' '.join(map(str, p.default)) if several else p.default})"
+    parser.add_argument(
+        f"--{name}" if is_option else p.name, help=told.replace("%", "%%"), metavar=name.upper(),
+        type=_one_of([*choices]) if choices else kind, **more,
+    )  # fmt: skip
+
+
+def _one_of(choices: Sequence[str]) -> Callable[[str], str]:
+    def read(text: str) -> str:
+        if text and text not in choices:
+            raise argparse.ArgumentTypeError(f"{text!r}, expected one of {', '.join(choices)}")
+        return text
+
+    return read
 
 
 class _Both(io.StringIO):
@@ -75,17 +133,26 @@ class _Both(io.StringIO):
         return super().write(text)
 
 
-def _run_command(topic: str, name: str, argv: Sequence[str]) -> int:
-    begin, said = time.monotonic(), _Both()
-    sys.argv[0] = f"python -m bench {topic} {name}"
-    with contextlib.redirect_stdout(said):
-        status = _module(topic, name).main(argv) or 0
-    add_run(topic, name, tables_of(said.getvalue()), time.monotonic() - begin)
-    return int(status)
+def _run(topic: str, name: str, function: Callable[..., Any], args: argparse.Namespace) -> int:
+    """Run a section: its rows are what it yields, or the tables and lines that it prints."""
+    begin, said, rows = time.monotonic(), _Both(), list[Row]()
+    print(f"== {topic} {name}")
+    with contextlib.redirect_stdout(said), tempfile.TemporaryDirectory() as folder:
+        taken = inspect.signature(function).parameters
+        given = {n: getattr(args, n) for n in _parameters(function)}
+        result = function(args, Path(folder)) if "args" in taken else _called(function, given)
+        for row in result if isinstance(result, Iterable) else ():
+            rows.append(Row(*row) if isinstance(row, tuple) else Row(row, "", ""))
+            widths = zip(rows[-1], (58, 22, 0), strict=True)
+            print("".join(f"{text!s:{width}} " for text, width in widths), flush=True)
+    add_run(topic, name, [rows] if rows else tables_of(said.getvalue()), time.monotonic() - begin)
+    return result if isinstance(result, int) else 0
 
 
-def _module(topic: str, name: str) -> Any:
-    return importlib.import_module(f"bench.{topic}.{name}")
+def _called(function: Callable[..., Any], given: dict[str, Any]) -> Any:
+    arguments = inspect.signature(function).bind_partial()
+    arguments.arguments.update(given)
+    return function(*arguments.args, **arguments.kwargs)
 
 
 if __name__ == "__main__":

@@ -7,11 +7,13 @@ the first column is the row, `required` what is asked, each other column what wa
 from __future__ import annotations
 
 import json
+import math
 import platform
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -42,6 +44,23 @@ def append_line(path: Path, entry: Mapping[str, Any]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(entry, ensure_ascii=False) + "\n")
+
+
+def resumed(
+    log: Path, works: Iterable[tuple[Any, Callable[[], Mapping[str, Any]]]], key: str,
+    minutes: float = math.inf,
+) -> Iterator[Mapping[str, Any]]:  # fmt: skip
+    """Do the works that a log lacks, and append their entries; yield each.
+
+    works: what the entry has under `key`, and what makes the entry. minutes: none is begun after that.
+    """
+    stop = time.monotonic() + 60.0 * minutes
+    done = {entry.get(key) for entry in read_lines(log)}
+    for name, work in works:
+        if name not in done and time.monotonic() < stop:
+            entry = work()
+            append_line(log, entry)
+            yield entry
 
 
 def add_run(topic: str, section: str, tables: Sequence[Sequence[Row]], seconds: float) -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from independent.bench import drawn_bench, record_command
+from independent.excitations import chirp_noise, odd_multisine
 from independent.hidden import OFF_CATALOGUE, hide, hide_off_catalogue
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
 
@@ -131,48 +132,42 @@ def _kin(name: str) -> tuple[str, ...]:
     return (name, *dict.fromkeys([*effects[name].claims.confusable_with, *alike]))
 
 
-def left_out(plan: Plan, pool: int) -> tuple[str, ...]:
-    """Return the effects that a diagnosis may not use: the plan's, and all but `pool` where pool is not 0.
-
-    The hidden effects and those confused with them stay, so a pool keeps the likeliest wrong names.
-    """
-    effects = catalogue()
-    mimics = OFF_CATALOGUE[plan.off[0]][1] if plan.off and plan.off[0] in OFF_CATALOGUE else ()
-    wanted = dict.fromkeys([*plan.truth, *mimics, *(k for n in plan.truth for k in _kin(n))])
-    drawn = np.random.default_rng([plan.seed, 1]).permutation(list(effects))
-    stays = [*wanted, *(str(n) for n in drawn if n not in wanted)][: max(pool, len(plan.truth))]
-    return (*plan.without, *(n for n in effects if pool and n not in stays and n not in plan.without))
-
-
 def simulate_plan(plan: Plan) -> tuple[Record, Rig]:
     """Simulate a plan; return the record and the rig that a user would diagnose it with."""
     rng = np.random.default_rng(plan.seed)
     return _second(plan, rng) if plan.family == "second" else _simulate(plan, rng)
 
 
-def _command(plan: Plan, rng: np.random.Generator, size: float = 1.0) -> FloatArray:
+def _command(plan: Plan, rng: np.random.Generator) -> FloatArray:
     """Return the commands of a plan, N m."""
-    from independent.excitations import chirp_noise, odd_multisine
-
     if plan.excitation == "chirp":
-        return size * chirp_noise(plan.duration, rng)
+        return chirp_noise(plan.duration, rng)
     if plan.excitation == "multisine":
-        return size * odd_multisine(plan.duration, rng, period=5.0 if plan.duration != 12.0 else 4.0)
+        return odd_multisine(plan.duration, rng, period=5.0 if plan.duration != 12.0 else 4.0)
     levels = 30.0 * work(plan.duration, rng, smooth=plan.excitation == "work")
     noise = 0.0 if plan.family in ("loop", "rigid") else 1.0  # no loop has white noise in its reference
-    return size * (levels + noise * rng.normal(size=len(levels)))
+    return levels + noise * rng.normal(size=len(levels))
 
 
 def work(duration: float, rng: np.random.Generator, smooth: bool) -> FloatArray:
     """Return a log of normal work, -1 to 1: levels held for 0.2 to 1.2 s, smoothed moves between if asked."""
-    levels, n = [], round(duration * RATE)
-    while sum(map(len, levels)) < n:
-        levels.append(np.full(round(rng.uniform(0.2, 1.2) * RATE), rng.uniform(-1.0, 1.0)))
-    held = np.concatenate(levels)[:n]
-    if not smooth:
-        return held
-    window = np.hanning(round(0.15 * RATE) + 2)[1:-1]
-    return np.convolve(held, window / window.sum(), mode="same")
+    held = levels(round(duration * RATE), rng)
+    return smoothed(held, 0.15) if smooth else held
+
+
+def levels(n: int, rng: np.random.Generator, seconds: tuple[float, float] = (0.2, 1.2)) -> FloatArray:
+    """Return n samples of levels, -1 to 1, each held for some seconds."""
+    held: list[FloatArray] = []
+    while sum(map(len, held)) < n:
+        held.append(np.full(round(rng.uniform(*seconds) * RATE), rng.uniform(-1.0, 1.0)))
+    return np.concatenate(held)[:n]
+
+
+def smoothed(values: FloatArray, seconds: float) -> FloatArray:
+    """Return values under a Hann window of some seconds."""
+    window = np.hanning(round(seconds * RATE) + 2)[1:-1]
+    smooth: FloatArray = np.convolve(values, window / window.sum(), mode="same")
+    return smooth
 
 
 def _second(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:

@@ -8,7 +8,6 @@ it. With a priority controller and, one above it, plant run at SCHED_FIFO.
 from __future__ import annotations
 
 import os
-import random
 import subprocess
 import sys
 import tempfile
@@ -23,8 +22,9 @@ from typing import Any
 import numpy as np
 import rclpy
 
-from bench import ROOT, parser_of
+from bench import ROOT
 from bench.driver.bare_loop import may_have
+from bench.processes import own_domain
 from msg_adapters.ros import DiagnosticArray, JointState, torque_command_message
 from msg_adapters.topic_map import AXES, JOINT_STATE, WRENCH
 from rsea_ros.control.settings import TorqueLimits
@@ -163,22 +163,21 @@ def cases() -> Sequence[Case]:
     )
 
 
-def main(argv: Sequence[str]) -> None:
-    """Measure and print."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="Hz")
-    parser.add_argument("--priority", type=int, nargs="+", default=[0, 80], help="SCHED_FIFO; 0: none")
-    args = parser.parse_args(argv)
-    os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+def main(*, rate: tuple[float, ...] = (280.0, 1000.0), priority: tuple[int, ...] = (0, 80)) -> None:
+    """Measure and print.
+
+    rate: Hz
+    priority: SCHED_FIFO; 0: none
+    """
+    own_domain()
     rclpy.init()
     head = f"{'':18}{'sine of 5 Hz':34}{'required':>8}{'error %':>9}{'worst %':>9}"
     print(f"{head}{'ahead ms':>10}{'late':>7}")
-    for rate, priority in product(args.rate, filter(may_have, args.priority)):
-        setup = f"{rate:g} Hz" + (f", FIFO {priority}" if priority else "")
+    for hz, fifo in product(rate, filter(may_have, priority)):
+        setup = f"{hz:g} Hz" + (f", FIFO {fifo}" if fifo else "")
         for case in cases():
             with tempfile.TemporaryDirectory() as folder:
-                error, worst, lead, late = measure(case, rate, priority, Path(folder))
+                error, worst, lead, late = measure(case, hz, fifo, Path(folder))
             asked = "" if case.asked is None else f"{case.asked:.1f}"
             numbers = f"{asked:>8}{error:9.2f}{worst:9.2f}{lead:10.2f}{late:>7}"
             print(f"{setup:18}{case.name:34}{numbers}", flush=True)

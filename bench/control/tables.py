@@ -3,9 +3,8 @@
 Run: python -m bench control [SECTION …] [RIG] [--free RIG] [--rate 280 1000].
 Sections: trials (all requirements, the worst of the set beside the nominal; the whole set swept, and 5 Hz
 simulated on all of its corners), free (a free load, unknown, by frequency and amplitude, without
-and with an encoder on the link), impedance (the outer loop), link (the benefit of that encoder), stiffest
-(the cost of a limit of |Z| for the whole set), late (samples with irregular arrival), baselines
-(docs/baselines.md), cost. Through real nodes: torque_control_nodes.py.
+and with an encoder on the link), impedance (the outer loop), link (the benefit of that encoder), late
+(samples with irregular arrival), baselines (docs/baselines.md), cost. Through real nodes: `nodes`.
 """
 
 from __future__ import annotations
@@ -17,14 +16,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from bench import parser_of
 from bench.control.baselines import baselines
 from bench.control.human import Virtual, measure_impedance, passive_to, stiffest
-from bench.control.stiffest import stiffest as limited
 from rsea_ros.cli.control import motors
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.grid import Grid, Lateness
@@ -258,19 +255,20 @@ def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[
 
 SECTIONS: dict[str, Callable[[Rig, Rig, Sequence[float]], Iterator[str]]] = {
     "trials": trials, "free": unknown, "impedance": outer, "link": with_link,
-    "stiffest": limited, "late": late, "baselines": baselines, "cost": cost,
+    "late": late, "baselines": baselines, "cost": cost,
 }  # fmt: skip
 
 
-def main(argv: Sequence[str]) -> None:
-    """Run the requested sections."""
-    parser = parser_of(__doc__)
-    parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
-    parser.add_argument("--rig", default="paper_high_impedance")
-    parser.add_argument("--free", default="paper_moving_output", help="rig whose ends are the lightest load")
-    parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="Hz")
-    args = parser.parse_args(argv)
-    for name in args.sections or SECTIONS:
+def main(
+    sections: Annotated[tuple[str, ...], SECTIONS] = (), *, rig: str = "paper_high_impedance",
+    free: str = "paper_moving_output", rate: tuple[float, ...] = (280.0, 1000.0),
+) -> None:  # fmt: skip
+    """Run the requested sections.
+
+    free: rig whose ends are the lightest load
+    rate: Hz
+    """
+    for name in sections or SECTIONS:
         print(f"== {name}", flush=True)
-        for line in SECTIONS[name](load_rig(args.rig), load_rig(args.free), args.rate):
+        for line in SECTIONS[name](load_rig(rig), load_rig(free), rate):
             print(line, flush=True)

@@ -21,9 +21,11 @@ from independent.hidden import (
 )
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
 
+from bench.diagnosis.played import Played
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.records.record import Record
+from rsea_ros.model.rig_file import load_rig
 
+RIG = "paper_high_impedance"
 PAIRS = (
     ("coulomb_friction", "structural_resonance"),
     ("coulomb_friction", "backlash"),
@@ -67,21 +69,6 @@ READINGS = (
 
 
 @dataclass(frozen=True)
-class Case:
-    """One record, its hidden effects, and another record of the same bench with another seed."""
-
-    name: str
-    record: Record
-    truth_causes: tuple[str, ...]
-    truth_parameters: Mapping[str, Mapping[str, float]]
-    fresh_record: Record | None
-    group: str = "single"
-    mimics: tuple[str, ...] = ()
-    faults: tuple[str, ...] = ()
-    without: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Plan:
     """The ingredients of a case; without: effects that the diagnosis may not use.
 
@@ -113,7 +100,7 @@ class Plan:
             bench = hide_off_catalogue(bench, *self.off)
         return bench.with_values(**self.values)
 
-    def make(self, fresh: bool = True, duration: float | None = None) -> Case:
+    def make(self, fresh: bool = True, duration: float | None = None) -> Played:
         """Simulate the case: its record with the faults put in, and a fresh record without.
 
         fresh: with that one. duration: of each, s, in place of the plan's.
@@ -124,11 +111,10 @@ class Plan:
         rng = np.random.default_rng(self.seed + 3)
         for fault in self.faults:
             record = FAULTS[fault](record, rng)
-        mimics = OFF_CATALOGUE[self.off[0]][1] if self.off else ()
         truth = self.truth()
-        return Case(
-            self.name, record, tuple(truth), truth, again, self.group, mimics, self.faults, self.without
-        )
+        about = {"group": self.group, "faults": self.faults}
+        about |= {"mimics": OFF_CATALOGUE[self.off[0]][1]} if self.off else {}
+        return Played(record, load_rig(RIG), self.without, tuple(truth), truth, fresh=again, about=about)
 
     def truth(self) -> Mapping[str, Mapping[str, float]]:
         """Return the hidden effects with their parameters in the catalogue's units."""

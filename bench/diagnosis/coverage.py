@@ -11,133 +11,70 @@ the intervals after a diagnosis are honest.
 
 from __future__ import annotations
 
-import argparse
-import time
-import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from independent.severities import SEVERITIES, SIZES
 
-from bench import parser_of
-from bench.diagnosis.coverage_cases import COMMANDS, RIG_VALUES, Made, make_record
-from bench.results import append_line, read_lines
-from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.model.rig_file import load_rig
+from bench.diagnosis.coverage_cases import COMMANDS, RIG_VALUES, make_record
+from bench.diagnosis.played import DOUBTED, Line, confirmed_of, is_error, names_of, play, said
+from bench.results import read_lines, resumed
 from rsea_ros.records.statistics import Z95
 
-PERIODIC = ("phase", "cycles_per_revolution")
-"""Parameters with several values that mean the same."""
-DOUBTED = ", the simulation's own error included"
 SHOWS = 1.1
 """Residual of the fitted rig over the noise from which an effect shows."""
 MARKS = {"named": "+", "rival": "r", "other": "x", "none": "-", "hidden": ".", "error": "E"}
 
 
-def main(argv: Sequence[str]) -> int:
-    """Play cells or print their table."""
-    args = _parser().parse_args(argv)
-    return int(args.step(args) or 0)
+def main(
+    step: Annotated[str, ("play", "table")], *, log: Path,
+    severity: Annotated[tuple[str, ...], SEVERITIES] = SEVERITIES,
+    work: Annotated[tuple[str, ...], COMMANDS] = tuple(COMMANDS),
+    effect: Annotated[tuple[str, ...], SIZES] = tuple(SIZES),
+    sample: int = 0, seed: int = 5, duration: float = 20.0,
+) -> None:  # fmt: skip
+    """Play the cells that the log lacks, or print the outcomes by cell.
+
+    log: JSON lines, a cell each
+    sample: at most so many cells, drawn by the seed
+    seed: of records
+    duration: of records, s
+    """
+    if step == "table":
+        return _print_table(read_lines(log))
+    cells = list(product(effect, work, severity))
+    order = np.random.default_rng(seed).permutation(len(cells))[: sample or None]
+    named = {f"{'/'.join(cells[k])}/{seed}/{duration:g}": cells[k] for k in order}
+    works = ((name, partial(_line, name, *cell, seed, duration)) for name, cell in named.items())
+    for line in resumed(log, works, "record"):
+        print(f"{judge(line):<7}{line['record']:<55}{said(line)} {line['seconds']:.0f} s", flush=True)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = parser_of(__doc__)
-    verbs = parser.add_subparsers(required=True, metavar="play|table")
-    play = verbs.add_parser("play", help="diagnose cells that the log does not hold")
-    play.add_argument("--severity", choices=SEVERITIES, action="append", help="by default all")
-    play.add_argument("--work", choices=COMMANDS, action="append", help="by default all")
-    play.add_argument("--effect", choices=SIZES, action="append", help="by default all")
-    play.add_argument("--sample", type=int, help="at most N cells, drawn by the seed")
-    play.add_argument("--seed", type=int, default=5, help="of records (default %(default)s)")
-    play.add_argument("--duration", type=float, default=20.0, help="of records, s (default %(default)s)")
-    play.set_defaults(step=_play)
-    table = verbs.add_parser("table", help="the outcomes by cell")
-    table.set_defaults(step=_table)
-    for verb in (play, table):
-        verb.add_argument("--log", type=Path, required=True, help="JSON lines, a cell each")
-    return parser
+def _line(name: str, effect: str, work: str, severity: str, seed: int, duration: float) -> dict[str, Any]:
+    return play(name, make_record(effect, work, severity, seed, duration))
 
 
-def _play(args: argparse.Namespace) -> None:
-    done = {entry["cell"] for entry in read_lines(args.log)}
-    cells = list(product(args.effect or SIZES, args.work or COMMANDS, args.severity or SEVERITIES))
-    order = np.random.default_rng(args.seed).permutation(len(cells))[: args.sample]
-    for effect, work, severity in (cells[k] for k in order):
-        cell = f"{effect}/{work}/{severity}/{args.seed}/{args.duration:g}"
-        if cell in done:
-            continue
-        entry = {"cell": cell, "effect": effect, "work": work, "severity": severity}
-        entry |= _outcome(effect, work, severity, args)
-        append_line(args.log, entry)
-        named = [f"{c['name']} {c['status']} {c['probability']:.2f}" for c in entry.get("causes", [])]
-        print(f"{entry['outcome']:<7}{cell:<55}{', '.join(named)} {entry['seconds']:.0f} s", flush=True)
-
-
-def _outcome(effect: str, work: str, severity: str, args: argparse.Namespace) -> dict[str, Any]:
-    start = time.perf_counter()
-    try:
-        truth = make_record(effect, work, severity, args.seed, args.duration)
-        result = diagnose([truth.record], load_rig("paper_high_impedance"))
-    except Exception:
-        return {"outcome": "error", "error": traceback.format_exc(limit=-3), "seconds": 0.0}
-    causes = [
-        {
-            "name": c.name,
-            "status": c.status,
-            "probability": c.probability,
-            "rivals": [a.name for a in result.alternatives if a.instead_of == c.name],
-        }
-        for c in result.causes
-    ]
-    left = max((result.residual_rms[k] / n for k, n in result.noise_rms.items() if n), default=0.0)
-    return {
-        "outcome": _judge(effect, causes, left),
-        "causes": causes,
-        "left": left,
-        "verdict": result.verdict,
-        "parameters": dict(truth.parameters),
-        "z": z_scores(result, truth) if [c["name"] for c in causes] == [effect] else {},
-        "seconds": round(time.perf_counter() - start, 1),
-    }
-
-
-def z_scores(result: Diagnosis, truth: Made) -> dict[str, float]:
-    """Return how many sigmas each value of the rig and of the cause lies from its truth."""
-    (cause,) = result.causes
-    quantities = result.extended_rig.quantities
-    intervals = {name: (quantities[name].value, quantities[name].ci95) for name in truth.rig}
-    for name, e in cause.parameters.items():
-        intervals[name] = (e.value, e.statistical_ci95)
-        intervals[f"{name}{DOUBTED}"] = (e.value, e.ci95)
-    true = {**truth.rig, **truth.parameters}
-    return {
-        name: (value - true[of]) / ((ci95[1] - ci95[0]) / (2.0 * Z95))
-        for name, (value, ci95) in intervals.items()
-        if (of := name.removesuffix(DOUBTED)) in true and of not in PERIODIC
-        if ci95 is not None and ci95[0] < ci95[1]
-    }
-
-
-def _judge(effect: str, causes: Sequence[dict[str, Any]], left: float) -> str:
+def judge(line: Line) -> str:
     """Return the outcome of a cell, a key of MARKS."""
-    if any(c["name"] == effect for c in causes):
+    (effect,) = line["truth"]
+    if is_error(line):
+        return "error"
+    if effect in names_of(line):
         return "named"
-    if any(effect in c["rivals"] for c in causes):
+    if any(effect in c["rivals"] for c in line["causes"]):
         return "rival"
-    if left <= SHOWS and not causes:
-        return "hidden"
-    return "other" if causes else "none"
+    return "other" if line["causes"] else "hidden" if line["left"] <= SHOWS else "none"
 
 
-def _table(args: argparse.Namespace) -> None:
-    entries = read_lines(args.log)
+def _print_table(lines: Sequence[Line]) -> None:
     by_cell: dict[tuple[str, str, str], list[str]] = {}
-    for entry in entries:
-        by_cell.setdefault((entry["effect"], entry["work"], entry["severity"]), []).append(entry["outcome"])
+    for line in lines:
+        effect, work, severity, *_ = line["record"].split("/")
+        by_cell.setdefault((effect, work, severity), []).append(judge(line))
     print("| effect | " + " | ".join(COMMANDS) + " |\n|---|" + "---|" * len(COMMANDS))
     for effect in SIZES:
         marks = (
@@ -145,18 +82,18 @@ def _table(args: argparse.Namespace) -> None:
             for work in COMMANDS
         )
         print(f"| {effect} | " + " | ".join(marks) + " |")
-    showing = [e for e in entries if e["outcome"] != "hidden"]
-    decided = [e for e in showing if e["outcome"] in ("named", "rival")]
-    wrong = [e for e in entries if _is_surely_wrong(e)]
+    outcomes = [judge(line) for line in lines]
+    showing = len(lines) - outcomes.count("hidden")
+    found = outcomes.count("named") + outcomes.count("rival")
+    wrong = sum(not confirmed_of(line) <= set(line["truth"]) for line in lines)
     print(f"\nmild, medium, strong; {', '.join(f'{m} {o}' for o, m in MARKS.items())}")
-    print(f"found {len(decided)} of {len(showing)} that show ({len(entries)} played): ", end="")
-    print(f"{len(decided) / max(len(showing), 1):.1%}; wrong and confirmed: {len(wrong)}")
-    _print_z_scores(entries)
+    print(f"found {found} of {showing} that show ({len(lines)} played): {found / max(showing, 1):.1%}; "
+          f"wrong and confirmed: {wrong}")  # fmt: skip
+    _print_z_scores([line["z"] for line in lines if line.get("z")])
 
 
-def _print_z_scores(entries: Sequence[dict[str, Any]]) -> None:
+def _print_z_scores(scored: Sequence[Mapping[str, float]]) -> None:
     """Print the RMS of z of each value of the rig, of the causes' parameters, and of all."""
-    scored = [e["z"] for e in entries if e.get("z")]
     groups: dict[str, list[float]] = {}
     for name, z in (item for scores in scored for item in scores.items()):
         of_cause = "causes" + DOUBTED * name.endswith(DOUBTED)
@@ -170,7 +107,3 @@ def _print_z_scores(entries: Sequence[dict[str, Any]]) -> None:
             f"| {name} | {len(group)} | {np.sqrt(np.mean(size**2)):.2f} | {np.median(size) / 0.6745:.2f} "
             f"| {100.0 * np.mean(size < Z95):.0f} |"
         )
-
-
-def _is_surely_wrong(entry: dict[str, Any]) -> bool:
-    return any(c["status"] == "confirmed" and c["name"] != entry["effect"] for c in entry.get("causes", []))

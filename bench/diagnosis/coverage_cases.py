@@ -7,7 +7,6 @@ machines at work.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
 
 import numpy as np
 from independent.bench import Bench, drawn_bench, record_command
@@ -19,7 +18,10 @@ from independent.solvers import _pieces, _rk4
 from numba import njit
 
 from bench.calibration.cases import RATE, work
-from rsea_ros.records.record import FloatArray, Record
+from bench.diagnosis.cases import RIG
+from bench.diagnosis.played import Played
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.records.record import FloatArray
 
 RIG_VALUES = {
     "rotor.reflected_inertia": "j_m",
@@ -34,22 +36,15 @@ SOFTNESS = 25.0 / 1500.0
 """Largest target of the closed loop, rad."""
 
 
-class Made(NamedTuple):
-    """A record, the parameters of the hidden effect, and the true values of the rig, in SI units."""
-
-    record: Record
-    parameters: Mapping[str, float]
-    rig: Mapping[str, float]
-
-
-def make_record(effect: str, excitation: str, severity: str, seed: int, duration: float) -> Made:
-    """Return a record (duration in s) with its truth."""
+def make_record(effect: str, excitation: str, severity: str, seed: int, duration: float) -> Played:
+    """Return a record (duration in s) of a hidden effect with its truth."""
     rng = np.random.default_rng([seed, *map(ord, effect + excitation + severity)])
     parameters = drawn_parameters(effect, severity, rng)
     drawn = drawn_bench(rng)
     bench = hide(drawn, effect, parameters)
     record = record_command(bench, COMMANDS[excitation](bench, duration, rng), rng)
-    return Made(record, parameters, {name: getattr(drawn.plant, n) for name, n in RIG_VALUES.items()})
+    values = {name: getattr(drawn.plant, n) for name, n in RIG_VALUES.items()}
+    return Played(record, load_rig(RIG), (), (effect,), {effect: parameters}, values)
 
 
 def _work(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:

@@ -6,12 +6,12 @@ python -m bench diagnosis intervals --seeds 100 [--scenarios NAME ...] [--durati
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Annotated
 
 import numpy as np
-from independent.bench import Bench, drawn_bench, record_run
+from independent.bench import drawn_bench, record_run
 from scipy.signal import lfilter
 
-from bench import parser_of
 from bench.diagnosis.coverage_cases import RIG_VALUES
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification
@@ -70,15 +70,10 @@ SCENARIOS: dict[str, tuple[dict[str, float], Spoil]] = {
 }
 
 
-def bench_of(seed: int, hidden: dict[str, float]) -> Bench:
-    """Return the bench of a seed with something hidden in it."""
-    return drawn_bench(np.random.default_rng(seed)).with_values(**hidden)
-
-
 def outcome(name: str, seed: int, duration: float) -> tuple[Identification, dict[str, float]]:
     """Identify one record; return the result and the true values by name."""
     hidden, spoil = SCENARIOS[name]
-    bench = bench_of(seed, hidden)
+    bench = drawn_bench(np.random.default_rng(seed)).with_values(**hidden)
     excitation = ("chirp_noise", "multisine", "white_noise")[seed % 3]
     record = spoil(record_run(bench, seed, excitation, duration), np.random.default_rng(seed + 10_000))
     plant = bench.plant._asdict()
@@ -101,16 +96,17 @@ def row(name: str, seeds: Sequence[int], duration: float) -> str:
     return f"{name:30}{shares}{np.median(widths):14.3g}{np.median(ratios):12.2f}"
 
 
-def main(argv: Sequence[str]) -> int:
-    """Print the table."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--seeds", type=int, default=100, help="records a scenario (default %(default)s)")
-    parser.add_argument("--first", type=int, default=0, help="first seed (default %(default)s)")
-    parser.add_argument("--duration", type=float, default=20.0, help="s, of a record (default %(default)s)")
-    parser.add_argument("--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), metavar="NAME")
-    args = parser.parse_args(argv)
-    print(f"truth inside the 95 % interval, %, of {args.seeds} records of {args.duration:g} s")
+def main(
+    *, seeds: int = 100, first: int = 0, duration: float = 20.0,
+    scenarios: Annotated[tuple[str, ...], SCENARIOS] = tuple(SCENARIOS),
+) -> None:  # fmt: skip
+    """Print the table.
+
+    seeds: records a scenario
+    first: first seed
+    duration: s, of a record
+    """
+    print(f"truth inside the 95 % interval, %, of {seeds} records of {duration:g} s")
     print(f"{'':30}{'J_m':>10}{'b_m':>10}{'K_s':>10}{'b_s':>10}{'K_s ± %':>14}{'x noise':>12}")
-    for name in args.scenarios:
-        print(row(name, range(args.first, args.first + args.seeds), args.duration), flush=True)
-    return 0
+    for name in scenarios:
+        print(row(name, range(first, first + seeds), duration), flush=True)

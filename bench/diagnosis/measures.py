@@ -1,162 +1,133 @@
-"""The required measures over many outcomes, a table for each effect, and the confusion matrix."""
+"""The required measures over the lines of many records, and the confusion matrix."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from math import isfinite
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
-from independent.hidden import BESIDE_THE_CONTRACT, CATALOGUE
+from independent.hidden import BESIDE_THE_CONTRACT, CATALOGUE, MAIN_PARAMETER
 
-from bench.diagnosis.outcome import OUTSIDE, Outcome
+from bench.diagnosis import played
+from bench.diagnosis.played import Line, confirmed_of, is_error, names_of
 from rsea_ros.diagnosis.settings import DEFAULT
 
 HIDDEN = ("single", "newer", "pair", "drawn_pair", "drawn_triple")
 NAMES = tuple(dict.fromkeys((*CATALOGUE, *BESIDE_THE_CONTRACT)))
 """Effects that the second bench can hide."""
 NOTHING, UNEXPLAINED, OFF = "nothing wrong", "unexplained", "not in the catalogue"
+FLOOR = DEFAULT.floor.reached
+Values = Callable[[Sequence[Line]], Sequence[float]]
 
 
-@dataclass(frozen=True)
-class Measure:
-    """One line of the summary: name, value, number of cases, and the required value."""
-
-    what: str
-    value: float
-    cases: int
-    asked: str
-    met: bool
-
-    def __str__(self) -> str:
-        mark = "ok  " if self.met else "LESS"
-        return f"{mark} {self.what:<66}{self.value:8.2f}   required {self.asked:<10} ({self.cases} values)"
+def of_group(*groups: str, when: Callable[[Line], bool] = played.is_right) -> Values:
+    """Return what tells of each line of some groups whether something holds."""
+    return lambda lines: [float(when(x)) for x in lines if x.get("group") in groups]
 
 
-def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
-    """Return the issue's measures, in the issue's order; one without a case is left out."""
-    sizes = [f for o in outcomes if o.group in HIDDEN for f in o.found if f.main]
-    ended = [o for o in outcomes if o.group in (*HIDDEN, "clean") and not o.error]
-    floor = DEFAULT.floor.reached
-    groups = {name: [o for o in outcomes if o.group == name] for name in {o.group for o in outcomes}}
-    lines = [
-        _at_least("first cause right, one effect, %", _right(groups.get("single", ())), 97.0),
-        _at_least(
-            "first cause right or confusable with the right one, one effect, %",
-            _lenient(groups.get("single", ())),
-            97.0,
-        ),
-        _at_least("first cause right, one of the newer effects, %", _right(groups.get("newer", ())), 97.0),
-        _at_least("both causes right, two effects, %", _right(groups.get("pair", ())), 90.0),
-        _at_least("both causes right, two drawn at random, %", _right(groups.get("drawn_pair", ())), 90.0),
-        _at_least("all causes right, three drawn at random, %", _right(groups.get("drawn_triple", ())), 90.0),
-        _at_least("verdict nothing_wrong for a clean bench, %", _right(groups.get("clean", ())), 98.0),
-        _at_least(
-            "unexplained, effect outside the catalogue, %", _right(groups.get("off_catalogue", ())), 90.0
-        ),
-        _at_least(
-            "unexplained or a look-alike, effect outside the catalogue, %",
-            _lenient(groups.get("off_catalogue", ())),
-            90.0,
-        ),
-        _at_least(
-            "unexplained, effect removed from the catalogue, %", _right(groups.get("taken_out", ())), 90.0
-        ),
-        _at_least(
-            "no name confirmed, effect outside the catalogue or removed, %",
-            [
-                "confirmed" not in o.statuses and not o.error
-                for g in ("off_catalogue", "taken_out")
-                for o in groups.get(g, ())
-            ],
-            95.0,
-        ),
-        _at_least("unexplained, effect that is not searched, %", _right(groups.get("unsearched", ())), 90.0),
-        _at_least("fault found and cause right, faulty data, %", _right(groups.get("faulty", ())), 90.0),
-        _at_most("main parameter, median error, %", [100.0 * f.error for f in sizes], 3.0),
-        _at_least("main parameter within 10 %, %", [f.error <= 0.1 for f in sizes], 100.0),
-        _at_least("main parameter in its 95 % interval, %", [f.covered for f in sizes], 90.0),
-        _at_least("held-out residual at the noise floor, %", [o.times_noise <= floor for o in ended], 95.0),
-        _at_least(
-            "residual on a fresh record at the noise floor, %",
-            [o.times_noise_fresh <= floor for o in ended if isfinite(o.times_noise_fresh)],
-            95.0,
-        ),
-        _at_least(
-            "gain within 0.05 of that on a fresh record, %",
-            [abs(o.gain - o.gain_fresh) <= 0.05 for o in ended if isfinite(o.gain_fresh)],
-            100.0,
-        ),
-        _longest("longest time for a case, s", [o.seconds for o in outcomes], 30.0),
-        _at_most("median time for a case, s", [o.seconds for o in outcomes], 30.0),
-    ]
-    return [line for line in lines if line.cases]
+def of_sizes(value: Callable[[float, float, float, float], float]) -> Values:
+    """Return what tells something of each main parameter, of truth, value, low and high."""
+    return lambda lines: [
+        value(*numbers)
+        for x in lines if x.get("group") in HIDDEN
+        for effect, name, *numbers in x.get("found", ())
+        if name == (MAIN_PARAMETER.get(effect) or next(iter(BESIDE_THE_CONTRACT[effect][0])))
+    ]  # fmt: skip
 
 
-def _right(outcomes: Iterable[Outcome]) -> list[bool]:
-    return [o.right for o in outcomes]
+def of_ended(key: str, value: Callable[[Line], float]) -> Values:
+    """Return what tells something of each line whose effects the catalogue has, where the line has a key."""
+    groups = (*HIDDEN, "clean")
+    return lambda lines: [
+        float(value(x)) for x in lines
+        if x.get("group") in groups and not is_error(x) and np.isfinite(x.get(key, np.nan))
+    ]  # fmt: skip
 
 
-def _lenient(outcomes: Iterable[Outcome]) -> list[bool]:
-    return [o.right_or_rival for o in outcomes]
+def _error(truth: float, value: float, *_: float) -> float:
+    """Return the error of a size relative to the truth; absolute where the truth is zero."""
+    return abs(value - truth) / (abs(truth) or 1.0)
 
 
-def _at_least(what: str, hits: Sequence[bool], asked: float) -> Measure:
-    share = 100.0 * float(np.mean(hits)) if hits else 0.0
-    return Measure(what, share, len(hits), f">= {asked:g}", share >= asked)
+def _share(values: Sequence[float]) -> float:
+    return 100.0 * float(np.mean(values))
 
 
-def _at_most(what: str, values: Sequence[float], asked: float) -> Measure:
-    median = float(np.median(values)) if values else 0.0
-    return Measure(what, median, len(values), f"<= {asked:g}", median <= asked)
+def _median(values: Sequence[float]) -> float:
+    return float(np.median(values))
 
 
-def _longest(what: str, values: Sequence[float], asked: float) -> Measure:
-    longest = max(values, default=0.0)
-    return Measure(what, longest, len(values), f"<= {asked:g}", longest <= asked)
+MEASURES: Sequence[tuple[str, Values, Callable[[Sequence[float]], float], str]] = (
+    ("first cause right, one effect, %", of_group("single"), _share, ">= 97"),
+    ("first cause right or confusable with the right one, one effect, %",
+     of_group("single", when=played.is_right_or_rival), _share, ">= 97"),
+    ("first cause right, one of the newer effects, %", of_group("newer"), _share, ">= 97"),
+    ("both causes right, two effects, %", of_group("pair"), _share, ">= 90"),
+    ("both causes right, two drawn at random, %", of_group("drawn_pair"), _share, ">= 90"),
+    ("all causes right, three drawn at random, %", of_group("drawn_triple"), _share, ">= 90"),
+    ("verdict nothing_wrong for a clean bench, %", of_group("clean"), _share, ">= 98"),
+    ("unexplained, effect outside the catalogue, %", of_group("off_catalogue"), _share, ">= 90"),
+    ("unexplained or a look-alike, effect outside the catalogue, %",
+     of_group("off_catalogue", when=played.is_right_or_rival), _share, ">= 90"),
+    ("unexplained, effect removed from the catalogue, %", of_group("taken_out"), _share, ">= 90"),
+    ("no name confirmed, effect outside the catalogue or removed, %",
+     of_group("off_catalogue", "taken_out", when=lambda x: not confirmed_of(x) and not is_error(x)),
+     _share, ">= 95"),
+    ("unexplained, effect that is not searched, %", of_group("unsearched"), _share, ">= 90"),
+    ("fault found and cause right, faulty data, %", of_group("faulty"), _share, ">= 90"),
+    ("main parameter, median error, %", of_sizes(lambda *n: 100.0 * _error(*n)), _median, "<= 3"),
+    ("main parameter within 10 %, %", of_sizes(lambda *n: _error(*n) <= 0.1), _share, ">= 100"),
+    ("main parameter in its 95 % interval, %", of_sizes(lambda t, _, low, high: low <= t <= high),
+     _share, ">= 90"),
+    ("held-out residual at the noise floor, %",
+     of_ended("times_noise", lambda x: x["times_noise"] <= FLOOR), _share, ">= 95"),
+    ("residual on a fresh record at the noise floor, %",
+     of_ended("times_noise_fresh", lambda x: x["times_noise_fresh"] <= FLOOR), _share, ">= 95"),
+    ("gain within 0.05 of that on a fresh record, %",
+     of_ended("gain_fresh", lambda x: abs(x["gain"] - x["gain_fresh"]) <= 0.05), _share, ">= 100"),
+    ("longest time for a case, s", lambda lines: [x["seconds"] for x in lines], max, "<= 30"),
+    ("median time for a case, s", lambda lines: [x["seconds"] for x in lines], _median, "<= 30"),
+)  # fmt: skip
+"""What is measured, of which values, how, and what is required; one without a value is left out."""
 
 
-def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:
+def confusion(lines: Sequence[Line]) -> dict[str, Counter[str]]:
     """Return counts of the first cause named (columns) for each truth (rows); two effects count twice."""
     rows: dict[str, Counter[str]] = {}
-    for o in outcomes:
-        if o.group == "reading":
-            continue
-        truths = o.truth or ((OFF,) if o.group in OUTSIDE else (NOTHING,))
-        for truth in truths:
-            rows.setdefault(truth, Counter())[_answer(o, truth)] += 1
-    order = (*NAMES, OFF, NOTHING)
-    return {truth: rows[truth] for truth in order if truth in rows}
+    for line in (x for x in lines if x.get("group") != "reading"):
+        outside = line.get("group") in played.OUTSIDE
+        for truth in (OFF,) if outside else line["truth"] or (NOTHING,):
+            rows.setdefault(truth, Counter())[_answer(line, truth)] += 1
+    return {truth: rows[truth] for truth in (*NAMES, OFF, NOTHING) if truth in rows}
 
 
-def _answer(outcome: Outcome, truth: str) -> str:
-    if outcome.error:
+def _answer(line: Line, truth: str) -> str:
+    hidden: Any = () if line.get("group") in played.OUTSIDE else line["truth"]
+    named = names_of(line)
+    if is_error(line):
         return "error"
-    if truth in outcome.named[: max(len(outcome.truth), 1)]:
+    if truth in named[: max(len(hidden), 1)]:
         return truth
-    others = [name for name in outcome.named if name not in outcome.truth]
-    if others:
-        return others[0]
-    return NOTHING if outcome.verdict == "nothing_wrong" else UNEXPLAINED
+    others = [name for name in named if name not in hidden]
+    return others[0] if others else NOTHING if line["verdict"] == "nothing_wrong" else UNEXPLAINED
 
 
-def markdown(outcomes: Sequence[Outcome]) -> str:
-    """Return the measures and the matrix as Markdown: columns are numbered as the rows are."""
-    matrix = confusion(outcomes)
+def markdown(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield the measures and the matrix as Markdown: columns are numbered as the rows are."""
+    yield "| measure | value | required | values |\n|---|--:|--:|--:|"
+    for what, values, statistic, asked in MEASURES:
+        if each := values(lines):
+            yield f"| {what} | {statistic(each):.2f} | {asked} | {len(each)} |"
+    matrix = confusion(lines)
     columns = [*NAMES, UNEXPLAINED, NOTHING]
     columns += ["error"] * any("error" in row for row in matrix.values())
-    lines = ["| measure | value | required | values |", "|---|--:|--:|--:|"]
-    lines += [f"| {m.what} | {m.value:.2f} | {m.asked} | {m.cases} |" for m in measures(outcomes)]
     heads = [str(k + 1) if name in NAMES else name for k, name in enumerate(columns)]
-    lines += ["", f"| truth (rows), first cause named (columns) | {' | '.join(heads)} |"]
-    lines.append("|---|" + "--:|" * len(columns))
+    yield f"\n| truth (rows), first cause named (columns) | {' | '.join(heads)} |"
+    yield "|---|" + "--:|" * len(columns)
     for truth, row in matrix.items():
         number = f"{columns.index(truth) + 1} " if truth in NAMES else ""
-        cells = [_cell(row[name], name == truth) for name in columns]
-        lines.append(f"| {number}`{truth}` | {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
-
-
-def _cell(count: int, right: bool) -> str:
-    return f"**{count}**" if right and count else str(count or "")
+        counts = {name: str(row[name] or "") for name in columns}
+        counts |= {truth: f"**{row[truth]}**"} if row[truth] else {}
+        cells = [counts[name] for name in columns]
+        yield f"| {number}`{truth}` | {' | '.join(cells)} |"

@@ -5,20 +5,16 @@
 MuJoCo plays the exported model of a rig with one effect, and the rig with that effect is fitted to the play.
 Each line shows the fitted over the true value, less 1, of every parameter whose interval by noise reaches no
 farther than NARROW. The last line shows their RMS, for `sizes.model_error`. The coverage of intervals is
-measured on another bench (interval_coverage.py with test/independent). MuJoCo needs Python 3.11 or later.
+measured on another bench (`intervals`). MuJoCo needs Python 3.11 or later.
 Left out by default are effects that MuJoCo plays by another law that stands in for them: their difference is
 that of the laws.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
-import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
-from bench import parser_of
-
-# isort: split
 import numpy as np
 
 from rsea_ros.errors import ParameterError, RseaError
@@ -39,18 +35,18 @@ NATIVE = tuple(name for name in (*EFFECTS, *STRUCTURES) if name not in SUBSTITUT
 BENCH = ExcitationSettings(amplitude=10.0, noise=2.0, low=0.2, high=60.0, seed=3)
 
 
-def main(argv: Sequence[str]) -> int:
-    """Print the table and the RMS of all deviations."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--rig", default="paper_high_impedance", help="default %(default)s")
-    parser.add_argument("--seconds", type=float, default=16.0, help="of each run (default %(default)s)")
-    parser.add_argument("--effects", nargs="*", default=["", *NATIVE], metavar="NAME")
-    args = parser.parse_args(argv)
+def main(
+    *, rig: str = "paper_high_impedance", seconds: float = 16.0, effects: tuple[str, ...] = ("", *NATIVE)
+) -> None:
+    """Print the table and the RMS of all deviations.
+
+    seconds: of each run
+    """
     every: list[float] = []
-    for name in args.effects:
-        rig = load_rig(args.rig)
+    for name in effects:
+        played = load_rig(rig)
         try:
-            deviations = dict(deviations_of(rig.with_effect(name) if name else rig, args.seconds))
+            deviations = dict(deviations_of(played.with_effect(name) if name else played, seconds))
         except RseaError as error:
             print(f"{name or 'nominal':24} {error}", flush=True)
             continue
@@ -60,7 +56,6 @@ def main(argv: Sequence[str]) -> int:
     median, largest = np.median(np.abs(every)), np.max(np.abs(every))
     print(f"{len(every)} parameters: RMS {100.0 * np.sqrt(np.mean(np.square(every))):.2f} %, "
           f"median {100.0 * median:.2f} %, largest {100.0 * largest:.2f} %")  # fmt: skip
-    return 0
 
 
 def deviations_of(rig: Rig, seconds: float) -> Iterator[tuple[str, float]]:

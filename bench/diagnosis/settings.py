@@ -13,11 +13,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from bench import parser_of
 from bench.diagnosis.cases import Plan, plan
-from bench.diagnosis.outcome import run_case
+from bench.diagnosis.played import OUTSIDE, is_right, names_of, play
 from bench.results import append_line, read_lines
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.report.diagnosis.page import value_text
@@ -46,36 +45,38 @@ DURATION = 12.0
 IN_USE = {s.name: s.value for s in DEFAULT.numbers() if not isinstance(s.value, tuple)}
 
 
-def main(argv: Sequence[str]) -> int:
-    """Print a table for each setting: right, wrong, missed and changed over its values."""
-    parser = parser_of(__doc__)
-    parser.add_argument("setting", nargs="?", choices=IN_USE, metavar="GROUP.FIELD", help="to change")
-    parser.add_argument("values", nargs="*", type=float, metavar="VALUE", help="what to set it to, in turn")
-    parser.add_argument("--list", action="store_true", help="print every setting and its reason")
-    parser.add_argument("--select", default="", metavar="TEXT", help="only cases with TEXT in name or group")
-    parser.add_argument("--limit", type=int, metavar="N", help="only N cases, spread evenly over all")
-    parser.add_argument("--log", type=Path, default=Path("out/settings.jsonl"), help="goes on where it ends")
-    args = parser.parse_args(argv)
-    if args.list:
+def main(
+    setting: Annotated[str, IN_USE] = "", values: tuple[float, ...] = (), *, list_: bool = False,
+    select: str = "", limit: int = 0, log: Path = Path("out/settings.jsonl"),
+) -> None:  # fmt: skip
+    """Print a table for each setting: right, wrong, missed and changed over its values.
+
+    setting: to change, GROUP.FIELD
+    values: what to set it to, in turn
+    list_: print every setting and its reason
+    select: only cases with this text in name or group
+    limit: only so many cases, spread evenly over all
+    log: goes on where it ends
+    """
+    if list_:
         for s in DEFAULT.numbers():
             print(f"{s.name:<30}{value_text(s.value):>8} {s.unit:<3} {s.meaning}: {s.reason}")
-        return 0
+        return
     curves, plans = CURVES, [replace(p, duration=DURATION) for p in plan() if p.name in CASES]
-    if args.setting:
-        curves = {args.setting: args.values}
-        plans = [p for p in plan() if args.select in f"{p.name} {p.group}"]
-        count = min(args.limit or len(plans), len(plans))
+    if setting:
+        curves = {setting: values}
+        plans = [p for p in plan() if select in f"{p.name} {p.group}"]
+        count = min(limit or len(plans), len(plans))
         plans = [plans[k * len(plans) // count] for k in range(count)]
-    for name, values in curves.items():
+    for name, tried in curves.items():
         print(f"{name}, {len(plans)} records\n| value | right | wrong | missed | changed |")
         print("|---|---|---|---|---|")
-        base = [_played(p, name, float(IN_USE[name]), args.log) for p in plans]
-        for value in sorted({*map(float, values), float(IN_USE[name])}):
+        base = [_played(p, name, float(IN_USE[name]), log) for p in plans]
+        for value in sorted({*map(float, tried), float(IN_USE[name])}):
             shown = f"**{value:g}**" if value == IN_USE[name] else f"{value:g}"
-            cells = _counts([_played(p, name, value, args.log) for p in plans], base)
+            cells = _counts([_played(p, name, value, log) for p in plans], base)
             print(f"| {shown} | {' | '.join(map(str, cells))} |", flush=True)
         print()
-    return 0
 
 
 def with_value(name: str, value: float) -> DiagnosisSettings:
@@ -92,10 +93,12 @@ def _played(case: Plan, setting: str, value: float, log: Path) -> Mapping[str, A
     for line in read_lines(log):
         if {k: v for k, v in line.items() if k != "outcome"} == key:
             return dict(line["outcome"])
-    o = run_case(case.make(), settings=with_value(setting, value))
-    said = {"truth": [*o.truth], "named": [*o.named], "statuses": [*o.statuses], "verdict": o.verdict}
-    append_line(log, {**key, "outcome": {**said, "right": o.right}})
-    return {**said, "right": o.right}
+    line = play(case.name, case.make(), with_value(setting, value))
+    outcome = {"truth": () if case.group in OUTSIDE else [*line["truth"]], "named": names_of(line),
+               "statuses": [c["status"] for c in line["causes"]], "verdict": line["verdict"],
+               "right": is_right(line)}  # fmt: skip
+    append_line(log, {**key, "outcome": outcome})
+    return outcome
 
 
 def _counts(played: Sequence[Mapping[str, Any]], base: Sequence[Mapping[str, Any]]) -> Iterator[int]:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 
 from independent.hidden import CATALOGUE
 
-from bench import SHARED as BESIDE
-from bench.diagnosis.cases import Case
+from bench import SHARED
+from bench.diagnosis.cases import RIG
+from bench.diagnosis.played import Played
 from msg_adapters import read_record
+from rsea_ros.model.rig_file import load_rig
 
-SHARED = BESIDE / "cases"
-
+FOLDER = SHARED / "cases"
 PARAMETERS = {
     "coulomb_friction": {"torque": ("coulomb",)},
     "backlash": {"gap": ("backlash",)},
@@ -31,15 +31,19 @@ PARAMETERS = {
 """Parameters that have another name in the truth file."""
 
 
-def shared_cases(folder: Path = SHARED) -> Iterator[Case]:
-    """Yield the shared cases; no second bag of the same bench exists for them."""
-    truth = json.loads((folder / "truth" / "truth.json").read_text())
-    for number, entry in sorted(truth.items()):
-        causes = tuple(entry["causes"])
-        parameters = {cause: _parameters(cause, entry["bench"]) for cause in causes}
-        group = ("clean", "single", "pair")[min(len(causes), 2)]
-        record = read_record(folder / number)
-        yield Case(f"shared-{number}", record, causes, parameters, None, group)
+def shared_names() -> list[str]:
+    """Return the names of the shared cases, none where the folder is not there."""
+    return sorted(f"shared-{folder.name}" for folder in FOLDER.glob("[0-9]*"))
+
+
+def shared_case(name: str) -> Played:
+    """Return a shared case; no second bag of the same bench exists for it."""
+    number = name.removeprefix("shared-")
+    entry = json.loads((FOLDER / "truth" / "truth.json").read_text())[number]
+    causes = tuple(entry["causes"])
+    sizes = {cause: _parameters(cause, entry["bench"]) for cause in causes}
+    about = {"group": ("clean", "single", "pair")[min(len(causes), 2)]}
+    return Played(read_record(FOLDER / number), load_rig(RIG), (), causes, sizes, about=about)
 
 
 def _parameters(cause: str, bench: Mapping[str, float]) -> dict[str, float]:

@@ -1,7 +1,6 @@
 """Designed experiments against fixed ones: python -m bench experiment COMMAND LOG …
 
     causes LOG [FIRST COUNT] [--limits full|lab|work]   hidden-cause benches, one a line of LOG; resumes
-    random LOG OUT [--limits …]   the random multisines of LOG once more, on the same benches, into OUT
     summary LOG                   the figures of those lines
     wire OUT                      the real driver on a simulated bench, an overload in the middle of a run
     limits RUNS                   limit violations in RUNS runs, true values drawn from their intervals
@@ -20,38 +19,33 @@ the slow work: no run is stronger than what the machine has already done. second
 from __future__ import annotations
 
 import json
-import sys
 import time
-from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from independent.bench import drawn_bench, record_command
+from independent.hidden import hide
+from independent.severities import SEVERITIES, drawn_parameters
 
-from bench import ROOT, parser_of
-
-sys.path[:0] = [str(ROOT), str(ROOT / "test")]
-
-from independent.bench import drawn_bench, record_command  # noqa: E402
-from independent.hidden import hide  # noqa: E402
-from independent.severities import SEVERITIES, drawn_parameters  # noqa: E402
-
-from bench.experiment.figures import SECONDS, SHORTEST, print_figures  # noqa: E402
-from bench.experiment.policies import RATE, Fixed, fixed_chirp, random_multisine  # noqa: E402
-from bench.results import append_line, read_lines  # noqa: E402
-from msg_adapters import write_record  # noqa: E402
-from rsea_ros.cli._processes import Processes  # noqa: E402
-from rsea_ros.cli.demo import EXCITED, patience  # noqa: E402
-from rsea_ros.experiment.campaign import Budget, Campaign  # noqa: E402
-from rsea_ros.experiment.hypothesis import motion  # noqa: E402
-from rsea_ros.experiment.joint_weighing import USUAL, weigh  # noqa: E402
-from rsea_ros.experiment.proposal import DesignRequest  # noqa: E402
-from rsea_ros.experiment.run_design import propose  # noqa: E402
-from rsea_ros.experiment.run_shape import RunLimits, largest_share, of_command, of_response  # noqa: E402
-from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
-from rsea_ros.identification.solver import worker_pools  # noqa: E402
-from rsea_ros.model.rig_file import load_rig, save_rig  # noqa: E402
-from rsea_ros.model.simulation import synthesize  # noqa: E402
-from rsea_ros.records.record import Channel  # noqa: E402
+from bench.experiment.figures import SECONDS, SHORTEST, print_figures
+from bench.experiment.policies import RATE, Fixed, fixed_chirp, random_multisine
+from bench.results import read_lines, resumed
+from msg_adapters import write_record
+from rsea_ros.cli._processes import Processes
+from rsea_ros.cli.demo import EXCITED, patience
+from rsea_ros.experiment.campaign import Budget, Campaign
+from rsea_ros.experiment.hypothesis import motion
+from rsea_ros.experiment.joint_weighing import USUAL, weigh
+from rsea_ros.experiment.proposal import DesignRequest
+from rsea_ros.experiment.run_design import propose
+from rsea_ros.experiment.run_shape import RunLimits, largest_share, of_command, of_response
+from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.identification.solver import worker_pools
+from rsea_ros.model.rig_file import load_rig, save_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.records.record import Channel
 
 LIMITS = {
     "full": RunLimits(torque=25.0, velocity=2.0, deflection=0.04),
@@ -122,22 +116,6 @@ def one(k, pools, limits):
     return line | {"cpu": time.process_time() - begun}
 
 
-def random_again(log, out, limits):
-    """Write the lines of a log with the random multisine played once more."""
-    rig = load_rig("paper_high_impedance")
-    with worker_pools() as pools:
-        for line in read_lines(log)[len(read_lines(out)) :]:
-            if "random" in line:
-                k = line["bench"]
-                bench, rng = hidden_case(k)[1], np.random.default_rng([18, k])
-                first = record_command(bench, slow_work(), rng)
-                policy = Fixed(random_multisine(line["rms"], k, limits.torque), SHORTEST)
-                weighing = weigh([first], rig, USUAL, run=pools.run)
-                line["random"] = play_policy(policy, first, weighing, bench, rig, rng, pools, limits)[1]
-                print(k, line["cause"], line["designed"]["seconds"], line["random"]["seconds"], flush=True)
-            append_line(out, line)
-
-
 def outcome_entry(outcome):
     """Return the part of an outcome that counts."""
     kinds = [getattr(getattr(r.proposal, "shape", None), "kind", "") for r in outcome.rounds if r.proposal]
@@ -152,22 +130,31 @@ def outcome_entry(outcome):
     }
 
 
-def causes(log, first, count, limits):
-    """Play benches and append their lines."""
-    done = {entry["bench"] for entry in read_lines(log)}
+def causes(log: Path, first: int = 0, count: int = 60, *, limits: Annotated[str, LIMITS] = "full") -> None:
+    """Play hidden-cause benches, designed runs against fixed ones, and append their lines.
+
+    log: JSON lines, a bench each
+    first: number of a bench
+    count: of benches
+    """
     with worker_pools() as pools:
-        for k in range(first, first + count):
-            if k in done:
-                continue
-            line = one(k, pools, limits)
-            append_line(log, line)
+        works = ((k, partial(one, k, pools, LIMITS[limits])) for k in range(first, first + count))
+        for line in resumed(log, works, "bench"):
             played = {p: line[p] for p in ("designed", "chirp", "random") if p in line}
             short = {p: [e[n] for n in ("end", "cause", "seconds")] for p, e in played.items()}
-            print(k, line["cause"], line["severity"], short, f"{line['cpu']:.0f} s", flush=True)
+            print(line["bench"], line["cause"], line["severity"], short, f"{line['cpu']:.0f} s", flush=True)
 
 
-def limits(runs):
-    """Count violations in designed runs on benches drawn from their intervals."""
+def summary(log: Path) -> None:
+    """Print the figures of the lines of a log.
+
+    log: of `causes`
+    """
+    print_figures(read_lines(log))
+
+
+def limits(runs: int = 10_000) -> None:
+    """Count violations of limits in designed runs on benches drawn from their intervals."""
     rig, rng, broken, worst, made = load_rig("paper_high_impedance"), np.random.default_rng(3), 0, 0.0, 0
     tight = RunLimits(torque=25.0, velocity=1.0, deflection=0.015, ft=22.0)
     with worker_pools() as pools:
@@ -191,7 +178,7 @@ def limits(runs):
     print(f"{made} runs, {broken} broke a limit; largest share {worst:.3f}; torques {np.round(sizes, 1)}")
 
 
-def wire(out):
+def wire(out: Path) -> None:
     """Inject an overload into a run on a simulated bench; print when the torque was zero and how it ended."""
     rig = load_rig("paper_high_impedance").with_effect("current_loop_lag", time_constant=3e-3)
     out.mkdir(parents=True)
@@ -219,32 +206,3 @@ def wire(out):
     runs = len(list((out / "session").glob("run-*.mcap")))
     print(f"overload at {moved} counts: torque zero after {1e3 * zero:.0f} ms (counts, enabled: {last})")
     print(f"loop ended: {said['end']}: {said['why']}; seconds {said['seconds']}, runs kept {runs}")
-
-
-def main(argv: Sequence[str]) -> None:
-    """Run a command."""
-    parser = parser_of(__doc__)
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    played = commands.add_parser("causes")
-    played.add_argument("log", type=Path)
-    played.add_argument("first", type=int, nargs="?", default=0)
-    played.add_argument("count", type=int, nargs="?", default=60)
-    played.add_argument("--limits", choices=LIMITS, default="full")
-    again = commands.add_parser("random")
-    again.add_argument("log", type=Path)
-    again.add_argument("out", type=Path)
-    again.add_argument("--limits", choices=LIMITS, default="full")
-    commands.add_parser("summary").add_argument("log", type=Path)
-    commands.add_parser("wire").add_argument("out", type=Path)
-    commands.add_parser("limits").add_argument("runs", type=int, nargs="?", default=10_000)
-    args = parser.parse_args(argv)
-    if args.command == "limits":
-        limits(args.runs)
-    elif args.command == "wire":
-        wire(args.out)
-    elif args.command == "summary":
-        print_figures(read_lines(args.log))
-    elif args.command == "random":
-        random_again(args.log, args.out, LIMITS[args.limits])
-    else:
-        causes(args.log, args.first, args.count, LIMITS[args.limits])

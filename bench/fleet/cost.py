@@ -1,29 +1,33 @@
-"""Cost of a run: equal rows, speed-up, overhead, memory of the scheduler, reading, a million recordings."""
+"""Cost of a run: equal rows, speed-up, overhead, memory of the scheduler and of a task."""
 
 from __future__ import annotations
 
 import os
 import resource
+import subprocess
+import sys
 import tempfile
 import time
 from array import array
-from collections.abc import Callable, Sequence
-from datetime import datetime, timedelta, timezone
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pyarrow as pa
 
+from bench import ROOT
 from bench.fleet import stub
 from bench.fleet.real import make_fleet, run_real
-from rsea_ros.fleet import history, recordings
 from rsea_ros.fleet.pool import on_this_machine
-from rsea_ros.fleet.row import ARROW, VARYING, read, write_table
+from rsea_ros.fleet.row import VARYING, read
 from rsea_ros.fleet.store import Store, open_store
 
 MEMORY = 4_000_000_000
 MEGA = 1e6
+LENGTHS = (10.0, 120.0, 600.0)
+"""s of recordings at 280 Hz whose memory is measured."""
 FLAT = 0.02
 """Share by which memory may grow over 10 000 tasks: the keys of rows take 0.2 kB each, 0.7 %."""
 
@@ -123,81 +127,27 @@ def resident() -> float:
     return float(pages * resource.getpagesize())
 
 
-def make_store(path: Path, count: int, joints: int = 20) -> Store:
-    """Make a store of many rows of a year, in the files that compaction leaves."""
-    store, rng = open_store(path, create=True), np.random.default_rng(1)
-    begin = datetime(2026, 1, 1, tzinfo=timezone.utc)
-    parts: dict[tuple[int, str], list[dict[str, object]]] = {}
-    for number in range(count):
-        when = begin + timedelta(days=365.0 * number / count)
-        parts.setdefault((number % joints, when.strftime("%Y-%m")), []).append(_row(number, when, rng))
-    for (joint, month), rows in parts.items():
-        folder = store.rows / f"joint=joint{joint:02d}" / f"month={month}"
-        folder.mkdir(parents=True)
-        write_table(pa.Table.from_pylist(rows, ARROW), folder / "part-0.parquet")
-    return store
-
-
-def _row(number: int, when: datetime, rng: np.random.Generator) -> dict[str, object]:
-    """Return a row of four parameters, one in ten with a cause and a fault."""
-    values = 1.0 + 0.01 * rng.standard_normal(4)
-    parameters = [
-        {"name": name, "value": v, "low": v - 0.02, "high": v + 0.02, "unit": "1", "identifiable": True}
-        for name, v in zip(stub.PARAMETERS, values.tolist(), strict=True)
-    ]
-    odd = bool(rng.random() < 0.1)
-    size = {"name": "gap", "value": 0.002, "low": 0.001, "high": 0.003, "unit": "rad"}
-    cause = {"name": "backlash", "status": "leading", "probability": 0.9, "gain": 0.4, "sizes": [size]}
-    return {
-        "recording": f"{number:016x}", "bag": f"/lab/{number}", "time": when, "duration": 60.0,
-        "excitation": [], "faults": [{"kind": "outliers", "count": 1, "detail": "ft"}] if odd else [],
-        "outcome": "done", "reason": "", "verdict": "misfit" if odd else "adequate", "diagnosis": "",
-        "parameters": parameters, "causes": [cause] if odd else [], "residual": 1.0, "model_version": "1",
-        "settings": "a", "schema": 1, "seconds": 1.0, "peak_memory": 1, "artefacts": "", "bytes": number,
-        "stamp": str(number), "written": when,
-    }  # fmt: skip
-
-
-def reading(count: int = 100_000) -> bool:
-    """Read and report a store of 100 000 rows."""
-    from rsea_ros.report.fleet.page import write_fleet_report
-
-    with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:
-        store = make_store(Path(folder) / "store", count)
-        known = seconds_of(store.known_rows)
-        line("keys of 100 000 rows", "–", f"{known:.1f} s, before a run begins")
-        begin, busy = time.perf_counter(), time.process_time()
-        columns, rows = history(store.path), recordings(store.path)
-        read_in = time.perf_counter() - begin
-        line("reading 100 000 rows", "–", f"{read_in:.1f} s, {len(columns['value'])} parameters")
-        write_fleet_report(columns, rows, Path(folder) / "report", store=store.path)
-        whole, busy = time.perf_counter() - begin, time.process_time() - busy
-        said = f"{whole:.1f} s with the pages, {busy:.1f} s of CPU"
-        return line("reporting 100 000 rows", "≤ 10 s", said, whole <= 10.0)
-
-
 def memory() -> bool:
     """Identify recordings of several lengths, each in a new process: the memory of a worker for each byte."""
-    from bench.fleet.memory import peaks
-
-    seen_peaks = peaks()
-    for size, peak in seen_peaks:
+    with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:
+        seen = [_peak(make_fleet(Path(folder) / f"{length:g}", 1, length)) for length in LENGTHS]
+    for size, peak in seen:
         line("memory of a task", "–", f"{peak / MEGA:.0f} MB for a recording of {size / MEGA:.1f} MB")
-    slope, base = np.polyfit(*np.array(seen_peaks, float).T, 1)
+    slope, base = np.polyfit(*np.array(seen, float).T, 1)
     return line("memory of a task", "BASE, FACTOR", f"{base / MEGA:.0f} MB + {slope:.1f} × bytes")
 
 
-def million() -> bool:
-    """Simulate 10^6 recordings on 100 workers from the costs measured here; print what breaks first."""
-    from bench.fleet.million import report
-
-    return report(line)
-
-
-ALL = (real, scheduler, reading, memory, million)
+def _peak(bags: Path) -> tuple[int, int]:
+    """Return bytes of the one recording of a folder, and bytes of memory that a process took for it."""
+    code = "import sys, rsea_ros.cli; from bench.fleet.real import print_peak; print_peak(sys.argv[1])"
+    command = [sys.executable, "-c", code, str(bags)]
+    size, peak = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    return int(size), int(peak)
 
 
-def main(argv: Sequence[str]) -> int:
+ALL = {one.__name__: one for one in (real, scheduler, memory)}
+
+
+def main(parts: Annotated[tuple[str, ...], ALL] = ()) -> int:
     """Run all, or those named; return the exit status."""
-    results = [one() for one in ALL if not argv or one.__name__ in argv]
-    return 0 if all(results) else 1
+    return int(any([not ALL[name]() for name in parts or ALL]))  # noqa: C419 all of them are run

@@ -1,24 +1,27 @@
-"""A run survives: lost workers, clients and schedulers, a full disk, poison, another run beside it."""
+"""A run survives lost workers, clients and schedulers.
+
+A full disk, recordings that take too much memory or change while they are read, and two runs at once: tests.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import random
-import shutil
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Annotated
 
 from bench import ROOT
 from bench.fleet import stub
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.cluster import on_scheduler
-from rsea_ros.fleet.executor import serial
 from rsea_ros.fleet.pool import on_this_machine
 from rsea_ros.fleet.store import Store, hold_lock, open_store
 
@@ -128,8 +131,6 @@ def _cluster() -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
         alone = ["--nthreads", "1", "--no-nanny"]
         worker = subprocess.Popen([*dask, "worker", *alone, *common], env=env, **quiet)
         try:
-            import json
-
             stub.wait_for(file.exists, 60.0)
             time.sleep(0.5)
             yield json.loads(file.read_text())["address"], scheduler
@@ -139,75 +140,9 @@ def _cluster() -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
                 process.wait()
 
 
-def disk_full(count: int = 200) -> bool:
-    """Let the store's file system run full (a small tmpfs, needs root), give it room, and go on."""
-    with place(count) as (bags, path):
-        path.mkdir()
-        small = ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", str(path)]
-        if subprocess.run(small, check=False).returncode:
-            print("disk full                    not measured: needs root, who can mount a small file system")
-            return True
-        try:
-            store, said, os.environ[stub.TAKES] = open_store(path, create=True), "never full", "0"
-            with hold_lock(store, None), serial() as serial_run:
-                try:
-                    stub.run_engine(store, bags, serial_run)
-                except OSError as error:
-                    said = f"stopped with {error.strerror}"
-            before = len(stub.outcomes(store)) and sum(stub.outcomes(store).values())
-            subprocess.run(["mount", "-o", "remount,size=20m", str(path)], check=True)
-            with hold_lock(store, None), serial() as serial_run:
-                store.finish()
-                stub.run_engine(store, bags, serial_run)
-            return verdict("disk full", path, count, f"{said} after {before} rows, which stayed")
-        finally:
-            subprocess.run(["umount", str(path)], check=False)
+ALL = {one.__name__: one for one in (workers_killed, client_killed, scheduler_killed)}
 
 
-def four_gigabytes(count: int = 8) -> bool:
-    """Have one recording take 4 GB on workers that may have 1 GB."""
-    with place(count) as (bags, path), on_this_machine(2, MEMORY) as workers:
-        summary = stub.run_engine(open_store(path, create=True), bags, workers, stub.greedy)
-        good = summary.outcomes == {"done": count - 1, "quarantined": 1}
-        why = summary.quarantined[0][2] if summary.quarantined else "no quarantine"
-        return verdict("4 GB on 1 GB", path, count, f"{summary.sentence()}: {why}") and good
-
-
-def two_at_once(count: int = 40) -> bool:
-    """Start two whole runs on one store at once."""
-    with place(count) as (bags, path):
-        open_store(path, create=True)
-        runs = [_client(bags, path, "0.1") for _ in range(2)]
-        states = [run.wait(timeout=200.0) for run in runs]
-        return verdict("two runs at once", path, count, f"exit status {states}")
-
-
-def truncate_while_read() -> bool:
-    """Truncate a real recording while it is read: no row; the next run reads the rest of it."""
-    from bench.fleet.real import make_fleet, run_real
-
-    with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:
-        held = make_fleet(Path(folder) / "bags", 3, seconds=6.0)
-        store = open_store(Path(folder) / "store", create=True)
-        first = run_real(store, held, cut="002")
-        shutil.copy(Path(folder) / "bags" / "knee-001.mcap", Path(folder) / "bags" / "whole.mcap")
-        second = run_real(store, held)
-        said = f"first {first.sentence()}; then {second.sentence()}"
-        return verdict("truncated while read", store.path, 3, said)
-
-
-ALL = (
-    workers_killed,
-    client_killed,
-    scheduler_killed,
-    disk_full,
-    four_gigabytes,
-    two_at_once,
-    truncate_while_read,
-)
-
-
-def main(argv: Sequence[str]) -> int:
+def main(parts: Annotated[tuple[str, ...], ALL] = ()) -> int:
     """Run all, or those named; return the exit status."""
-    passed = [one() for one in ALL if not argv or one.__name__ in argv]
-    return 0 if all(passed) else 1
+    return int(any([not ALL[name]() for name in parts or ALL]))  # noqa: C419 all of them are run

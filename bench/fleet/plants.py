@@ -8,6 +8,7 @@ import numpy as np
 from independent.bench import Bench, drawn_bench, record_command
 from independent.excitations import RATE
 
+from bench.calibration.cases import levels, smoothed
 from rsea_ros.records.record import FloatArray, Record
 
 COULOMB = 1.0
@@ -45,12 +46,12 @@ def joint(
 
 def handle_loads(n: int, rng: np.random.Generator) -> FloatArray:
     """Return pick and place, N m: levels held for 0.2 to 1.2 s with smooth moves between them."""
-    return _smooth(_levels(n, rng, 30.0, (0.2, 1.2)), 0.15)
+    return smoothed(30.0 * levels(n, rng), 0.15)
 
 
 def step_loads(n: int, rng: np.random.Generator) -> FloatArray:
     """Return commands of a coarse supervisor, N m: levels without a move between them."""
-    return _levels(n, rng, 25.0, (0.3, 1.0))
+    return 25.0 * levels(n, rng, (0.3, 1.0))
 
 
 def gait(n: int, rng: np.random.Generator) -> FloatArray:
@@ -64,7 +65,7 @@ def gait(n: int, rng: np.random.Generator) -> FloatArray:
 
 def hold_loads(n: int, rng: np.random.Generator) -> FloatArray:
     """Return loads that are held and slowly changed, N m: hardly any excitation."""
-    return _smooth(_levels(n, rng, 6.0, (2.0, 4.0)), 1.0)
+    return smoothed(6.0 * levels(n, rng, (2.0, 4.0)), 1.0)
 
 
 WORK: dict[str, Callable[[int, np.random.Generator], FloatArray]] = {
@@ -82,20 +83,7 @@ def recording(bench: Bench, kind: str, seed: int, duration: float = 12.0) -> Rec
     return record_command(bench, WORK[kind](round(duration * RATE), rng), rng)
 
 
-def _levels(n: int, rng: np.random.Generator, most: float, held: tuple[float, float]) -> FloatArray:
-    levels: list[FloatArray] = []
-    while sum(map(len, levels)) < n:
-        levels.append(np.full(round(rng.uniform(*held) * RATE), rng.uniform(-most, most)))
-    return np.concatenate(levels)[:n]
-
-
-def _smooth(values: FloatArray, seconds: float) -> FloatArray:
-    window = np.hanning(round(seconds * RATE) + 2)[1:-1]
-    smooth: FloatArray = np.convolve(values, window / window.sum(), mode="same")
-    return smooth
-
-
 def _slow_noise(n: int, rng: np.random.Generator) -> FloatArray:
     """Return noise below about 1 Hz, RMS 1, shape (n,)."""
-    slow = _smooth(rng.normal(size=n), 1.0)
+    slow = smoothed(rng.normal(size=n), 1.0)
     return slow / slow.std()

@@ -48,6 +48,12 @@ def knee() -> MappedJoint:
     return MappedJoint("knee", rig_text(load_rig(RIG)), diagnose="never")
 
 
+def print_peak(folder: str) -> None:
+    """Work through the one recording of a folder and print its bytes and the peak of memory, bytes."""
+    ((bag, joints),) = bags_of([folder], [knee()])
+    print(bag.size, work(Task(bag, joints[0], "0" * 16, "bench")).row["peak_memory"])
+
+
 def run_real(
     store: Store, folder: Path, executor: Executor | None = None, cut: str = "",
     spent: list[float] | None = None,

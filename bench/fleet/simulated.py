@@ -193,26 +193,21 @@ def _row(
     name: str, k: int, time: float, temperature: float, entry: Mapping[str, Any], true: Mapping[str, float],
     rng: np.random.Generator,
 ) -> dict[str, Any]:  # fmt: skip
-    row: dict[str, Any] = {
+    return {
         "joint": name,
         "recording": f"{name}-{k:04d}",
         "time_s": time,
         "temperature": temperature,
-    }
-    row |= {
         "outcome": entry["outcome"],
         "verdict": entry.get("verdict", ""),
         "faults": entry.get("faults", []),
-    }
-    row |= {
         "residual": entry.get("times_noise", float("nan")),
         "artefacts": f"artefacts/{name}/{name}-{k:04d}",
+        "parameters": {
+            n: _estimate(v, entry["true"][n], true[n], rng) for n, v in entry.get("parameters", {}).items()
+        },
+        "causes": [_cause(c, entry, true, rng) for c in entry.get("causes", [])],
     }
-    row["parameters"] = {
-        n: _estimate(v, entry["true"][n], true[n], rng) for n, v in entry.get("parameters", {}).items()
-    }
-    row["causes"] = [_cause(c, entry, true, rng) for c in entry.get("causes", [])]
-    return row
 
 
 def _estimate(played: list[float], was: float, true: float, rng: np.random.Generator) -> tuple[float, ...]:
@@ -242,20 +237,11 @@ def _cause(
 
 def _history(rows: list[dict[str, Any]]) -> dict[str, np.ndarray]:
     flat = [
-        (
-            r["joint"],
-            n,
-            UNITS[n],
-            r["time_s"],
-            *v[:3],
-            v[3] >= TOLD,
-            r["temperature"],
-            r["recording"],
-            r["artefacts"],
-        )
+        (r["joint"], n, UNITS[n], r["time_s"], *v[:3], v[3] >= TOLD, r["temperature"], r["recording"],
+         r["artefacts"])
         for r in rows
         for n, v in r["parameters"].items()
-    ]
+    ]  # fmt: skip
     names = ("joint", "parameter", "unit", "time_s", "value", "low", "high", "identifiable", "temperature",
              "recording", "artefacts")  # fmt: skip
     columns = dict(zip(names, map(np.array, zip(*flat, strict=True)), strict=True))

@@ -49,16 +49,6 @@ def slow(task: Task) -> TaskOutcome:
     return stub_row(task)
 
 
-def greedy(task: Task) -> TaskOutcome:
-    """Allocate 4 GB and touch them, for one recording; return a row for any other."""
-    if "00003" in task.bag.url:
-        held = []
-        for _ in range(400):
-            held.append(bytearray(b"\1") * 10_000_000)
-            time.sleep(0.002)
-    return stub_row(task)
-
-
 def run_engine(
     store: Store, folder: Path, executor: Executor, work=slow, limits: EngineLimits | None = None
 ) -> RunSummary:

@@ -1,6 +1,6 @@
 """Ten simulated fleets over a year through trends and alarms of `rsea fleet`: required and measured values.
 
-python -m bench fleet trends --log /tmp/fleets.jsonl [--seeds 10] [--seconds 200]
+python -m bench fleet trends --log out/fleets.jsonl [--seeds 10] [--minutes 3]
 
 A fleet: 20 joints, 500 recordings each, a season of temperature, a day effect, normal work. Five wear, one is
 replaced, three get faults of the data. Every week of the year `alarms` looks at the recordings so
@@ -13,18 +13,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from bench import parser_of
-from bench.fleet.simulated import DAY, DAY_SD, START, Fleet, Wear, fleet
-from bench.results import append_line, read_lines
-from rsea_ros.trends import Alarm, TrendSettings, alarms
+from bench.fleet.simulated import DAY, START, Fleet, Wear, fleet
+from bench.results import read_lines, resumed
+from rsea_ros.trends import Alarm, alarms
 from rsea_ros.trends.alarms import by_joint
-from rsea_ros.trends.appearing import scan_threshold
 
+VALUES = ("parameters", "identified")
 WEEK, FIRST = 7, 28
 """Days between looks; the first look."""
 RIGHT = {
@@ -85,7 +85,7 @@ def is_beside(wear: Wear | None, day: float, alarm: Alarm) -> bool:
 def judge_joint(
     made: Fleet, joint: str, wear: Wear, final: Sequence[Alarm], first: dict[str, tuple[float, Alarm]]
 ) -> dict[str, Any]:
-    """Return whether the joint's first finding is right, its date's error, and the delay beside its limit."""
+    """Return whether the joint's first finding is right, its date's error, and the delay."""
     names = RIGHT.get(wear.kind, (wear.fault,) if wear.fault else ())
     right = [a for a in final if a.about in names or not names]
     seen = [
@@ -103,56 +103,7 @@ def judge_joint(
         "date_error": float(min(dates, key=abs)) if dates else None,
         "first_date_error": float(dates[0]) if dates else None,
         "delay": float(min(seen) - wear.since) if seen else None,
-        "limit": limit(made, joint, wear),
     }
-
-
-def limit(made: Fleet, joint: str, wear: Wear) -> float | None:
-    """Return days after the onset from which an observer who knows the shape could be sure, by the intervals.
-
-    Of a parameter: its expected score, from the recordings' intervals and the true day effect, passes
-    the threshold of the alarms. Of a cause or a fault: the third day that names it.
-    """
-    settings = TrendSettings()
-    if wear.kind in ("stiffness", "friction"):
-        about = {"stiffness": "spring.stiffness", "friction": "rotor.reflected_damping"}[wear.kind]
-        return _limit_of_parameter(made, joint, wear, about)
-    if wear.kind == "replaced":
-        return None
-    name = RIGHT[wear.kind][0] if wear.kind in RIGHT else wear.fault
-    column = "faults" if wear.fault else "causes"
-    r = made.recordings
-    named = [
-        (t - START) / DAY
-        for j, t, items in zip(r["joint"], r["time_s"], r[column], strict=True)
-        if j == joint and any((i if isinstance(i, str) else i["name"]) == name for i in items)
-    ]
-    days = sorted({int(d) for d in named if d >= wear.since})
-    return (
-        float(days[settings.fewest_named - 1] + 1 - wear.since)
-        if len(days) >= settings.fewest_named
-        else None
-    )
-
-
-def _limit_of_parameter(made: Fleet, joint: str, wear: Wear, about: str) -> float | None:
-    h = made.history
-    rows = (h["joint"] == joint) & (h["parameter"] == about) & h["identifiable"]
-    day, value = (h["time_s"][rows] - START) / DAY, h["value"][rows]
-    sd = np.maximum((h["high"] - h["low"])[rows] / 3.92 / value, 1e-9)
-    change = abs(wear.size - 1.0) * wear.share(day)
-    whole = np.floor(day).astype(int)
-    for until in range(int(wear.since) + 2, 366):
-        use = whole < until
-        days, place = np.unique(whole[use], return_inverse=True)
-        precision = np.bincount(place, 1.0 / sd[use] ** 2)
-        weight = 1.0 / (1.0 / precision + DAY_SD[about] ** 2)
-        profile = np.bincount(place, change[use]) / np.bincount(place)
-        about_mean = profile - np.sum(weight * profile) / np.sum(weight)
-        z = np.sqrt(np.sum(weight * about_mean**2))
-        if z >= scan_threshold(TrendSettings().false_discovery / 20.0, min(0.4, 3.0 / len(days)), len(days)):
-            return float(until - wear.since)
-    return None
 
 
 def table(outcomes: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -172,11 +123,11 @@ def table(outcomes: Sequence[dict[str, Any]]) -> Iterator[str]:
     rate = 1000.0 * len(false) / days
     yield f"{'false alarms <= 1 per 1000 joint-days':<52}{rate:.3f} ({len(false)} in {days})"
     yield ""
-    yield f"{'':<14}{'right':>9}{'date error, days':>24}{'delay, days':>22}{'limit, days':>22}"
+    yield f"{'':<14}{'right':>9}{'date error, days':>24}{'delay, days':>22}"
     for kind in dict.fromkeys(w["kind"] for w in worn):
         group = [w for w in worn if w["kind"] == kind]
         yield f"{kind:<14}{sum(w['right'] for w in group):>4} of {len(group):<3}" + "".join(
-            f"{_spread([w[n] for w in group]):>22}" for n in ("first_date_error", "delay", "limit")
+            f"{_spread([w[n] for w in group]):>22}" for n in ("first_date_error", "delay")
         )
     beside = [k for o in outcomes for k in o["beside"]]
     yield f"other alarms of worn joints after their wear began: {len(beside)} ({_names(beside)})"
@@ -195,26 +146,18 @@ def _names(keys: Sequence[str]) -> str:
     return ", ".join(f"{names.count(n)} {n}" for n in dict.fromkeys(names))
 
 
-def main(argv: Sequence[str]) -> int:
-    """Play the fleets that the log does not hold yet, and print the table."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--log", type=Path, required=True, help="JSON lines, a fleet each")
-    parser.add_argument("--seeds", type=int, default=10, help="fleets (default %(default)s)")
-    parser.add_argument(
-        "--seconds", type=float, default=200.0, help="begin no fleet after this time, s (%(default)s)"
-    )
-    parser.add_argument(
-        "--values", choices=("parameters", "identified"), default="parameters",
-        help="the rig's values beside a diagnosis's causes, or those of a fit without causes (%(default)s)",
-    )  # fmt: skip
-    args = parser.parse_args(argv)
-    end = time.perf_counter() + args.seconds
-    done = {o["seed"]: o for o in read_lines(args.log)}
-    for seed in range(args.seeds):
-        if seed not in done and time.perf_counter() < end:
-            done[seed] = outcome(seed, args.values)
-            append_line(args.log, done[seed])
-    drawn = f"{args.values} and causes drawn from a played sample"
-    print(f"simulated: {drawn}; {len(done)} of {args.seeds} fleets")
-    print("\n".join(table([done[s] for s in sorted(done)])))
-    return 0
+def main(
+    *, log: Path, seeds: int = 10, minutes: float = 3.0, values: Annotated[str, VALUES] = "parameters"
+) -> None:
+    """Play the fleets that the log does not hold yet, and print the table.
+
+    log: JSON lines, a fleet each
+    seeds: fleets
+    minutes: begin no fleet after this time
+    values: the rig's values beside a diagnosis's causes, or those of a fit without causes
+    """
+    for _ in resumed(log, ((seed, partial(outcome, seed, values)) for seed in range(seeds)), "seed", minutes):
+        pass
+    done = sorted(read_lines(log), key=lambda o: int(o["seed"]))
+    print(f"simulated: {values} and causes drawn from a played sample; {len(done)} of {seeds} fleets")
+    print("\n".join(table(done)))

@@ -1,6 +1,6 @@
 """Simulate and diagnose a sample of a fleet's recordings, to measure what a recording shows of its joint.
 
-python -m bench fleet trends_played --log /tmp/played.jsonl [--seconds 200] [--write]
+python -m bench fleet trends_played --log out/played.jsonl [--minutes 3] [--write]
 
 Each plan is a joint of test/independent with some wear, at some temperature, at some kind of normal work.
 The log goes on where it stopped. --write puts the sample, without unneeded fields, beside this file; the
@@ -15,6 +15,7 @@ import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,8 @@ import numpy as np
 from independent.bench import Bench
 from independent.faults import FAULTS
 
-from bench import parser_of
 from bench.fleet.plants import COULOMB, RIG, WORK, joint, recording
-from bench.results import append_line, read_lines
+from bench.results import read_lines, resumed
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
@@ -39,35 +39,15 @@ TRIED = (
     "stribeck_friction", "ft_sensor_lag", "current_loop_lag", "gear_compliance", "load_dependent_friction",
 )  # fmt: skip
 """Effects to try: the fleet's, and those easily confused with them. All would take an hour."""
-WEAR: tuple[Mapping[str, float], ...] = (
-    {},
-    {},
-    {"stiffness": 0.925},
-    {"stiffness": 0.85},
-    {"friction": 1.25},
-    {"friction": 1.5},
-    {"gap": 0.3e-3},
-    {"gap": 0.6e-3},
-    {"gap": 1.2e-3},
-    {"gap": 2.5e-3},
-    {"gap": 4.0e-3},
-    {"delay": 1.0e-3},
-    {"delay": 2.5e-3},
-    {"delay": 5.0e-3},
-    {"ft_gain": 0.95},
-    {"ft_gain": 0.9},
-)
-SLIGHT: tuple[Mapping[str, float], ...] = (
-    {},
-    {},
-    {"gap": 0.03e-3},
-    {"gap": 0.1e-3},
-    {"delay": 0.2e-3},
-    {"delay": 0.5e-3},
-    {"ft_gain": 0.98},
-    {"ft_gain": 0.99},
-)
-"""Sizes near the threshold of naming, and more joints without wear, on which every cause is wrong."""
+WEAR: Mapping[str, Sequence[float]] = {
+    "stiffness": (0.925, 0.85), "friction": (1.25, 1.5), "gap": (0.3e-3, 0.6e-3, 1.2e-3, 2.5e-3, 4.0e-3),
+    "delay": (1.0e-3, 2.5e-3, 5.0e-3), "ft_gain": (0.95, 0.9),
+}  # fmt: skip
+SLIGHT: Mapping[str, Sequence[float]] = {
+    "gap": (0.03e-3, 0.1e-3), "delay": (0.2e-3, 0.5e-3), "ft_gain": (0.98, 0.99),
+}  # fmt: skip
+"""Sizes of each wear, and those near the threshold of naming; two new joints beside each of the tables, on
+which every cause is wrong."""
 SPOILT = ("dropped_samples", "outliers", "frozen_samples")
 """Faults of recording that a joint of the fleet can have."""
 TRUE = {
@@ -92,8 +72,11 @@ class Plan:
 
 def plans() -> Iterator[Plan]:
     """Yield the plans in an order in which every part of them is a fair sample."""
-    states = [(wear, "") for wear in WEAR] + [({}, fault) for fault in SPOILT]
-    slight = [(wear, "") for wear in SLIGHT]
+    states, slight = (
+        [({}, ""), ({}, ""), *(({kind: size}, "") for kind, sizes in table.items() for size in sizes)]
+        for table in (WEAR, SLIGHT)
+    )
+    states += [({}, fault) for fault in SPOILT]
     every = [(kind, *state) for part in (states, slight) for kind in WORK for state in part]
     for k in np.random.default_rng(16).permutation(len(every)):
         kind, wear, fault = every[k]
@@ -112,21 +95,14 @@ def record_run(plan: Plan) -> tuple[Bench, Record]:
     return bench, record
 
 
-def identify_run(plan: Plan) -> dict[str, Any]:
-    """Return the result of identify, which trusts the rig's structure; nothing if it refuses."""
-    start = time.perf_counter()
-    parameters = {}
-    with suppress(RseaError):
-        fit = identify(record_run(plan)[1], RIG)
-        parameters = {n: [p.value, *p.ci95, p.told_by_data] for n, p in fit.parameters.items() if n in TRUE}
-    return {"name": plan.name, "identified": parameters, "seconds": round(time.perf_counter() - start, 1)}
-
-
 def play(plan: Plan) -> dict[str, Any]:
-    """Return the outcome of a plan beside the truth; a refusal is an outcome too."""
+    """Return the outcome of a plan beside the truth; a refusal is an outcome too.
+
+    identified: of identify, which trusts the rig's structure; nothing if it refuses.
+    """
     start = time.perf_counter()
     bench, record = record_run(plan)
-    entry: dict[str, Any] = {**asdict(plan), "outcome": "done", "true": truth(bench)}
+    entry: dict[str, Any] = {**asdict(plan), "outcome": "done", "true": truth(bench), "identified": {}}
     others = tuple(name for name in catalogue() if name not in TRIED)
     try:
         entry |= summary_of(diagnose(record, RIG, settings=DiagnosisSettings(without=others)).result)
@@ -134,7 +110,10 @@ def play(plan: Plan) -> dict[str, Any]:
         entry |= {"outcome": "refused", "reason": str(error)}
     except Exception:
         entry |= {"outcome": "error", "reason": traceback.format_exc(limit=-3)}
-    return entry | {"seconds": round(time.perf_counter() - start, 1)}
+    with suppress(RseaError):
+        fit = identify(record, RIG).parameters
+        entry["identified"] = {n: [p.value, *p.ci95, p.told_by_data] for n, p in fit.items() if n in TRUE}
+    return dict(round_numbers(entry | {"seconds": round(time.perf_counter() - start, 1)}))
 
 
 def truth(bench: Bench) -> dict[str, float]:
@@ -173,34 +152,19 @@ def round_numbers(value: Any) -> Any:
     return [round_numbers(v) for v in value] if isinstance(value, list) else value
 
 
-def main(argv: Sequence[str]) -> int:
-    """Play the plans that the log does not hold yet."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--log", type=Path, required=True, help="JSON lines, a recording each")
-    parser.add_argument("--seconds", type=float, default=200.0, help="stop after this time, s (%(default)s)")
-    parser.add_argument("--write", action="store_true", help=f"write {SAMPLE.name} from the log")
-    args = parser.parse_args(argv)
-    end = time.perf_counter() + args.seconds
-    done: dict[str, dict[str, Any]] = {}
-    for entry in read_lines(args.log):
-        done.setdefault(entry["name"], {}).update(entry)
-    every = list(plans())
-    for step, key in ((play, "outcome"), (identify_run, "identified")):
-        for plan in every:
-            if key not in done.get(plan.name, {}) and time.perf_counter() < end:
-                _keep(args.log, done, round_numbers(step(plan)))
-    told = [sum(key in e for e in done.values()) for key in ("outcome", "identified")]
-    print(f"of {len(every)} recordings {told[0]} diagnosed, {told[1]} identified")
+def main(*, log: Path, minutes: float = 3.0, write: bool = False) -> None:
+    """Play the plans that the log does not hold yet.
+
+    log: JSON lines, a recording each
+    minutes: begin no recording after this time
+    write: put the sample of the log beside this file
+    """
+    every = {plan.name: plan for plan in plans()}
+    for entry in resumed(log, ((name, partial(play, plan)) for name, plan in every.items()), "name", minutes):
+        names = ", ".join(c["name"] for c in entry.get("causes", []))
+        print(f"{entry['name']:<34}{entry['seconds']:5.1f} s  {names}", flush=True)
+    done = {entry["name"]: entry for entry in read_lines(log)}
+    print(f"of {len(every)} recordings {len(done)} diagnosed and identified")
     print(f"healthy joints have {COULOMB:g} N·m of dry friction")
-    if args.write:
-        kept = [json.dumps(done[p.name]) for p in every if "outcome" in done.get(p.name, {})]
-        SAMPLE.write_text("[\n" + ",\n".join(kept) + "\n]\n")
-    return 0
-
-
-def _keep(log: Path, done: dict[str, dict[str, Any]], entry: dict[str, Any]) -> None:
-    """Write the outcome of a recording to the log and the screen."""
-    done.setdefault(entry["name"], {}).update(entry)
-    append_line(log, entry)
-    names = ", ".join(c["name"] for c in entry.get("causes", [])) or "identified"
-    print(f"{entry['name']:<34}{entry['seconds']:5.1f} s  {names}", flush=True)
+    if write:
+        SAMPLE.write_text("[\n" + ",\n".join(json.dumps(done[n]) for n in every if n in done) + "\n]\n")

@@ -18,16 +18,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bench import parser_of
-from bench.frozen.cases import Entry, Played, bench_records, lab_records, small_records
-from bench.frozen.play import KEPT, line_of, said
+from bench.diagnosis.played import Entry, confirmed_of, names_of, play as diagnosed, said, steps
+from bench.frozen.cases import bench_records, lab_records, small_records
+from bench.frozen.play import KEPT
 from bench.results import append_line, read_lines
 from rsea_ros.diagnosis.backward_elimination import ReducedModels
 from rsea_ros.diagnosis.candidate import Candidate
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.errors import RseaError
 
-steps = importlib.import_module("rsea_ros.diagnosis.diagnose")
 Off = Callable[..., Any]
 _WITH = ReducedModels._with
 
@@ -123,11 +121,11 @@ def _without(branch: Branch) -> contextlib.AbstractContextManager[None]:
     return replaced({place: lambda _, off=off: off for place, off in branch.functions.items()})
 
 
-def _settings(branch: Branch, settings: DiagnosisSettings) -> DiagnosisSettings:
+def _settings(branch: Branch) -> DiagnosisSettings:
     if branch.setting is None:
-        return settings
+        return DEFAULT
     group, name, value = branch.setting
-    return replace(settings, **{group: replace(getattr(settings, group), **{name: value})})
+    return replace(DEFAULT, **{group: replace(getattr(DEFAULT, group), **{name: value})})
 
 
 @contextlib.contextmanager
@@ -189,30 +187,17 @@ def _kept_search(kept: list[_Search]) -> Iterator[None]:
 def play(entry: Entry) -> Iterator[dict[str, Any]]:
     """Yield a line of a record as it is, then one without each branch that does something on it."""
     played = entry.make()
-    settings = replace(DEFAULT, without=played.without)
     acts: Counter[str] = Counter()
     kept: list[_Search] = []
     with _noting(acts), _kept_search(kept):
-        first = _line(entry.name, played, settings)
-    yield {**first, "branch": "", "acts": dict(acts), "truth": played.truth}
+        first = diagnosed(entry.name, played)
+    yield {**first, "branch": "", "acts": dict(acts)}
     for name in (n for n in BRANCHES if acts[n]):
         branch = BRANCHES[name]
         with _without(branch), _kept_search(kept) if branch.late else contextlib.nullcontext():
-            line = _line(entry.name, played, _settings(branch, settings))
+            line = diagnosed(entry.name, played, _settings(branch))
         saved = kept[0].seconds if branch.late and kept else 0.0
         yield {**line, "branch": name, "processor": round(line["processor"] + saved, 1)}
-
-
-def _line(name: str, played: Played, settings: DiagnosisSettings) -> dict[str, Any]:
-    begin, clock = time.perf_counter(), time.process_time()
-    try:
-        result = steps.diagnose([played.record], played.rig, settings=settings)
-    except RseaError as error:
-        return {"record": name, "verdict": f"error: {error}", "causes": [], "digest": "", "seconds": 0.0,
-                "processor": 0.0, "remarks": []}  # fmt: skip
-    line = line_of(name, result, time.perf_counter() - begin)
-    remarks = sorted({r.code for r in result.remarks})
-    return {**line, "processor": round(time.process_time() - clock, 1), "remarks": remarks}
 
 
 def records() -> Iterator[Entry]:
@@ -229,39 +214,30 @@ def records() -> Iterator[Entry]:
             yield entry
 
 
-def run(path: Path, minutes: float = math.inf) -> None:
-    """Append to a file the lines that it lacks, record by record, for some minutes."""
+def main(*, log: Path = KEPT / "ablation.jsonl", minutes: float = math.inf) -> None:
+    """Play the records that the log lacks, and print the table.
+
+    log: a line of JSON each
+    minutes: begin no record after that; 0: only the table of the log
+    """
     stop = time.monotonic() + 60.0 * minutes
-    done = {line["record"] for line in read_lines(path) if line["branch"] == "end"}
-    left = [entry for entry in records() if entry.name not in done]
-    if left and time.monotonic() < stop:
-        _line("", left[0].make(), DEFAULT)  # loads what is compiled: no record's time holds that
+    done = {line["record"] for line in read_lines(log) if line["branch"] == "end"}
+    left = [entry for entry in records() if entry.name not in done] if minutes else []
+    if left:
+        diagnosed("", left[0].make())  # loads what is compiled: no record's time holds that
     for entry in left:
         if time.monotonic() > stop:
             break
         for line in play(entry):
-            append_line(path, line)
-        append_line(path, {"record": entry.name, "branch": "end"})
+            append_line(log, line)
+        append_line(log, {"record": entry.name, "branch": "end"})
         print(entry.name, flush=True)
-
-
-def main(argv: Sequence[str]) -> int:
-    """Play the records that the log lacks, and print the table."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--log", type=Path, default=KEPT / "ablation.jsonl", help="a line of JSON each")
-    parser.add_argument("--minutes", type=float, default=math.inf, help="0: only the table of the log")
-    args = parser.parse_args(argv)
-    run(args.log, args.minutes)
-    print(table(read_lines(args.log)))
-    return 0
+    print(table(read_lines(log)))
 
 
 def is_right(line: Mapping[str, Any], truth: Sequence[str] | None) -> bool:
     """Return whether no wrong name is told as sure, and every hidden cause is named where there is one."""
-    names = {c["name"] for c in line["causes"]}
-    sure = {c["name"] for c in line["causes"] if c["status"] == "confirmed"}
-    hidden = set(truth or ())
-    return sure <= hidden and hidden <= names
+    return confirmed_of(line) <= set(truth or ()) <= set(names_of(line))
 
 
 def table(lines: Iterable[Mapping[str, Any]]) -> str:

@@ -5,66 +5,36 @@ from __future__ import annotations
 import importlib
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
-from typing import NamedTuple
 
 import numpy as np
 
 from bench import SHARED
 from bench.diagnosis.cases import plan
-from bench.diagnosis.shared import shared_cases
+from bench.diagnosis.played import Entry, Played
+from bench.diagnosis.shared import shared_case, shared_names
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.cli.maps import map_path
-from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 
-PAPER = "paper_high_impedance"
 SMALL_SECONDS, LAB_SECONDS = 8.0, 30.0
-
-
-class Played(NamedTuple):
-    """A record, its rig, effects that the diagnosis may not use, and the causes in it (None: not known)."""
-
-    record: Record
-    rig: Rig
-    without: tuple[str, ...] = ()
-    truth: tuple[str, ...] | None = None
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A record by its name, `set/name`, and how it is made."""
-
-    name: str
-    make: Callable[[], Played]
 
 
 def bench_records(seed: int = 2024, duration: float | None = None) -> Iterator[Entry]:
     """Yield the records of the diagnosis bench: of the second bench. duration: s, in place of their own."""
     for number, case in enumerate(plan(seed)):
-        yield Entry(f"bench/{number:03d}-{case.name}", partial(_of_plan, case, duration))
-
-
-def _of_plan(case, duration: float | None) -> Played:
-    made = case.make(fresh=False, duration=duration)
-    return Played(made.record, load_rig(PAPER), made.without, made.truth_causes)
+        yield Entry(f"bench/{number:03d}-{case.name}", partial(case.make, False, duration))
 
 
 def case_records() -> Iterator[Entry]:
     """Yield the recorded bags of ../shared/cases."""
-    for folder in sorted((SHARED / "cases").glob("[0-9]*")):
-        yield Entry(f"cases/{folder.name}", partial(_of_cases, folder.name))
-
-
-def _of_cases(number: str) -> Played:
-    case = next(c for c in shared_cases() if c.name == f"shared-{number}")
-    return Played(case.record, load_rig(PAPER), (), case.truth_causes)
+    for name in shared_names():
+        yield Entry(f"cases/{name.removeprefix('shared-')}", partial(shared_case, name))
 
 
 REAL: Mapping[str, tuple[str, Sequence[str]]] = {
@@ -152,6 +122,27 @@ def _of_lab(name: str, seed: int, seconds: float) -> Played:
         rig.write_text(lab.RIG % (300.0, 0.1))
         mapping.write_text(lab.MAP)
         return Played(import_record(table, load_map(mapping)), load_rig(str(rig)), (), tuple(truth))
+
+
+def generated(folder: Path, seeds: Iterable[int]) -> Iterator[Entry]:
+    """Yield the records of every module of a folder that makes some.
+
+    `cases(seed)` yields names and the causes hidden; `make(name, seed, folder)` writes record.csv, map.yaml
+    and rig.yaml there.
+    """
+    sys.path.append(str(folder.resolve()))
+    for module in map(importlib.import_module, sorted(path.stem for path in folder.glob("*.py"))):
+        for seed in seeds:
+            for name, truth in module.cases(seed):
+                make = partial(_of_generator, module, name, seed, truth)
+                yield Entry(f"{module.__name__}-{seed}/{name}", make)
+
+
+def _of_generator(module: ModuleType, name: str, seed: int, truth: Sequence[str]) -> Played:
+    with TemporaryDirectory() as made:
+        module.make(name, seed, made)
+        table, maps, rig = (Path(made) / n for n in ("record.csv", "map.yaml", "rig.yaml"))
+        return Played(import_record(table, load_map(maps)), load_rig(str(rig)), (), tuple(truth))
 
 
 def plant_records() -> Iterator[Entry]:

@@ -2,81 +2,46 @@
 
 A line for each record: its verdict; of each cause the name, status, probability to 0.01 and sizes to a tenth
 of their sigma; seconds; and a digest of every number to the last bit.
+
+    python -m bench frozen play                                    the quick set against the kept lines
+    python -m bench frozen play --plants FOLDER --out L.jsonl      generators of another hand, scored
+    python -m bench frozen play --plants FOLDER --before L.jsonl   the same after a change
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-import time
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated, Any
 
-from bench import parser_of
-from bench.frozen.cases import SETS, Entry
-from bench.results import append_line, read_lines
-from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.result import CauseParameter, Diagnosis
-from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.errors import RseaError
-from rsea_ros.records.statistics import Z95
+from bench.diagnosis.played import Entry, confirmed_of, names_of, play, said
+from bench.frozen.cases import SETS, generated
+from bench.results import read_lines, resumed
 
 KEPT = Path(__file__).resolve().parent / "kept"
 WITHIN = 0.1
 """Sigmas by which a size may differ where two pieces of code became one."""
 
 
-def line_of(name: str, result: Diagnosis, seconds: float) -> dict[str, Any]:
-    """Return the line of a record."""
-    causes = [
-        {"name": c.name, "status": c.status, "p": round(c.probability, 2),
-         "sizes": {n: _size(p) for n, p in c.parameters.items()}}
-        for c in result.causes
-    ]  # fmt: skip
-    exact = [result.verdict, *(
-        [c.name, c.status, c.probability.hex(), *(p.value.hex() for p in c.parameters.values())]
-        for c in result.causes
-    )]  # fmt: skip
-    digest = hashlib.sha256(json.dumps(exact).encode()).hexdigest()[:12]
-    return {"record": name, "verdict": result.verdict, "causes": causes, "digest": digest,
-            "seconds": round(seconds, 1)}  # fmt: skip
-
-
-def _size(p: CauseParameter) -> list[float]:
-    """Return a size, rounded to a tenth of its sigma, and that sigma."""
-    sigma = (p.ci95[1] - p.ci95[0]) / (2.0 * Z95)
-    if not math.isfinite(sigma) or sigma <= 0.0:
-        return [float(f"{p.value:.6g}"), 0.0]
-    digits = max(0, -math.floor(math.log10(0.1 * sigma)))
-    return [round(p.value, digits), float(f"{sigma:.2g}")]
-
-
-def play(entry: Entry) -> dict[str, Any]:
-    """Diagnose a record and return its line; an error is its verdict."""
-    played = entry.make()
-    begin = time.perf_counter()
-    try:
-        settings = replace(DEFAULT, without=played.without)
-        result = diagnose([played.record], played.rig, settings=settings)
-    except RseaError as error:
-        said = f"error: {error}"
-        return {"record": entry.name, "verdict": said, "causes": [], "digest": "", "seconds": 0.0}
-    return line_of(entry.name, result, time.perf_counter() - begin)
-
-
-def record(chosen: str, path: Path, minutes: float = math.inf) -> list[dict[str, Any]]:
-    """Append to a file the lines of a set that it lacks, for some minutes; return all lines of the file."""
-    stop = time.monotonic() + 60.0 * minutes
-    done = {line["record"] for line in read_lines(path)}
-    for entry in SETS[chosen]():
-        if entry.name not in done and time.monotonic() < stop:
-            append_line(path, play(entry))
-            print(f"{entry.name}", flush=True)
-    return read_lines(path)
+def score(lines: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the records that are not named rightly and surely, and a last line that counts."""
+    right, wrong, sure = [], [], []
+    known = [line for line in lines if line.get("truth") is not None]
+    for line in known:
+        hidden, named, confirmed = set(line["truth"]), set(names_of(line)), confirmed_of(line)
+        right.append(named == hidden)
+        sure.append(confirmed == hidden)
+        wrong.append(not confirmed <= hidden)
+        if confirmed != hidden or named != hidden:
+            mark = "not so" if confirmed <= hidden else "WRONG"
+            yield f"{mark}: {line['record']}, hidden {', '.join(sorted(hidden)) or 'nothing'}; {said(line)}"
+    processor = sum(line["processor"] for line in known)
+    yield f"{len(known)} records: {sum(right)} with all hidden named and no other, {sum(sure)} with all"\
+        f" confirmed, {sum(wrong)} with a wrong one confirmed; {processor:.0f} s of processor"
 
 
 def compare(lines: Iterable[Mapping[str, Any]], kept: Iterable[Mapping[str, Any]], exact: bool) -> list[str]:
@@ -108,27 +73,38 @@ def _differences(now: Mapping[str, Any], before: Mapping[str, Any], exact: bool)
                     yield f"{a['name']}.{n}: {value:g} -> {new:g}, sigma {sigma:g}"
 
 
-def said(line: Mapping[str, Any]) -> str:
-    """Return verdict, names and statuses of a line."""
-    names = ", ".join(f"{c['name']} ({c['status']})" for c in line["causes"])
-    return f"{line['verdict']}: {names or 'no cause'}"
+def main(
+    *, subset: Annotated[str, SETS] = "quick", exact: bool = False, keep: bool = False,
+    minutes: float = math.inf, out: Path | None = None, plants: Path | None = None,
+    seeds: tuple[int, ...] = (1,), only: str = "", before: Path | None = None,
+) -> int:  # fmt: skip
+    """Play a set and compare it with the kept file, or keep it; status 1 where something differs.
 
-
-def main(argv: Sequence[str]) -> int:
-    """Play a set and compare it with the kept file, or keep it; status 1 where something differs."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--subset", choices=SETS, default="quick", help="the records (default %(default)s)")
-    parser.add_argument("--exact", action="store_true", help="compare to the last bit")
-    parser.add_argument("--keep", action="store_true", help="play what the kept file lacks, and keep it")
-    parser.add_argument("--minutes", type=float, default=math.inf, help="then stop; the next run goes on")
-    parser.add_argument("--out", type=Path, help="lines of this run; goes on where they end")
-    args = parser.parse_args(argv)
-    kept = KEPT / f"{args.subset}.jsonl"
-    if args.keep:
-        print(f"{len(record(args.subset, kept, args.minutes))} records kept in {kept.name}")
-        return 0
+    subset: the records
+    exact: compare to the last bit
+    keep: play what the kept file lacks, and keep it
+    minutes: then stop; the next run goes on
+    out: lines of this run; goes on where they end
+    plants: a folder of generators of another hand in place of a set; what is said is held against their truth
+    seeds: of these records
+    only: those whose names have this pattern in them
+    before: lines of an earlier run to compare with, in place of the kept ones
+    """
+    kept = before or KEPT / f"{subset}.jsonl"
+    entries = [e for e in (generated(plants, seeds) if plants else SETS[subset]()) if re.search(only, e.name)]
     with TemporaryDirectory() as folder:
-        lines = record(args.subset, args.out or Path(folder) / kept.name, args.minutes)
-    differing = compare(lines, read_lines(kept), args.exact)
+        log = kept if keep and not plants else out or Path(folder) / "lines.jsonl"
+        for line in resumed(log, ((e.name, partial(_made, e)) for e in entries), "record", minutes):
+            print(line["record"], flush=True)
+        lines = read_lines(log)
+    if plants:
+        print("\n".join(score(lines)))
+    if keep or (plants and not before):
+        return 0
+    differing = compare(lines, read_lines(kept), exact)
     print("\n".join(differing) or f"{len(lines)} records: all as kept")
     return int(bool(differing))
+
+
+def _made(entry: Entry) -> dict[str, Any]:
+    return play(entry.name, entry.make())

@@ -1,7 +1,5 @@
 """Performance of the health monitor: required and measured values.
 
-Run: python -m bench health [SECTION …] [--hours 1] [--seeds 0 1 2] [--seconds 60]
-white   false alarms of the sums on scores drawn at the edge of the doubt: stated, measured
 alarms  false alarms over hours of clean work of test/independent, at several stated rates on the same looks
 faults  each fault switched on after five minutes of work: named, delay, size
 cost    CPU of the monitor alone, as a share of one core, while it learns and afterwards
@@ -10,16 +8,14 @@ node    the same of the node with its subscriptions, beside plant and excite
 
 from __future__ import annotations
 
-import argparse
-import os
 import signal
 import time
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 
 from bench.health.cases import FAULTS, draw_bench, faulty, monitor_of, pieces, watch, work
+from bench.processes import cpu_time
 from rsea_ros.cli._processes import start, stop
 from rsea_ros.health.recursive_estimates import Cusum, threshold
 from rsea_ros.model.observer.log import events_of
@@ -34,42 +30,25 @@ LEARNED = 220.0
 """s after the start of a joint in motion when learning is over."""
 WINDOW = 10.0
 """s over which a share of a core is taken."""
-TICKS = os.sysconf("SC_CLK_TCK")
 
 
-def white(args: argparse.Namespace) -> Iterator[str]:
-    """Draw scores at the edge of the doubt, the worst that is no change, and count alarms."""
-    yield f"{'stated, 1/h':>14}{'measured, 1/h':>16}{'hours':>8}"
-    inner, outer, looks = np.full(10, 1.0), np.full(10, 2.0), 60_000
-    for rate in (100.0, 30.0, 10.0):
-        rng, count = np.random.default_rng(0), 0
-        cusum = Cusum(inner, outer, threshold(rate, 20, EVERY))
-        for _ in range(looks):
-            information = rng.uniform(0.0, 4.0, 10)
-            score = information * inner + np.sqrt(information) * rng.standard_normal(10)
-            if cusum.take(score, information, np.ones(10)):
-                count += 1
-                cusum.clear()
-        hours = looks * EVERY / 3600.0
-        yield f"{rate:14g}{count / hours:16.3g}{hours:8.0f}"
-
-
-def alarms(args: argparse.Namespace) -> Iterator[str]:
+def alarms(*, hours: float = 0.5, seeds: tuple[int, ...] = (0, 1, 2)) -> Iterator[str]:
     """Watch clean work of another bench each seed; the sums run again on its looks at other thresholds."""
-    hours, findings, seen = 0.0, 0, dict.fromkeys(RATES, 0)
-    for seed in args.seeds:
+    findings, seen = 0, dict.fromkeys(RATES, 0)
+    for seed in seeds:
         rng = np.random.default_rng([seed, 1])
         bench, rig = draw_bench(rng)
         with _noted() as rows:
-            raised = list(watch(monitor_of(rig), pieces(bench, 3600.0 * args.hours, rng)))
-        hours, findings = hours + args.hours, findings + len(raised)
+            raised = list(watch(monitor_of(rig), pieces(bench, 3600.0 * hours, rng)))
+        findings += len(raised)
         for rate in RATES:
             seen[rate] += _again(rows, rate)
         told = "; ".join(f"{f.code} {f.name} {f.size:.3g} at {at:.0f} s" for at, f in raised)
-        yield f"seed {seed}: {args.hours:g} h, findings: {told or 'none'}"
-    yield f"{hours:g} h of work, {findings} false findings at {RATES[-1]:g} an hour"
+        yield f"seed {seed}: {hours:g} h, findings: {told or 'none'}"
+    total = hours * len(seeds)
+    yield f"{total:g} h of work, {findings} false findings at {RATES[-1]:g} an hour"
     for rate, count in seen.items():
-        yield f"stated {rate:8g} an hour: sums over their threshold {count / hours:.3g} an hour"
+        yield f"stated {rate:8g} an hour: sums over their threshold {count / total:.3g} an hour"
 
 
 class _noted:
@@ -102,11 +81,11 @@ def _again(rows: list[tuple[Cusum, tuple[np.ndarray, ...]]], rate: float) -> int
     return count
 
 
-def faults(args: argparse.Namespace) -> Iterator[str]:
+def faults(*, seeds: tuple[int, ...] = (0, 1, 2)) -> Iterator[str]:
     """Switch a fault on after clean work; the last name within a minute counts, and the delay to it."""
     rows: dict[str, list[tuple[bool, float, float, str]]] = {name: [] for name in FAULTS}
     fits: list[float] = []
-    for seed in args.seeds:
+    for seed in seeds:
         for name, fault in FAULTS.items():
             rng = np.random.default_rng([seed, 2])
             bench, rig = draw_bench(rng)
@@ -129,7 +108,7 @@ def faults(args: argparse.Namespace) -> Iterator[str]:
         yield f"{line}, delay median {np.median(delays):.1f} s, longest {max(delays):.1f} s"
 
 
-def cost(args: argparse.Namespace) -> Iterator[str]:
+def cost() -> Iterator[str]:
     """Measure CPU time of the monitor alone over the time of the joint, in windows."""
     for rate in (280.0, 1000.0):
         rig, rng = load_rig("paper_high_impedance"), np.random.default_rng(3)
@@ -151,14 +130,14 @@ def cost(args: argparse.Namespace) -> Iterator[str]:
         yield f"longest single call, {rate:g} Hz: {1e3 * longest:.0f} ms"
 
 
-def node(args: argparse.Namespace) -> Iterator[str]:
+def node(*, rate: float = 280.0, seconds: float = 30.0) -> Iterator[str]:
     """Measure CPU time of the node with its subscriptions, beside plant and excite."""
-    used = _node_cpu(args.rate, args.seconds)
-    yield f"node, {args.rate:g} Hz, until {WINDOW:g} s after its start: {used[1]:.1f} s of a core"
+    used = _node_cpu(rate, seconds)
+    yield f"node, {rate:g} Hz, until {WINDOW:g} s after its start: {used[1]:.1f} s of a core"
     shares = np.diff(used[1:]) / WINDOW
     learned = round(LEARNED / WINDOW) - 1
     for learning, part in ((True, shares[:learned]), (False, shares[learned:])):
-        yield f"node, {args.rate:g} Hz, {_phase(learning)}: {_shares(part)} (asked at 280 Hz: < 5)"
+        yield f"node, {rate:g} Hz, {_phase(learning)}: {_shares(part)} (asked at 280 Hz: < 5)"
 
 
 def _phase(learning: bool) -> str:
@@ -184,14 +163,8 @@ def _node_cpu(rate: float, seconds: float) -> list[float]:
     try:
         while len(used) * WINDOW <= LEARNED + seconds:
             time.sleep(max(0.0, begun + len(used) * WINDOW - time.monotonic()))
-            used.append(_cpu(health.pid))
+            used.append(cpu_time(health.pid))
         return used
     finally:
         health.send_signal(signal.SIGINT)
         stop([*nodes, health])
-
-
-def _cpu(pid: int) -> float:
-    """Return the CPU time of a process, s."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / TICKS

@@ -7,18 +7,8 @@ import struct
 
 ODD_NUMBERS = (0, 1, 2, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 2**40, 2**63 - 1, 2**64 - 1)
 ODD_DOUBLES = (
-    float("nan"),
-    float("inf"),
-    -float("inf"),
-    1e308,
-    -1e308,
-    5e-324,
-    1e-300,
-    0.0,
-    -0.0,
-    1e30,
-    1e31,
-)
+    float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, 1e-300, 0.0, -0.0, 1e30, 1e31,
+)  # fmt: skip
 
 
 def damage_bytes(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:

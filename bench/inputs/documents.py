@@ -7,6 +7,7 @@ import json
 import random
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import yaml
@@ -35,32 +36,24 @@ ODD_CELLS = (
 
 def damaged_yaml(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return a YAML document changed in its structure, its text or its bytes."""
-    try:
-        document = yaml.safe_load(data.decode("utf-8"))
-    except Exception:
-        return damage_bytes(rng, data, other)
-    kind = rng.random()
-    if kind < 0.6:
-        with suppress(RecursionError):  # what was damaged before may be nested deeper than it can be written
-            return yaml.safe_dump(
-                change_nodes(rng, document), sort_keys=False, allow_unicode=rng.random() < 0.5
-            ).encode()
-    return damaged_text(rng, data, other) if kind < 0.85 else damage_bytes(rng, data, other)
+    return _damaged(rng, data, other, yaml.safe_load, partial(yaml.safe_dump, sort_keys=False))
 
 
 def damaged_json(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
-    """Return a JSON document changed in its structure, its text or its bytes."""
-    try:
-        document = json.loads(data)
-    except Exception:
-        return damage_bytes(rng, data, other)
-    kind = rng.random()
-    if kind < 0.6:
-        with suppress(RecursionError):
-            return json.dumps(change_nodes(rng, document)).encode()
-    if kind < 0.7:
+    """Return a JSON document changed in its structure, its text or its bytes, or one nested deeply."""
+    if rng.random() < 0.1:
         depth = rng.choice((10, 1000, 100_000))
         return b"[" * depth + b"]" * rng.choice((0, depth))
+    return _damaged(rng, data, other, json.loads, json.dumps)
+
+
+def _damaged(
+    rng: random.Random, data: bytes, other: bytes, read: Callable[[str], Any], write: Callable[[Any], str]
+) -> bytes:
+    kind = rng.random()
+    if kind < 0.6:
+        with suppress(Exception):  # what was damaged before may be no document, or too deep to be written
+            return write(change_nodes(rng, read(data.decode("utf-8")))).encode()
     return damaged_text(rng, data, other) if kind < 0.85 else damage_bytes(rng, data, other)
 
 

@@ -1,38 +1,32 @@
-"""Every format that is read: well-formed files to begin with, the damage to them, and their reader."""
+"""Every format that is read: well-formed files to begin with, the damage to them, and their reader.
+
+Damaged files come in batches, each a child that makes and reads them one after another. It keeps each file
+that brought a new answer, and damages it further: a cheap stand-in for the coverage of code, which reaches
+the code behind the first check.
+"""
 
 from __future__ import annotations
 
 import gzip
 import json
 import random
-from collections.abc import Callable, Sequence
+import re
+import signal
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import FrameType
 
 import numpy as np
 
-from bench.inputs.arrays import damaged_npz, damaged_parquet
-from bench.inputs.bag_files import bag_of_views, damaged_mcap, damaged_sqlite
+from bench.inputs.binaries import bag_of_views, damaged_mcap, damaged_npz, damaged_parquet, damaged_sqlite
 from bench.inputs.bytes_damage import damage_bytes
 from bench.inputs.documents import damaged_json, damaged_table, damaged_yaml
-from bench.inputs.outcome import REFUSED, RESULT, Outcome, Play, call
-from bench.inputs.tables import (
-    CSV,
-    EXPRESSED,
-    LISTED,
-    MAP,
-    RATED,
-    STRUCTS,
-    damaged_gzip,
-    json_tables,
-    mat_files,
-    npz_files,
-    parquet_files,
-    play_import,
-    struct_files,
-)
+from bench.inputs.outcome import REFUSED, RESULT, Outcome, Play, call, failed, limit_child
+from bench.inputs.server import RIG, WALL, Work
+from bench.inputs.tables import CSV, LISTED, MAPS, STRUCTS, damaged_gzip, play_import, tables_as
 from msg_adapters import iterate, read_record, write_record
 from rsea_ros.cli.simulate import parse_effect
 from rsea_ros.design.motor_gear_units import catalogue
@@ -43,7 +37,8 @@ from rsea_ros.model.rig_file import load_rig, rig_folders
 from rsea_ros.nodes._health_inputs import noise_from
 from rsea_ros.records.record import Channel, Record
 
-RIG = "paper_high_impedance"
+BATCH, SLOW = 50, 20
+"""Files of a batch; s of processor for one, above which it counts as endless: all of them are small."""
 EVERY = 8
 """One in this many accepted files goes on into a verb that computes with it."""
 Damage = Callable[[random.Random, bytes, bytes], bytes]
@@ -73,20 +68,14 @@ def try_readers(*readers: Callable[[], object]) -> Outcome:
 
 
 @cache
-def _record() -> Record:
-    t = np.arange(400) / 280.0
-    rng = np.random.default_rng(0)
+def _bag(name: str, file: str = "") -> bytes:
+    """Return a bag, or a file of one that is a folder."""
+    t, rng = np.arange(400) / 280.0, np.random.default_rng(0)
     names = ("command", "motor_torque", "position", "velocity", "ft")
-    return Record(
-        {n: Channel(t, rng.standard_normal(400)) for n in names}, epoch_ns=1_700_000_000_000_000_000
-    )
-
-
-@cache
-def _bag(suffix: str) -> bytes:
+    channels = {n: Channel(t, rng.standard_normal(400)) for n in names}
     with TemporaryDirectory() as folder:
-        write_record(_record(), Path(folder) / f"bag{suffix}")
-        return (Path(folder) / f"bag{suffix}").read_bytes()
+        write_record(Record(channels, epoch_ns=1_700_000_000_000_000_000), Path(folder) / name)
+        return (Path(folder) / name / file).read_bytes() if file else (Path(folder) / name).read_bytes()
 
 
 def _play_bag(suffix: str) -> Play:
@@ -104,24 +93,13 @@ def _play_bag(suffix: str) -> Play:
     return play
 
 
-def _metadata() -> list[bytes]:
-    with TemporaryDirectory() as folder:
-        write_record(_record(), Path(folder) / "bag")
-        return [(Path(folder) / "bag" / "metadata.yaml").read_bytes()]
-
-
 def _play_metadata(folder: Path, data: bytes, number: int) -> Outcome:
     bag = folder / f"bag{number}"
     bag.mkdir(exist_ok=True)
     (bag / "metadata.yaml").write_bytes(data)
-    (bag / "bag.mcap").write_bytes(_bag(".mcap"))
-    (bag / f"bag{number}.mcap").write_bytes(_bag(".mcap"))
+    (bag / "bag.mcap").write_bytes(_bag("bag.mcap"))
+    (bag / f"bag{number}.mcap").write_bytes(_bag("bag.mcap"))
     return try_readers(lambda: read_record([bag]), lambda: read_record([bag], strict=False))
-
-
-def _rigs() -> list[bytes]:
-    files = sorted(f for folder in rig_folders() for f in folder.glob("*.yaml"))
-    return [f.read_bytes() for f in files]
 
 
 EXPORTED = ("mjcf", "urdf", "sdf", "isaac", "bam")
@@ -141,10 +119,6 @@ def _play_rig(folder: Path, data: bytes, number: int) -> Outcome:
         ["simulate", str(rig), "--out", str(bag), "--duration", "1", "--no-noise", "--excitation", "steps"],
     )
     return call(verbs[number % 3])
-
-
-def _units() -> list[bytes]:
-    return [(rig_folders()[0].parent / "design" / "motor_gear_units.yaml").read_bytes()]
 
 
 def _play_units(folder: Path, data: bytes, number: int) -> Outcome:
@@ -167,10 +141,10 @@ def _play_page(folder: Path, data: bytes, number: int) -> Outcome:
     return try_readers(lambda: parse(data).wrench((1, 2, 3, 4, 5, 6)))
 
 
-def _noise() -> list[bytes]:
+def _noise() -> bytes:
     names = ("ft", "position", "velocity", "motor_torque")
     body = {"schema": 1, "noise_rms": dict.fromkeys(names, 0.01), "residual_rms": dict.fromkeys(names, 0.02)}
-    return [json.dumps(body).encode()]
+    return json.dumps(body).encode()
 
 
 def _play_noise(folder: Path, data: bytes, number: int) -> Outcome:
@@ -179,10 +153,8 @@ def _play_noise(folder: Path, data: bytes, number: int) -> Outcome:
     return try_readers(lambda: noise_from(load_rig(RIG), str(file)))
 
 
-def _settings() -> list[bytes]:
-    return [
-        f"{n}:{','.join(f'{k}={v}' for k, v in e.typical.items())}".encode() for n, e in effects().items()
-    ]
+def _setting(name: str) -> bytes:
+    return f"{name}:{','.join(f'{k}={v}' for k, v in effects()[name].typical.items())}".encode()
 
 
 def _play_setting(folder: Path, data: bytes, number: int) -> Outcome:
@@ -197,23 +169,7 @@ def _play_setting(folder: Path, data: bytes, number: int) -> Outcome:
 
 def _damaged_setting(rng: random.Random, data: bytes, other: bytes) -> bytes:
     text = data.decode("utf-8", "replace")
-    odd = (
-        "nan",
-        "inf",
-        "-inf",
-        "-1",
-        "1e308",
-        "1e-300",
-        "0",
-        "0x1",
-        "1_0",
-        "",
-        "x",
-        "=",
-        "1,1",
-        "1e999",
-        "9" * 400,
-    )
+    odd = ("nan", "inf", "-inf", "-1", "1e308", "1e-300", "0", "0x1", "1_0", "", "x", "=", "1,1", "1e999")
     kind = rng.randrange(4)
     if kind == 0 and "=" in text:
         parts = text.split("=")
@@ -226,34 +182,86 @@ def _damaged_setting(rng: random.Random, data: bytes, other: bytes) -> bytes:
     return damage_bytes(rng, data, other)
 
 
+def _files(folder: Path, pattern: str) -> list[bytes]:
+    return [file.read_bytes() for file in sorted(folder.glob(pattern))]
+
+
 FORMATS = (
-    Format("mcap", lambda: [_bag(".mcap")], damaged_mcap, _play_bag(".mcap")),
-    Format(
-        "sqlite",
-        lambda: [*[_bag(".db3")] * 30, bag_of_views(_bag(".db3"))],
-        damaged_sqlite,
-        _play_bag(".db3"),
-    ),
-    Format("metadata", _metadata, damaged_yaml, _play_metadata),
-    Format("rig", _rigs, damaged_yaml, _play_rig),
-    Format(
-        "map",
-        lambda: [MAP.encode(), RATED.encode(), EXPRESSED.encode()],
-        damaged_yaml,
-        play_import("run.csv", True),
-    ),
-    Format("structs.mat", struct_files, damage_bytes, play_import("run.mat", False, STRUCTS)),
-    Format("npz", npz_files, damaged_npz, play_import("run.npz", False, LISTED)),
-    Format("parquet", parquet_files, damaged_parquet, play_import("run.parquet", False, LISTED)),
-    Format("json.table", json_tables, damaged_json, play_import("run.json", False, LISTED)),
-    Format("csv", lambda: [CSV.encode()], damaged_table, play_import("run.csv", False)),
-    Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damaged_table, play_import("run.tsv", False)),
-    Format("csv.gz", lambda: [gzip.compress(CSV.encode())], damaged_gzip, play_import("run.csv.gz", False)),
-    Format("mat", mat_files, damage_bytes, play_import("run.mat", False)),
-    Format("catalogue", _units, damaged_yaml, _play_units),
+    Format("mcap", lambda: [_bag("bag.mcap")], damaged_mcap, _play_bag(".mcap")),
+    Format("sqlite", lambda: [*[_bag("bag.db3")] * 30, bag_of_views(_bag("bag.db3"))], damaged_sqlite,
+           _play_bag(".db3")),
+    Format("metadata", lambda: [_bag("bag", "metadata.yaml")], damaged_yaml, _play_metadata),
+    Format("rig", lambda: _files(rig_folders()[0], "*.yaml"), damaged_yaml, _play_rig),
+    Format("map", lambda: list(map(str.encode, MAPS)), damaged_yaml, play_import("run.csv", is_map=True)),
+    Format("structs.mat", lambda: tables_as("struct"), damage_bytes, play_import("run.mat", STRUCTS)),
+    Format("npz", lambda: tables_as("npz"), damaged_npz, play_import("run.npz", LISTED)),
+    Format("parquet", lambda: tables_as("parquet"), damaged_parquet, play_import("run.parquet", LISTED)),
+    Format("json.table", lambda: tables_as("json"), damaged_json, play_import("run.json", LISTED)),
+    Format("csv", lambda: [CSV.encode()], damaged_table, play_import("run.csv")),
+    Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damaged_table, play_import("run.tsv")),
+    Format("csv.gz", lambda: [gzip.compress(CSV.encode())], damaged_gzip, play_import("run.csv.gz")),
+    Format("mat", lambda: tables_as("mat"), damage_bytes, play_import("run.mat")),
+    Format("catalogue", lambda: _files(rig_folders()[0].parent / "design", "motor_gear_units.yaml"),
+           damaged_yaml, _play_units),
     Format("calibration", lambda: [PAGE, BOMB], damage_bytes, _play_page),
-    Format("json", _noise, damaged_json, _play_noise),
-    Format("effect", _settings, _damaged_setting, _play_setting),
-)
+    Format("json", lambda: [_noise()], damaged_json, _play_noise),
+    Format("effect", lambda: [_setting(name) for name in effects()], _damaged_setting, _play_setting),
+)  # fmt: skip
 SHARES = {"mcap": 5, "sqlite": 3, "metadata": 2, "rig": 5, "map": 3, "csv": 3, "mat": 3}
 """Parts of all files; one part for a format that is not named here."""
+
+
+def batches(seed: int, count: int, keep: Path | None) -> Iterator[tuple[str, Work]]:
+    """Yield name and work of each batch, formats by their shares and by turns. keep: for files that broke."""
+    shares = [f for f in FORMATS for _ in range(SHARES.get(f.name, 1))]
+    for k in range(-(-count // BATCH)):
+        form, number = shares[k % len(shares)], seed * 1_000_003 + k
+        yield f"{form.name} {number}", partial(_read_batch, form, number, keep)
+
+
+def _read_batch(
+    form: Format, seed: int, keep: Path | None, folder: Path
+) -> Iterator[tuple[str, Callable[[], Outcome]]]:
+    """Make and read the files of a batch."""
+    signal.signal(signal.SIGVTALRM, _stop)
+    rng, seeds, answers = random.Random(seed), list(form.seeds()), dict[str, bytes]()
+    for number in range(BATCH):
+        kept = list(answers.values())
+        base = rng.choice(kept) if kept and rng.random() < 0.5 else rng.choice(seeds)
+        sound = number < len(seeds) and seed % 7 == 0
+        data = base if sound else form.damage(rng, base, rng.choice(seeds))
+        name = f"{form.name} {seed} {number}"
+        copy = (keep or folder) / name.replace(" ", "-")
+        yield name, partial(_read, form, folder, data, number, answers, copy)
+
+
+def _read(
+    form: Format, folder: Path, data: bytes, number: int, answers: dict[str, bytes], copy: Path
+) -> Outcome:
+    """Read a file; its copy stays where a promise was broken, or this process ends."""
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    copy.write_bytes(data)
+    limit_child(seconds=SLOW + 5)
+    signal.setitimer(signal.ITIMER_VIRTUAL, SLOW)
+    try:
+        outcome = form.play(folder, data, number)
+    except BaseException as error:
+        outcome = failed(error)
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        limit_child(seconds=WALL)  # the next file may take long to make
+    if "_TooSlow" in outcome.where:
+        outcome.kind = "time-out"
+    pattern = re.sub(r"'[^']*'|\d+|\S*/\S*", "#", outcome.where or outcome.detail)[:120]
+    answers.setdefault(outcome.kind + pattern, data)
+    if not outcome.is_fault:
+        copy.unlink()
+    return outcome
+
+
+class _TooSlow(BaseException):
+    """Raised by the timer, past every `except Exception`."""
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    raise _TooSlow(f"more than {SLOW} s")

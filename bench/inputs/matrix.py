@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import chain, combinations, product
 from pathlib import Path
 from typing import Any
 
 from bench.inputs.bags import CHANNELS, COMMANDS, SENSORS, STAMPS, bag_of
-from bench.inputs.cover import Case, cover_pairs
 from bench.inputs.outcome import Outcome, call, limit_child
 from bench.inputs.server import Work
 from rsea_ros.cli.main import verbs
@@ -21,6 +21,9 @@ BAG_VERBS = ("identify", "diagnose", "predict", "check")
 SUBSETS = tuple(chain.from_iterable(combinations(CHANNELS, k) for k in range(len(CHANNELS) + 1)))
 FIRST = 1_000_000_000
 """ns, the epoch of a clock that began with the machine."""
+TRIED = 40
+"""Random candidates for each case: more of them make the design a little smaller."""
+Case = dict[str, Any]
 ROUND_FIGURES = 1_700_000_000_000_000_000
 """ns, an epoch as a recorder has it."""
 
@@ -149,14 +152,33 @@ _ARGUMENTS: Mapping[str, Callable[[Case, Path], list[str]]] = {
 }
 
 
-def describe(case: Mapping[str, Any]) -> str:
-    """Return a case in one line, in a form that `--only` can search."""
-    texts = {k: "+".join(v) or "command alone" if k == "channels" else v for k, v in case.items()}
-    return " ".join(f"{k}={v}" for k, v in texts.items())
+def works(cases: Sequence[Case], play: Callable[[Case, Path], Outcome]) -> Iterator[tuple[str, Work]]:
+    """Yield name and work of each case; the name is the case in one line, which `--only` can search."""
+    for case in cases:
+        texts = {k: "+".join(v) or "command alone" if k == "channels" else v for k, v in case.items()}
+        name = " ".join(f"{k}={v}" for k, v in texts.items())
+        yield name, lambda folder, case=case, name=name: iter([(name, partial(play, case, folder))])
 
 
-def works(cases: Sequence[Case], play: Callable[[Case, Path], Outcome], letter: str) -> Iterator[Work]:
-    """Return name and work of each case."""
-    for number, case in enumerate(cases):
-        name = f"{letter}{number:04d} {describe(case)}"
-        yield name, lambda folder, case=case: play(case, folder)
+def cover_pairs(
+    factors: Mapping[str, Sequence[Any]], rng: random.Random, must: Sequence[Case] = ()
+) -> tuple[list[Case], int]:
+    """Return few cases in which every two values of any two factors meet, and how many pairs that are.
+
+    must: cases of which some values are given; each is filled up so that it brings new pairs.
+    Sizes matter: a value that stands twice in a factor is drawn twice as often, a rare one seldom.
+    """
+    names = list(factors)
+    left = {(a, x, b, y) for a, b in combinations(names, 2) for x in factors[a] for y in factors[b]}
+    total, cases, waiting = len(left), [], list(must)
+
+    def pairs(case: Case) -> set[tuple[str, Any, str, Any]]:
+        return {(a, case[a], b, case[b]) for a, b in combinations(names, 2)}
+
+    while waiting or left:
+        a, x, b, y = min(left, key=repr) if left else ("", None, "", None)
+        given = waiting.pop() if waiting else {a: x, b: y}
+        drawn = [{n: given.get(n, rng.choice(factors[n])) for n in names} for _ in range(TRIED)]
+        cases.append(max(drawn, key=lambda case: len(pairs(case) & left)))
+        left -= pairs(cases[-1])
+    return cases, total

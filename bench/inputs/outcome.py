@@ -12,7 +12,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rsea_ros.cli.main import FAULT, main
@@ -51,28 +51,21 @@ Play = Callable[[Path, bytes, int], Outcome]
 """Reads the bytes of a file in a folder, the n-th of its format."""
 
 
-def limit_child(verb: str = "") -> None:
-    """Put the ceilings on this process, counted from now. verb: the one that it runs."""
-    limit_seconds(SECONDS * (2 if verb in TWO_CORES else 1))
-    limit_memory()
-
-
-def limit_seconds(seconds: int) -> None:
-    """End this process after some seconds of processor time from now."""
+def limit_child(verb: str = "", seconds: int = SECONDS) -> None:
+    """Put the ceilings on this process, of processor time counted from now. verb: the one that it runs."""
     used = resource.getrusage(resource.RUSAGE_SELF)
-    cpu = int(used.ru_utime + used.ru_stime) + seconds
+    cpu = int(used.ru_utime + used.ru_stime) + seconds * (2 if verb in TWO_CORES else 1)
     resource.setrlimit(resource.RLIMIT_CPU, (cpu, resource.getrlimit(resource.RLIMIT_CPU)[1]))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def limit_memory() -> None:
-    """Put the ceiling of memory on this process, or back on it."""
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY + SPARE))
 
 
-def more_memory() -> None:
-    """Let this process write down that its memory was used up."""
-    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY + SPARE, MEMORY + SPARE))
+def failed(error: BaseException) -> Outcome:
+    """Return the outcome of a call that ended by an error; its memory is freed to write that down."""
+    if isinstance(error, MemoryError):
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY + SPARE, MEMORY + SPARE))
+        return Outcome("memory", place(error), repr(error)[:300])
+    return Outcome("traceback", place(error), "".join(traceback.format_exception(error))[-3000:])
 
 
 def call(arguments: list[str]) -> Outcome:
@@ -91,11 +84,8 @@ def call(arguments: list[str]) -> Outcome:
             status: int | str | None = main(arguments)
         except SystemExit as error:
             status = error.code
-        except MemoryError as error:
-            more_memory()
-            return Outcome("memory", place(error), repr(error)[:300])
         except BaseException as error:
-            return Outcome("traceback", place(error), "".join(traceback.format_exception(error))[-3000:])
+            return failed(error)
     outcome = judge(status, read(out), read(err), "--json" in arguments)
     outcome.warned = sorted(set(warned))
     if warned and not outcome.is_fault:
@@ -180,41 +170,6 @@ def _short(filename: str) -> str:
 
 def _pattern(message: str) -> str:
     return re.sub(r"\b[0-9][0-9a-fx.e+-]*|'[^']*'", "#", message)[:160]
-
-
-def fork(work: Callable[[], Outcome], answer: Path) -> int:
-    """Start a child that writes the outcome of `work` to a file; return its process id."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    pid = os.fork()
-    if pid:
-        return pid
-    status = 70
-    try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        outcome = work()
-        answer.write_text(json.dumps(asdict(outcome)), encoding="utf-8")
-        status = 0
-    except BaseException:
-        with contextlib.suppress(BaseException):
-            text = traceback.format_exc()
-            answer.write_text(json.dumps(asdict(Outcome("gate", text.splitlines()[-1], text[-3000:]))))
-            status = 0
-    finally:
-        os._exit(status)
-
-
-def collect(status: int, usage: resource.struct_rusage, answer: Path, late: bool) -> Outcome:
-    """Return the outcome that a child has left in its file."""
-    if late:
-        return Outcome("time-out", "neither done nor at work")
-    try:
-        outcome = Outcome(**json.loads(answer.read_text(encoding="utf-8")))
-    except (FileNotFoundError, ValueError):  # it ended before or while it answered
-        return outcome_of_end(status, usage)
-    outcome.seconds = usage.ru_utime + usage.ru_stime
-    outcome.megabytes = usage.ru_maxrss / 1024
-    return outcome
 
 
 def outcome_of_end(status: int, usage: resource.struct_rusage) -> Outcome:

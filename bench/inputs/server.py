@@ -3,32 +3,30 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import resource
-import shutil
 import signal
+import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 
-from bench.inputs.outcome import Outcome, call, collect, fork
+from bench.inputs.outcome import Outcome, call, outcome_of_end
 from rsea_ros.effects.catalogue import catalogue
 
 RIG = "paper_high_impedance"
-WALL = 600.0
-"""s, after which a child that does not even compute is ended."""
+WALL = 1200
+"""s after which a child that neither computes nor ends is ended."""
 MODULES = (
     "rsea_ros.cli.identify", "rsea_ros.cli.diagnose", "rsea_ros.cli.predict", "rsea_ros.cli.simulate",
     "rsea_ros.cli.control", "rsea_ros.cli.design", "rsea_ros.cli.export", "rsea_ros.cli.import_",
-    "rsea_ros.cli.check", "rsea_ros.checks.check", "rsea_ros.report.check",
-    "rsea_ros.identification.identify", "rsea_ros.diagnosis.diagnose",
-    "rsea_ros.report.diagnosis.files", "rsea_ros.report.identification.page",
-    "rsea_ros.report.diagnosis.terminal",
-    "rsea_ros.report.control.page", "rsea_ros.report.design.page", "rsea_ros.control.study",
-    "rsea_ros.design.spring_design", "rsea_ros.design.mujoco_model", "msg_adapters.records",
-    "msg_adapters.records",
-    "scipy.interpolate", "scipy.signal", "scipy.io", "rich.console", "rich.table",
+    "rsea_ros.cli.check", "rsea_ros.report.diagnosis.files", "rsea_ros.report.identification.page",
+    "rsea_ros.report.control.page", "rsea_ros.report.design.page", "rsea_ros.design.mujoco_model",
+    "msg_adapters.records", "scipy.interpolate", "scipy.signal", "scipy.io", "rich.console", "rich.table",
 )  # fmt: skip
 FIRST = (
     ["simulate", RIG, "--out", "DIR/bag.mcap", "--duration", "5"],
@@ -40,8 +38,8 @@ FIRST = (
 )  # fmt: skip
 """Verbs that are run once before all others."""
 
-Work = tuple[str, Callable[[Path], Outcome]]
-"""A name, and the work to do in its own folder."""
+Work = Callable[[Path], Iterator[tuple[str, Callable[[], Outcome]]]]
+"""In a folder of its own: yields names, and what gives the outcome of each."""
 
 
 def warm() -> None:
@@ -54,35 +52,57 @@ def warm() -> None:
             call([word.replace("DIR", folder) for word in words])
 
 
-def serve(work: Iterable[Work], folder: Path, jobs: int, wall: float = WALL) -> Iterator[tuple[str, Outcome]]:
-    """Do the work in at most `jobs` children at a time; yield name and outcome as they end."""
-    running: dict[int, tuple[str, Path, float]] = {}
-    for number, (name, one) in enumerate(work):
-        while len(running) >= jobs:
-            yield from _end(running, wall)
+def serve(works: Iterable[Work], folder: Path, jobs: int) -> Iterator[tuple[str, Outcome]]:
+    """Do the works in at most `jobs` children at a time; yield name and outcome of each part as they end."""
+    running: dict[int, Path] = {}
+    for number, work in enumerate(works):
+        if len(running) >= jobs:
+            yield from _end(running)
         inside = folder / str(number)
         inside.mkdir()
-        pid = fork(lambda one=one, inside=inside: one(inside), folder / f"{number}.json")
-        running[pid] = (name, folder / f"{number}.json", time.monotonic())
+        running[_fork(work, inside)] = inside
     while running:
-        yield from _end(running, wall)
+        yield from _end(running)
 
 
-def _end(running: dict[int, tuple[str, Path, float]], wall: float) -> Iterator[tuple[str, Outcome]]:
-    """Wait until at least one child ends, or a late one is ended."""
-    while True:
-        for pid, (name, answer, since) in list(running.items()):
-            late = time.monotonic() - since > wall
-            if late:
-                os.kill(pid, signal.SIGKILL)
-            done, status, usage = _wait(pid, block=late)
-            if done:
-                del running[pid]
-                shutil.rmtree(answer.with_suffix(""), ignore_errors=True)
-                yield name, collect(status, usage, answer, late)
-                return
-        time.sleep(0.01)
+def _fork(work: Work, inside: Path) -> int:
+    """Start a child that writes each name and then its outcome to a file; return its process id."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    pid = os.fork()
+    if pid:
+        return pid
+    status = 70
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.alarm(WALL)
+        with (inside / "log").open("w", encoding="utf-8", buffering=1) as file:
+            for name, part in work(inside):
+                file.write(json.dumps(name) + "\n")
+                file.write(json.dumps(asdict(_judged(part))) + "\n")
+        status = 0
+    finally:
+        os._exit(status)
 
 
-def _wait(pid: int, block: bool) -> tuple[int, int, resource.struct_rusage]:
-    return os.wait4(pid, 0 if block else os.WNOHANG)
+def _judged(part: Callable[[], Outcome]) -> Outcome:
+    """Return the outcome of a part; an error of the bench's own is one too."""
+    began = time.process_time()
+    try:
+        outcome = part()
+    except Exception:
+        text = traceback.format_exc()
+        outcome = Outcome("gate", text.splitlines()[-1], text[-3000:])
+    outcome.seconds = time.process_time() - began
+    outcome.megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return outcome
+
+
+def _end(running: dict[int, Path]) -> Iterator[tuple[str, Outcome]]:
+    """Wait until a child ends, and yield what it has left; the part at which it broke off has its end."""
+    pid, status, usage = os.wait4(-1, 0)
+    lines = [json.loads(line) for line in (running.pop(pid) / "log").read_text("utf-8").splitlines()]
+    for name, outcome in zip(lines[::2], lines[1::2], strict=False):
+        yield name, Outcome(**outcome)
+    if status:
+        yield lines[-1] if len(lines) % 2 else "the bench itself", outcome_of_end(status, usage)

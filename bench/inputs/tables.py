@@ -6,9 +6,13 @@ import gzip
 import io
 import json
 import random
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from scipy.io import savemat
 
 from bench.inputs.bytes_damage import damage_bytes
 from bench.inputs.documents import damaged_table
@@ -40,83 +44,57 @@ channels:
 """
 
 
-def play_import(file_name: str, is_map: bool, of_file: str = MAP) -> Play:
+STRUCTS = """time: {column: log.t, unit: s}
+channels: {position: {column: "log.q(:,2)", unit: deg}, command: {column: log.i, unit: mA, scale: 3}}
+"""
+MAPS = (MAP, RATED, EXPRESSED)
+
+
+def play_import(file_name: str, of_file: str = MAP, *, is_map: bool = False) -> Play:
+    """Return the reader of a table with a map. is_map: the damaged file is the map."""
+
     def play(folder: Path, data: bytes, number: int) -> Outcome:
         table, maps = folder / file_name, folder / "map.yaml"
-        table.write_bytes(_CSV_AS[file_name] if is_map else data)
+        table.write_bytes(CSV.encode() if is_map else data)
         maps.write_bytes(data if is_map else of_file.encode())
         return call(["import", str(table), "--map", str(maps), "--out", str(folder / f"bag{number}.mcap")])
 
     return play
 
 
-def mat_files() -> list[bytes]:
-    from scipy.io import savemat
-
+def tables_as(kind: str) -> list[bytes]:
+    """Return the table as files of a kind, in its variants; all but `mat` have q, a matrix of two columns."""
     rows = np.array([[float(c) for c in line.split(",")] for line in CSV.splitlines()[1:]])
-    columns = dict(zip(("t", "phi", "i", "load"), rows.T, strict=True))
-    kinds = ({"do_compression": False}, {"do_compression": True}, {"format": "4"})
+    plain = dict(zip(("t", "phi", "i", "load"), rows.T, strict=True))
+    columns = plain | {"q": rows[:, 1:3]}
+    texts = {name: y.tolist() for name, y in columns.items()}
+    if kind == "json":
+        records = [dict(zip(texts, row, strict=True)) for row in zip(*texts.values(), strict=True)]
+        return [json.dumps(texts).encode(), json.dumps(records).encode()]
+    table = pa.table({name: pa.array(list(y)) for name, y in columns.items()})
+    whole = {"log": {**columns, "notes": "a bench"}, "spare": np.zeros(3)}
+    writers: Mapping[str, Sequence[Callable[[io.BytesIO], object]]] = {
+        "npz": [lambda f: np.savez(f, **columns), lambda f: np.savez_compressed(f, **columns)],
+        "mat": [
+            lambda f: savemat(f, plain), lambda f: savemat(f, plain, do_compression=True),
+            lambda f: savemat(f, plain, format="4"),
+        ],
+        "struct": [lambda f: savemat(f, whole)],
+        "parquet": [
+            lambda f, codec=codec: pq.write_table(table, f, row_group_size=20, compression=codec)
+            for codec in ("snappy", "none")
+        ],
+    }  # fmt: skip
     files = []
-    for options in kinds:
+    for write in writers[kind]:
         buffer = io.BytesIO()
-        savemat(buffer, columns, **options)
+        write(buffer)
         files.append(buffer.getvalue())
     return files
 
 
-def _columns() -> dict[str, np.ndarray]:
-    """Return t, i and load, and q with a matrix of two columns."""
-    rows = np.array([[float(c) for c in line.split(",")] for line in CSV.splitlines()[1:]])
-    return dict(zip(("t", "phi", "i", "load"), rows.T, strict=True)) | {"q": rows[:, 1:3]}
-
-
-def npz_files() -> list[bytes]:
-    files = []
-    for save in (np.savez, np.savez_compressed):
-        buffer = io.BytesIO()
-        save(buffer, **_columns())
-        files.append(buffer.getvalue())
-    return files
-
-
-def parquet_files() -> list[bytes]:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    files = []
-    for codec in ("snappy", "none"):
-        buffer = io.BytesIO()
-        columns = {name: pa.array(list(y)) for name, y in _columns().items()}
-        pq.write_table(pa.table(columns), buffer, row_group_size=20, compression=codec)
-        files.append(buffer.getvalue())
-    return files
-
-
-def json_tables() -> list[bytes]:
-    columns = {name: y.tolist() for name, y in _columns().items()}
-    records = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return [json.dumps(columns).encode(), json.dumps(records).encode()]
-
-
-def struct_files() -> list[bytes]:
-    from scipy.io import savemat
-
-    buffer = io.BytesIO()
-    savemat(buffer, {"log": {**_columns(), "notes": "a bench"}, "spare": np.zeros(3)})
-    return [buffer.getvalue()]
-
-
-STRUCTS = """time: {column: log.t, unit: s}
-channels: {position: {column: "log.q(:,2)", unit: deg}, command: {column: log.i, unit: mA, scale: 3}}
-"""
-_CSV_AS = {
-    "run.csv": CSV.encode(),
-    "run.tsv": CSV.replace(",", "\t").encode(),
-    "run.csv.gz": gzip.compress(CSV.encode()),
-}
-
-
-def damaged_gzip(rng: random.Random, data: bytes, other: bytes) -> bytes:
+def damaged_gzip(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+    """Return a compressed table damaged in its text or its bytes, or one that unpacks to 400 MB."""
     try:
         plain = gzip.decompress(data)
     except Exception:

@@ -1,106 +1,73 @@
 """Real machines: the residual after naming, its law, and the gain of the law on held-out data.
 
-    python -m bench laws real emps --out out/laws-real      a diagnosis, then a law on its model
-    python -m bench laws real --table --out out/laws-real    the machines that are done, as a table
+    python -m bench laws real --only emps --log out/laws-real.jsonl
 
-Data: ../shared/realdata, beside the repository; origins and licences: CONTRIBUTING.md.
+Records of ../shared/realdata that have a map and a rig in the library, and the silverbox, whose rig states
+its causes; origins and licences: CONTRIBUTING.md. Named before: by a diagnosis.
 """
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-from bench import parser_of
-from bench.public.fit import DATA, RIGS, record_of as benchmark_record
+import numpy as np
+
+from bench.diagnosis.played import Entry, Played
+from bench.frozen.cases import real_records
+from bench.public.fit import DATA, RIGS, record_of
 from bench.public.silverbox import ANGLE, RATE, TORQUE
-from msg_adapters.tables import import_record, load_map
-from rsea_ros.cli.maps import map_path
+from bench.results import read_lines, resumed
 from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.laws.law import equation_of
 from rsea_ros.laws.learn import learn
-from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.record import Record
-from rsea_ros.report.law.page import write_law
-from rsea_ros.report.law.words import headline, law_lines
+from rsea_ros.report.law.words import headline
 
 
-def _table(file: str, name: str) -> Callable[[], Record]:
-    return lambda: import_record(DATA / file, load_map(map_path(name)))
+def main(*, log: Path, only: str = "", minutes: float = 60.0) -> None:
+    """Play the machines that the log lacks, and print the table.
+
+    log: JSON lines, a record each
+    only: those with this text in their names
+    minutes: begin no record after that
+    """
+    chosen = [e for e in _records() if only in e.name]
+    for row in resumed(log, ((e.name, partial(_row, e)) for e in chosen), "machine", minutes):
+        print(row["machine"], flush=True)
+    print("| machine | named before | what is left depends on | law | gain, held out (95 %) |")
+    print("|---|---|---|---|---|")
+    for row in read_lines(log):
+        print(f"| {row['machine']} | {row['named']} | {row['sentence']} | {row['law']} | {row['gain']} |")
 
 
-def _silverbox() -> Record:
+def _records() -> Iterator[Entry]:
+    if (DATA / "silverbox").exists():
+        yield Entry("silverbox", _silverbox)
+    if DATA.exists():
+        yield from real_records()
+
+
+def _silverbox() -> Played:
     """Return 40 s of the training part."""
-    import numpy as np
-
     u, y = np.genfromtxt(DATA / "silverbox" / "SNLS80mV.csv", delimiter=",", skip_header=1, usecols=(0, 1)).T
     part = slice(40650, 40650 + int(40 * RATE))
-    record = benchmark_record(TORQUE * u[part], ANGLE * y[part], RATE)
-    return record
+    return Played(record_of(TORQUE * u[part], ANGLE * y[part], RATE), load_rig(RIGS / "silverbox.yaml"))
 
 
-CYCLOIDAL = "cycloidal/2024-07-18__10-58-26__torqueramp__base_onyx_runin1.csv.gz"
-MACHINES: Mapping[str, tuple[Callable[[], Record], str | Path, bool]] = {
-    "emps": (_table("emps/DATA_EMPS.mat", "emps_identification"), "emps", True),
-    "silverbox": (_silverbox, RIGS / "silverbox.yaml", False),
-    "cycloidal": (_table(CYCLOIDAL, "cycloidal_short_ramps"), "cycloidal", True),
-    "sea_gamma": (_table("sea_gamma/open_3_1_25.csv", "sea_gamma"), "sea_two_encoders", True),
-    "pendulum": (_table("pendulum/gravity_compensation.measured.csv.gz", "pendulum"), "pendulum", True),
-}
-"""Record, rig, and whether a diagnosis names causes first (the silverbox's rig states them)."""
-
-
-def main(argv: Sequence[str]) -> int:
-    """Play one machine, or print the table of those played."""
-    parser = parser_of(__doc__)
-    parser.add_argument("machine", nargs="?", choices=tuple(MACHINES))
-    parser.add_argument("--out", type=Path, default=Path("out/laws-real"))
-    parser.add_argument("--table", action="store_true", help="print what is done")
-    args = parser.parse_args(argv)
-    if args.table:
-        print(table(args.out))
-        return 0
-    if args.machine is None:
-        parser.error("expected a machine or --table")
-    if not DATA.is_dir():
-        print(f"{DATA}: no such folder, expected the measurements of real machines", file=sys.stderr)
-        return 2
-    read, rig_name, is_diagnosed = MACHINES[args.machine]
-    record, rig = read(), load_rig(rig_name)
-    named, rig = _name_causes(record, rig) if is_diagnosed else ([e.name for e in rig.effects], rig)
-    result = learn([record], rig)
-    write_law(result, args.out / args.machine)
-    (args.out / args.machine / "named.json").write_text(json.dumps(named), encoding="utf-8")
-    print(f"{args.machine}: named {', '.join(named) or 'nothing'}")
-    print(headline(result), *law_lines(result), f"gain {100 * result.gain:.1f} %", sep="\n")
-    return 0
-
-
-def _name_causes(record: Record, rig: Rig) -> tuple[list[str], Rig]:
-    """Return the causes that a diagnosis names, and the rig with them."""
-    result = diagnose([record], rig)
-    return [c.name for c in result.causes], replace(result.extended_rig, name=rig.name)
-
-
-def table(folder: Path) -> str:
-    """Return named causes, the law of the rest and its gain, a row for each machine."""
-    rows = [
-        "| machine | named before | what is left depends on | law | gain, held out (95 %) |",
-        "|---|---|---|---|---|",
-    ]
-    for name in MACHINES:
-        path = folder / name / "law.json"
-        if not path.exists():
-            continue
-        law = json.loads(path.read_text(encoding="utf-8"))
-        named = json.loads((folder / name / "named.json").read_text(encoding="utf-8"))
-        equations = "; ".join(f"`{each['equation']}`" for each in law["laws"]) or "none"
-        low, high = (100 * v for v in law["gain"]["holdout_ci95"])
-        gain = f"{100 * law['gain']['holdout']:.0f} % ({low:.0f} to {high:.0f} %)" if law["laws"] else "–"
-        rows.append(
-            f"| {name} | {', '.join(named) or 'nothing'} | {law['sentence']} | {equations} | {gain} |"
-        )
-    return "\n".join(rows)
+def _row(entry: Entry) -> dict[str, Any]:
+    """Return named causes, the law of the rest and its gain."""
+    played = entry.make()
+    rig, named = played.rig, [e.name for e in played.rig.effects]
+    if entry.name != "silverbox":
+        diagnosis = diagnose([played.record], rig)
+        rig, named = replace(diagnosis.extended_rig, name=rig.name), [c.name for c in diagnosis.causes]
+    result = learn([played.record], rig)
+    low, high = (100.0 * v for v in result.gain_ci95)
+    gain = f"{100.0 * result.gain:.0f} % ({low:.0f} to {high:.0f} %)" if result.laws else "–"
+    law = "; ".join(f"`{equation_of(w.law)}`" for w in result.laws) or "none"
+    sentence, before = headline(result), ", ".join(named) or "nothing"
+    return {"machine": entry.name, "named": before, "sentence": sentence, "law": law, "gain": gain}

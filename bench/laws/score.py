@@ -12,19 +12,18 @@ channels in units of what the base leaves of them.
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from bench import parser_of
 from bench.laws.cases import LawCase, cases
-from bench.results import append_line, read_lines
+from bench.results import read_lines, resumed
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import Score, score
@@ -39,37 +38,27 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Record
 
 
-def main(argv: Sequence[str]) -> int:
-    """Run the cases that the log lacks, or print its figures."""
-    args = _parser().parse_args(argv)
-    if args.table:
-        print(table(read_lines(args.log)))
-        return 0
-    if args.group == "time":
-        return _time(args.duration or 160.0)
-    done = {entry["name"] for entry in read_lines(args.log)}
-    for case in cases(args.clean):
-        if case.group != args.group or case.name in done or args.select not in case.name:
-            continue
-        row = _keep(case, args.duration or 30.0)
-        append_line(args.log, row)
-        print(_line(row), flush=True)
+def main(
+    *, group: Annotated[str, ("catalogue", "unknown", "clean", "time")] = "catalogue", select: str = "",
+    clean: int = 50, duration: float = 0.0, log: Path = Path("out/laws.jsonl"), table: bool = False,
+) -> int:  # fmt: skip
+    """Run the cases that the log lacks, or print its figures.
+
+    select: only cases with this text in their name
+    clean: clean benches
+    duration: of a record, s; 0: 30, and 160 for time
+    log: outcomes, one a line
+    table: print the figures of the log
+    """
+    if table:
+        print(figures(read_lines(log)))
+    elif group == "time":
+        return _time(duration or 160.0)
+    else:
+        chosen = (c for c in cases(clean) if c.group == group and select in c.name)
+        for row in resumed(log, ((c.name, partial(_keep, c, duration or 30.0)) for c in chosen), "name"):
+            print(_line(row), flush=True)
     return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = parser_of(__doc__)
-    parser.add_argument("--group", choices=("catalogue", "unknown", "clean", "time"), default="catalogue")
-    parser.add_argument("--select", default="", metavar="TEXT", help="only cases with TEXT in their name")
-    parser.add_argument(
-        "--clean", type=int, default=50, metavar="N", help="clean benches (default %(default)s)"
-    )
-    parser.add_argument(
-        "--duration", type=float, metavar="S", help="of a record (default 30 s, 160 s for time)"
-    )
-    parser.add_argument("--log", type=Path, default=Path("out/laws.jsonl"), help="outcomes, one a line")
-    parser.add_argument("--table", action="store_true", help="print the figures of the log")
-    return parser
 
 
 def _keep(case: LawCase, duration: float) -> dict[str, object]:
@@ -144,7 +133,7 @@ def _time(duration: float) -> int:
     return int(wall > 60.0)
 
 
-def _line(row: dict[str, object]) -> str:
+def _line(row: Mapping[str, object]) -> str:
     share = ""
     if "true_gain" in row:
         share = f" gain {row['gain']:.3f} of {row['true_gain']:.3f} {'right' if row['right'] else 'WRONG'}"
@@ -152,7 +141,7 @@ def _line(row: dict[str, object]) -> str:
     return f"{row['name']:<28}{share} {law} {row['seconds']} s"
 
 
-def table(rows: Sequence[dict[str, object]]) -> str:
+def figures(rows: Sequence[dict[str, object]]) -> str:
     """Return the figures of a log, required and measured."""
     lines = ["| figure | asked | measured |", "|---|---|---|"]
     for group, share, asked in (("catalogue", 0.9, 80), ("unknown", 0.7, 80)):
@@ -174,7 +163,3 @@ def table(rows: Sequence[dict[str, object]]) -> str:
             f"| clean benches without a law | ≥ 98 % | {100 * np.mean(nothing):.0f} % of {len(clean)} |"
         )
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -18,7 +18,6 @@ from __future__ import annotations
 import cProfile
 import json
 import os
-import random
 import re
 import sys
 import tempfile
@@ -27,18 +26,15 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
+from random import Random
 from typing import TextIO
 
-import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
-
-# isort: split
 import hypothesis  # noqa: F401  what every test needs, once
 import numpy  # noqa: F401
 import pytest  # noqa: F401
 import scipy  # noqa: F401
 import xdist.scheduler  # noqa: F401
 
-from bench import parser_of
 from bench.mutants.imports import PACKAGES, ROOT, imported, reachable
 from bench.mutants.operators import Mutant, mutants_of
 from bench.mutants.run import SURVIVED, BenchError, outcomes
@@ -57,31 +53,32 @@ LIMIT = 240.0
 GOLDEN = "golden/test_golden.py"
 
 
-def main(argv: Sequence[str]) -> int:
-    """Play a sample, or go on with it."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--random", type=int, default=60, metavar="N", help="so many faults")
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the sample")
-    parser.add_argument("--in", dest="place", default="", metavar="PLACE", help="of a module or folder only")
-    parser.add_argument("--minutes", type=float, default=8.0, metavar="M", help="begin no fault after that")
-    parser.add_argument("--list", action="store_true", help="print the faults and play none")
-    args = parser.parse_args(argv)
-    chosen = _sample(args.random, args.seed, args.place)
-    if args.list:
+def main(
+    *, random: int = 60, seed: int = 0, in_: str = "", minutes: float = 8.0, list_: bool = False
+) -> int:
+    """Play a sample, or go on with it.
+
+    random: so many faults
+    seed: of the sample
+    in_: of a module or folder only
+    minutes: begin no fault after that
+    list_: print the faults and play none
+    """
+    chosen = _sample(random, seed, in_)
+    if list_:
         print(*(f"{target}.py:{_text(mutant)}" for target, mutant in chosen), sep="\n")
         return 0
-    place = args.place.replace("/", "-") or "all"
-    log = ROOT / "out" / f"mutants-{place}-{args.random}-{args.seed}.jsonl"
+    log = ROOT / "out" / f"mutants-{in_.replace('/', '-') or 'all'}-{random}-{seed}.jsonl"
     told = {(line["target"], line["fault"]): line["outcome"] for line in read_lines(log)}
     steps, begun = _steps(), time.monotonic()
     for target, mutant in chosen:
         fault = _text(mutant)
-        if (target, fault) not in told and time.monotonic() - begun < 60.0 * args.minutes:
+        if (target, fault) not in told and time.monotonic() - begun < 60.0 * minutes:
             outcome = _outcome(target, mutant, steps.get(target, ()))
             told[target, fault] = outcome
             append_line(log, {"target": target, "fault": fault, "outcome": outcome})
             print(f"{target}.py:{fault}: {outcome}", file=sys.stderr, flush=True)
-    return _show(told, len(chosen) - len(told), args.seed)
+    return _show(told, len(chosen) - len(told), seed)
 
 
 def _text(m: Mutant) -> str:
@@ -129,7 +126,7 @@ def _sample(count: int, seed: int, place: str) -> list[tuple[str, Mutant]]:
         if path.name not in ("__init__.py", "__main__.py") and f"{path}/".startswith(str(start))
         for mutant in mutants_of(path.read_text(encoding="utf-8"))
     ]
-    return random.Random(seed).sample(every, min(count, len(every)))
+    return Random(seed).sample(every, min(count, len(every)))
 
 
 def tests_of(target: str) -> tuple[tuple[str, ...], tuple[str, ...]]:

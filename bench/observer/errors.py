@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from bench.observer.lacks import chirp
 from bench.observer.truth import Truth, true_run
 from rsea_ros.model.observer import Observer, observe
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.rival_models import lumped_rig
-from rsea_ros.records.record import FloatArray
 
 RATE, SECONDS, SETTLE = 280.0, 8.0, 0.5
 RIGS = ("paper_high_impedance", "paper_moving_output", "prototype_knee", "separate_stiffnesses",
         "two_moving_outputs", "cycloidal")  # fmt: skip
 """All rigs of config/rigs that have a spring; the last one has no F/T sensor, and backlash."""
-
-
-def command(amplitude: float = 12.0) -> FloatArray:
-    """Return a chirp from 0.2 to 60 Hz with white noise of 3 N m, N m."""
-    t = np.arange(round(SECONDS * RATE)) / RATE
-    phase = 2.0 * np.pi * 0.2 * SECONDS / np.log(300.0) * (300.0 ** (t / SECONDS) - 1.0)
-    return amplitude * np.sin(phase) + 3.0 * np.random.default_rng(1).standard_normal(len(t))
 
 
 def errors(model: Rig, truth: Truth) -> tuple[float, float]:
@@ -40,7 +32,7 @@ def errors(model: Rig, truth: Truth) -> tuple[float, float]:
     return distal, proximal
 
 
-def rigs(args: argparse.Namespace) -> Iterator[str]:
+def rigs() -> Iterator[str]:
     """Compare the unlumped with the lumped observer on every rig with a spring.
 
     The lumped one takes encoder and F/T, which contradict each other there, or the F/T alone.
@@ -49,7 +41,7 @@ def rigs(args: argparse.Namespace) -> Iterator[str]:
     yield f"{'RMS error, N·m':24}{'T_p itself':>11}{heads}"
     for name in RIGS:
         rig = load_rig(name)
-        truth = true_run(rig, command(), RATE, seed=2)
+        truth = true_run(rig, chirp(RATE, SECONDS, (12.0, 3.0), 1), RATE, seed=2)
         size = float(np.sqrt(np.mean(truth.proximal**2)))
         unlumped, other = errors(rig, truth), errors(lumped_rig(rig), truth)
         line = f"{name:24}{size:11.3f}{unlumped[0]:14.4f}{unlumped[1]:9.4f}{other[0]:12.3f}{other[1]:9.3f}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -180,7 +179,7 @@ def restless(rig: Rig) -> tuple[float, float]:
     return worst
 
 
-def flag(args: argparse.Namespace) -> Iterator[str]:
+def flag() -> Iterator[str]:
     """Print the table, then latencies, then benches that differ from the model."""
     settings = ErrorSettings()
     names = ("share", "judged", "agree", "changes/s", "longest wrong, s")

@@ -7,7 +7,6 @@ project's simulation or effects.
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -194,7 +193,7 @@ def measure(a: Actuator, name: str, seconds: float, seeds: Sequence[int]) -> tup
     return *rms, float(np.mean(np.concatenate(inside)))
 
 
-def lacks(args: argparse.Namespace) -> Iterator[Row]:
+def lacks() -> Iterator[Row]:
     """Tell the error of T at the F/T sensor where the model lacks something, on plants of another hand."""
     both = actuators()
     for case in cases(both["bench"]):

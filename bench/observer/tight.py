@@ -6,7 +6,6 @@ the node's time.
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Iterator
 
@@ -22,7 +21,7 @@ from rsea_ros.records.record import FloatArray
 SAMPLES, WARM, REPEATS, RATE = 3000, 600, 5, 1000.0
 
 
-def tight(args: argparse.Namespace) -> Iterator[str]:
+def tight() -> Iterator[str]:
     """Print p50 and p99 of the best of five runs, with stamps on a grid and with jitter of 0.1 ms."""
     yield f"{'one sample, µs, best of five':34} p50, p99"
     for name in ("paper_high_impedance", "two_moving_outputs"):

@@ -7,9 +7,7 @@ loop with absolute deadlines.
 
 from __future__ import annotations
 
-import argparse
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -25,6 +23,7 @@ from bench import ROOT
 from bench.driver.bare_loop import BareLoop, may_have
 from bench.driver.reception import Reception
 from bench.observer.node import MARK
+from bench.processes import cpu_time, own_domain
 from msg_adapters.ros import JointState, WrenchStamped
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from rsea_ros.records.record import FloatArray
@@ -32,14 +31,15 @@ from rsea_ros.records.record import FloatArray
 SETTLE = 3.0
 
 
-def timing(args: argparse.Namespace) -> Iterator[str]:
+def timing(
+    *, rate: tuple[float, ...] = (280.0, 1000.0), priority: tuple[int, ...] = (0, 80), seconds: float = 20.0
+) -> Iterator[str]:
     """Measure each rate with each priority."""
-    os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    own_domain()
     yield f"{'what':58} {'required':18} p50, p99"
-    for rate, priority in product(args.rate, filter(may_have, args.priority)):
+    for hz, fifo in product(rate, filter(may_have, priority)):
         with tempfile.TemporaryDirectory() as folder:
-            yield from _at(rate, priority, args.seconds, Path(folder))
+            yield from _at(hz, fifo, seconds, Path(folder))
 
 
 def _at(rate: float, priority: int, seconds: float, folder: Path) -> Iterator[str]:
@@ -59,9 +59,9 @@ def _at(rate: float, priority: int, seconds: float, folder: Path) -> Iterator[st
         time.sleep(SETTLE)
         reception.forget()
         bare = BareLoop(rate, seconds, folder, priority)
-        begin, cpu = time.monotonic_ns(), _cpu(nodes[1])
+        begin, cpu = time.monotonic_ns(), cpu_time(nodes[1].pid)
         time.sleep(seconds)
-        end, cpu = time.monotonic_ns(), _cpu(nodes[1]) - cpu
+        end, cpu = time.monotonic_ns(), cpu_time(nodes[1].pid) - cpu
         estimates, wrenches = reception.delays("torque_estimate"), reception.delays("ft")
         lateness = np.abs(np.diff(bare.cycles()[:, 1]) / 1e6 - 1e3 / rate)
         reception.close()
@@ -99,9 +99,3 @@ def _start(words: list[str], folder: Path, environment: dict[str, str]) -> subpr
     log = (folder / f"{len(list(folder.iterdir()))}.log").open("wb")
     return subprocess.Popen([sys.executable, *words], env=environment, cwd=ROOT, stdin=subprocess.DEVNULL,
                             stdout=log, stderr=log)  # fmt: skip
-
-
-def _cpu(process: subprocess.Popen[bytes]) -> float:
-    """Return the CPU time of a process so far, s."""
-    fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -10,13 +10,9 @@ Status 1 where a nominal rig differs by more than NOMINAL, the allowed differenc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
-import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
-from bench import parser_of
-
-# isort: split
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RseaError
 from rsea_ros.exports.bam import export_bam
@@ -35,19 +31,19 @@ NOMINAL = 0.1
 """Times the sensor's noise."""
 
 
-def main(argv: Sequence[str]) -> int:
-    """Print the tables."""
-    parser = parser_of(__doc__)
-    parser.add_argument("rigs", nargs="*", help="default: all that a target takes")
-    parser.add_argument("--fmu", action="store_true", help="play FMUs, not MuJoCo")
-    parser.add_argument("--seconds", type=float, default=2.0, help="of the chirp (default %(default)s)")
-    args = parser.parse_args(argv)
+def main(rigs: tuple[str, ...] = (), *, fmu: bool = False, seconds: float = 2.0) -> int:
+    """Print the tables.
+
+    rigs: all that a target takes, where none is named
+    fmu: play FMUs, not MuJoCo
+    seconds: of the chirp
+    """
     words()
     worst = 0.0
-    for name in args.rigs or rig_names():
+    for name in rigs or rig_names():
         rig = load_rig(name)
-        if not rig.rigid_spring or args.fmu:
-            worst = max(worst, play_rig(rig, command(rig, args.seconds), args.fmu))
+        if not rig.rigid_spring or fmu:
+            worst = max(worst, play_rig(rig, command(rig, seconds), fmu))
     return int(worst > NOMINAL)
 
 

@@ -14,10 +14,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
-from bench import ROOT, parser_of
+from bench import ROOT
 
 VERSIONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
 FAST = (
@@ -28,11 +28,9 @@ NODES = re.compile(r"rclpy|msg_adapters\.ros|rsea_ros\.nodes")
 USE = "import rsea_ros as rsea; rsea.simulate('paper_high_impedance', [0.0, 1.0] * 300, rate=280.0)"
 
 
-def main(argv: Sequence[str]) -> int:
+def main(*, only: Annotated[tuple[str, ...], VERSIONS] = VERSIONS) -> int:
     """Try each version and print a line for it; status 1 when one fails."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--only", nargs="+", choices=VERSIONS, default=list(VERSIONS))
-    results = [try_version(version) for version in parser.parse_args(argv).only]
+    results = [try_version(version) for version in only]
     return 1 if "failed" in results else 0
 
 

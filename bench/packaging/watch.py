@@ -1,7 +1,7 @@
 """Cost of the live view: its processor time as a share of one core, with a page open, at some rates.
 
-Options: [--rate 280 1000] [--seconds 20]. A plant, the observer and the node `watch` run as
-processes of their own; a page is a socket that reads all frames. The plant's late cycles, without and with
+A plant, the observer and the node `watch` run as processes of their own; a page is a socket that reads all
+frames. The plant's late cycles, without and with
 the view for equally long, say whether it delays the loop. Status 1 when the view takes more than 10 % of a
 core at 280 Hz, or more cycles are missed with it than without, by more than chance.
 """
@@ -14,14 +14,14 @@ import re
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-from bench import parser_of
+from bench.processes import cpu_time
 from rsea_ros.cli._processes import Processes
 
 MOST = 0.10
@@ -31,19 +31,19 @@ DOMAIN = 94
 ADDRESS = re.compile(r"open http://(\S+)/\?token=(\S+)")
 
 
-def main(argv: Sequence[str]) -> int:
-    """Measure at each rate and print a row."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="of the plant, Hz")
-    parser.add_argument("--seconds", type=float, default=20.0, help="of each measurement")
-    given = parser.parse_args(argv)
+def main(*, rate: tuple[float, ...] = (280.0, 1000.0), seconds: float = 20.0) -> int:
+    """Measure at each rate and print a row.
+
+    rate: of the plant, Hz
+    seconds: of each measurement
+    """
     os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
     print("    rate  pages    core  frames/s   kB/s  plant's missed cycles/s before, with")
     wrong = False
-    for rate in given.rate:
-        for pages, share, delays, row in measure_pages(rate, given.seconds):
-            print(f"{rate:6.0f}Hz {pages:6d} {share:7.1%} {row}{'  delays the loop' * delays}", flush=True)
-            wrong |= delays or (rate <= 280.0 and share > MOST)
+    for hz in rate:
+        for pages, share, delays, row in measure_pages(hz, seconds):
+            print(f"{hz:6.0f}Hz {pages:6d} {share:7.1%} {row}{'  delays the loop' * delays}", flush=True)
+            wrong |= delays or (hz <= 280.0 and share > MOST)
     return int(wrong)
 
 
@@ -85,12 +85,12 @@ async def watch_run(
             counts[1] += len(text)
 
     readers = [asyncio.ensure_future(read(s)) for s in sockets]
-    used, begin = processor_time(pid), time.monotonic()
+    used, begin = cpu_time(pid), time.monotonic()
     late = await asyncio.get_running_loop().run_in_executor(None, missed_rate, seconds)
     span = time.monotonic() - begin
     for each in readers:
         each.cancel()
-    return (processor_time(pid) - used) / span, counts[0] / span, 1e-3 * counts[1] / span, late
+    return (cpu_time(pid) - used) / span, counts[0] / span, 1e-3 * counts[1] / span, late
 
 
 def missed_rate(seconds: float) -> float:
@@ -106,12 +106,6 @@ def missed_rate(seconds: float) -> float:
             if time.monotonic() > deadline:
                 break
     return (values[-1] - values[0]) / seconds if values else float("nan")
-
-
-def processor_time(pid: int) -> float:
-    """Return the processor time that a process has used, s."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def wait_for(ask: Callable[[], Any], seconds: float = 30.0) -> Any:

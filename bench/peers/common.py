@@ -1,6 +1,6 @@
-"""What every peer's script shares: it reads a case, and writes what it predicts.
+"""What every peer shares: it reads a case, and writes what it predicts.
 
-    python with_NAME.py CASE.npz RESULT.json BUDGET
+    python common.py NAME CASE.npz RESULT.json BUDGET
 
 A case has t (s), u (input), y (output to be predicted), position, velocity (empty where not measured), each
 of shape (n,), `split` (index of the first held-out sample) and `meta` (JSON: physics and stated values). A
@@ -10,6 +10,7 @@ BUDGET: processor seconds. Only numpy is needed, so that every peer's environmen
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
 import time
@@ -61,9 +62,9 @@ class NotApplicable(Exception):
     """A case that a peer has no model for; its text is the reason."""
 
 
-def main(fit: Callable[[PeerCase], PeerResult]) -> None:
-    """Run a peer on the case of the command line."""
-    source, target, budget = sys.argv[1:4]
+def main(name: str, source: str, target: str, budget: str) -> None:
+    """Run the function `fit` of with_NAME.py on a case."""
+    fit = importlib.import_module(f"with_{name}").fit
     data = np.load(source)
     arrays = (np.array(data[n]) for n in ("t", "u", "y", "position", "velocity"))
     case = PeerCase(*arrays, int(data["split"]), json.loads(str(data["meta"])), float(budget))
@@ -104,3 +105,9 @@ def narx_rows(u: Array, y: Array, lags: int) -> tuple[Array, Array]:
     columns = [y[lags - k : len(y) - k] for k in range(1, lags + 1)]
     columns += [u[lags - k : len(y) - k] for k in range(lags + 1)]
     return np.column_stack(columns), y[lags:]
+
+
+if __name__ == "__main__":
+    from common import main as run_peer  # under the name by which the peers know its classes
+
+    run_peer(*sys.argv[1:])

@@ -10,19 +10,16 @@ which settings, and who is at home where: docs/peers.md.
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from bench import parser_of
 from bench.peers.cases import REAL, SIMULATED, PeerRecord
 
 HERE = Path(__file__).resolve().parent
@@ -48,60 +45,49 @@ DIVERGED = -1000.0
 """Fit, %, below which a free run is said to diverge."""
 
 
-def main(argv: Sequence[str]) -> int:
-    """Run what is missing, and print the table."""
-    args = _parser().parse_args(argv)
-    cases = [make() for make in SIMULATED]
-    if args.realdata:
-        cases += [make(args.realdata) for make in REAL]
-    cases = [c for c in cases if not args.cases or c.name in args.cases]
-    args.out.mkdir(parents=True, exist_ok=True)
+def main(
+    *, peers: Annotated[tuple[str, ...], PEERS] = PEERS, cases: tuple[str, ...] = (),
+    realdata: Path | None = None,
+    budget: float = 20.0, envs: Path = Path("out/peers/envs"), out: Path = Path("out/peers"),
+) -> None:  # fmt: skip
+    """Run what is missing, and print the table.
+
+    cases: names of cases, all where none is named
+    realdata: folder with silverbox and emps; without it those cases are left out
+    budget: processor seconds for a fit; 0: run nothing, print the results so far
+    envs: environments
+    out: cases and results
+    """
+    made = [make() for make in SIMULATED] + [make(realdata) for make in REAL if realdata]
+    out.mkdir(parents=True, exist_ok=True)
     rows = []
-    for case in cases:
-        for peer in args.peers:
-            result = _result(peer, case, args)
-            rows.append(_row(peer, case, result))
+    for case in (c for c in made if not cases or c.name in cases):
+        for peer in peers:
+            rows.append(_row(peer, case, _result(peer, case, out, envs, budget)))
             print(rows[-1], file=sys.stderr, flush=True)
-    table = HEAD + "\n".join(rows) + "\n"
-    print(table)
-    return 0
+    print(HEAD + "\n".join(rows) + "\n")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = parser_of(__doc__)
-    add = parser.add_argument
-    add("--peers", nargs="+", default=PEERS, choices=PEERS, metavar="PEER", help=f"of {', '.join(PEERS)}")
-    add("--cases", nargs="+", default=[], metavar="CASE", help="names of cases (default all)")
-    add("--realdata", type=Path, help="folder with silverbox and emps; without it those cases are left out")
-    add("--budget", type=float, default=20.0, help="processor seconds for a fit (default %(default)g)")
-    add("--envs", type=Path, default=Path("out/peers/envs"), help="environments (default %(default)s)")
-    add("--out", type=Path, default=Path("out/peers"), help="cases and results (default %(default)s)")
-    add("--table", action="store_true", help="run nothing, print the results so far")
-    return parser
-
-
-def _result(peer: str, case: PeerRecord, args: argparse.Namespace) -> dict[str, Any]:
+def _result(peer: str, case: PeerRecord, out: Path, envs: Path, budget: float) -> dict[str, Any]:
     """Return the result of a peer, from its file if there is one."""
     stem = f"{case.name.replace(' ', '_').replace(',', '').replace(chr(39), '')}"
-    target = args.out / f"{stem}.{peer}.json"
+    target = out / f"{stem}.{peer}.json"
     if target.exists():
         return dict(json.loads(target.read_text(encoding="utf-8")))
-    if args.table:
-        return {"not_run": "not yet"}
-    python, reason = _python(peer, args.envs)
-    if reason:
-        return {"not_run": reason}
-    source = args.out / f"{stem}.npz"
+    python, reason = _python(peer, envs)
+    if reason or not budget:
+        return {"not_run": reason or "not yet"}
+    source = out / f"{stem}.npz"
     np.savez(source, meta=json.dumps(case.meta), **case.arrays)  # type: ignore[arg-type]
-    command = [python, HERE / f"with_{peer}.py", source, target, str(args.budget)]
+    command = [python, HERE / "common.py", peer, source, target, str(budget)]
     one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         done = subprocess.run(
-            list(map(str, command)), env={**os.environ, **one_thread}, timeout=PATIENCE * args.budget,
+            list(map(str, command)), env={**os.environ, **one_thread}, timeout=PATIENCE * budget,
             capture_output=True, text=True, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return {"not_run": f"stopped after {PATIENCE * args.budget:g} s"}
+        return {"not_run": f"stopped after {PATIENCE * budget:g} s"}
     if not target.exists():
         lines = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
         return {"not_run": lines[-1][:120]}

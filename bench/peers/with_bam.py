@@ -7,7 +7,7 @@ actuators, 2025; Rhoban/bam 1.0.2.
 from __future__ import annotations
 
 import numpy as np
-from common import PeerCase, PeerResult, main
+from common import PeerCase, PeerResult
 from evolution import evolve, predict
 from second_order import NAMES, simulate_run
 
@@ -50,7 +50,3 @@ def _free(case: PeerCase, names: tuple[str, ...]) -> dict[str, tuple[float, bool
     for stated in ("stiffness", "gravity"):
         free |= {stated: (1.0, True)} if case.meta["stated"].get(stated) else {}
     return free | {n: (scales[n], False) for n in names}
-
-
-if __name__ == "__main__":
-    main(fit)

@@ -6,7 +6,7 @@ else, such as the stiffness of a spring, stays as stated.
 
 from __future__ import annotations
 
-from common import PeerCase, PeerResult, main
+from common import PeerCase, PeerResult
 from evolution import evolve, predict
 
 
@@ -18,7 +18,3 @@ def fit(case: PeerCase) -> PeerResult:
     values, _ = evolve(case, free, case.split, 0.9 * case.seconds_left)
     shown = {n: values[n] for n in ("inertia", "damping", "friction", "delay")}
     return PeerResult(predict(case, values), shown)
-
-
-if __name__ == "__main__":
-    main(fit)

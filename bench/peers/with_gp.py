@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from common import PeerCase, PeerResult, free_run, main, narx_rows, scale
+from common import PeerCase, PeerResult, free_run, narx_rows, scale
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, DotProduct, WhiteKernel
 
@@ -20,7 +20,3 @@ def fit(case: PeerCase) -> PeerResult:
     weights, x, k = process.alpha_, process.X_train_, process.kernel_
     predicted = free_run(lambda row: float(k(row[None, :], x)[0] @ weights), u, y, LAGS)
     return PeerResult(mean + size * predicted, note=f"{LAGS} lags, {POINTS} points")
-
-
-if __name__ == "__main__":
-    main(fit)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import jax
 import numpy as np
-from common import PeerCase, PeerResult, main, scale
+from common import PeerCase, PeerResult, scale
 from jax_sysid.models import LinearModel
 
 STATES, ROUNDS = 4, 300
@@ -24,7 +24,3 @@ def fit(case: PeerCase) -> PeerResult:
     run, _ = model.predict(np.ravel(model.x0), u[:, None])
     predicted = np.ravel(run)[case.split :]
     return PeerResult(mean + size * predicted, note=f"linear, {STATES} states")
-
-
-if __name__ == "__main__":
-    main(fit)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import torch
-from common import PeerCase, PeerResult, main, scale
+from common import PeerCase, PeerResult, scale
 
 HIDDEN, LENGTH, BATCH, SKIP, RATE = 32, 300, 16, 30, 3e-3
 """Units; samples of a sequence; sequences of a step; samples at a sequence's start that no loss looks at."""
@@ -42,7 +42,3 @@ def fit(case: PeerCase) -> PeerResult:
     with torch.no_grad():
         run = network(inputs[None, :])[0, case.split :].numpy()
     return PeerResult(mean + size * run, note=f"{HIDDEN} units, {rounds} steps of Adam")
-
-
-if __name__ == "__main__":
-    main(fit)

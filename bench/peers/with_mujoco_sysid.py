@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from common import NotApplicable, PeerCase, PeerResult, main
+from common import NotApplicable, PeerCase, PeerResult
 from mujoco import sysid
 
 PARTS = 4
@@ -105,7 +105,3 @@ def _run(xml: str, controls):
         mujoco.mj_step(model, data)
         out[k] = data.qpos[0], data.qvel[0]
     return out
-
-
-if __name__ == "__main__":
-    main(fit)

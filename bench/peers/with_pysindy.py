@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pysindy
-from common import PeerCase, PeerResult, main
+from common import PeerCase, PeerResult
 
 DEGREE, THRESHOLD = 3, 0.01
 
@@ -44,7 +44,3 @@ def _simulate(model, state, u, period):
         d = rate(x + period * c, force)
         states.append(np.clip(x + period / 6.0 * (a + 2.0 * b + 2.0 * c + d), -20.0, 20.0))
     return np.array(states)
-
-
-if __name__ == "__main__":
-    main(fit)

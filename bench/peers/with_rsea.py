@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from common import NotApplicable, PeerCase, PeerResult, main
+from common import NotApplicable, PeerCase, PeerResult
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))
 
@@ -81,7 +81,3 @@ def _duffing(case: PeerCase) -> PeerResult:
     whole = record_of(TORQUE * case.u, np.zeros(len(case.u)), rate)
     drive = case_of(rig, whole, skip=0).drive
     return PeerResult(simulate_drive(rig, drive)["position"][n:] / ANGLE, note="rig with stated effects")
-
-
-if __name__ == "__main__":
-    main(fit)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from common import PeerCase, PeerResult, main, scale
+from common import PeerCase, PeerResult, scale
 from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
@@ -24,7 +24,3 @@ def fit(case: PeerCase) -> PeerResult:
     run = np.ravel(model.predict(X=u[begin:, None], y=first[:LAGS, None]))[LAGS:]
     terms = len(np.ravel(model.theta))
     return PeerResult(mean + size * run[: len(u) - case.split], note=f"{LAGS} lags, {terms} terms")
-
-
-if __name__ == "__main__":
-    main(fit)

@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from bench.public.fit import DATA, RIGS, Score, case_of, error_from, fit_rig, record_of, rig_of
+from bench.public.fit import DATA, RIGS, Score, case_of, error_of, fit_rig, record_of, rig_of
 from bench.public.hdf5 import arrays
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
@@ -31,8 +31,8 @@ def scores() -> list[Score]:
     rig = _rig(record_of(TORQUE * train["multisine/u"], train["multisine/y"], RATE))
     u, y = (np.tile(test[f"multisine/{n}"], 2) for n in "uy")
     errors = {
-        "multisine": error_from(rig, record_of(TORQUE * u, y, RATE), skip=len(u) // 2),
-        "sine sweep": error_from(rig, record_of(TORQUE * test["sinesweep/u"], test["sinesweep/y"], RATE)),
+        "multisine": error_of(rig, record_of(TORQUE * u, y, RATE), skip=len(u) // 2),
+        "sine sweep": error_of(rig, record_of(TORQUE * test["sinesweep/u"], test["sinesweep/y"], RATE)),
     }
     return [Score(f"Bouc-Wen, {n}", e, "m", *PUBLISHED[n]) for n, e in errors.items()]
 

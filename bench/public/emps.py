@@ -18,7 +18,7 @@ from itertools import product
 import numpy as np
 from scipy.io import loadmat
 
-from bench.public.fit import DATA, RIGS, Score, case_of, error_from, fit_rig, record_of, rig_of
+from bench.public.fit import DATA, RIGS, Score, case_of, error_of, fit_rig, record_of, rig_of
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.prediction_errors import predict
@@ -51,12 +51,12 @@ def scores() -> list[Score]:
     return [free, Score("EMPS, free run in its loop, targets as input", _error_in_loop(), "mm", none, np.inf)]
 
 
-def both_ways() -> str:
-    """Return what the law fitted to each whole record leaves of both, mm."""
+def main() -> None:
+    """Print what the law fitted to each whole record leaves of both, mm."""
     records = [_record(name) for name in FILES]
     rigs = [_fit(r, r.stop - r.start, HELD) for r in records]
     rows = [" | ".join(f"{_error(rig, r):.2f}" for r in records) for rig in rigs]
-    return "\n".join(f"fitted to {name}: {row} mm" for name, row in zip(FILES, rows, strict=True))
+    print(*(f"fitted to {name}: {row} mm" for name, row in zip(FILES, rows, strict=True)), sep="\n")
 
 
 def _error_in_loop() -> float:
@@ -84,7 +84,7 @@ def _fit(record: Record, length: float, held: set[str]) -> Rig:
 
 def _error(rig: Rig, record: Record) -> float:
     """Return the RMS error of a free run, mm."""
-    return 1e3 * error_from(rig, record, WINDOW, refine=1, initial=_state(record, record.start))
+    return 1e3 * error_of(rig, record, WINDOW, refine=1, initial=_state(record, record.start))
 
 
 def _state(record: Record, t: float) -> tuple[float, float]:
@@ -92,7 +92,3 @@ def _state(record: Record, t: float) -> tuple[float, float]:
     near = record["position"].between(t - WINDOW / RATE, t + WINDOW / RATE)
     velocity, position = np.polyfit(near.t - t, near.y, 3)[-2:]
     return float(position), float(velocity)
-
-
-if __name__ == "__main__":
-    print(both_ways())

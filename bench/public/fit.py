@@ -78,30 +78,17 @@ def rig_of(solution: Solution) -> Rig:
     return apply(solution.problem.rig, solution.problem.unknowns, solution.theta)[0]
 
 
-def error_of(rig: Rig, record: Record, window: int, refine: int = REFINE) -> float:
-    """Return the RMS error on a test record, the first `window` samples left out, as the position's unit.
+def error_of(
+    rig: Rig, record: Record, skip: int = 0, refine: int = REFINE,
+    initial: tuple[float, float] | None = (0.0, 0.0),
+) -> float:  # fmt: skip
+    """Return the RMS error on a test record, its first `skip` samples left out, in the position's unit.
 
-    They give the initial state: position and velocity that fit them best.
+    initial: position and velocity at the start; None: those that fit the first samples best.
     """
-    drive = drive_from(record, hold=rig.hold, refine=refine)
-    started = replace(drive, initial=_initial(rig, drive, record["position"].y[:window]))
-    return _rms(simulate_drive(rig, started)["position"] - record["position"].y, window)
-
-
-def error_from(
-    rig: Rig,
-    record: Record,
-    skip: int = 0,
-    refine: int = REFINE,
-    initial: tuple[float, float] = (0.0, 0.0),
-) -> float:
-    """Return the RMS error on a test record that is simulated from a state, its first samples left out."""
-    drive = replace(drive_from(record, hold=rig.hold, refine=refine), initial=initial)
-    return _rms(simulate_drive(rig, drive)["position"] - record["position"].y, skip)
-
-
-def _rms(error: FloatArray, skip: int) -> float:
-    return float(np.sqrt(np.mean(error[skip:] ** 2)))
+    drive, measured = drive_from(record, hold=rig.hold, refine=refine), record["position"].y
+    started = replace(drive, initial=initial or _initial(rig, drive, measured[:skip]))
+    return float(np.sqrt(np.mean((simulate_drive(rig, started)["position"] - measured)[skip:] ** 2)))
 
 
 def _initial(rig: Rig, drive: Drive, measured: FloatArray) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from bench.public import boucwen, emps, silverbox
 from bench.public.fit import DATA, Score
@@ -16,7 +16,7 @@ from bench.public.fit import DATA, Score
 HEAD = "| test | error here | published | required |  | s |\n|---|---|---|---|---|---|\n"
 
 
-def main(argv: Sequence[str]) -> int:
+def main() -> int:
     """Print the table; 1 where a limit is not reached, 2 without the data."""
     if not DATA.is_dir():
         print(f"{DATA}: no such folder, expected the measurements of real machines", file=sys.stderr)
@@ -40,7 +40,3 @@ def _row(score: Score, seconds: float) -> str:
     if math.isinf(score.asked):
         asked = reached = ""
     return f"| {score.test} | {error} | {score.published} | {asked} | {reached} | {seconds:.0f} |"
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

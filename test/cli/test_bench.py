@@ -6,16 +6,19 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 import yaml
 
-from bench.__main__ import index, main as run_bench
-from bench.results import tables_of, write_pages
+from bench.__main__ import _parser, index, main as run_bench
+from bench.frozen.cases import generated
+from bench.results import read_lines, resumed, tables_of, write_pages
 from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli.main import main
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.model.rig_file import load_rig, rig_folders
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -104,3 +107,53 @@ def test_a_run_keeps_each_table_that_it_prints_by_rows_and_columns():
     text = "found:\n| a | required | b |\n|---|--:|---|\n| x | <= 1 | 0.5 |\n\n| a |\n|---|\n| y |\n"
     (first,), (second,) = tables_of(text)
     assert first == ("x", "<= 1", {"b": "0.5"}) and second == ("y", "", {})
+
+
+def section(
+    step: Annotated[str, ("play", "table")], *, log: Path, seeds: tuple[int, ...] = (1,), exact: bool = False
+):
+    """Play.
+
+    seeds: of records
+    """
+
+
+def test_the_command_line_of_a_section_is_its_signature(capsys):
+    parser = _parser("frozen", {"play": section})
+    given = parser.parse_args(["table", "--log", "a.jsonl", "--seeds", "2", "3"])
+    assert vars(given) == {"step": "table", "log": Path("a.jsonl"), "seeds": [2, 3], "exact": False}
+    with pytest.raises(SystemExit):
+        parser.parse_args(["draw", "--log", "a.jsonl"])
+    assert "'draw', expected one of play, table" in capsys.readouterr().err
+
+
+def test_a_run_that_was_stopped_goes_on_with_its_log(tmp_path):
+    works = [(name, lambda name=name: {"record": name}) for name in "ab"]
+    assert [line["record"] for line in resumed(tmp_path / "log", works[:1], "record")] == ["a"]
+    assert [line["record"] for line in resumed(tmp_path / "log", works, "record")] == ["b"]
+    assert [line["record"] for line in read_lines(tmp_path / "log")] == ["a", "b"]
+
+
+GENERATOR = """
+from pathlib import Path
+
+def cases(seed):
+    yield f"stuck{seed}", ["coulomb_friction"]
+
+def make(name, seed, folder):
+    rows = "".join(f"{0.01 * k},{k % 7},{k % 5}\\n" for k in range(200))
+    channels = "{command: {column: u, unit: N m}, ft: {column: y, unit: N m}}"
+    Path(folder, "record.csv").write_text("t,u,y\\n" + rows)
+    Path(folder, "map.yaml").write_text("time: {column: t, unit: s}\\nchannels: " + channels)
+    Path(folder, "rig.yaml").write_text(Path("RIG").read_text())
+"""
+
+
+def test_generators_of_another_hand_are_played_from_their_folder(tmp_path):
+    rig = next(folder / "paper_high_impedance.yaml" for folder in rig_folders())
+    (tmp_path / "stuck_plant.py").write_text(GENERATOR.replace("RIG", str(rig)))
+    entries = list(generated(tmp_path, [3, 4]))
+    assert [entry.name for entry in entries] == ["stuck_plant-3/stuck3", "stuck_plant-4/stuck4"]
+    played = entries[0].make()
+    assert played.truth == ("coulomb_friction",) and len(played.record["ft"]) == 200
+    assert played.rig.name == load_rig("paper_high_impedance").name
