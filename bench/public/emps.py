@@ -20,6 +20,7 @@ from scipy.io import loadmat
 
 from bench.public.fit import DATA, RIGS, Score, case_of, error_of, fit_rig, record_of, rig_of
 from msg_adapters.tables import import_record, load_map
+from rsea_ros.cli.maps import map_path
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -27,7 +28,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Record
 
 FILES = ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")
-MAPS = [RIGS.parents[1] / "config" / "imports" / f"emps_{run}.yaml" for run in ("identification", "pulses")]
+MAPS = [map_path(f"emps_{run}") for run in ("identification", "pulses")]
 RATE, WINDOW, TWO_THIRDS = 1000.0, 20, 16.0
 COULOMB = EffectSetting("coulomb_friction", {"torque": 20.0, "creep_velocity": 1e-5})
 ONE_SIDED = EffectSetting("asymmetric_friction", {"offset": 0.0, "viscous_difference": 0.0})
