@@ -105,6 +105,18 @@ def test_sensor_noise_alone_is_no_torque_and_as_strong_as_predicted():
     assert np.mean(heard[280:], axis=0) == pytest.approx(foretold, rel=0.3)
 
 
+def test_one_wrong_reading_of_ft_is_not_believed():
+    """Noise beyond 4 sigma, once a minute, passed for a torque that the model lacks: 94 false alarms."""
+    rig, rate = load_rig("paper_high_impedance"), 280.0
+    observer, plant = Observer(rig), Plant(rig, rate, seed=12)
+    for k in range(2000):
+        sample = plant.step(0.0)
+        observer.state(k / rate, sample.position, sample.motor_torque)
+        wrong = 5.0 * rig.sensors["ft"].noise if k == 1500 else 0.0
+        estimate = observer.ft(k / rate, sample.ft + wrong)
+        assert k < 280 or abs(estimate.distal) < rig.sensors["ft"].noise
+
+
 def test_the_noise_of_white_samples_is_split_as_the_butterworth_pair_does():
     """Closed form of the mean of 1 / (1 + (tan x / g)^4): the part that passes below the corner."""
     corner, dt = 57.0, 1.0 / 280.0
