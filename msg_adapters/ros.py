@@ -1,10 +1,9 @@
-"""Message types of ROS for the nodes, made from plain numbers and taken apart again. Needs ROS.
+"""Message types of ROS for the nodes, made from plain numbers. Needs ROS.
 
-Stamps are integers, ns since the epoch; values are SI. A field that a message does not hold is NaN.
+Stamps are integers, ns since the epoch; values are SI.
 """
 
 import importlib
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,7 +18,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from msg_adapters.topic_map import AXES, sign_and_index
 from rsea_ros.errors import ParameterError
 
 __all__ = [
@@ -77,21 +75,13 @@ def deflection_message(stamp_ns: int, angle: float, joint: str = "joint", frame:
     return _state(stamp_ns, [joint], frame, position=[float(angle)])
 
 
-def wrench_message(
-    stamp_ns: int, values: float | Sequence[float], axis: str = "torque.z", frame: str = "ft_sensor"
-) -> WrenchStamped:
-    """Return a wrench of force N and torque N m: all six values in the order of AXES, or that of one axis."""
-    if isinstance(values, Sequence):
-        wrench = [float(value) for value in values]
-    else:
-        sign, index = sign_and_index(axis)
-        wrench = [0.0] * len(AXES)
-        wrench[index] = sign * float(values)
+def wrench_message(stamp_ns: int, values: Sequence[float], frame: str = "ft_sensor") -> WrenchStamped:
+    """Return a wrench of force N and torque N m: all six values in the order of AXES."""
     message = WrenchStamped()
     message.header.stamp = time_of(stamp_ns)
     message.header.frame_id = frame
     force, torque = message.wrench.force, message.wrench.torque
-    force.x, force.y, force.z, torque.x, torque.y, torque.z = wrench
+    force.x, force.y, force.z, torque.x, torque.y, torque.z = map(float, values)
     return message
 
 
@@ -141,26 +131,6 @@ def parameter_descriptor(
     return descriptor
 
 
-def effort_of(message: JointState, joint: str | None = None) -> tuple[int, float]:
-    """Return the stamp (ns) and the torque (N m) of a command or a desired torque."""
-    return stamp_of(message.header.stamp), _value(message.effort, _index(message, joint))
-
-
-def joint_state_of(message: JointState, joint: str | None = None) -> tuple[int, float, float, float]:
-    """Return the stamp (ns), position (rad), velocity (rad/s) and torque (N m) of one joint."""
-    index = _index(message, joint)
-    position, velocity = _value(message.position, index), _value(message.velocity, index)
-    return stamp_of(message.header.stamp), position, velocity, _value(message.effort, index)
-
-
-def wrench_of(message: WrenchStamped, axis: str = "torque.z") -> tuple[int, float]:
-    """Return the stamp (ns) and the component of the wrench about the actuator axis (N m)."""
-    sign, index = sign_and_index(axis)
-    force, torque = message.wrench.force, message.wrench.torque
-    values = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
-    return stamp_of(message.header.stamp), sign * float(values[index])
-
-
 def message_type(name: str) -> Any:
     """Return the class of a type such as 'sensor_msgs/msg/JointState'.
 
@@ -188,19 +158,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, str | bool | int | float):
         return value
     return [_plain(item) for item in value]
-
-
-def _index(message: JointState, joint: str | None) -> int:
-    """Return the index of a joint. Raises ParameterError for a missing one, or one among several."""
-    names = list(message.name)
-    if joint is not None and names:
-        if joint not in names:
-            raise ParameterError(f"no joint {joint!r} in the message, which holds {', '.join(names)}")
-        return names.index(joint)
-    if joint is None and len(names) > 1:
-        raise ParameterError(f"{len(names)} joints ({', '.join(names)}), expected one; name it with `joint`")
-    return 0
-
-
-def _value(field: Sequence[float], index: int) -> float:
-    return float(field[index]) if index < len(field) else math.nan

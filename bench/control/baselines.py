@@ -28,10 +28,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from rsea_ros.control.controller import Measurement, TorqueController
+from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import LOCKED, load_range
-from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.trials import amplitude_of, disturbed_rig
 from rsea_ros.control.uncertainty import BenchVariant, variant_rig

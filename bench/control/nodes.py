@@ -27,7 +27,7 @@ from bench.driver.bare_loop import may_have
 from bench.processes import own_domain
 from msg_adapters.ros import DiagnosticArray, JointState, torque_command_message
 from msg_adapters.topic_map import AXES, JOINT_STATE, WRENCH
-from rsea_ros.control.settings import TorqueLimits
+from rsea_ros.control.controller import TorqueLimits
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes._cycle import SECOND

@@ -23,14 +23,13 @@ import numpy as np
 from bench.control.baselines import baselines
 from bench.control.human import Virtual, measure_impedance, passive_to, stiffest
 from rsea_ros.cli.control import motors
-from rsea_ros.control.controller import Measurement, TorqueController
+from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
+from rsea_ros.control.following import ControlTrace, reading
 from rsea_ros.control.grid import Grid, Lateness
-from rsea_ros.control.harness import ControlTrace, reading
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.link import LinkShare, link_share, linked_set
 from rsea_ros.control.loads import LOCKED, load_range, lock
 from rsea_ros.control.robustness import largest, robustness
-from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
 from rsea_ros.control.trials import LEARNED, sine, tracking_error

@@ -4,22 +4,51 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
-from msg_adapters.tables.clock import spread_repeats
 from msg_adapters.tables.column_files import read_columns
 from msg_adapters.tables.column_table import CHANNELS, LINEAR, Table, canonical, unit
 from msg_adapters.tables.import_map import ImportMap, RowFilter
 from msg_adapters.tables.map_terms import ChannelTerm
 from msg_adapters.tables.raw_codes import raw_code
-from msg_adapters.tables.set_points import SET_POINTS, static_lines
 from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.units import in_motion, plain
 from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import ImportMapError
 from rsea_ros.records.record import IMPORTED, UNITS, BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.records.stamps import even_behind_ticks
+
+SET_POINTS = (
+    "static readings, without the commands, one a second in the bag: `identify` and `diagnose` need the"
+    " record of a motion; a stiffness found here goes into its rig"
+)
+_ORDER = ("deflection", "position", "command", "motor_torque", "ft")
+"""A channel over those before it."""
+_FEWEST, _NORMAL = 4, 1.96
+
+
+def static_lines(record: Record) -> Iterator[str]:
+    """Yield the line through each two channels of readings at rest, y = slope x + offset, with 95 %.
+
+    Of ft over deflection the slope is the spring's stiffness. Source: ordinary least squares.
+    """
+    for x, y in combinations([name for name in _ORDER if name in record], 2):
+        at, readings = record[x], record[y]
+        if len(at) != len(readings) or len(at) < _FEWEST or np.ptp(at.y) == 0.0:
+            continue
+        (slope, offset), covariance = np.polyfit(at.y, readings.y, 1, cov=True)
+        off = float(np.abs(readings.y - slope * at.y - offset).max())
+        unit, per = plain(UNITS[y]), plain(UNITS[x])
+        ratio = "" if unit == per else f" {unit}/{per}"
+        half = _NORMAL * float(covariance[0, 0]) ** 0.5
+        yield (
+            f"{y} over {x}: {slope:.6g} ± {half:.2g}{ratio}, {offset:.3g} {unit} at zero,"
+            f" readings up to {off:.2g} {unit} off the line"
+        )
+
 
 UNDATED = 1e8
 """Stamps below this (s, three years after 1970) have no date: the file's clock starts near zero."""
@@ -352,3 +381,40 @@ def _values(table: Table, terms: Sequence[ChannelTerm], keep: BoolArray, t: Floa
             values += term.constant
             total += values
     return total
+
+
+LONG = 1.5
+"""Where the clock moved this many times its usual tick, whole ticks passed without a sample."""
+
+
+def spread_repeats(t: FloatArray) -> tuple[FloatArray, str]:
+    """Spread samples with equal stamps evenly until the clock's next tick; return a note.
+
+    Where all stamps fit one even clock, that is used. Otherwise the first sample after a tick is dated by it
+    to within one sample period, so the error of each stamp stays below that, whatever the rate does
+    meanwhile; a line through all samples would be off by as much as the rate wanders.
+    t: s, shape (n,), not decreasing. Returns t unchanged where no stamp repeats.
+    """
+    first = np.flatnonzero(np.diff(t, prepend=-np.inf))
+    if len(first) == len(t) or len(first) < 2:
+        return t, ""
+    repeats = f"{len(t) - len(first)} of {len(t)} stamps repeat"
+    even = even_behind_ticks(t)
+    if even is not None:
+        rate = 1.0 / (even[1] - even[0])
+        return even, f"{repeats}: samples dated by the even clock that they fit, {rate:.4g} Hz"
+    counts = np.diff(first, append=len(t))
+    spans = np.diff(t[first])
+    tick = float(np.median(spans))
+    spans = np.append(np.where(spans > LONG * tick, tick, spans), tick)
+    steps = spans / counts
+    steps[-1] = min(steps[-2:])
+    place = np.arange(len(t)) - np.repeat(first, counts)
+    spread = t + place * np.repeat(steps, counts)
+    if np.median(counts) > 1:  # the recording began within a tick
+        spread[: counts[0]] = spread[first[1]] - (counts[0] - place[: counts[0]]) * min(steps[:2])
+    slow, fast = 1.0 / np.quantile(steps, [0.95, 0.05])
+    return spread, (
+        f"{repeats} (clock of {tick * 1e3:.3g} ms):"
+        f" samples spread evenly between its ticks, {slow:.0f} to {fast:.0f} Hz"
+    )

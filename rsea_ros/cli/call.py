@@ -10,7 +10,7 @@ from rsea_ros.cli._graph import need_ros
 from rsea_ros.cli._terminal import positive
 
 if TYPE_CHECKING:
-    from rsea_ros.nodes._caller import Caller
+    from rsea_ros.nodes._visitor import Caller
 
 HELP = "call a running node: activate, deactivate, clear_fault, stop …"
 EXAMPLE = "rsea call driver configure activate"
@@ -27,8 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """List, or call."""
     need_ros()
-    from rsea_ros.nodes._caller import Caller
-    from rsea_ros.nodes._visitor import visit
+    from rsea_ros.nodes._visitor import Caller, visit
 
     with visit("rsea_call") as node:
         caller = Caller(node)
@@ -49,7 +48,7 @@ def _list(caller: Caller, nodes: Sequence[str]) -> None:
 
 def offer_of(caller: Caller, node: str) -> tuple[str, str]:
     """Return the state of a node and what it would do now; a node that hangs does not hide the others."""
-    from rsea_ros.nodes._caller import CallRefused
+    from rsea_ros.nodes._visitor import CallRefused
 
     try:
         return caller.state(node) or "-", ", ".join(caller.actions(node))

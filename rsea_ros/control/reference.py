@@ -29,8 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.control.law import FT, POSITION, VELOCITY, FeedbackLaw, Sampled
-from rsea_ros.control.learning import CREEP, Learning
-from rsea_ros.control.motion import Yielding
+from rsea_ros.control.learning import CREEP, Learning, Yielding
 from rsea_ros.effects._friction import mean_tanh
 from rsea_ros.errors import ParameterError
 from rsea_ros.records.record import FloatArray

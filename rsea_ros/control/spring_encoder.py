@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsea_ros.control.motion import Stretch
+from rsea_ros.control.learning import Stretch
 from rsea_ros.model.rig import Rig
 
 SIGMAS = 8.0

@@ -13,13 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.control.controller import TorqueController
-from rsea_ros.control.following import Following, Step, fall, step_response
-from rsea_ros.control.harness import closed_loop
+from rsea_ros.control.controller import ControllerSettings, TorqueController, TorqueLimits
+from rsea_ros.control.following import Following, Step, closed_loop, fall, step_response
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LOCKED, lock
 from rsea_ros.control.robustness import Robustness, largest
-from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.spread import Spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
 from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, variant_rig

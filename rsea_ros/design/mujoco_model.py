@@ -1,10 +1,23 @@
 """A rig as MJCF, the XML of the multibody engine MuJoCo, for a second opinion from other code.
 
 Housing and loads have their own hinges about the actuator's axis (z); gear output and rotor are borne where
-the mechanism bears them (mesh.py): a planetary train's rotor in the carrier, a harmonic drive's flexspline on
+the mechanism bears them: a planetary train's rotor in the carrier, a harmonic drive's flexspline on
 its wave generator. So a hinge's angle is that against the bearing part, the engine composes the rotor's spin
 from the bodies by itself, and the train is one equality between two hinges, two gears in mesh:
-z_1 q_1 = s z_2 q_2.
+z_1 q_1 = s z_2 q_2. Seen from the arm two gears turn about fixed centres, so that one pair of teeth is the
+law of the train:
+
+    z_1 (w_1 - w_arm) = s z_2 (w_2 - w_arm),   s = +1 for internal teeth, -1 for external ones
+
+    train                  arm                       first                second
+    planetary              output (carrier)          rotor (sun)          housing (annulus), planets between
+    star                   housing (carrier)         rotor (sun)          output (annulus), planets between
+    harmonic, circular     rotor (wave generator)    output (flexspline)  housing (circular spline)
+    harmonic, flexspline   rotor (wave generator)    housing (flexspline) output (circular spline)
+    spur                   housing (bearings)        rotor (pinion)       output (wheel)
+
+How often the rotor turns follows from bodies borne in each other; model/train.py has it as a formula, which
+this file does not use. Teeth need not be whole numbers here: only their ratio counts.
 
     spring       q_c - q_d, stiffness and damping       motor    q_c - q_h, driven and damped
     gear         where it gives: chassis and rotor in the housing, a spring from chassis to the mesh's output
@@ -20,14 +33,56 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
 from xml.etree import ElementTree as xml
 
-from rsea_ros.design.mesh import Mesh, mesh_of
 from rsea_ros.documents.units import STANDARD_GRAVITY
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia
 from rsea_ros.model.rig import Rig
+
+Member = Literal["housing", "rotor", "output"]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """arm: the frame of the two centres. gears: the members that mesh. teeth: of each. internal: s = +1."""
+
+    arm: Member
+    gears: tuple[Member, Member]
+    teeth: tuple[float, float]
+    internal: bool
+
+    @property
+    def sense(self) -> float:
+        """Return s: +1 where both gears turn the same way as seen from the arm."""
+        return 1.0 if self.internal else -1.0
+
+    def law(self) -> dict[Member, float]:
+        """Return the factors of the members' absolute angles whose sum is zero."""
+        first, second = self.teeth[0], -self.sense * self.teeth[1]
+        return {self.gears[0]: first, self.gears[1]: second, self.arm: -(first + second)}
+
+
+def mesh_of(rig: Rig) -> Mesh:
+    """Return the mesh of a rig's train. Raises RigError for a lumped one, which no mechanism is."""
+    ratio = rig["gear.ratio"]
+    match rig.train:
+        case "planetary":
+            return Mesh("output", ("rotor", "housing"), (1.0, ratio - 1.0), internal=False)
+        case "star":
+            return Mesh("housing", ("rotor", "output"), (1.0, ratio - 1.0), internal=False)
+        case "harmonic_circular_spline_held":
+            return Mesh("rotor", ("output", "housing"), (2.0 * ratio, 2.0 * ratio + 2.0), internal=True)
+        case "harmonic_flexspline_held":
+            return Mesh("rotor", ("housing", "output"), (2.0 * ratio, 2.0 * ratio + 2.0), internal=True)
+        case "spur":
+            return Mesh("housing", ("rotor", "output"), (1.0, ratio), internal=False)
+        case _:
+            raise RigError(f"rig {rig.name}: the lumped train cannot be exported, expected a real train")
+
 
 STEP = 5e-5
 """s, fixed step of the engine."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.control.controller import TorqueController
+from rsea_ros.control.controller import CORNER, ControllerSettings, TorqueController, TorqueLimits
 from rsea_ros.control.grid import Lateness, Tolerance
 from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LIGHTEST, lightest, load_range
-from rsea_ros.control.settings import CORNER, ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, design
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig

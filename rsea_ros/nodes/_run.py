@@ -64,7 +64,8 @@ class Program(Protocol):
     """The work of a node beside its callbacks."""
 
     def is_finished(self) -> bool:
-        """Return whether the work is done; raises the error of a thread."""
+        """Return whether the work is done; raises the error of a thread. Default: run until stopped."""
+        return False
 
     def conclude(self) -> None:
         """Finish after the work is done or was stopped; Ctrl-C interrupts this."""
@@ -117,7 +118,9 @@ class _Stop:
     def __init__(self) -> None:
         self.status = 0
         self._numbers = [
-            n for n in ENDING if n in STOPPING or signal.getsignal(n) is signal.SIG_DFL  # no other handler
+            n
+            for n in ENDING
+            if n in STOPPING or signal.getsignal(n) is signal.SIG_DFL  # no other handler
         ]
         for number in self._numbers:
             signal.signal(number, self._ask)

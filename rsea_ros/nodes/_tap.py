@@ -1,8 +1,9 @@
-"""Raw subscriptions that keep up with any rate: each callback takes all that waits, not one message."""
+"""Raw subscriptions that keep up with any rate, and the record of a bench from them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from functools import partial
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -10,9 +11,16 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
+from msg_adapters.contents import Contents
+from msg_adapters.reading import record_from
+from msg_adapters.ros import message_type
+from msg_adapters.topic_map import ROLES, TYPES, TopicMap
+from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
+from rsea_ros.records.record import Record
+
 
 class Tap:
-    """Give every message of a topic, serialised, to `store(received_ns, raw)`.
+    """Give every message of a topic, serialised, to `store(received_ns, raw)`, all that waits at once.
 
     count: messages so far. lost: messages that the middleware reports as lost.
     """
@@ -45,3 +53,39 @@ class Tap:
 
     def _on_lost(self, status: Any) -> None:
         self.lost = status.total_count
+
+
+class Ears:
+    """The topics of a bench while its node lives, kept for a record.
+
+    reliable: roles of which nothing may be lost. heard: called with the role of each message.
+    """
+
+    def __init__(
+        self, node: Node, axis: str, reliable: Collection[str], heard: Callable[[str], None]
+    ) -> None:
+        self._heard = heard
+        self.begin()
+        self.taps = {
+            role: Tap(
+                node, message_type(TYPES[role]), role, RECORD_RELIABLE if role in reliable else RECORD,
+                partial(self._keep, role),
+            )
+            for role in ROLES
+        }  # fmt: skip
+        self.topics = TopicMap(**{role: tap.topic for role, tap in self.taps.items()}, axis=axis)
+
+    def begin(self) -> None:
+        """Start a new record."""
+        self._contents = Contents()
+
+    def record(self, *, strict: bool) -> Record:
+        """Return the record since then. Raises BagError where none can be made."""
+        return record_from(self._contents, self.topics.topic("torque_command"), self.topics, strict=strict)
+
+    def _keep(self, role: str, received: int, raw: bytes) -> None:
+        sink = self._contents.sink(self.topics.topic(role), TYPES[role])
+        assert sink is not None
+        sink.log_times.append(received)
+        sink.raw.append(raw)
+        self._heard(role)

@@ -24,7 +24,7 @@ from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Program, run_node
 from rsea_ros.records.record import FloatArray
 
 PATIENCE = 1.5
@@ -102,8 +102,12 @@ TABLE = (
     NodeParameter("seed", 0, "seed of noise and phases", "", 0, 1_000_000_000),
     NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
     NodeParameter(
-        "limit", DERIVED, "largest torque, of the whole excitation; -1: as the driver derives it", "N m",
-        DERIVED, 1e4,
+        "limit",
+        DERIVED,
+        "largest torque, of the whole excitation; -1: as the driver derives it",
+        "N m",
+        DERIVED,
+        1e4,
     ),
     NodeParameter("ramp", 0.5, "raised cosine at either end", "s", 0.0, 100.0),
     NodeParameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
@@ -112,7 +116,7 @@ TABLE = (
 )
 
 
-class ExciteNode:
+class ExciteNode(Program):
     """Plays one excitation, or the file of one, and ends."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -132,9 +136,6 @@ class ExciteNode:
         """Return whether the whole excitation is out. Raises DeviceError where the bench makes no torque."""
         self._bench.check(playing=self._player.started)
         return self._player.over()
-
-    def conclude(self) -> None:
-        """Leave nothing to do: `close` commands the zeros."""
 
     def close(self) -> None:
         """Command zero torque after the last command, and wait until that has arrived."""

@@ -25,10 +25,9 @@ from rsea_ros.experiment.run_shape import limits_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
-from rsea_ros.nodes._player import Player
+from rsea_ros.nodes._player import BenchEars, LiveRun, Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
-from rsea_ros.nodes._trial import Ears, LiveRun
 from rsea_ros.outputs.files import unused_path
 from rsea_ros.outputs.new_files import Destination
 from rsea_ros.records.record import Record
@@ -70,7 +69,7 @@ class ExperimentNode:
         self._out = unused_path(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
         check_session_free(self._out)
         self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
-        self._ears = Ears(node, values["axis"])
+        self._ears = BenchEars(node, values["axis"])
         self._trial: LiveRun | None = None
         self._proposal: Proposal | None = None
         self._round: Round | None = None
@@ -152,9 +151,7 @@ class ExperimentNode:
     def _player(self, proposal: Proposal) -> Player:
         lead, joint = self._values["lead"], self._values["joint"]
         command, rate = proposal.command, proposal.rate
-        return Player(
-            self._node, command, rate, lead=lead, wanted=2, joint=joint, publisher=self._publisher
-        )
+        return Player(self._node, command, rate, lead=lead, wanted=2, joint=joint, publisher=self._publisher)
 
     def _approve(self, request: Any, response: Any) -> Any:
         return self._take_answer(True, response)

@@ -23,7 +23,7 @@ from rsea_ros.nodes._findings import FindingsPublisher, Keeper, Ring, instant, s
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._health_inputs import Events, HealthInputs, noise_from
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
-from rsea_ros.nodes._run import NAMESPACE, run_node
+from rsea_ros.nodes._run import NAMESPACE, Program, run_node
 
 TABLE = (
     NodeParameter(
@@ -53,7 +53,7 @@ SILENT = 2.0
 """s without any message after which the node says so."""
 
 
-class HealthNode:
+class HealthNode(Program):
     """Reads the topics four times a second; a thread fits causes, another one writes bags."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -143,13 +143,6 @@ class HealthNode:
         if self._keeper.last is not None:
             values |= {"bag": self._keeper.last, "diagnose": self._command(self._keeper.last)}
         return values
-
-    def is_finished(self) -> bool:
-        """Run until stopped."""
-        return False
-
-    def conclude(self) -> None:
-        """Leave nothing to do."""
 
     def close(self) -> None:
         """Clean up; a requested bag is written."""

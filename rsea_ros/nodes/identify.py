@@ -13,10 +13,8 @@ from typing import Any
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 
-from msg_adapters.contents import Contents
-from msg_adapters.reading import record_from
-from msg_adapters.ros import Trigger, message_type
-from msg_adapters.topic_map import ROLES, TYPES, TopicMap
+from msg_adapters.ros import Trigger
+from msg_adapters.topic_map import ROLES
 from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.result import Identification
@@ -24,12 +22,10 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._diagnosing import Diagnosing
 from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
-from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
-from rsea_ros.nodes._tap import Tap
+from rsea_ros.nodes._tap import Ears
 from rsea_ros.outputs.files import unused_path
 from rsea_ros.outputs.new_files import check_free
-from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.words import diagnosis_sentence
 from rsea_ros.report.identification.words import verdict_sentence
 from rsea_ros.report.remark_words import fault_lines
@@ -63,10 +59,8 @@ class IdentifyNode:
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node, self._values = node, values
         self._rig = load_rig(values["rig"])
-        self._taps = {role: self._tap(role) for role in ROLES}
-        self._topics = TopicMap(**{role: tap.topic for role, tap in self._taps.items()}, axis=values["axis"])
-        self._contents = Contents()
         self._commanded, self._asked, self._done = 0.0, False, False
+        self._ears = Ears(node, values["axis"], ROLES if values["reliable"] else (), self._heard)
         self._service = node.create_service(Trigger, "~/finish", self._on_finish)
         self._out = unused_path(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
         check_free(self._out / name for name in IDENTIFICATION)
@@ -78,17 +72,7 @@ class IdentifyNode:
         self._health = Health(node, self._report)
         node.create_timer(1.0, self._tell)
 
-    def _tap(self, role: str) -> Tap:
-        qos = RECORD_RELIABLE if self._values["reliable"] else RECORD
-        return Tap(
-            self._node, message_type(TYPES[role]), role, qos, lambda *message: self._keep(role, *message)
-        )
-
-    def _keep(self, role: str, received: int, raw: bytes) -> None:
-        sink = self._contents.sink(self._topics.topic(role), TYPES[role])
-        assert sink is not None
-        sink.log_times.append(received)
-        sink.raw.append(raw)
+    def _heard(self, role: str) -> None:
         if role == "torque_command":
             self._commanded = time.monotonic()
 
@@ -101,7 +85,7 @@ class IdentifyNode:
         """Answer with the verdict in a sentence, once it is known; other callbacks run meanwhile."""
         self._answering += 1
         try:
-            diagnosis = await self._diagnosing.begin(self._record(strict=False))
+            diagnosis = await self._diagnosing.begin(self._ears.record(strict=False))
             response.success, response.message = True, diagnosis_sentence(diagnosis)
         except (RseaError, OSError) as error:
             response.success, response.message = False, " ".join(str(error).split())
@@ -114,7 +98,7 @@ class IdentifyNode:
     def is_finished(self) -> bool:
         """Return whether the commands are over and every diagnosis has been answered."""
         waited = self._commanded > 0.0 and time.monotonic() - self._commanded > self._values["quiet"]
-        over = waited and not self._node.count_publishers(self._topics.topic("torque_command"))
+        over = waited and not self._node.count_publishers(self._ears.topics.topic("torque_command"))
         self._done = (self._asked or (over and not self._values["stay"])) and not self._answering
         return self._done
 
@@ -128,7 +112,8 @@ class IdentifyNode:
             return
         log = self._node.get_logger()
         log.info(f"identifying from {self._progress_text()}")
-        record = with_check_faults(self._record(), self._rig, self._values["axis"], masks=False)
+        record = self._ears.record(strict=True)
+        record = with_check_faults(record, self._rig, self._values["axis"], masks=False)
         result = identify([record], self._rig, self._progress)
         report = write_results(result, self._out)
         self._identified = report_of(result, report)
@@ -141,11 +126,6 @@ class IdentifyNode:
             log.info(f"{p.name} = {size}, 95 %: {p.ci95[0]:.6g} to {p.ci95[1]:.6g}")
         log.info(f"report: {report}")
 
-    def _record(self, strict: bool = True) -> Record:
-        """Return the record. Raises BagError where none can be made."""
-        source = self._topics.topic("torque_command")
-        return record_from(self._contents, source, self._topics, strict=strict)
-
     def _progress(self, step: str, share: float) -> None:
         self._node.get_logger().info(f"{share:.0%} {step}")
 
@@ -154,9 +134,9 @@ class IdentifyNode:
         self._diagnosing.close()
 
     def _progress_text(self) -> str:
-        lost = sum(tap.lost for tap in self._taps.values())
+        lost = sum(tap.lost for tap in self._ears.taps.values())
         return (
-            ", ".join(f"{tap.count} {role}" for role, tap in self._taps.items() if tap.count)
+            ", ".join(f"{tap.count} {role}" for role, tap in self._ears.taps.items() if tap.count)
             + f", {lost} lost"
         )
 
@@ -170,8 +150,8 @@ class IdentifyNode:
     def _report(self) -> NodeHealth:
         if self._identified is not None:
             return self._identified
-        lost = sum(tap.lost for tap in self._taps.values())
-        counts = {role: tap.count for role, tap in self._taps.items()}
+        lost = sum(tap.lost for tap in self._ears.taps.values())
+        counts = {role: tap.count for role, tap in self._ears.taps.items()}
         if (diagnosis := self._diagnosing.report()) is not None:
             return NodeHealth(diagnosis.level, diagnosis.summary, {**counts, **diagnosis.values})
         return NodeHealth(WARN if lost else OK, f"{lost} messages lost" if lost else "gathering", counts)

@@ -25,7 +25,7 @@ from rsea_ros.nodes._model_inputs import InputSettings, ModelInputs, stopped_sen
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._realtime import REALTIME, keep_time
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Program, run_node
 from rsea_ros.nodes._waiter import Waiter
 
 TABLE = (
@@ -57,7 +57,7 @@ TICK = 0.02
 """s between looks at what has come without ft."""
 
 
-class ModelNode:
+class ModelNode(Program):
     """Wakes at each ft and processes the messages that came with it; while ft is silent, every 20 ms."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -105,9 +105,6 @@ class ModelNode:
     def is_finished(self) -> bool:
         """Run until stopped."""
         return not self._waiter.is_running()
-
-    def conclude(self) -> None:
-        """Leave nothing to do."""
 
     def close(self) -> None:
         """Leave nothing behind: the flag of a node that is gone is down, and its subscribers know."""

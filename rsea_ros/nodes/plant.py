@@ -14,7 +14,7 @@ from rsea_ros.nodes._bench_topics import NAMES, SPRING_FRAME, BenchTopics
 from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import Health
 from rsea_ros.nodes._parameters import NodeParameter
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Program, run_node
 
 TABLE = (
     NodeParameter("rig", "paper_high_impedance", "rig to simulate: a name of config/rigs, or a file"),
@@ -29,7 +29,7 @@ STALL, PAUSE = SECOND // 50, 0.005
 """After a stall of so many ns, the pause (s) in which commands arrive that were held up with this process."""
 
 
-class PlantNode:
+class PlantNode(Program):
     """Simulates up to each deadline with the commands that took effect until then, and publishes.
 
     The simulation ends at the instant of the stamp; a command with a stamp in between acts from that
@@ -75,9 +75,6 @@ class PlantNode:
     def is_finished(self) -> bool:
         """Run until stopped."""
         return not self._cycle.is_running()
-
-    def conclude(self) -> None:
-        """Leave nothing to do."""
 
     def close(self) -> None:
         """Stop the simulation, at zero torque; warn if a bag of it would have wrong stamps."""

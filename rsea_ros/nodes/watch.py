@@ -11,9 +11,8 @@ from rclpy.node import Node
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._health import OK, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
-from rsea_ros.nodes._run import run_node
-from rsea_ros.nodes._watch_command import WatchCommand
-from rsea_ros.nodes._watch_source import WatchSource
+from rsea_ros.nodes._run import Program, run_node
+from rsea_ros.nodes._watch_source import WatchCommand, WatchSource
 from rsea_ros.watch.runs import Runs
 from rsea_ros.watch.server import Server
 
@@ -25,8 +24,12 @@ TABLE = (
         "limit", 10.0, "largest torque of the page; the driver's counts where it is less", "N m", 0.0, 1e3
     ),
     NodeParameter(
-        "growth", 20.0, "of a page's torque; the driver's soft_start counts where it is less", "N m/s",
-        0.1, 1e4,
+        "growth",
+        20.0,
+        "of a page's torque; the driver's soft_start counts where it is less",
+        "N m/s",
+        0.1,
+        1e4,
     ),
     NodeParameter("rate", 280.0, "of the page's commands, as the bench runs", "Hz", 50.0, 1000.0),
     NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
@@ -36,7 +39,7 @@ TABLE = (
 )
 
 
-class WatchNode:
+class WatchNode(Program):
     """The subscriptions, the server, and the commands where they are permitted."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -57,9 +60,6 @@ class WatchNode:
         if self._command is not None:
             self._command.look()
         return not self._server.is_running()
-
-    def conclude(self) -> None:
-        """Leave nothing to do."""
 
     def close(self) -> None:
         """Zero torque; end pages, recordings and evaluations."""

@@ -22,7 +22,7 @@ from rsea_ros.cli._processes import together
 from rsea_ros.cli.call import offer_of
 from rsea_ros.cli.run import node_names, ros_arguments
 from rsea_ros.errors import ParameterError
-from rsea_ros.nodes import _caller, _visitor
+from rsea_ros.nodes import _visitor
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -122,16 +122,16 @@ def visitor():
 
 
 def test_a_node_that_hangs_is_listed_as_such(visitor, monkeypatch):
-    monkeypatch.setattr(_caller, "DISCOVERY", 0.1)
-    caller = _caller.Caller(visitor)
-    assert _caller._await(lambda: "/rsea/mute" in caller.callable_nodes(0.0), 3.0)
+    monkeypatch.setattr(_visitor, "DISCOVERY", 0.1)
+    caller = _visitor.Caller(visitor)
+    assert _visitor._await(lambda: "/rsea/mute" in caller.callable_nodes(0.0), 3.0)
     assert offer_of(caller, "/rsea/mute") == ("no answer", "-")
 
 
 def test_a_named_node_is_listed_without_a_question_to_the_others(visitor, monkeypatch, capsys):
     asked = []
     monkeypatch.setattr(_visitor, "visit", lambda name: nullcontext(visitor))
-    monkeypatch.setattr(_caller.Caller, "actions", lambda self, name: asked.append(name) or ("stop",))
+    monkeypatch.setattr(_visitor.Caller, "actions", lambda self, name: asked.append(name) or ("stop",))
     assert cli.main(["call", "visitor"]) == 0
     assert set(asked) == {"/rsea/visitor"} and "stop" in capsys.readouterr().out
 
@@ -157,8 +157,8 @@ def test_a_driver_is_activated_stopped_and_cleared_by_calls(tmp_path):
 
 
 def test_a_visitor_does_not_propose_itself(visitor, monkeypatch):
-    monkeypatch.setattr(_caller, "_SEARCH", 0.1)
+    monkeypatch.setattr(_visitor, "_SEARCH", 0.1)
     with pytest.raises(ParameterError) as error:
-        _caller.Caller(visitor).full_name("visitr")
+        _visitor.Caller(visitor).full_name("visitr")
     assert "node /rsea/visitr: it does not run" in str(error.value)
     assert "did you mean /rsea/visitor" not in str(error.value)

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.compensation import compensation
-from rsea_ros.control.controller import Measurement, TorqueController
-from rsea_ros.control.following import follow
+from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController, TorqueLimits
+from rsea_ros.control.following import closed_loop, follow
 from rsea_ros.control.grid import Lateness
-from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.law import Gains, sample_rig
 from rsea_ros.control.loads import load_range
 from rsea_ros.control.prediction import AHEAD, Prediction, prediction_response
 from rsea_ros.control.reference import inverse, inverse_poles
-from rsea_ros.control.settings import ControllerSettings, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.trials import EFFECTS, Span, restlessness, sine, tracking_error
 from rsea_ros.control.uncertainty import BenchVariant

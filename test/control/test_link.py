@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from bench.control.human import Virtual, measure_impedance
-from rsea_ros.control.controller import TorqueController
-from rsea_ros.control.harness import closed_loop
+from rsea_ros.control.controller import ControllerSettings, TorqueController
+from rsea_ros.control.following import closed_loop
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
 from rsea_ros.control.loads import load_range
 from rsea_ros.control.margins import link_response
-from rsea_ros.control.settings import ControllerSettings
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.trials import disturbed_rig, lagging_corners
 from rsea_ros.model.rig_file import load_rig

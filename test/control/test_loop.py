@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rsea_ros.control.controller import TorqueController
-from rsea_ros.control.harness import closed_loop
+from rsea_ros.control.controller import TorqueController, TorqueLimits
+from rsea_ros.control.following import closed_loop
 from rsea_ros.control.law import (
     FT,
     VELOCITY,
@@ -18,7 +18,6 @@ from rsea_ros.control.law import (
 )
 from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.margins import largest_pole, margins, returns
-from rsea_ros.control.settings import TorqueLimits
 from rsea_ros.control.synthesis import check, grid
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.plant import Plant

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.controller import Measurement, TorqueController
-from rsea_ros.control.harness import closed_loop
+from rsea_ros.control.following import closed_loop
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare
 from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading

@@ -9,11 +9,10 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.control.controller import Measurement, TorqueController
+from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController
 from rsea_ros.control.grid import Grid
 from rsea_ros.control.law import Gains
 from rsea_ros.control.prediction import Acted, Prediction
-from rsea_ros.control.settings import ControllerSettings
 from rsea_ros.hardware.peer.peer_motor import EmulatedMotor
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig

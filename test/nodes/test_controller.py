@@ -9,10 +9,8 @@ import pytest
 from msg_adapters.ros import (
     DiagnosticArray,
     JointState,
-    effort_of,
     stamp_of,
     torque_command_message,
-    wrench_of,
 )
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig, save_rig
@@ -51,7 +49,7 @@ def test_a_sine_is_followed_through_friction_that_the_model_has(loop):
 
 def test_a_command_acts_one_sample_after_its_measurement(loop):
     first = stamp_of(loop.states[0].header.stamp)
-    cycles = np.array([effort_of(m)[0] - first for m in loop.commands]) / PERIOD
+    cycles = np.array([stamp_of(m.header.stamp) - first for m in loop.commands]) / PERIOD
     assert cycles == pytest.approx(np.round(cycles), abs=1e-5)
     assert np.median(np.diff(cycles)) == pytest.approx(1.0, abs=1e-5)
     heard = np.array([stamp_of(m.header.stamp) - first for m in loop.states]) / PERIOD
@@ -61,32 +59,32 @@ def test_a_command_acts_one_sample_after_its_measurement(loop):
 def test_steps_stay_within_the_limit_and_reach_their_value(loop):
     begun = len(loop.commands)
     loop.hold(0.0, lambda: len(loop.commands) > begun + RATE)  # the first one after a pause is no step
-    loop.hold(40.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 40.0) < 0.5)
-    torques = np.array([effort_of(m)[1] for m in loop.commands])
+    loop.hold(40.0, lambda: abs(loop.wrenches[-1].wrench.torque.z - 40.0) < 0.5)
+    torques = np.array([m.effort[0] for m in loop.commands])
     assert np.abs(torques).max() == pytest.approx(60.0)
-    loop.hold(0.0, lambda: abs(wrench_of(loop.wrenches[-1])[1]) < 0.5)
+    loop.hold(0.0, lambda: abs(loop.wrenches[-1].wrench.torque.z) < 0.5)
 
 
 def test_a_desired_torque_that_ceases_and_comes_back_is_no_step(loop, listener):
     """50 to 61 N m at the motor for 10 N m, when their sender died or was held up for 50 ms."""
-    loop.hold(10.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 10.0) < 0.5)
+    loop.hold(10.0, lambda: abs(loop.wrenches[-1].wrench.torque.z - 10.0) < 0.5)
     loop.commands.clear()
-    listener.until(lambda: abs(wrench_of(loop.wrenches[-1])[1]) < 0.5)
-    loop.hold(10.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 10.0) < 0.5)
-    assert max(abs(effort_of(m)[1]) for m in loop.commands) < 20.0
+    listener.until(lambda: abs(loop.wrenches[-1].wrench.torque.z) < 0.5)
+    loop.hold(10.0, lambda: abs(loop.wrenches[-1].wrench.torque.z - 10.0) < 0.5)
+    assert max(abs(m.effort[0]) for m in loop.commands) < 20.0
 
 
 def test_without_measurements_the_torque_ends_until_the_fault_is_cleared(loop, start, model, listener):
-    loop.hold(20.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 20.0) < 0.5)
+    loop.hold(20.0, lambda: abs(loop.wrenches[-1].wrench.torque.z - 20.0) < 0.5)
     loop.plant.kill()
     listener.until(lambda: "no usable measurement" in loop.values()[""])
-    listener.until(lambda: effort_of(loop.commands[-1])[1] == 0.0)
+    listener.until(lambda: loop.commands[-1].effort[0] == 0.0)
     start("plant", rig=model, rate=RATE)
     seen = len(loop.states)
     loop.hold(20.0, lambda: len(loop.states) > seen + 50)
-    assert all(effort_of(m)[1] == 0.0 for m in loop.commands[-20:])
+    assert all(m.effort[0] == 0.0 for m in loop.commands[-20:])
     listener.call("/rsea/controller/clear_fault")
-    loop.hold(20.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 20.0) < 0.5)
+    loop.hold(20.0, lambda: abs(loop.wrenches[-1].wrench.torque.z - 20.0) < 0.5)
 
 
 def test_a_reversed_axis_is_a_fault_before_there_is_torque(start, listener):
@@ -99,17 +97,17 @@ def test_a_reversed_axis_is_a_fault_before_there_is_torque(start, listener):
     desired = listener.node.create_publisher(JointState, "/turned/desired_torque", COMMAND)
     told = lambda: [m.status[0].message for m in health if m.status[0].name == "/turned/controller"]  # noqa: E731
     listener.until(lambda: len(commands) > 100)
-    assert not any(effort_of(m)[1] for m in commands)
+    assert not any(m.effort[0] for m in commands)
 
     def contradicted():
         desired.publish(torque_command_message(time.time_ns(), 10.0))
         return any("ft is reversed" in words for words in told())
 
     listener.until(contradicted)
-    listener.until(lambda: any(effort_of(m)[1] for m in commands))  # they may be heard after what they showed
-    assert 0.0 < max(abs(effort_of(m)[1]) for m in commands) < 5.0
+    listener.until(lambda: any(m.effort[0] for m in commands))  # they may be heard after what they showed
+    assert 0.0 < max(abs(m.effort[0]) for m in commands) < 5.0
 
 
 def test_at_its_end_the_controller_commands_zero(loop, listener):
     assert loop.controller.stop(signal.SIGTERM) == 0
-    listener.until(lambda: effort_of(loop.commands[-1])[1] == 0.0)
+    listener.until(lambda: loop.commands[-1].effort[0] == 0.0)

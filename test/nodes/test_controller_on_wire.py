@@ -11,7 +11,6 @@ from msg_adapters.ros import (
     JointState,
     WrenchStamped,
     torque_command_message,
-    wrench_of,
 )
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.hardware.peer.remote import RemoteBench
@@ -74,11 +73,11 @@ def wire(tmp_path_factory, start, listener):
 
 def test_the_controller_runs_on_the_drivers_measurements_and_reaches_the_torque(wire):
     """It divided by zero at the first late cycle that was followed by one in time."""
-    wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
+    wire.hold(10.0, lambda: abs(wire.wrenches[-1].wrench.torque.z - 10.0) < 1.0)
     heard = len(wire.wrenches)
     wire.hold(10.0, lambda: len(wire.wrenches) > heard + 420)
     assert wire.controller.is_running() and wire.driver.is_running()
-    wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
+    wire.hold(10.0, lambda: abs(wire.wrenches[-1].wrench.torque.z - 10.0) < 1.0)
 
 
 def test_the_controller_never_becomes_unstable(wire):
@@ -86,22 +85,22 @@ def test_the_controller_never_becomes_unstable(wire):
 
     In half a second of late commands at the limit nearly every sample was off, to 102 N m.
     """
-    off = [abs(wrench_of(message)[1] - 10.0) > ERROR_LIMIT for message in wire.wrenches]
+    off = [abs(message.wrench.torque.z - 10.0) > ERROR_LIMIT for message in wire.wrenches]
     window = round(2 * ERROR_TIME * RATE)
     counts = np.convolve(off, np.ones(window), "valid")
     assert len(off) > 420 and counts.max() <= 0.5 * window + 0.1 * RATE
-    assert max(abs(wrench_of(message)[1]) for message in wire.wrenches) < FT_LIMIT
+    assert max(abs(message.wrench.torque.z) for message in wire.wrenches) < FT_LIMIT
 
 
 def test_the_end_of_the_controller_is_that_of_the_torque_and_another_one_begins_softly(wire, start, listener):
     """It was 15 to 47 N m at the motor for 10 N m: a limit that grows slowly let the whole error in."""
     wire.controller.kill()
-    listener.until(lambda: wire.bench.torque()[0] == 0 and abs(wrench_of(wire.wrenches[-1])[1]) < 1.0)
+    listener.until(lambda: wire.bench.torque()[0] == 0 and abs(wire.wrenches[-1].wrench.torque.z) < 1.0)
     assert wire.driver.is_running()
     since = wire.bench.ask("torque")["t"]
     wire.health.clear()
     wire.controller = start("controller", remaps={"__ns": "/wired"})
-    wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 0.5)
+    wire.hold(10.0, lambda: abs(wire.wrenches[-1].wrench.torque.z - 10.0) < 0.5)
     heard = len(wire.wrenches)
     wire.hold(10.0, lambda: len(wire.wrenches) > heard + 200)
     log = wire.bench.log(since)["torque"]

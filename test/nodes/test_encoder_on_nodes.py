@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from msg_adapters.ros import JointState, effort_of, joint_state_of, stamp_of
+from msg_adapters.ros import JointState, stamp_of
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes._qos import MEASURED, MEASUREMENT
@@ -30,7 +30,7 @@ class Encoder:
         listener.node.create_subscription(JointState, "/rsea/encoder", self._pass_on, MEASUREMENT)
 
     def _pass_on(self, message):
-        self.angles.append(joint_state_of(message)[:2])
+        self.angles.append((stamp_of(message.header.stamp), message.position[0]))
         if self.alive:
             self._publisher.publish(message)
 
@@ -74,7 +74,7 @@ def run(loop):
 
 def commands(loop, at):
     """Return time after an instant (s) and torque of each command about it."""
-    stamps, torques = np.array([effort_of(m)[:2] for m in loop.commands]).T
+    stamps, torques = np.array([(stamp_of(m.header.stamp), m.effort[0]) for m in loop.commands]).T
     t = (stamps - at) * 1e-9
     about = (t > -1.0) & (t < 0.5)
     return t[about], torques[about]

@@ -48,7 +48,7 @@ def test_events_are_sorted_strangers_are_refused_and_bags_can_be_read(heard, lis
     inputs, ring, state, command, ft = heard
     for k in range(100):
         stamp = EPOCH + k * PERIOD
-        ft.publish(wrench_message(stamp, 0.1 * k))
+        ft.publish(wrench_message(stamp, (0.0,) * 5 + (0.1 * k,)))
         state.publish(joint_state_message(stamp, 1e-3 * k if k != 50 else math.nan, 0.0, 0.0))
         command.publish(joint_state_message(stamp, 0.0, 0.0, 1.0))
     state.publish(joint_state_message(EPOCH, 0.0, 0.0, 0.0, joint="elbow"))

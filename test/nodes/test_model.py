@@ -128,7 +128,7 @@ def test_the_estimate_survives_a_loss_of_ft_and_its_return_without_a_jump(heard,
             values = (record[n].y[k] for n in ("position", "velocity", "motor_torque"))
             state.publish(joint_state_message(int(stamps[k]), *values))
             if with_ft:
-                ft.publish(wrench_message(int(stamps[k]), float(record["ft"].y[k])))
+                ft.publish(wrench_message(int(stamps[k]), (0.0,) * 5 + (float(record["ft"].y[k]),)))
             listener.until(lambda: True)
 
     def newest(k):

@@ -32,7 +32,7 @@ def feed(listener, inputs, publishers, samples):
             stamp = round(EPOCH + k * PERIOD)
             publishers["torque_command"].publish(torque_command_message(stamp, command))
             publishers["joint_states"].publish(joint_state_message(stamp, state[0], 0.0, state[1]))
-            publishers["ft"].publish(wrench_message(stamp, torque))
+            publishers["ft"].publish(wrench_message(stamp, (0.0,) * 5 + (torque,)))
 
         def has_arrived():
             estimates.extend(estimate for _, estimate in inputs.take())

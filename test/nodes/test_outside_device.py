@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from msg_adapters.ros import JointState, WrenchStamped, torque_command_message, wrench_of
+from msg_adapters.ros import JointState, WrenchStamped, torque_command_message
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 
@@ -50,7 +50,7 @@ def test_the_deflection_is_published_also_as_an_ft_marked_as_such(drive, listene
     listener.until(push_commands)
     assert (deflections[-1].name, list(deflections[-1].position)) == (["joint"], [0.01])
     assert not deflections[-1].velocity and deflections[-1].header.frame_id == "spring_deflection"
-    assert wrench_of(wrenches[-1])[1] == 0.0, "torque.z"
+    assert wrenches[-1].wrench.torque.z == 0.0, "torque.z"
     assert wrenches[-1].wrench.torque.y == pytest.approx(-1530.456 * 0.01)
     assert wrenches[-1].header.frame_id == "spring_deflection"
     values = program.joints[0].report().values

@@ -22,7 +22,7 @@ def test_a_bag_has_the_deflection_and_only_a_sensors_torque(tmp_path, frame, kep
             for topic, message in (
                 ("torque_command", torque_command_message(stamp, 10.0 * angle)),
                 ("deflection", deflection_message(stamp, angle, frame=SPRING_FRAME.default)),
-                ("ft", wrench_message(stamp, 1500.0 * angle, frame=frame)),
+                ("ft", wrench_message(stamp, (0.0,) * 5 + (1500.0 * angle,), frame=frame)),
             ):
                 bag.write(f"/rsea/{topic}", TYPES[topic], stamp, bytes(serialize_message(message)))
     run = read_record(tmp_path / "run.mcap")

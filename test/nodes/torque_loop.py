@@ -12,7 +12,6 @@ from msg_adapters.ros import (
     WrenchStamped,
     stamp_of,
     torque_command_message,
-    wrench_of,
 )
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
@@ -56,7 +55,7 @@ class Loop:
             self._desired.publish(torque_command_message(stamp, wanted(k / RATE)))
             during((stamp_of(self.wrenches[-1].header.stamp) - start) / SECOND)
         self.listener.until(lambda: stamp_of(self.wrenches[-1].header.stamp) > start + seconds * SECOND)
-        read = np.array([wrench_of(m) for m in self.wrenches])
+        read = np.array([(stamp_of(m.header.stamp), m.wrench.torque.z) for m in self.wrenches])
         t = (read[:, 0] - start) / SECOND
         inside = (t > SETTLED) & (t < seconds)
         error, period = (read[:, 1] - wanted(t))[inside], np.floor(t[inside] * hz)

@@ -14,8 +14,7 @@ from rsea_ros.model.train import TRAINS
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper.bands import HZ, arrangements, limits
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims, last_digit
-from rsea_ros.paper.findings import findings
-from rsea_ros.paper.findings_bench import clamp_error
+from rsea_ros.paper.findings import clamp_error, findings
 from rsea_ros.paper.rival_models import draw, largest_gap, readings, resonance_hz
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from msg_adapters.tables.clock import spread_repeats
+from msg_adapters.tables.importing import spread_repeats
 
 
 def _true_times(rng, count, rate, wander, stalls):

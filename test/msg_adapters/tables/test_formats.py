@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.io import savemat
 
-from msg_adapters.tables import json_file, npz_file
+from msg_adapters.tables import column_files, json_file
 from msg_adapters.tables.column_files import read_columns
 from rsea_ros.errors import ImportMapError
 
@@ -128,7 +128,7 @@ def test_no_pickle_is_opened(tmp_path):
 
 def test_the_size_of_an_array_is_checked_before_it_is_read(tmp_path, monkeypatch):
     np.savez(tmp_path / "run.npz", t=T, q=Q)
-    monkeypatch.setattr(npz_file, "LARGEST", 10)
+    monkeypatch.setattr(column_files, "LARGEST", 10)
     assert_refused(
         tmp_path / "run.npz", "q[0]", r"array 'q' is float64 \(6, 3\), expected fewer than 10 numbers"
     )

@@ -10,7 +10,7 @@ import pytest
 from map_files import CSV, MAP
 
 from msg_adapters.tables import import_record, load_map
-from msg_adapters.tables.map_keys import tables
+from msg_adapters.tables.map_terms import tables
 from rsea_ros.errors import ImportMapError
 
 
