@@ -60,13 +60,11 @@ def join(parts: Sequence[Contents], contents: Contents) -> None:
             whole.raw.extend(messages.raw)
 
 
-def iterate(
-    paths: BagPath | Sequence[BagPath], wanted: Collection[str] | None = None
-) -> Iterator[tuple[str, str, int, bytes]]:
-    """Yield (topic, type, log time in ns, serialised message) by log time, known topics or not."""
+def iterate(paths: BagPath | Sequence[BagPath]) -> Iterator[tuple[str, str, int, bytes]]:
+    """Yield (topic, type, log time in ns, serialised message) by log time."""
     rows = [
         (topic, messages.msgtype, log_time, raw)
-        for topic, messages in read_contents(paths, wanted).topics.items()
+        for topic, messages in read_contents(paths).topics.items()
         for log_time, raw in zip(messages.log_times, messages.raw, strict=True)
     ]
     rows.sort(key=lambda row: row[2])

@@ -233,11 +233,11 @@ def joint_states(
     return _written(JOINT_STATE, stamps, columns, "", name=[name], **sizes)
 
 
-def wrenches(stamps: IntArray, values: FloatArray, frame: str = "ft_sensor") -> list[bytes]:
+def wrenches(stamps: IntArray, values: FloatArray) -> list[bytes]:
     """Serialise geometry_msgs/WrenchStamped: stamps in ns (n,), force N and torque N m (n, 6)."""
     zero = typestore().types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
     wrench = typestore().types["geometry_msgs/msg/Wrench"](zero, zero)
-    return _written(WRENCH, stamps, {"wrench": values}, frame, wrench=wrench)
+    return _written(WRENCH, stamps, {"wrench": values}, "ft_sensor", wrench=wrench)
 
 
 def _written(

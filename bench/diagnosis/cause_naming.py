@@ -32,7 +32,7 @@ from rsea_ros.benchmark.dataset import COLUMNS, LIMIT, MANIFEST, VERSION, truth_
 from rsea_ros.benchmark.scoring import RecordTruth, truth_hash
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_text
-from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_text
+from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_file
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import UNITS, FloatArray, Record
 
@@ -129,7 +129,7 @@ def write(folder: Path, count: int, duration: float, seed: str, tell: Progress) 
         effects = {name: effect.about for name, effect in catalogue().items()}
         hashes = {name: truth_hash(name, truth) for name, truth in truths.items()}
         new.write(MANIFEST, manifest_text(hashes, effects))
-    return write_text(truth_file, truth_text(truths))
+    return write_file(truth_file, truth_text(truths))
 
 
 def make_record(seed: str, number: int, duration: float) -> tuple[Record, RecordTruth]:

@@ -5,6 +5,7 @@ place is a variable, or a field of structs, `log.motor.current` or `runs(2).t`; 
 vector, one column or row where it is a matrix.
 """
 
+import math
 import re
 from typing import Any
 
@@ -112,7 +113,7 @@ def _single(value: Any, way: str) -> Any:
 def _check_shape(place: dict[str, Any], shape: Any, kind: object, *, is_number: bool) -> None:
     """Refuse anything but a vector of numbers or a matrix with the requested column or row."""
     index = place["index"]
-    is_vector = max(shape, default=0) >= 2 and max(shape) == _product(shape)
+    is_vector = max(shape, default=0) >= 2 and max(shape) == math.prod(shape)
     if index is None and is_number and is_vector:
         return
     if index is not None and is_number and len(shape) == 2:
@@ -124,10 +125,3 @@ def _check_shape(place: dict[str, Any], shape: Any, kind: object, *, is_number: 
         first, last = (f"{place['base'].split('[')[0]}(:,{n})" for n in (1, shape[1]))
         wanted += f" or a column of the matrix, {first} to {last}"
     raise VariableRefused(f"variable {place['column']!r} is {kind} {tuple(shape)}, expected {wanted}")
-
-
-def _product(shape: Any) -> float:
-    result = 1.0
-    for length in shape:
-        result *= length
-    return result

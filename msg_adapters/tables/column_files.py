@@ -7,8 +7,7 @@ import csv
 import gzip
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any, Literal
@@ -83,8 +82,8 @@ def _array(file: IO[bytes], name: str, size: int) -> Any:
         raise ValueError(f"array {name!r} is {dtype} {shape}, expected fewer than {LARGEST} numbers")
     if held > size:
         raise ValueError(f"array {name!r} is {dtype} {shape}, more than its {size} bytes; a damaged file?")
-    with _rewound(file) as again:
-        return npy.read_array(again, allow_pickle=False)
+    file.seek(0)
+    return npy.read_array(file, allow_pickle=False)
 
 
 def _header(file: IO[bytes], name: str) -> tuple[Any, Any]:
@@ -96,12 +95,6 @@ def _header(file: IO[bytes], name: str) -> tuple[Any, Any]:
     except Exception:  # NumPy evaluates it as a literal: a damaged one may bring errors of any kind
         raise ValueError(f"array {name!r} has no header that can be read; a damaged file?") from None
     return shape, dtype
-
-
-@contextmanager
-def _rewound(file: IO[bytes]) -> Iterator[IO[bytes]]:
-    file.seek(0)
-    yield file
 
 
 def _numbers(column: str, place: ElementAddress, arrays: Any, names: Any) -> FloatArray:

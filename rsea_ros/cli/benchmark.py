@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from rsea_ros.cli._output import Action, add_actions, add_force, path
 from rsea_ros.cli._terminal import columns, positive, progress, say, whole_number
 from rsea_ros.errors import BenchmarkError, ParameterError, RseaError
-from rsea_ros.outputs.new_files import check_free, write_text
+from rsea_ros.outputs.new_files import check_free, write_file
 
 if TYPE_CHECKING:
     from rsea_ros.benchmark import dataset, scoring
@@ -95,7 +95,7 @@ def _run(args: argparse.Namespace) -> int:
     partial = out.with_name(f"{out.name}.partial")
     with progress("benchmark") as tell:
         lines = list(_lines(records, args.entry, partial, tell))
-    write_text(out, "".join(f"{json.dumps(line)}\n" for line in lines), force=args.force)
+    write_file(out, "".join(f"{json.dumps(line)}\n" for line in lines), force=args.force)
     partial.unlink()
     print(f"answers     {out}: {len(lines)} records")
     refused = [line["error"] for line in lines if "error" in line]
@@ -116,7 +116,7 @@ def _lines(records: dataset.Dataset, entry: str, partial: Path, tell: Progress) 
         if name not in known:
             known[name] = _answer(records, entry, name)
             marked = ({**line, "entry": entry, "truth": records.hashes[n]} for n, line in known.items())
-            write_text(partial, "".join(f"{json.dumps(line)}\n" for line in marked), force=True)
+            write_file(partial, "".join(f"{json.dumps(line)}\n" for line in marked), force=True)
         yield known[name]
 
 

@@ -14,7 +14,7 @@ from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, cut, topic_map
 from rsea_ros.model.prediction_errors import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.outputs.new_files import check_free, write_text
+from rsea_ros.outputs.new_files import check_free, write_file
 from rsea_ros.records.stamps import repair_stamps
 from rsea_ros.report.result_files import fault_json, pick
 
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
     comparisons = predict(rig, record)
     if args.out:
-        write_text(args.out, _table(comparisons), force=args.force)
+        write_file(args.out, _table(comparisons), force=args.force)
     errors = {n: pick(c, "rms_error fit_percent") for n, c in comparisons.items()}
     with np.errstate(all="ignore"):
         faults_json = [fault_json(fault) for fault in check_record(record, rig, args.axis).faults]

@@ -36,14 +36,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _new(args: argparse.Namespace) -> int:
     from rsea_ros.model.rig_file import load_rig, rig_folders
-    from rsea_ros.outputs.new_files import check_free, write_text
+    from rsea_ros.outputs.new_files import check_free, write_file
 
     if not args.name.isidentifier():
         raise ParameterError(f"name {args.name!r}, expected letters, digits and _, such as left_knee")
     template = next(folder.parent / "templates" / "rig.yaml" for folder in rig_folders())
     out = args.out or Path(f"{args.name}.yaml")
     check_free([out], force=args.force)
-    write_text(out, template.read_text(encoding="utf-8").replace("NAME", args.name), force=args.force)
+    write_file(out, template.read_text(encoding="utf-8").replace("NAME", args.name), force=args.force)
     load_rig(out)
     print(f"{out}: fill in the values, then: rsea rig check {quote(str(out))}")
     return 0

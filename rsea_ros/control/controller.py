@@ -164,7 +164,6 @@ class TorqueController:
         desired: float,
         missed: int = 0,
         *,
-        late: bool = False,
         trust: float = 1.0,
         offset: float = 0.0,
         desired_offset: float = 0.0,
@@ -177,8 +176,7 @@ class TorqueController:
         sample, as with a trust or an offset that is no number; for such a desired torque the one that was
         expected counts.
         desired_offset: samples by which desired is for later than that place; with preview it does not count.
-        late: the torque will act later than the margins allow; then it is feed-forward alone.
-        trust: part of the feedback that counts, as lateness.py has it.
+        trust: part of the feedback that counts, as lateness.py has it; with 0 it is feed-forward alone.
         """
         if not is_measured(desired, self._most):
             desired = self._prediction.expected(missed + 1)
@@ -198,10 +196,10 @@ class TorqueController:
         more, lead, learned = model.more(forward)
         more = min(max(more, -largest - forward), largest - forward)
         error, slowness, reading = self._compare(reading, offset)
-        self._hear(reading, missed, error, slowness, in_time=trust == 1.0 and not late)
+        self._hear(reading, missed, error, slowness, in_time=trust == 1.0)
         back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
         back += self._link.torque(reading.link, model.yield_speed, missed, offset)
-        back = 0.0 if late else trust * back
+        back *= trust
         compensated, crossing = self._compensating_torque(reading, forward), self._crossing(ahead)
         known = learned + compensated
         whole = forward + more + back + lead + compensated + crossing

@@ -43,20 +43,18 @@ def closed_loop(
     desired: FloatArray,
     *,
     noise: bool = True,
-    seed: int = 0,
-    ahead: int = 0,
     late: int = 0,
 ) -> ControlTrace:
     """Run a controller on a simulated rig from rest. desired: N m at the samples, shape (n,).
 
     A command that is computed at a sample acts from the next one on: one sample of delay. late: samples
-    more. ahead: samples by which the controller knows the desired torque before it is due.
+    more.
     """
-    plant = Plant(rig, rate, seed=seed, noise=noise)
+    plant = Plant(rig, rate, noise=noise)
     sample = plant.step(0.0)
     pending, rows = [0.0] * (1 + late), np.empty((len(desired), 3))
     controller.start(reading(sample), float(desired[0]))
-    for k, wanted in enumerate(np.append(desired[ahead:], np.full(ahead, desired[-1]))):
+    for k, wanted in enumerate(desired):
         command = controller.step(reading(sample), float(wanted))
         rows[k] = sample.ft, command, sample.velocity
         sample = plant.step(pending.pop(0))
@@ -168,12 +166,10 @@ def _sine(
     return complex(np.sum(run.ft * turn) / scale), float(abs(np.sum(run.command * turn) / scale))
 
 
-def step_response(
-    true: Rig, model: Rig, design: ControllerDesign, *, late: int = 0, seconds: float = 1.5
-) -> Step:
+def step_response(true: Rig, model: Rig, design: ControllerDesign, *, late: int = 0) -> Step:
     """Return the answer to a step from rest, within the motor's limits, without noise."""
     rate = design.rate
-    wanted = np.where(np.arange(round(seconds * rate)) < 0.3 * rate, 0.0, STEP)
+    wanted = np.where(np.arange(round(1.5 * rate)) < 0.3 * rate, 0.0, STEP)
     controller = TorqueController(lock(model), rate, design.gains)
     run = closed_loop(true, rate, controller, wanted, noise=False, late=late)
     begin = int(np.argmax(wanted > 0.0))

@@ -11,9 +11,17 @@ import numpy as np
 from rsea_ros.control.following import Following, follow
 from rsea_ros.control.impedance import OutputImpedance, impedance
 from rsea_ros.control.loads import LOCKED, load_range, with_ends
-from rsea_ros.control.robustness import Reach, Robustness, reach, robustness
-from rsea_ros.control.spread import Softness, Spread, softness, spread
-from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, design
+from rsea_ros.control.robustness import (
+    Reach,
+    Robustness,
+    Softness,
+    Spread,
+    reach,
+    robustness,
+    softness,
+    spread,
+)
+from rsea_ros.control.synthesis import ControllerDesign, design
 from rsea_ros.control.trials import Compensated, TrialResult, compensations, hard, trials
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.propagator import state_space
@@ -69,7 +77,6 @@ def study(
     free: Rig,
     rates: Sequence[float],
     motors: Sequence[MotorLimits] = (),
-    demand: DesignLimits | None = None,
     progress: Callable[[str, float], None] = lambda step, share: None,
 ) -> Study:
     """Return the study of a rig's actuator. free: a rig whose ends are the lightest load.
@@ -84,7 +91,7 @@ def study(
     done = []
     for k, rate in enumerate(rates):
         progress(f"{rate:g} Hz", k / len(rates))
-        designed = design(rig, loads, rate, demand)
+        designed = design(rig, loads, rate)
         done.append(_at_rate(clamped, light, loads, designed))
     reaches = {motor: tuple(_reaches(clamped, light, a, motor) for a in AMPLITUDES) for motor in motors}
     return Study(clamped, light, resonance, tuple(done), reaches)

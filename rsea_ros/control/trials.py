@@ -17,8 +17,7 @@ from rsea_ros.control.controller import ControllerSettings, TorqueController, To
 from rsea_ros.control.following import Following, Step, closed_loop, fall, step_response
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LOCKED, lock
-from rsea_ros.control.robustness import Robustness, largest
-from rsea_ros.control.spread import Spread
+from rsea_ros.control.robustness import Robustness, Spread, largest
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
 from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, variant_rig
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -236,7 +235,7 @@ def sine(
     return closed_loop(true, design.rate, controller, wanted, late=late).error(span.counted_from)
 
 
-def restlessness(rig: Rig, design: ControllerDesign, gap: float = 5.0 * ARCMIN) -> float:
+def restlessness(rig: Rig, design: ControllerDesign) -> float:
     """Return the torque's RMS about its mean with backlash, over that without, worst of a few torques held.
 
     Each is held after a sine has shaken the gap. 1 is the noise of the sensor alone; NaN for a rig whose F/T
@@ -244,7 +243,7 @@ def restlessness(rig: Rig, design: ControllerDesign, gap: float = 5.0 * ARCMIN) 
     """
     if "ft" not in rig.sensors or rig.sensors["ft"].noise <= 0.0:
         return math.nan
-    worn = rig.with_effects(EffectSetting("backlash", {"gap": gap}))
+    worn = rig.with_effects(EffectSetting("backlash", {"gap": 5.0 * ARCMIN}))
     ratios = []
     for torque in (0.0, 2.0):
         noise, with_gap = (_torque_scatter(true, rig, design, torque) for true in (rig, worn))

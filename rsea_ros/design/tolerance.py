@@ -70,14 +70,14 @@ def margins(
     return (*rows, Margin("All at once", "", (np.nan, np.nan, np.nan), np.nan, together))
 
 
-def robust_stiffness(requirement: Requirement, unit: MotorGear, share: float = 0.95) -> float:
-    """Return the least K_s, N m/rad, with which that share of all parts within tolerance meets every demand.
+def robust_stiffness(requirement: Requirement, unit: MotorGear) -> float:
+    """Return the least K_s, N m/rad, with which 95 % of all parts within tolerance meets every demand.
 
     inf where the motor alone fails more often. Bisection in log K_s.
     """
 
     def reaches(k_s: float) -> bool:
-        return margins(spring_design(requirement, unit, k_s))[-1].share >= share
+        return margins(spring_design(requirement, unit, k_s))[-1].share >= 0.95
 
     low = least_stiffness(requirement, unit)
     return bisect(reaches, low, 100.0 * low, 12) if reaches(100.0 * low) else float("inf")

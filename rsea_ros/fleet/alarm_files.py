@@ -20,7 +20,7 @@ from rsea_ros.errors import OutputError
 from rsea_ros.fleet.query import NoRowsError, history, recordings
 from rsea_ros.fleet.store import Store
 from rsea_ros.outputs.files import make_folder
-from rsea_ros.outputs.new_files import write_text
+from rsea_ros.outputs.new_files import write_file
 from rsea_ros.trends import Alarm, alarms
 
 FOLDER = "alarms"
@@ -52,7 +52,7 @@ def _new(store: Store, folder: Path) -> Iterator[AlarmFile]:
     for alarm in present:
         file = folder / f"{alarm.joint}-{hashlib.sha256(alarm.key.encode()).hexdigest()[:12]}.json"
         with suppress(OutputError):
-            write_text(file, json.dumps(webhook(alarm), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+            write_file(file, json.dumps(webhook(alarm), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
             yield AlarmFile(file, sentence(alarm))
 
 

@@ -34,7 +34,7 @@ from rsea_ros.fleet.row import (
     write,
 )
 from rsea_ros.outputs.files import make_folder
-from rsea_ros.outputs.new_files import Destination, NewFiles, write_text
+from rsea_ros.outputs.new_files import Destination, NewFiles, write_file
 
 MARK = "store.json"
 LOCK = ".lock"
@@ -128,7 +128,7 @@ def open_store(path: str | Path, *, create: bool = False) -> Store:
 def _write_mark(mark: Path) -> None:
     """Write the mark, unless another run has done so in the meantime."""
     try:
-        write_text(mark, json.dumps({"about": "rsea fleet", "schema": SCHEMA}) + "\n")
+        write_file(mark, json.dumps({"about": "rsea fleet", "schema": SCHEMA}) + "\n")
     except FileExistsError:
         return
     except OSError:

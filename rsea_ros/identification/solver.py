@@ -227,31 +227,25 @@ def descend(
     theta: FloatArray,
     information: FloatArray,
     *,
-    centre: FloatArray | None = None,
-    is_robust: bool = False,
     rounds: int = 15,
     enough: float = 1e-3,
     parts: Sequence[float] = (1.0, 0.5, 0.25, 0.1, 0.03),
 ) -> Descent:
     """Minimise a residual beside a prior by Gauss-Newton, every step cut until it helps.
 
-    slope: derivatives (m, n) at theta and its residual. information: of the prior, (n, n), about `centre`, or
-    the start. is_robust: rows that do not fit count less (Cauchy). enough: relative fall of the cost that is
-    too small to go on. parts: of a step, tried until the cost falls.
+    slope: derivatives (m, n) at theta and its residual. information: of the prior, (n, n), about the start.
+    enough: relative fall of the cost that is too small to go on. parts: of a step, tried till the cost falls.
     """
-    start = theta if centre is None else centre
 
     def at(place: FloatArray) -> Descent:
-        r, off = residual(place), place - start
-        size = float(np.sum(np.log1p(r**2))) if is_robust else power(r)
-        return Descent(place, r, size + float(off @ information @ off))
+        r, off = residual(place), place - theta
+        return Descent(place, r, power(r) + float(off @ information @ off))
 
     best = at(theta)
     for _ in range(rounds):
         matrix = slope(best.theta, best.residual)
-        weighted = matrix / (1.0 + best.residual**2)[:, None] if is_robust else matrix
-        right = weighted.T @ best.residual + information @ (best.theta - start)
-        step = -np.linalg.lstsq(weighted.T @ matrix + information, right, rcond=None)[0]
+        right = matrix.T @ best.residual + information @ (best.theta - theta)
+        step = -np.linalg.lstsq(matrix.T @ matrix + information, right, rcond=None)[0]
         trials = (at(best.theta + part * step) for part in parts)
         better = next((t for t in trials if t.cost < best.cost), None)
         if better is None:

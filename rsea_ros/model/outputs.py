@@ -68,9 +68,9 @@ def distal(rig: Rig, sees: Sees = "spring_and_damper") -> Output:
     return end_torque(rig, "housing_end" if rig.proximal == "spring_end" else "spring_end", sees)
 
 
-def proximal(rig: Rig, sees: Sees = "spring_and_damper") -> Output:
+def proximal(rig: Rig) -> Output:
     """Return T_p, the torque on the rig's `proximal` end, N m."""
-    return end_torque(rig, rig.proximal, sees)
+    return end_torque(rig, rig.proximal)
 
 
 def end_torque(rig: Rig, end: str, sees: Sees = "spring_and_damper") -> Output:

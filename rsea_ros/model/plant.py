@@ -27,11 +27,9 @@ class PlantSample:
 class Plant:
     """A bench that is stepped one sample at a time, with the noise and the quantum of its sensors."""
 
-    def __init__(
-        self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0
-    ) -> None:
-        """rate: samples a second. duration: over which drifts reach their full size, s."""
-        self._rig, self._noise, self._duration = rig, noise, duration
+    def __init__(self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True) -> None:
+        """rate: samples a second. Drifts reach their full size in a minute."""
+        self._rig, self._noise = rig, noise
         self._count = steps_per_sample(1.0 / rate)
         self._step = 1.0 / rate / self._count
         self._out = np.empty((self._count, len(OUTPUTS)))
@@ -40,7 +38,7 @@ class Plant:
 
     def reset(self) -> None:
         """Go back to rest, at time zero."""
-        self._machine = build(self._rig, self._step, self._duration)
+        self._machine = build(self._rig, self._step, 60.0)
         self._time = 0.0
 
     def step(self, command: float) -> PlantSample:

@@ -127,11 +127,6 @@ def write_file(path: str | Path, content: str | bytes, *, force: bool = False) -
         return new.write(Path(path).name, content)
 
 
-def write_text(path: str | Path, text: str, *, force: bool = False) -> Path:
-    """Write one file of text as `write_file` does."""
-    return write_file(path, text, force=force)
-
-
 def check_free(
     paths: Iterable[Path], *, force: bool | None = None, inputs: Collection[str | Path] = ()
 ) -> None:

@@ -50,7 +50,7 @@ class Bands:
     """Of one actuator. eq_7: Hz, with J_sc. eq_7_spin: Hz, with J_sc + n J_r, of either sign; spin_range: the
     same over 90 % of J_m within its spread.
 
-    spring_limit: N m at the deflection limit, of the nonlinear Eq. (8). motor_limit: by frequency (Hz), the
+    spring_limit: N m at the limit of 5 deg, of the nonlinear Eq. (8). motor_limit: by frequency (Hz), the
     amplitude of T_d, N m, that the motor's torque limit leaves against clamped ends.
     """
 
@@ -62,8 +62,8 @@ class Bands:
     motor_limit: Mapping[float, float]
 
 
-def bands(rig: Rig, motor_torque: float, deflection: float = math.radians(5.0)) -> Bands:
-    """Return the bands of a rig. motor_torque: N m. deflection: rad."""
+def bands(rig: Rig, motor_torque: float) -> Bands:
+    """Return the bands of a rig. motor_torque: N m."""
     k_s, j_sc, b_s = (rig[n] for n in ("spring.stiffness", "chassis.inertia", "spring.damping"))
     functions = {
         "Eq. (6) undamped, element": eq_6_distal_per_proximal(k_s, j_sc, 0.0),
@@ -78,7 +78,7 @@ def bands(rig: Rig, motor_torque: float, deflection: float = math.radians(5.0)) 
         eq_7_spin=edge,
         spin_range=band_range(k_s, j_sc, inner - j_sc, spread),
         rows=tuple(BandRow(n, tuple(flat_band(f, *t) for t in TOLERANCES)) for n, f in functions.items()),
-        spring_limit=0.5 * k_s * math.sin(2.0 * deflection),
+        spring_limit=0.5 * k_s * math.sin(2.0 * math.radians(5.0)),
         motor_limit={f: motor_torque * _gain(rig, f) for f in (1.0, 5.0, 10.0, edge)},
     )
 

@@ -75,11 +75,11 @@ EQ_10 = (1560.436, 27.267, 1638.783)
 """Fit to the high-impedance test: c_0 / (s^2 + c_1 s + c_2). Paper, Eq. (10)."""
 
 
-def eq_10_inertia_and_damping(k_s: float, fit: tuple[float, float, float] = EQ_10) -> tuple[float, float]:
+def eq_10_inertia_and_damping(k_s: float) -> tuple[float, float]:
     """Return J_eff (kg m^2) and b_eff (N m s/rad) as the paper has them: both K_s / J_eff averaged.
 
     That hides a gain of c_0 / c_2 = 0.952 at rest, which a torque constant or friction makes.
     """
-    c_0, c_1, c_2 = fit
+    c_0, c_1, c_2 = EQ_10
     j_eff = k_s / (0.5 * (c_0 + c_2))
     return j_eff, c_1 * j_eff

@@ -168,7 +168,6 @@ class Record:
         Raises ChannelError for an unknown name, a wrong shape, values that are not real numbers, stamps that
         do not increase, and stamps or commands that are not finite.
         """
-
         return record_from_arrays(t, source, channels)
 
     @classmethod
@@ -180,8 +179,8 @@ class Record:
         columns: the column of each channel, `{"command": "tau_cmd", "ft": "tau_ft"}`. time: the column of
         the stamps, s. Raises ChannelError as from_arrays does, and for a column that the table lacks.
         """
-
-        return record_from_table(table, columns, time, source)
+        series = {name: _column(table, column, source) for name, column in {"t": time, **columns}.items()}
+        return record_from_arrays(series.pop("t"), source, series)
 
     def __repr__(self) -> str:
         """Return source, duration and the rate of each channel in one line."""
@@ -264,12 +263,7 @@ class NamedColumns(Protocol):
 
 
 def record_from_arrays(t: npt.ArrayLike, source: str, channels: Mapping[str, npt.ArrayLike]) -> Record:
-    """Return a record of channels that share their stamps t (s, shape (n,)); values are copied.
-
-    channels: by a name of signals.UNITS or one of ALIASES, each in SI and of shape (n,).
-    Raises ChannelError for an unknown name, another shape, complex numbers, texts or dates, stamps that are
-    not finite or do not rise, a command that is not finite, or fewer than 2 samples.
-    """
+    """Return a record as `Record.from_arrays` does, of channels whatever their names."""
     stamps = _vector("t", t, source)
     values = {_channel(name, source): _vector(name, y, source) for name, y in channels.items()}
     if len(values) < len(channels):
@@ -284,15 +278,6 @@ def record_from_arrays(t: npt.ArrayLike, source: str, channels: Mapping[str, npt
     if "command" in values:
         _check_finite("command", UNITS["command"], values["command"], source)
     return Record({name: Channel(stamps - stamps[0], y) for name, y in values.items()}, source)
-
-
-def record_from_table(table: NamedColumns, columns: Mapping[str, str], time: str, source: str) -> Record:
-    """Return a record of named columns. columns: column by channel; time: the column of the stamps, s.
-
-    Raises ChannelError for a column that the table lacks, and as record_from_arrays does.
-    """
-    series = {name: _column(table, column, source) for name, column in {"t": time, **columns}.items()}
-    return record_from_arrays(series.pop("t"), source, series)
 
 
 def _channel(name: str, source: str) -> str:

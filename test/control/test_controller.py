@@ -212,7 +212,7 @@ def test_commands_that_come_far_too_late_are_feed_forward_alone_and_stay_stable(
     for k in range(2000):
         wanted = 10.0 * math.sin(2.0 * math.pi * 5.0 * k / 1000.0)
         errors.append(sample.ft - wanted)
-        acting.append(controller.step(_reading(sample), wanted, late=True))
+        acting.append(controller.step(_reading(sample), wanted, trust=0.0))
         sample = plant.step(acting.pop(0))
     assert np.sqrt(2.0) * np.std(errors[1000:]) / 10.0 < 0.3
 

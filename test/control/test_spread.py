@@ -8,7 +8,7 @@ import pytest
 from rsea_ros.control.following import fall, follow
 from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import LOCKED, load_range
-from rsea_ros.control.spread import NEAR, softness, spread
+from rsea_ros.control.robustness import NEAR, softness, spread
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.trials import hard
 from rsea_ros.control.uncertainty import Uncertainty, mode_of

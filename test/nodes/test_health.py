@@ -10,9 +10,9 @@ from msg_adapters.ros import ERROR, OK, WARN, JointState, WrenchStamped, joint_s
 from rsea_ros.errors import ParameterError
 from rsea_ros.health.health_finding import NAMES, HealthFinding
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._findings import FindingsPublisher, Keeper, Ring
 from rsea_ros.nodes._health_inputs import HealthInputs, noise_from
 from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes.health import FindingsPublisher, Keeper, Ring
 
 EPOCH, PERIOD = 1_700_000_000_000_000_000, round(1e9 / 280.0)
 TOPICS = ("joint_states", "torque_command", "ft")

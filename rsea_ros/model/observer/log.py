@@ -195,13 +195,12 @@ def events_of(record: Record) -> tuple[FloatArray, IntArray, FloatArray]:
 class BatchObserver:
     """An observer of separate blocks. hold: how long a command stays in force, s.
 
-    duration: over which drifts of the rig reach their full size, s. Not to be confused with `Observer`,
-    which takes single samples in any order and gives torques.
+    Not to be confused with `Observer`, which takes single samples in any order and gives torques.
     """
 
-    def __init__(self, rig: Rig, noise: Noise, *, hold: float = math.inf, duration: float = 60.0) -> None:
+    def __init__(self, rig: Rig, noise: Noise, *, hold: float = math.inf) -> None:
         plain, self._delay = without_delay(rig)
-        self._model, self._state = assemble(plain, noise, hold=hold, duration=duration, learns=False)
+        self._model, self._state = assemble(plain, noise, hold=hold, duration=60.0, learns=False)
         self._start = self._state.whole.copy()
 
     def innovations(self, t: FloatArray, kind: IntArray, values: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.control.following import Following
-from rsea_ros.control.spread import Spread
+from rsea_ros.control.robustness import Spread
 from rsea_ros.control.study import Study
 from rsea_ros.model import outputs
 from rsea_ros.model.rig import Rig
