@@ -50,8 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Test the stiffness, find the stiffnesses that meet all demands, write the results."""
     from rsea_ros.design.motor_gear_units import unit_named
-    from rsea_ros.design.spring_design import least_stiffness, spring_design
-    from rsea_ros.design.tolerance import robust_stiffness
+    from rsea_ros.design.spring_design import least_stiffness, robust_stiffness, spring_design
     from rsea_ros.report.design.page import design_report
     from rsea_ros.report.design.tables import design_json
     from rsea_ros.report.result_files import json_text

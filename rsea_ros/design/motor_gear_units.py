@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rsea_ros.documents import strict_yaml
-from rsea_ros.documents.strict_yaml import mapping, number, only_keys, text, unit
+from rsea_ros.documents.strict_yaml import mapping, number, only_keys, sequence, spread, text, unit
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import FieldError, ParameterError
@@ -133,9 +133,7 @@ def train_named(name: Any, field: str) -> Train:
 def _trains(name: str, item: Any) -> tuple[tuple[Train, ...], str]:
     body = mapping(item, name, expected="{value: planetary, source: …}")
     only_keys(body, {"value", "or", "source"}, name)
-    others = body.get("or", [])
-    if not isinstance(others, list):
-        raise FieldError(f"{name}.or = {others!r}, expected a list of trains", f"{name}.or")
+    others = sequence(body.get("or", []), f"{name}.or", "trains")
     trains = tuple(
         train_named(value, f"{name}.{key}")
         for key, value in (("value", body.get("value")), *(("or", o) for o in others))
@@ -155,9 +153,4 @@ def _entry(name: str, symbol: str, item: Any) -> tuple[float, str, float]:
         raise FieldError(
             f"{name} = {value:g} {plain(symbol)}, source {source!r}, expected a value > 0 and a source", name
         )
-    spread = number(body.get("spread", 0.0), f"{name}.spread", "relative, one sigma")
-    if not 0.0 <= spread < 10.0:
-        raise FieldError(
-            f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10", f"{name}.spread"
-        )
-    return value, source, spread
+    return value, source, spread(body, name)

@@ -239,6 +239,23 @@ def number(value: Any, name: str, unit: str) -> float:
     return converted
 
 
+def sequence(value: Any, name: str, expected: str) -> list[Any]:
+    """Return a list. Raises FieldError for anything else. expected: of what."""
+    if not isinstance(value, list):
+        raise FieldError(f"{name} = {quote(value)}, expected a list of {expected}", name)
+    return value
+
+
+def spread(body: Mapping[str, Any], name: str) -> float:
+    """Return the relative one-sigma spread of a quantity, 0 where none is stated. Raises FieldError."""
+    value = number(body.get("spread", 0.0), f"{name}.spread", "relative, one sigma")
+    if not 0.0 <= value < 10.0:
+        raise FieldError(
+            f"{name}.spread = {value:g}, expected a relative one-sigma spread from 0 to 10", f"{name}.spread"
+        )
+    return value
+
+
 def interval(value: Any, name: str, unit: str) -> tuple[float, float]:
     """Return [low, high] as two floats. Raises FieldError for anything else."""
     if not isinstance(value, list) or len(value) != 2:

@@ -57,7 +57,7 @@ from rsea_ros.model.position_loop import close_loop
 from rsea_ros.model.propagator import encoder_row, read_row, state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray, Record
-from rsea_ros.records.statistics import next_fast_length, runs_of
+from rsea_ros.records.statistics import hann, next_fast_length, runs_of
 
 LONGEST_SEGMENT = 16.0
 """s. Long against what the actuator remembers, so that segments leak little."""
@@ -102,7 +102,7 @@ def welch(aligned: Aligned) -> Lines:
         method="Welch", frequency=(np.arange(u.shape[1]) / (length * aligned.period))[keep],
         response=response[keep], sd=widen(spread, effective - 1.0)[keep],
         coherence=np.minimum(np.abs(response) ** 2 * s_uu / s_yy, 1.0)[keep],
-        noise=(np.sqrt(2.0 * residual / np.sum(_window(length) ** 2) / length))[keep],
+        noise=(np.sqrt(2.0 * residual / np.sum(hann(length) ** 2) / length))[keep],
     )
 
 
@@ -123,13 +123,8 @@ def _starts(aligned: Aligned, length: int) -> IntArray:
 def _segments(values: FloatArray, starts: IntArray, length: int) -> ComplexArray:
     """Return the windowed spectra, shape (segments, lines)."""
     windows = np.lib.stride_tricks.sliding_window_view(detrend(values), length)[starts]
-    spectra: ComplexArray = rfft(windows * _window(length), axis=1)
+    spectra: ComplexArray = rfft(windows * hann(length), axis=1)
     return spectra
-
-
-def _window(length: int) -> FloatArray:
-    window: FloatArray = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
-    return window
 
 
 def _align_phases(cross: ComplexArray, length: int) -> ComplexArray:

@@ -165,7 +165,7 @@ def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray) -> BoolArr
 def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
     """Return the power of a channel that does not follow the command linearly, by frequency."""
     period = float(np.median(np.diff(t)))
-    u = unit_spectra(_held_before(command, t - 0.25 * period), _LONGEST, _SEGMENTS)
+    u = unit_spectra(np.nan_to_num(command.held(t - 0.25 * period)), _LONGEST, _SEGMENTS)
     v = unit_spectra(y, _LONGEST, _SEGMENTS)
     power = np.mean(np.abs(v) ** 2, axis=0)
     shared = np.abs(np.mean(v * u.conj(), axis=0)) ** 2 / (np.mean(np.abs(u) ** 2, axis=0) + _TINY)
@@ -190,9 +190,3 @@ def _top(lines: FloatArray, rule: NoiseSettings) -> slice:
 def _finite(channel: Channel) -> tuple[FloatArray, FloatArray]:
     good = np.isfinite(channel.y) & np.isfinite(channel.t)
     return channel.t[good], channel.y[good]
-
-
-def _held_before(command: Channel, t: FloatArray) -> FloatArray:
-    """Return the command that was held just before each instant."""
-    index = np.clip(np.searchsorted(command.t, t, side="right") - 1, 0, len(command) - 1)
-    return np.nan_to_num(command.y[index])

@@ -129,9 +129,7 @@ def _regression(record: Record, rig: Rig) -> FloatArray:
 
 def _loop_torque(record: Record, rig: Rig, t: FloatArray, q: FloatArray, v: FloatArray) -> FloatArray:
     """Return the torque that the loop makes along a motion, without its integral."""
-    command = record["command"]
-    held = command.y[np.clip(np.searchsorted(command.t, t, side="right") - 1, 0, len(command) - 1)]
-    target = smooth(held, float(t[1] - t[0]))
+    target = smooth(record["command"].held(t), float(t[1] - t[0]))
     _, position, _, velocity, *_ = loop_parameters(rig)
     if rig.loop == "pd":
         return position * (target - q) - velocity * v

@@ -18,6 +18,8 @@ from rsea_ros.documents.strict_yaml import (
     names,
     number,
     only_keys,
+    sequence,
+    spread,
     switch,
     table,
     text,
@@ -282,7 +284,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         rigid_spring=switch(groups["spring"], "spring.rigid"),
         linear=switch(document, "linear"),
         train=groups["gear"].get("train", "planetary"),
-        other_trains=_other_trains(groups["gear"].get("or", [])),
+        other_trains=tuple(sequence(groups["gear"].get("or", []), "gear.or", "trains")),
         sensors=sensors_from(mapping(document.get("sensors", {}), "sensors")),
         known=_known_names(
             document.get("known", []),
@@ -316,25 +318,12 @@ def _quantity(name: str, item: Any) -> Quantity:
     unit(body.get("unit"), f"{name}.unit", field.unit)
     value = number(body.get("value"), name, field.unit)
     check_value(name, value, where="value")
-    spread = number(body.get("spread", 0.0), f"{name}.spread", "relative, one sigma")
-    if not 0.0 <= spread < 10.0:
-        raise RigError(
-            f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10", f"{name}.spread"
-        )
     ci95 = interval(body["ci95"], f"{name}.ci95", field.unit) if "ci95" in body else None
-    return Quantity(value, spread, text(body.get("source", ""), f"{name}.source"), ci95)
-
-
-def _other_trains(items: Any) -> tuple[Any, ...]:
-    if not isinstance(items, list):
-        raise RigError(f"gear.or = {quote(items)}, expected a list of trains", "gear.or")
-    return tuple(items)
+    return Quantity(value, spread(body, name), text(body.get("source", ""), f"{name}.source"), ci95)
 
 
 def _known_names(items: Any, stated: Collection[str]) -> frozenset[str]:
-    if not isinstance(items, list):
-        raise RigError(f"known = {items!r}, expected a list of field names", "known")
-    for i, item in enumerate(items):
+    for i, item in enumerate(sequence(items, "known", "field names")):
         if item not in stated:
             raise RigError(
                 f"known: {quote(item)}, expected a value that this rig states: {', '.join(stated)}",
@@ -382,10 +371,8 @@ def _controller(item: Any) -> PositionLoop | None:
 
 
 def _effects(items: Any) -> tuple[EffectSetting, ...]:
-    if not isinstance(items, list):
-        raise RigError(f"effects = {items!r}, expected a list of {{name: …, parameters: {{…}}}}", "effects")
     settings = []
-    for i, item in enumerate(items):
+    for i, item in enumerate(sequence(items, "effects", "{name: …, parameters: {…}}")):
         body = mapping(item, f"effects[{i}]")
         only_keys(body, names(EFFECT), f"effects[{i}]")
         parameters = mapping(body.get("parameters", {}), f"effects[{i}].parameters")

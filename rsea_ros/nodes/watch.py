@@ -1,20 +1,248 @@
-"""watch: the live view, a page in a browser. It listens, and commands only where it was started to."""
+"""watch: the live view, a page in a browser. It listens, and commands only where it was started to.
+
+The page requests the newest samples of each topic. All subscriptions to measurements are best effort and
+hold a bounded queue: a publisher neither waits for this node nor repeats anything for it.
+"""
 
 from __future__ import annotations
 
+import math
 import sys
+import time
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.serialization import serialize_message
 
+from msg_adapters.raw import RawWriter
+from msg_adapters.ros import Bool, DiagnosticArray, JointState, torque_command_message
+from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import OK, Health, NodeHealth
+from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
+from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT, await_arrival
 from rsea_ros.nodes._run import Program, run_node
-from rsea_ros.nodes._watch_source import WatchCommand, WatchSource
+from rsea_ros.watch.command import Bounds, Commander
 from rsea_ros.watch.runs import Runs
 from rsea_ros.watch.server import Server
+
+SILENT, GONE = 3.0, 30.0
+"""s after which a node's health is old, and after which it is forgotten."""
+MOST_NODES = 40
+STALE = 3
+"""Level of a health that is old, as diagnostics number it."""
+Rows = dict[str, list[tuple[float, float]]]
+
+
+class WatchSource:
+    """Samples by channel, flag and health. axis, joint: as for every node.
+
+    newest: last stamp of joint_states, ns.
+    """
+
+    def __init__(self, node: Node, rig: Rig, axis: str, joint: str) -> None:
+        self._namespace = node.get_namespace().rstrip("/") + "/"
+        self._sign, along = sign_and_index(axis)
+        self._stiffness = math.nan if rig.rigid_spring else rig["spring.stiffness"]
+        self._angle_is_deflection = rig.clamped == set(END_NAMES)
+        self.flag: bool | None = None
+        self.newest, self._epoch = 0, 0
+        self._refused = 0
+        self._health: dict[str, tuple[float, Mapping[str, Any]]] = {}
+        self._counted = time.monotonic()
+        self.bench = f"{self._namespace.strip('/')} · {rig.name}"
+        effort = ("effort", 0)
+        self._boxes = {
+            topic: Mailbox(
+                node, topic, MessageFields(kind, tuple(fields), name, most), MEASUREMENT, self._refuse
+            )
+            for topic, kind, name, most, *fields in (
+                ("joint_states", JOINT_STATE, joint, 1, ("position", 0), effort),
+                ("ft", WRENCH, "", 1, ("wrench", along)),
+                ("torque_estimate", JOINT_STATE, "", 3, effort, ("effort", 1), ("effort", 2)),
+                ("torque_command", JOINT_STATE, joint, 1, effort),
+            )
+        }
+        self._counts = dict.fromkeys(self._boxes, 0)
+        node.create_subscription(Bool, "pure_torque", self._on_flag, LATCHED)
+        node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, MEASUREMENT)
+
+    def take(self) -> Mapping[str, Sequence[tuple[float, float]]]:
+        """Return the samples since the last call: s since the first stamp, SI."""
+        rows: Rows = {}
+        for stamp, (angle, effort) in self._of("joint_states"):
+            self.newest = max(self.newest, stamp)
+            _put(rows, self._seconds(stamp), motor=effort)
+            if self._angle_is_deflection:
+                _put(rows, self._seconds(stamp), deflection=angle)
+        for stamp, (torque,) in self._of("ft"):
+            t, torque = self._seconds(stamp), self._sign * torque
+            _put(rows, t, ft=torque)
+            if not self._angle_is_deflection and not math.isnan(self._stiffness):
+                _put(rows, t, deflection=torque / self._stiffness)
+        for stamp, (distal, proximal, disturbance) in self._of("torque_estimate"):
+            _put(rows, self._seconds(stamp), distal=distal, proximal=proximal, disturbance=disturbance)
+        for stamp, (torque,) in self._of("torque_command"):
+            _put(rows, self._seconds(stamp or self.newest), command=torque)
+        return rows
+
+    def state(self) -> Mapping[str, Any]:
+        """Return bench, health and rates, Hz, since the last call."""
+        now = time.monotonic()
+        span, self._counted = max(now - self._counted, 1e-3), now
+        rates = {topic: round(count / span) for topic, count in self._counts.items() if count}
+        self._counts = dict.fromkeys(self._boxes, 0)
+        self._health = {name: each for name, each in self._health.items() if now - each[0] < GONE}
+        shown = [_status_json(now - heard, each) for _, (heard, each) in sorted(self._health.items())]
+        return {"bench": self.bench, "health": shown, "rates": rates}
+
+    def _of(self, topic: str) -> Sequence[tuple[int, Sequence[float]]]:
+        taken = [(stamp, numbers) for stamp, numbers, _ in self._boxes[topic].take(MEASUREMENT.depth)]
+        self._counts[topic] += len(taken)
+        return taken
+
+    def _seconds(self, stamp: int) -> float:
+        self._epoch = self._epoch or stamp
+        return (stamp - self._epoch) / SECOND
+
+    def _refuse(self) -> None:
+        self._refused += 1
+
+    def _on_flag(self, message: Bool) -> None:
+        self.flag = bool(message.data)
+
+    def _on_health(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name.startswith(self._namespace) and len(self._health) < MOST_NODES:
+                self._health[status.name] = (time.monotonic(), {
+                    "name": status.name, "level": status.level[0], "message": status.message,
+                    "values": [(each.key, each.value) for each in status.values],
+                })  # fmt: skip
+
+
+def _put(rows: Rows, t: float, **values: float) -> None:
+    for name, value in values.items():
+        rows.setdefault(name, []).append((t, value))
+
+
+def _status_json(age: float, status: Mapping[str, Any]) -> Mapping[str, Any]:
+    if age < SILENT:
+        return status
+    return {**status, "level": STALE, "message": f"silent for {age:.0f} s; before: {status['message']}"}
+
+
+LEAD = SECOND // 50
+"""ns by which a command is published before it takes effect: longer than this process is held up."""
+MARGIN = SECOND // 200
+"""A command that has less than this left until it takes effect is left out, as by excite."""
+LIMITS = ("torque_limit", "slew_limit", "soft_start")
+"""Parameters of a driver; a plant has none. A negative one is derived: the driver itself cuts commands."""
+LOOK = 0.5
+"""s between looks at who is there."""
+ANSWER = 2.0
+"""s after which limits are requested again: the first answer of a bench just found may be lost."""
+
+
+class WatchCommand:
+    """Commands of a page on the grid of the measurements. why_not: why none may be held now, or nothing."""
+
+    def __init__(self, node: Node, source: WatchSource, values: Mapping[str, Any]) -> None:
+        self._node, self._source = node, source
+        self._rate: float = values["rate"]
+        self._most = Bounds(values["limit"], math.inf, values["growth"])
+        self.commander = Commander()
+        self.why_not = "nothing is known of the bench yet"
+        self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
+        template = serialize_message(torque_command_message(0, 0.0, values["joint"]))
+        self._writer = RawWriter(template, JOINT_STATE, "effort")
+        self._bench = ""
+        self._client: AsyncParameterClient | None = None
+        self._asked = -math.inf
+        self._cycle: Cycle | None = None
+        self._due = 0.0
+
+    def look(self) -> None:
+        """Check the publishers, and start or end the cycle. Raises its error."""
+        if time.monotonic() >= self._due:
+            self._due = time.monotonic() + LOOK
+            self._see_to_the_limits()
+            self.why_not = self._reason()
+        if self._cycle is not None:
+            self._cycle.is_running()
+            if not self.commander.active:
+                self._cycle.stop()
+                self._cycle = None
+        elif self.commander.active and self._source.newest:
+            self._cycle = Cycle(self._rate, self._step, catch_up=False)
+            self._cycle.start(self._first() - LEAD)
+
+    def close(self) -> None:
+        """End with zeros that have arrived, whichever page holds the command."""
+        if self.commander.holder is not None:
+            self.commander.release(self.commander.holder)
+        deadline = time.monotonic() + 1.0
+        while self._cycle is not None and self.commander.active and time.monotonic() < deadline:
+            time.sleep(0.01)
+        if self._cycle is not None:
+            self._cycle.stop()
+        await_arrival(self._publisher)
+
+    def _step(self, stamp: int) -> None:
+        assert self._cycle is not None
+        anchor = self._cycle.anchor
+        torque = self.commander.torque((stamp - anchor.offset) / SECOND)
+        if torque is not None and stamp + LEAD - anchor.now() > MARGIN:
+            self._publisher.publish(self._writer.write(stamp + LEAD, [torque]))
+
+    def _first(self) -> int:
+        """Return when the first command takes effect, ns: a whole number of periods after a measurement."""
+        earliest = time.time_ns() + 2 * LEAD
+        periods = math.ceil((earliest - self._source.newest) * self._rate / SECOND)
+        return self._source.newest + round(periods * SECOND / self._rate)
+
+    def _see_to_the_limits(self) -> None:
+        """Request the limits from the publisher of joint_states until it has said them."""
+        bench = ", ".join(sorted(self._publishers("joint_states")))
+        if bench != self._bench:
+            self._bench, self._client, self._asked, self.commander.bounds = bench, None, -math.inf, None
+        if not bench or "," in bench or self.commander.bounds is not None:
+            return
+        self._client = self._client or AsyncParameterClient(self._node, bench)
+        if time.monotonic() > self._asked + ANSWER and self._client.services_are_ready():
+            self._asked = time.monotonic()
+            self._client.get_parameters(list(LIMITS)).add_done_callback(partial(self._on_limits, bench))
+
+    def _on_limits(self, bench: str, future: Any) -> None:
+        if bench != self._bench:  # that bench has left
+            return
+        told = future.result().values
+        values = [v.double_value if v.type and v.double_value >= 0.0 else math.inf for v in told]
+        torque, slew, growth = [*values, math.inf, math.inf, math.inf][:3]
+        most = self._most
+        self.commander.bounds = Bounds(min(torque, most.torque), slew, min(growth, most.growth))
+
+    def _reason(self) -> str:
+        others = self._publishers("torque_command") - {self._node.get_fully_qualified_name()}
+        if others:
+            return f"{', '.join(sorted(others))} commands already"
+        if not self._bench:
+            return "nobody publishes joint_states"
+        if "," in self._bench:
+            return f"{self._bench} publish joint_states, expected one"
+        return f"{self._bench} has not said its limits yet" if self.commander.bounds is None else ""
+
+    def _publishers(self, topic: str) -> set[str]:
+        name = self._node.resolve_topic_name(topic)
+        infos = self._node.get_publishers_info_by_topic(name)
+        return {f"{i.node_namespace.rstrip('/')}/{i.node_name}" for i in infos}
+
 
 TABLE = (
     NodeParameter("host", "localhost", "where the page is served; 0.0.0.0: in the network too"),

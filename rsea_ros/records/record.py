@@ -110,6 +110,10 @@ class Channel:
         keep = (self.t >= start) & (self.t < stop)
         return Channel(self.t[keep], self.y[keep])
 
+    def held(self, t: FloatArray) -> FloatArray:
+        """Return the newest value at each instant, s; before the first one that."""
+        return self.y[np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self) - 1)]
+
 
 @dataclass(frozen=True)
 class Fault:

@@ -11,7 +11,7 @@ import pytest
 from msg_adapters import write_record
 from rsea_ros.checks import carried as usable, check as checks
 from rsea_ros.checks.finding import Findings
-from rsea_ros.design import spring_design, tolerance
+from rsea_ros.design import spring_design
 from rsea_ros.diagnosis import diagnose
 from rsea_ros.identification import identify
 from rsea_ros.model.rig_file import RigChoice
@@ -63,7 +63,7 @@ def prepare(record: Record, folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
     for module, names, value in (
         (identify, "identify", result), (diagnose, "diagnose", result),
         (spring_design, "spring_design", result), (spring_design, "least_stiffness", 1.0),
-        (tolerance, "robust_stiffness", np.inf),
+        (spring_design, "robust_stiffness", np.inf),
         (usable, "check_diagnosable", None), (checks, "check_record", Findings("run.mcap", RIG, (), ())),
         (identification_words, "identification_json", JSON), (results, "identification_report", "page"),
         (diagnosis_files, "diagnosis_json", JSON), (diagnosis_files, "diagnosis_report", "page"),

@@ -15,10 +15,12 @@ from rsea_ros.design.spring_design import (
     band_range,
     by_train,
     least_stiffness,
+    margins,
+    robust_stiffness,
+    spreads_of,
     spring_design,
     stiffness_bounds,
 )
-from rsea_ros.design.tolerance import margins, robust_stiffness, spreads_of
 from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import undamped_band

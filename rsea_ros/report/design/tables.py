@@ -7,14 +7,16 @@ from typing import Any
 
 from rsea_ros.design.spring_design import (
     Check,
+    Margin,
     SpringDesign,
     WithTrain,
     by_train,
+    margins,
     sense_unknown,
+    spreads_of,
     spring_design,
     stiffness_bounds,
 )
-from rsea_ros.design.tolerance import Margin, margins, spreads_of
 from rsea_ros.records.statistics import Z90
 from rsea_ros.report import words
 from rsea_ros.report.page import Html, listed, section, table

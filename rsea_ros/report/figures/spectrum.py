@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.records.record import UNITS, FloatArray
+from rsea_ros.records.statistics import power_density
 from rsea_ros.report import words
 from rsea_ros.report.figures import figure as fig
 
@@ -51,12 +52,8 @@ def residual_figure(
 def density(residual: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
     """Return Hz and the amplitude spectral density by averaged Hann segments, unit/√Hz. rate: Hz."""
     length = min(_LONGEST, 2 * (len(residual) // 8))
-    window = np.hanning(length + 1)[:-1]
-    windows = np.lib.stride_tricks.sliding_window_view(residual - residual.mean(), length)[:: length // 2]
-    power = np.mean(np.abs(np.fft.rfft(windows * window, axis=1)) ** 2, axis=0)
-    result: FloatArray = np.sqrt(2.0 * power / (rate * np.sum(window**2)))
-    frequency: FloatArray = np.arange(len(result), dtype=np.float64) * (rate / length)
-    return frequency[2:-1], result[2:-1]
+    frequency, power = power_density(residual, rate, length)
+    return frequency[2:-1], np.sqrt(power[2:-1])
 
 
 def in_bands(frequency: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
