@@ -49,7 +49,8 @@ def unpack_chunk(compression: str, packed: bytes, declared: int, allowance: Allo
     if not compression:
         return packed
     allowance.take(declared)
-    records = _one_frame(_decompressor(compression), packed, declared)
+    decompressor = zstd.ZstdDecompressor() if compression == "zstd" else LZ4FrameDecompressor()
+    records = _one_frame(decompressor, packed, declared)
     if len(records) != declared:
         raise ValueError(f"unpacks to {len(records)} bytes, expected the {declared} that it declares")
     return records
@@ -73,10 +74,6 @@ def unpack_file(path: Path, directory: Path) -> Path:
             allowance.take(len(block))
             plain.write(block)
     return target
-
-
-def _decompressor(compression: str) -> Any:
-    return zstd.ZstdDecompressor() if compression == "zstd" else LZ4FrameDecompressor()
 
 
 def _one_frame(decompressor: Any, packed: bytes, most: int) -> bytes:

@@ -180,7 +180,7 @@ def gauss_newton_step(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the step of every unknown and its one sigma."""
     m, matrix = len(setting.timed), rows.matrix
-    doubt = [_WIDER * _doubt(u) for u in setting.values]
+    doubt = [_WIDER * (u.doubt if np.isfinite(u.doubt) else u.scale) for u in setting.values]
     doubt += [_OFFSET_DOUBT] * m + [_DRIFT_DOUBT] * m + [np.inf] * m + [_GAIN_DOUBT] * m
     prior = np.array(doubt) ** -2.0
     off = state.theta - start_vector(setting.values)
@@ -191,10 +191,6 @@ def gauss_newton_step(
     scores = sum_by_block(matrix, rows.residual + matrix @ step, rows.block)
     covariance = inverse @ (scores.T @ scores + np.diag(prior)) @ inverse
     return step, np.sqrt(np.maximum(np.diag(covariance), np.diag(inverse)))
-
-
-def _doubt(u: Unknown) -> float:
-    return u.doubt if np.isfinite(u.doubt) else u.scale
 
 
 _ROUNDS = 6

@@ -310,7 +310,8 @@ def motor_torque(rig: Rig) -> tuple[float, str]:
 
 def check_structure(rig: Rig) -> None:
     """Raise RigError where parts of a rig contradict each other, or one is missing."""
-    _check_clamped(rig)
+    for end in set(rig.clamped) - set(END_NAMES):
+        raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
     _check_trains(rig)
     _check_sensor_end(rig)
     _check_spring(rig)
@@ -327,11 +328,6 @@ def check_two_torques(rig: Rig) -> None:
     """Raise RigError for a rig without a spring: it has one torque, not one on either side."""
     if rig.rigid_spring:
         raise RigError(f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side")
-
-
-def _check_clamped(rig: Rig) -> None:
-    for end in set(rig.clamped) - set(END_NAMES):
-        raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
 
 
 def _check_trains(rig: Rig) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rclpy.duration import Duration
+from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -37,3 +38,9 @@ def await_arrival(publisher: Publisher[Any]) -> None:
     On a busy machine one of four subscribers loses the last message of a node that exits at once.
     """
     publisher.wait_for_all_acked(ARRIVAL)
+
+
+def publishers_of(node: Node, topic: str) -> set[str]:
+    """Return the full names of the nodes that publish a topic, named as the node resolves it."""
+    infos = node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
+    return {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos}

@@ -23,7 +23,7 @@ from rsea_ros.model.rig_limits import derive
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._player import Player
-from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, publishers_of
 from rsea_ros.nodes._run import Program, run_node
 from rsea_ros.records.record import FloatArray
 
@@ -40,7 +40,6 @@ class BenchStatus:
 
     def __init__(self, node: Node, joint: str, largest: float) -> None:
         self._node, self._joint, self._largest = node, joint, largest
-        self._topic = node.resolve_topic_name("joint_states")
         self._heard, self._measured, self._fault, self.idle = False, 0.0, "", ""
         self._states = node.create_subscription(JointState, "joint_states", self._on_state, MEASUREMENT)
         node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
@@ -62,7 +61,7 @@ class BenchStatus:
         self._node.destroy_subscription(self._states)
 
     def _on_health(self, message: DiagnosticArray) -> None:
-        benches = self._benches()
+        benches = publishers_of(self._node, "joint_states")
         for status in message.status:
             for bench in benches:
                 if status.name in (bench, f"{bench}/{self._joint}"):
@@ -81,10 +80,6 @@ class BenchStatus:
                 f" of {status.name}"
             )
         self.idle = "" if active else f"{status.name} is not active; rsea call {bench} activate"
-
-    def _benches(self) -> set[str]:
-        infos = self._node.get_publishers_info_by_topic(self._topic)
-        return {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos}
 
 
 TABLE = (

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -79,8 +80,8 @@ class ExperimentNode:
         self._campaign = self._make(values)
         self._runs = 0
         for name, answer in (
-            ("approve", self._approve),
-            ("decline", self._decline),
+            ("approve", partial(self._take_answer, True)),
+            ("decline", partial(self._take_answer, False)),
             ("cancel", self._cancel),
         ):
             node.create_service(Trigger, f"~/{name}", answer)
@@ -153,13 +154,7 @@ class ExperimentNode:
         command, rate = proposal.command, proposal.rate
         return Player(self._node, command, rate, lead=lead, wanted=2, joint=joint, publisher=self._publisher)
 
-    def _approve(self, request: Any, response: Any) -> Any:
-        return self._take_answer(True, response)
-
-    def _decline(self, request: Any, response: Any) -> Any:
-        return self._take_answer(False, response)
-
-    def _take_answer(self, answer: bool, response: Any) -> Any:
+    def _take_answer(self, answer: bool, request: Any, response: Any) -> Any:
         with self._changed:
             waits = self._proposal is not None and self._answer is None
             if waits:

@@ -27,7 +27,7 @@ from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import OK, Health, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
-from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT, await_arrival
+from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT, await_arrival, publishers_of
 from rsea_ros.nodes._run import Program, run_node
 from rsea_ros.watch.command import Bounds, Commander
 from rsea_ros.watch.runs import Runs
@@ -209,7 +209,7 @@ class WatchCommand:
 
     def _see_to_the_limits(self) -> None:
         """Request the limits from the publisher of joint_states until it has said them."""
-        bench = ", ".join(sorted(self._publishers("joint_states")))
+        bench = ", ".join(sorted(publishers_of(self._node, "joint_states")))
         if bench != self._bench:
             self._bench, self._client, self._asked, self.commander.bounds = bench, None, -math.inf, None
         if not bench or "," in bench or self.commander.bounds is not None:
@@ -229,7 +229,7 @@ class WatchCommand:
         self.commander.bounds = Bounds(min(torque, most.torque), slew, min(growth, most.growth))
 
     def _reason(self) -> str:
-        others = self._publishers("torque_command") - {self._node.get_fully_qualified_name()}
+        others = publishers_of(self._node, "torque_command") - {self._node.get_fully_qualified_name()}
         if others:
             return f"{', '.join(sorted(others))} commands already"
         if not self._bench:
@@ -237,11 +237,6 @@ class WatchCommand:
         if "," in self._bench:
             return f"{self._bench} publish joint_states, expected one"
         return f"{self._bench} has not said its limits yet" if self.commander.bounds is None else ""
-
-    def _publishers(self, topic: str) -> set[str]:
-        name = self._node.resolve_topic_name(topic)
-        infos = self._node.get_publishers_info_by_topic(name)
-        return {f"{i.node_namespace.rstrip('/')}/{i.node_name}" for i in infos}
 
 
 TABLE = (

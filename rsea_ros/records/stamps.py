@@ -139,7 +139,7 @@ def _doubled_stretch(channel: Channel) -> tuple[float, float] | None:
     length = float(t[last] - t[first])
     times = (last - first) / max(length, 1e-300) * usual / _AROUND
     whole = len(dense) > 0.9 * (dense[-1] - dense[0] + 1)
-    same = _share_of_repeats(channel.y[first:last])
+    same = float(np.mean(np.diff(channel.y[first:last]) == 0.0))
     if length < _SHORTEST or not _DOUBLE[0] < times < _DOUBLE[1] or not whole or same > _SAME:
         return None
     return float(t[first]), float(t[last])
@@ -151,11 +151,6 @@ def _alternates(y: FloatArray) -> bool:
         return False
     by_one, by_two = (float(np.nanmedian(np.abs(y[k:] - y[:-k]))) for k in (1, 2))
     return by_one > _ALTERNATES * by_two > 0.0
-
-
-def _share_of_repeats(y: FloatArray) -> float:
-    """Return the share of samples that repeat the one before."""
-    return float(np.mean(np.diff(y) == 0.0))
 
 
 _FEWEST_TICKS = 10
@@ -266,17 +261,15 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
     for name, channel in record.channels.items():
         channels[name], stray = _without_stray_parts(channel, name, record.keeps_rows)
         faults += stray
-    pauses = {name: np.abs(np.diff(c.t)) > _pause(c.t) for name, c in channels.items()}
+    pauses = {
+        name: np.abs(np.diff(c.t)) > max(LONGEST_PAUSE, _SHORTEST_JUMP * median_period(c.t))
+        for name, c in channels.items()
+    }
     if all(at.any() for at in pauses.values()):
         for name, at in pauses.items():
             channels[name], jump = _shorten_steps(channels[name], name, at)
             faults += jump
     return record.with_channels(**channels), faults
-
-
-def _pause(t: FloatArray) -> float:
-    """Return from which step on a channel pauses, s."""
-    return max(LONGEST_PAUSE, _SHORTEST_JUMP * median_period(t))
 
 
 def _without_stray_parts(channel: Channel, name: str, keep: bool) -> tuple[Channel, list[Fault]]:
