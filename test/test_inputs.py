@@ -114,7 +114,7 @@ def test_a_bad_input_is_refused_in_one_line(played, name):
 
 
 def test_a_rig_without_noise_is_controlled(tmp_path):
-    from rsea_ros.control.trials import TrialResult, restlessness
+    from rsea_ros.control.study import TrialResult, restlessness
 
     value = restlessness(load_rig("cycloidal"), design=None)
     assert np.isnan(value)

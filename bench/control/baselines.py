@@ -30,10 +30,9 @@ from scipy.optimize import minimize
 
 from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.law import Gains
-from rsea_ros.control.loads import LOCKED, load_range
+from rsea_ros.control.study import amplitude_of, disturbed_rig
 from rsea_ros.control.synthesis import design
-from rsea_ros.control.trials import amplitude_of, disturbed_rig
-from rsea_ros.control.uncertainty import BenchVariant, variant_rig
+from rsea_ros.control.uncertainty import LOCKED, BenchVariant, load_range, variant_rig
 from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray

@@ -28,12 +28,10 @@ from rsea_ros.control.following import ControlTrace, reading
 from rsea_ros.control.grid import Grid, Lateness
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.link import LinkShare, link_share, linked_set
-from rsea_ros.control.loads import LOCKED, load_range, lock
 from rsea_ros.control.robustness import largest, robustness
-from rsea_ros.control.study import study
+from rsea_ros.control.study import LEARNED, sine, study, tracking_error
 from rsea_ros.control.synthesis import ControllerDesign, design
-from rsea_ros.control.trials import LEARNED, sine, tracking_error
-from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, corners
+from rsea_ros.control.uncertainty import LOCKED, BenchVariant, Uncertainty, corners, load_range, lock
 from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig

@@ -38,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Design the controller, run the trials, write the results."""
-    from rsea_ros.control.loads import lightest
     from rsea_ros.control.study import study
+    from rsea_ros.control.uncertainty import lightest
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.report.control.page import control_report
     from rsea_ros.report.control.tables import control_json

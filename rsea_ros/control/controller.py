@@ -26,10 +26,10 @@ from rsea_ros.control.compensation import Compensation, compensation
 from rsea_ros.control.law import FeedbackLaw, FeedbackState, Gains, feedback, hold, law_of, sample_rig
 from rsea_ros.control.learning import Learning
 from rsea_ros.control.link import LinkMotion, LinkShare
-from rsea_ros.control.loads import lightest, load_range, lock
 from rsea_ros.control.prediction import AHEAD, Acted, Prediction
 from rsea_ros.control.reference import Reference
 from rsea_ros.control.synthesis import design
+from rsea_ros.control.uncertainty import lightest, load_range, lock
 from rsea_ros.model.rig import MOTOR_TORQUE, Rig, motor_torque
 from rsea_ros.records.record import HUGE, NONSENSE, FloatArray, is_measured
 

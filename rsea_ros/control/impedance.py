@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.control.law import FT, FeedbackLaw, Gains, law_of, responses, sample_rig, z_of
-from rsea_ros.control.loads import lock
 from rsea_ros.control.margins import actions, returns
-from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, lags_of, mode_of, variant_rig
+from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, lags_of, lock, mode_of, variant_rig
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output

@@ -24,10 +24,9 @@ import numpy.typing as npt
 
 from rsea_ros.control.impedance import moved_bench
 from rsea_ros.control.law import FT, law_of
-from rsea_ros.control.loads import LOCKED
 from rsea_ros.control.margins import Margins, encirclements, least, margins, returns
 from rsea_ros.control.synthesis import ControllerDesign, grid
-from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, corners, dense, family, mode_of
+from rsea_ros.control.uncertainty import LOCKED, BenchVariant, Uncertainty, corners, dense, family, mode_of
 from rsea_ros.model import outputs
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.transfer import frequency_response

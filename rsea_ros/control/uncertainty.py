@@ -1,6 +1,6 @@
-"""Uncertainty of the actuator: corners of the rig's spread, and lags.
+"""What a controller must tolerate: loads (clamped, free, or in between), corners of the spread, lags.
 
-loads           locked, and the free ends with 0.5 to 100 times their inertia           loads.py
+    loads           locked, and the free ends with 0.5 to 100 times their inertia
     K_s             ± 10 %          b_m   ± 50 %
     path            one sample more than the one of the design, 2 ms of delay, both
     sensor          a mode of 33 Hz, damping ratio 0.02, 0.3 of the spring's torque in it
@@ -15,17 +15,64 @@ the current, at the motor on all torque, at the F/T sensor on ft. The law does n
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 
-from rsea_ros.control.law import FT, Sampled, responses, sample_rig, z_of
+from rsea_ros.control.law import FT, Sampled, check_controllable, responses, sample_rig, z_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.signal_table import Port
-from rsea_ros.model.rig import Rig
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import ComplexArray, FloatArray
+
+LIGHTEST = "paper_moving_output"
+LOCKED = "locked"
+MULTIPLES = (0.5, 1.0, 2.0, 4.0, 10.0, 30.0, 100.0)
+"""Of the free ends' inertia. At 100 times the paper's load hardly moves at the frequencies of control."""
+
+
+def load_range(rig: Rig, free: Rig | None = None) -> Mapping[str, Rig]:
+    """Return the rig by load: `locked`, and the free ends of `free` with 0.5 to 100 times their inertia.
+
+    free: a bench whose ends are the lightest load; by default the rig itself. The actuator is the rig's in
+    all. Raises ParameterError where `free` has no free end, or nothing can be controlled.
+    """
+    check_controllable(rig)
+    loads = {LOCKED: lock(rig)}
+    light = with_ends(rig, free or rig)
+    ends = [end for end in END_NAMES if light.end_is_free(end)]
+    if free is not None and not ends:
+        raise ParameterError(
+            f"rig {free.name}: both ends are clamped, expected a free one: it is the lightest load"
+        )
+    for multiple in MULTIPLES if ends else ():
+        inertias = {f"{end}.inertia": multiple * light[f"{end}.inertia"] for end in ends}
+        loads[f"free x {multiple:g}"] = light.with_values(inertias)
+    return loads
+
+
+def lightest(rig: Rig, name: str = "") -> Rig:
+    """Return the rig whose ends are the lightest load: that of a name, else the rig, LIGHTEST if clamped."""
+    if name:
+        return load_rig(name)
+    return load_rig(LIGHTEST) if rig.clamped == set(END_NAMES) else rig
+
+
+def lock(rig: Rig) -> Rig:
+    """Return the rig with both ends clamped."""
+    return replace(rig, clamped=frozenset(END_NAMES))
+
+
+def with_ends(rig: Rig, other: Rig) -> Rig:
+    """Return the rig with the ends and loads of another one."""
+    prefixes = (*(f"{end}." for end in END_NAMES), "housing.", "proximal_spring.")
+    ends = {name: q for name, q in other.quantities.items() if name.startswith(prefixes)}
+    rest = {name: q for name, q in rig.quantities.items() if not name.startswith(prefixes)}
+    return replace(rig, quantities={**rest, **ends}, clamped=other.clamped)
 
 
 def lag_responses(rig: Rig, plant: Sampled, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:

@@ -9,8 +9,8 @@ from rsea_ros.control.controller import CORNER, ControllerSettings, TorqueContro
 from rsea_ros.control.grid import Lateness, Tolerance
 from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
-from rsea_ros.control.loads import LIGHTEST, lightest, load_range
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, design
+from rsea_ros.control.uncertainty import LIGHTEST, lightest, load_range
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import SLEW, derive

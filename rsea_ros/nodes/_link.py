@@ -15,9 +15,9 @@ from rsea_ros.control.compensation import compensation
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.law import law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
-from rsea_ros.control.loads import lightest, load_range
 from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading, spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
+from rsea_ros.control.uncertainty import lightest, load_range
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._anchor import Anchor

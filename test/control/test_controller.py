@@ -11,12 +11,11 @@ from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueC
 from rsea_ros.control.following import closed_loop, follow
 from rsea_ros.control.grid import Lateness
 from rsea_ros.control.law import Gains, sample_rig
-from rsea_ros.control.loads import load_range
 from rsea_ros.control.prediction import AHEAD, Prediction, prediction_response
 from rsea_ros.control.reference import inverse, inverse_poles
+from rsea_ros.control.study import EFFECTS, Span, restlessness, sine, tracking_error
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.trials import EFFECTS, Span, restlessness, sine, tracking_error
-from rsea_ros.control.uncertainty import BenchVariant
+from rsea_ros.control.uncertainty import BenchVariant, load_range
 from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig_file import load_rig
 

@@ -9,8 +9,8 @@ from rsea_ros.control.controller import TorqueLimits
 from rsea_ros.control.impedance import impedance
 from rsea_ros.control.law import Gains
 from rsea_ros.control.robustness import largest, reach
+from rsea_ros.control.study import sine
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.trials import sine
 from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")

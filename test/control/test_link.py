@@ -11,10 +11,10 @@ from rsea_ros.control.following import closed_loop
 from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
-from rsea_ros.control.loads import load_range
 from rsea_ros.control.margins import link_response
+from rsea_ros.control.study import disturbed_rig, lagging_corners
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.trials import disturbed_rig, lagging_corners
+from rsea_ros.control.uncertainty import load_range
 from rsea_ros.model.rig_file import load_rig
 
 RATE = 280.0

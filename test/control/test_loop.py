@@ -16,9 +16,9 @@ from rsea_ros.control.law import (
     responses,
     sample_rig,
 )
-from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.margins import largest_pole, margins, returns
 from rsea_ros.control.synthesis import check, grid
+from rsea_ros.control.uncertainty import LOCKED, load_range
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting

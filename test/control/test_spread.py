@@ -7,11 +7,10 @@ import pytest
 
 from rsea_ros.control.following import fall, follow
 from rsea_ros.control.law import Gains
-from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.robustness import NEAR, softness, spread
+from rsea_ros.control.study import hard
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.control.trials import hard
-from rsea_ros.control.uncertainty import Uncertainty, mode_of
+from rsea_ros.control.uncertainty import LOCKED, Uncertainty, load_range, mode_of
 from rsea_ros.model.rig_file import load_rig
 
 RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")

@@ -7,9 +7,9 @@ import pytest
 
 from rsea_ros.control.impedance import impedance
 from rsea_ros.control.law import Gains
-from rsea_ros.control.loads import LOCKED, load_range
 from rsea_ros.control.robustness import robustness
 from rsea_ros.control.synthesis import check, design
+from rsea_ros.control.uncertainty import LOCKED, load_range
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from rsea_ros.control.robustness import Reach
-from rsea_ros.control.study import AtRate, Study
-from rsea_ros.control.trials import Compensated, TrialResult
+from rsea_ros.control.study import AtRate, Compensated, Study, TrialResult
 from rsea_ros.report import words
 from rsea_ros.report.page import Html, section, table
 from rsea_ros.report.result_files import pick
