@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.checks.expected import (
+    Quotient,
     Side,
     is_commanded,
     is_full_of_gaps,
+    quotient,
     quotients,
     sides,
 )
@@ -19,7 +21,6 @@ from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings, in_words_of, missing_command, unused_sentence
 from rsea_ros.checks.linearised_rig import LinearisedFit, Start, linear_of
 from rsea_ros.checks.pairs import is_held
-from rsea_ros.checks.response_shape import Quotient, quotient
 from rsea_ros.checks.rig_findings import (
     at_rates,
     clock_findings,

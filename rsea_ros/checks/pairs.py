@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.checks.response_shape import Quotient, quotient, usable
+from rsea_ros.checks.expected import Quotient, quotient, usable
 from rsea_ros.errors import RseaError
 from rsea_ros.model.equations import Mechanics, gear_inertia, mechanics
 from rsea_ros.model.rig import Rig

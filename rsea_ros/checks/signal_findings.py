@@ -16,9 +16,8 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from rsea_ros.checks.expected import Side, at_rest, moves
+from rsea_ros.checks.expected import Quotient, Side, at_rest, moves, usable
 from rsea_ros.checks.finding import Finding
-from rsea_ros.checks.response_shape import Quotient, usable
 from rsea_ros.checks.stamp_findings import command_band, natural_frequency
 from rsea_ros.identification.noise import noise_floor
 from rsea_ros.model.rig import Rig

@@ -8,7 +8,7 @@ from typing import Any
 from rsea_ros.cli import _output
 from rsea_ros.cli._output import path
 from rsea_ros.cli._terminal import say
-from rsea_ros.design.requirement import Requirement, check_magnitude
+from rsea_ros.design.mechanism import Requirement, check_magnitude
 from rsea_ros.model.train import TRAINS
 from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report.result_files import DESIGN_JSON, REPORT

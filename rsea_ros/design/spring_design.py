@@ -13,9 +13,8 @@ from types import MappingProxyType
 import numpy as np
 
 from rsea_ros.design import mechanism
-from rsea_ros.design.mechanism import spring_rate
+from rsea_ros.design.mechanism import Requirement, spring_rate
 from rsea_ros.design.motor_gear_units import MotorGear
-from rsea_ros.design.requirement import Requirement
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import (
     end_over_end,

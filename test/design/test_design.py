@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.design import mechanism
+from rsea_ros.design.mechanism import Requirement
 from rsea_ros.design.motor_gear_units import catalogue, unit_named
-from rsea_ros.design.requirement import Requirement
 from rsea_ros.design.spring_design import (
     band_range,
     by_train,
