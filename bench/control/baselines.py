@@ -33,8 +33,8 @@ from rsea_ros.control.law import Gains
 from rsea_ros.control.study import amplitude_of, disturbed_rig
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.uncertainty import LOCKED, BenchVariant, load_range, variant_rig
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import Plant
 from rsea_ros.records.record import FloatArray
 
 Step = Callable[[float, float, float], float]

@@ -32,9 +32,9 @@ from rsea_ros.control.robustness import largest, robustness
 from rsea_ros.control.study import LEARNED, sine, study, tracking_error
 from rsea_ros.control.synthesis import ControllerDesign, design
 from rsea_ros.control.uncertainty import LOCKED, BenchVariant, Uncertainty, corners, load_range, lock
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import Plant
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report.control import tables
 

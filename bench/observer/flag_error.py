@@ -9,12 +9,11 @@ import numpy as np
 
 from bench.observer.truth import true_run
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import end_over_end
 from rsea_ros.model.observer import Observer, TorqueEstimate, observe
 from rsea_ros.model.pure_torque_error import BEYOND, PURE, ErrorFlag, ErrorSettings
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.transfer import frequency_response
+from rsea_ros.model.transfer import end_over_end, frequency_response
 from rsea_ros.records.record import FloatArray
 
 BAND = 0.2

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.effects import signal_table as st
-from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.drive import steps_per_sample
 from rsea_ros.model.equations import C, H, P, mechanics, with_structure
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build, measure, run
+from rsea_ros.model.transfer import inner_inertia
 from rsea_ros.records.record import Channel, FloatArray, Record
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.uncertainty import lock
-from rsea_ros.model.plant import Plant, PlantSample
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import Plant, PlantSample
 from rsea_ros.records.record import ComplexArray, FloatArray
 
 

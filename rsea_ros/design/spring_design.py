@@ -16,15 +16,15 @@ from rsea_ros.design import mechanism
 from rsea_ros.design.mechanism import Requirement, spring_rate
 from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.bandwidth import (
+from rsea_ros.model.rig import END_NAMES, Quantity, Rig
+from rsea_ros.model.train import Train
+from rsea_ros.model.transfer import (
     end_over_end,
     flat_band,
     pure_torque_bandwidth,
     undamped_band,
     undamped_stiffness,
 )
-from rsea_ros.model.rig import END_NAMES, Quantity, Rig
-from rsea_ros.model.train import Train
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z90
 

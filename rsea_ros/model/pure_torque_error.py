@@ -22,10 +22,10 @@ import numpy as np
 
 from rsea_ros.compiler import njit
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.bandwidth import edge_of_error, end_over_end, inner_inertia
 from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.rig import Rig, check_two_torques
+from rsea_ros.model.transfer import edge_of_error, end_over_end, inner_inertia
 from rsea_ros.records.record import HUGE, FloatArray, is_measured
 from rsea_ros.records.statistics import Z90
 

@@ -1,7 +1,7 @@
 """Whether there is a torque, and how its power lies about the edge of the band of pure torque.
 
 The edge is where |T_d / T_p| of this rig leaves its tolerance in dB or in degrees, exact and damped
-(bandwidth.py). One state-variable filter with two outputs splits the torque there:
+(transfer.py). One state-variable filter with two outputs splits the torque there:
 
     high = s^2 / D,   low = w^2 / D,   D = s^2 + sqrt(2) w s + w^2   (Butterworth, power complementary)
 
@@ -20,10 +20,10 @@ import numpy as np
 from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 
 from rsea_ros.compiler import njit
-from rsea_ros.model.bandwidth import end_over_end, flat_band
 from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import ErrorModel, TorqueEstimate
 from rsea_ros.model.rig import Rig, check_two_torques
+from rsea_ros.model.transfer import end_over_end, flat_band
 from rsea_ros.records.record import HUGE, FloatArray, is_measured
 
 DAMPING = math.sqrt(2.0)

@@ -9,7 +9,7 @@
     lumped                          (rotor turns against the ground)                      N
 
 n counts both turns against the housing; N is `gear.ratio`. The sign matters: n J_r adds to the chassis or
-takes from it (bandwidth.py). Sources: Willis' equation for the first two; for a harmonic drive the maker's
+takes from it (transfer.py). Sources: Willis' equation for the first two; for a harmonic drive the maker's
 ratio R = z_f / (z_c - z_f) with z_f, z_c teeth of flexspline and circular spline (Harmonic Drive catalogues,
 "rotational direction and reduction ratio"). test/model/test_train.py derives every n from rolling contacts.
 """

@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from rclpy.node import Node
 
 from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
-from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
 from rsea_ros.model.observer.signal_noise import Consistency, consistency
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.torque_band import TorqueBand
+from rsea_ros.model.transfer import pure_torque_bandwidth
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._model_inputs import ModelInputs
 from rsea_ros.nodes._qos import LATCHED, await_arrival

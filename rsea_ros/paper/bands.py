@@ -18,17 +18,17 @@ import numpy as np
 
 from rsea_ros.design.spring_design import band_range
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import (
+from rsea_ros.model.equations import rotor_inertia, train_ratio
+from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.train import TRAINS, Train
+from rsea_ros.model.transfer import (
     end_to_end,
     flat_band,
+    frequency_response,
     inner_inertia,
     pure_torque_bandwidth,
     undamped_band,
 )
-from rsea_ros.model.equations import rotor_inertia, train_ratio
-from rsea_ros.model.rig import END_NAMES, Rig
-from rsea_ros.model.train import TRAINS, Train
-from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import formulas
 from rsea_ros.paper.formulas import eq_6_distal_per_proximal
 from rsea_ros.records.record import ComplexArray, FloatArray

@@ -14,8 +14,8 @@ from types import MappingProxyType
 from typing import Literal
 
 from rsea_ros.documents.units import STANDARD_GRAVITY
-from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.train import Train
+from rsea_ros.model.transfer import pure_torque_bandwidth
 from rsea_ros.paper import formulas
 
 TABLE_2: Mapping[str, tuple[str, str]] = MappingProxyType(

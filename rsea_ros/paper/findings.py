@@ -15,16 +15,16 @@ import numpy as np
 from rsea_ros.design.mechanism import spring_radius
 from rsea_ros.documents.units import STANDARD_GRAVITY
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import (
+from rsea_ros.model.rig import END_NAMES, Quantity
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import (
     flat_band,
+    frequency_response,
     inner_inertia,
     pure_torque_bandwidth,
     resonance_peak,
     undamped_band,
 )
-from rsea_ros.model.rig import END_NAMES, Quantity
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import claims, formulas
 from rsea_ros.paper.claims import PaperFinding
 from rsea_ros.paper.rival_models import largest_gap, readings, resonance_hz

@@ -1,6 +1,6 @@
 """The paper's formulas as printed, Eqs. (1) to (10); the model in `model/equations.py` is exact.
 
-Eq. (7) is in `model/bandwidth.py`: the design method needs it too.
+Eq. (7) is in `model/transfer.py`: the design method needs it too.
 
 k_s: N m/rad; j_*: kg m^2; b_*: N m s/rad, at the gear output, but for `*_rotor`, which are at the rotor
 (times N^2 at the output). The term that Eqs. (5) to (7) leave out is in docs/physics.md.

@@ -16,8 +16,8 @@ from rsea_ros.control.reference import inverse, inverse_poles
 from rsea_ros.control.study import EFFECTS, Span, restlessness, sine, tracking_error
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.uncertainty import BenchVariant, load_range
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import Plant
 
 RATE = 280.0
 GAINS = Gains(0.2575, 0.003029, 1.195, 6.99, 42.9)

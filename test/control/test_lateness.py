@@ -9,8 +9,8 @@ from bench.control.tables import Arrivals, irregular
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.grid import Lateness, Tolerance
 from rsea_ros.control.law import Gains
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import Plant
 from rsea_ros.nodes import _control as _controller_limits
 
 RATES = {

@@ -20,9 +20,9 @@ from rsea_ros.control.margins import largest_pole, margins, returns
 from rsea_ros.control.synthesis import check, grid
 from rsea_ros.control.uncertainty import LOCKED, load_range
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import Plant
 
 RATE = 280.0
 GAINS = Gains(0.2575, 0.003029, 1.195, 6.99, 42.9)

@@ -11,9 +11,9 @@ from rsea_ros.control.law import Gains
 from rsea_ros.control.polarity import Polarity
 from rsea_ros.control.sign_change import SignChange
 from rsea_ros.control.sign_evidence import SignEvidence
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import Plant
 
 RATE, LIMIT = 280.0, 68.0
 """Of config/nodes/controller.yaml: Hz, N m."""

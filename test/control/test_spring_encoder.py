@@ -12,9 +12,9 @@ from rsea_ros.control.following import closed_loop
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare
 from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import Plant
 
 RATE = 280.0
 GAINS, SHARE = Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), LinkShare(0.25, 0.4, 20.0)

@@ -23,9 +23,8 @@ from rsea_ros.design.spring_design import (
 )
 from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.transfer import frequency_response
+from rsea_ros.model.transfer import frequency_response, undamped_band
 from rsea_ros.paper.bands import bands
 from rsea_ros.paper.formulas import eq_8_spring_torque, eq_9_spring_stiffness
 

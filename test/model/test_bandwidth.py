@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.bandwidth import (
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import (
     end_to_end,
     flat_band,
     inner_inertia,
@@ -17,7 +18,6 @@ from rsea_ros.model.bandwidth import (
     resonance_peak,
     undamped_band,
 )
-from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.formulas import EXACT_FACTOR, eq_6_distal_per_proximal
 
 PLATFORM, PROTOTYPE = load_rig("paper_high_impedance"), load_rig("prototype_knee")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from rsea_ros.errors import ParameterError, RigError
-from rsea_ros.model.bandwidth import end_over_end, flat_band
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.pure_torque_error import BEYOND, NOTHING, PURE, ErrorFlag, ErrorSettings, edge_of
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import end_over_end, flat_band
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 
 RATE = 1000.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.design import mechanism as spring
-from rsea_ros.model import bandwidth, outputs
+from rsea_ros.model import outputs, transfer
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper import formulas
@@ -48,13 +48,13 @@ TABLE = [
     ("damping ratio of Eq. (10)", C_1 / (2 * math.sqrt(C_2)), 0.337, 5e-4),
     ("natural frequency of Table 2, Hz", math.sqrt(K_S / (J_M + J_SC)) / (2 * math.pi), 6.365, 5e-4),
     ("damping ratio of Table 2", (B_M + B_S) / (2 * math.sqrt(K_S * (J_M + J_SC))), 0.341, 5e-4),
-    ("Eq. (7), platform, Hz", bandwidth.pure_torque_bandwidth(K_S, J_SC), 53.20, 5e-3),
-    ("Eq. (7), prototype, Hz", bandwidth.pure_torque_bandwidth(K_S_PROTOTYPE, J_SC_PROTOTYPE), 55.83, 5e-3),
+    ("Eq. (7), platform, Hz", transfer.pure_torque_bandwidth(K_S, J_SC), 53.20, 5e-3),
+    ("Eq. (7), prototype, Hz", transfer.pure_torque_bandwidth(K_S_PROTOTYPE, J_SC_PROTOTYPE), 55.83, 5e-3),
     ("factor of Eq. (7), +3 dB for sqrt(2)", formulas.EXACT_FACTOR, 0.29289, 5e-6),
-    ("factor of Eq. (7) as printed, +3 dB", 1 - 10 ** (-3 / 20), bandwidth.PAPER_FACTOR, 5e-4),
-    ("Eq. (6), peak, dB", bandwidth.resonance_peak(EQ_6)[1], 0.316, 5e-4),
-    ("Eq. (6), peak, Hz", bandwidth.resonance_peak(EQ_6)[0], 50.7, 5e-2),
-    ("Eq. (6), -3 dB, Hz", bandwidth.flat_band(EQ_6, 3.0), 112.1, 5e-2),
+    ("factor of Eq. (7) as printed, +3 dB", 1 - 10 ** (-3 / 20), transfer.PAPER_FACTOR, 5e-4),
+    ("Eq. (6), peak, dB", transfer.resonance_peak(EQ_6)[1], 0.316, 5e-4),
+    ("Eq. (6), peak, Hz", transfer.resonance_peak(EQ_6)[0], 50.7, 5e-2),
+    ("Eq. (6), -3 dB, Hz", transfer.flat_band(EQ_6, 3.0), 112.1, 5e-2),
     (
         "platform spring radius of Eq. (9), mm",
         1e3 * spring.spring_radius(1690.5, 207350.0, 0.0635),

@@ -13,11 +13,10 @@ from scipy.linalg import expm
 from scipy.signal import lsim
 
 from rsea_ros.model import outputs
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.prediction_errors import in_phase, predict
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import build, run, simulate, synthesize
+from rsea_ros.model.simulation import Plant, build, run, simulate, synthesize
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel, Record
 

@@ -10,9 +10,9 @@ import pytest
 
 from rsea_ros.errors import RigError
 from rsea_ros.model.observer import Observer, TorqueEstimate
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import Plant
 from rsea_ros.model.torque_band import TorqueBand, empty_pair, powers, split
 from rsea_ros.model.transfer import frequency_response
 

@@ -9,12 +9,11 @@ import pytest
 from rolling import rotor_speed
 
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import END_NAMES
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS, rotor_turns, spin_inertia
-from rsea_ros.model.transfer import frequency_response
+from rsea_ros.model.transfer import frequency_response, inner_inertia
 from rsea_ros.paper.rival_models import lumped_rig
 
 MOVING, KNEE = load_rig("paper_moving_output"), load_rig("prototype_knee")

@@ -11,11 +11,10 @@ from random_rigs import RIG_NAMES, WITH_SPRING, rigs
 
 from rsea_ros.errors import RigError
 from rsea_ros.model import outputs, transfer
-from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import PORTS
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.transfer import frequency_response
+from rsea_ros.model.transfer import frequency_response, inner_inertia
 from rsea_ros.paper import formulas
 from rsea_ros.paper.rival_models import lumped_rig
 

@@ -10,9 +10,9 @@ from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.spring_encoder import SpringEncoder
 from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.model.plant import Plant
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
+from rsea_ros.model.simulation import Plant
 from rsea_ros.nodes import _link as _measurements
 from rsea_ros.nodes._control import TABLE, with_limits
 from rsea_ros.nodes._link import link_of, link_values, link_words

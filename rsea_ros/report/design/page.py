@@ -8,8 +8,7 @@ import numpy as np
 
 from rsea_ros.design.spring_design import SpringDesign, by_train, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import end_to_end, undamped_stiffness
-from rsea_ros.model.transfer import frequency_response
+from rsea_ros.model.transfer import end_to_end, frequency_response, undamped_stiffness
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.design.surface import Point, bandwidth_contours, log_marks

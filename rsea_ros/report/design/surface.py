@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.model.bandwidth import undamped_band
+from rsea_ros.model.transfer import undamped_band
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report.figures import figure as fig
 

@@ -8,11 +8,16 @@ import numpy as np
 
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import end_to_end, inner_inertia, pure_torque_bandwidth, undamped_band
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.transfer import frequency_response
+from rsea_ros.model.transfer import (
+    end_to_end,
+    frequency_response,
+    inner_inertia,
+    pure_torque_bandwidth,
+    undamped_band,
+)
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.rival_models import MovingOutput, largest_gap, readings, resonance_hz

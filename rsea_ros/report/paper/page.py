@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.model.bandwidth import inner_inertia, pure_torque_bandwidth
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.transfer import inner_inertia, pure_torque_bandwidth
 from rsea_ros.paper.bands import TOLERANCES, Bands, arrangements, bands, limits
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS, TABLE_2, claims
 from rsea_ros.paper.findings import findings
