@@ -25,9 +25,9 @@ from scipy.linalg import expm
 
 from rsea_ros.control.controller import CORNER, ControllerSettings, Measurement, TorqueController
 from rsea_ros.control.following import UNLIMITED
-from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import law_of
 from rsea_ros.control.link import LinkShare
+from rsea_ros.control.margins import distal_responses
 from rsea_ros.control.prediction import AHEAD, SMOOTH, prediction_response, z_of
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model import outputs

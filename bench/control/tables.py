@@ -26,8 +26,8 @@ from rsea_ros.cli.control import motors
 from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.following import ControlTrace, reading
 from rsea_ros.control.grid import Grid, Lateness
-from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.link import LinkShare, link_share, linked_set
+from rsea_ros.control.margins import distal_responses
 from rsea_ros.control.robustness import largest, robustness
 from rsea_ros.control.study import LEARNED, sine, study, tracking_error
 from rsea_ros.control.synthesis import ControllerDesign, design

@@ -18,9 +18,8 @@ from itertools import product
 
 import numpy as np
 
-from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import LINK, FeedbackLaw, law_of
-from rsea_ros.control.margins import encirclements, link_response, returns
+from rsea_ros.control.margins import distal_responses, encirclements, link_response, returns
 from rsea_ros.control.synthesis import SOFT, ControllerDesign, DesignLimits, grid
 from rsea_ros.control.uncertainty import Uncertainty, corners, family
 from rsea_ros.model.rig import Rig

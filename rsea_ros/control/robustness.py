@@ -7,7 +7,7 @@ and the mode exactly (python-control's mu needs slycot, which is not installed, 
 
 Gain and phase of torque and output impedance of each bench under one controller:
 
-    T / T_r = (P path D_0) / (P_0 D)        D as in loop.py; 0: the nominal bench with the same load
+    T / T_r = (P path D_0) / (P_0 D)        D as in margins.py; 0: the nominal bench with the same load
 
 T is the torque on the load, not what a mode of the F/T sensor's mount makes of it; T_r is what the nominal
 bench makes of a desired torque. Feed-forward and law are linear, so this is exact where nothing is learned;
@@ -22,9 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rsea_ros.control.impedance import moved_bench
 from rsea_ros.control.law import FT, law_of
-from rsea_ros.control.margins import Margins, encirclements, least, margins, returns
+from rsea_ros.control.margins import Margins, encirclements, least, margins, moved_bench, returns
 from rsea_ros.control.synthesis import ControllerDesign, grid
 from rsea_ros.control.uncertainty import LOCKED, BenchVariant, Uncertainty, corners, dense, family, mode_of
 from rsea_ros.model import outputs

@@ -16,8 +16,8 @@ import numpy as np
 
 from rsea_ros.control.controller import ControllerSettings, TorqueController, TorqueLimits
 from rsea_ros.control.following import Following, Step, closed_loop, fall, follow, step_response
-from rsea_ros.control.impedance import OutputImpedance, impedance
 from rsea_ros.control.link import LinkShare
+from rsea_ros.control.margins import OutputImpedance, impedance
 from rsea_ros.control.robustness import (
     Reach,
     Robustness,

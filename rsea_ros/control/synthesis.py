@@ -24,9 +24,16 @@ from types import MappingProxyType
 import numpy as np
 from scipy.optimize import minimize
 
-from rsea_ros.control.impedance import Moved, distal_responses
 from rsea_ros.control.law import FT, Gains, law_of, sample_rig
-from rsea_ros.control.margins import Margins, encirclements, largest_pole, margins, returns
+from rsea_ros.control.margins import (
+    Margins,
+    Moved,
+    distal_responses,
+    encirclements,
+    largest_pole,
+    margins,
+    returns,
+)
 from rsea_ros.control.uncertainty import Family, Uncertainty, corners, family
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.controller import TorqueLimits
-from rsea_ros.control.impedance import impedance
 from rsea_ros.control.law import Gains
+from rsea_ros.control.margins import impedance
 from rsea_ros.control.robustness import largest, reach
 from rsea_ros.control.study import sine
 from rsea_ros.control.synthesis import ControllerDesign

@@ -8,10 +8,9 @@ import pytest
 from bench.control.human import Virtual, measure_impedance
 from rsea_ros.control.controller import ControllerSettings, TorqueController
 from rsea_ros.control.following import closed_loop
-from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
-from rsea_ros.control.margins import link_response
+from rsea_ros.control.margins import distal_responses, link_response
 from rsea_ros.control.study import disturbed_rig, lagging_corners
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.uncertainty import load_range

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_ros.control.impedance import impedance
 from rsea_ros.control.law import Gains
+from rsea_ros.control.margins import impedance
 from rsea_ros.control.robustness import robustness
 from rsea_ros.control.synthesis import check, design
 from rsea_ros.control.uncertainty import LOCKED, load_range

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bench.control.human import Virtual, felt_impedance, measure_impedance, passive_to, stiffest
-from rsea_ros.control.impedance import distal_responses
 from rsea_ros.control.law import Gains
+from rsea_ros.control.margins import distal_responses
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model.rig_file import load_rig
 
