@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 import rsea_ros as rsea
-from rsea_ros.model.bandwidth import inner_inertia, undamped_band
+from rsea_ros.model.transfer import inner_inertia, undamped_band
 
 rig = rsea.load_rig("paper_high_impedance")
 stiffness = np.linspace(200.0, 4000.0, 200)  # N·m/rad
