@@ -25,10 +25,10 @@ from scipy.linalg import expm
 
 from rsea_ros.control.controller import CORNER, ControllerSettings, Measurement, TorqueController
 from rsea_ros.control.following import UNLIMITED
-from rsea_ros.control.law import law_of
+from rsea_ros.control.law import law_of, z_of
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.margins import distal_responses
-from rsea_ros.control.prediction import AHEAD, SMOOTH, prediction_response, z_of
+from rsea_ros.control.prediction import AHEAD, ALONG, SMOOTH, gains_of
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, PORTS, D
@@ -40,6 +40,18 @@ from rsea_ros.records.record import ComplexArray, FloatArray
 
 SMALLEST = 0.02
 """Hz, from which on passivity is looked at."""
+
+
+def prediction_response(corner: float, period: float, hz: FloatArray) -> ComplexArray:
+    """Return predicted over true torque at the end of the hold, trusted in full, at hz: 1 is no error."""
+    g = gains_of(math.exp(-2.0 * math.pi * corner * period))
+    z = z_of(period, hz)
+    first = np.array([1.0, 0.0, 0.0])
+    to_state = np.eye(3) - (np.eye(3) - np.outer(g, first)) @ ALONG / z[:, None, None]
+    states = np.linalg.solve(to_state, np.broadcast_to(g.astype(complex)[:, None], (len(z), 3, 1)))[..., 0]
+    rates = ALONG[0] * [1.0, AHEAD, AHEAD * AHEAD]
+    response: ComplexArray = (1.0 + states[:, 1:] @ rates[1:]) / z**AHEAD
+    return response
 
 
 def smoothed_response(period: float, hz: FloatArray) -> ComplexArray:

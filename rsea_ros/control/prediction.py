@@ -25,8 +25,7 @@ import math
 
 import numpy as np
 
-from rsea_ros.control.law import z_of
-from rsea_ros.records.record import ComplexArray, FloatArray
+from rsea_ros.records.record import FloatArray
 
 ALONG: FloatArray = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
 AHEAD = 2
@@ -108,18 +107,6 @@ def gains_of(memory: float) -> FloatArray:
     """Return g for a memory from 0 (the last three samples) to below 1."""
     fresh = 1.0 - memory
     return np.array([1.0 - memory**3, 1.5 * fresh**2 * (1.0 + memory), fresh**3])
-
-
-def prediction_response(corner: float, period: float, hz: FloatArray) -> ComplexArray:
-    """Return predicted over true torque at the end of the hold, trusted in full, at hz: 1 is no error."""
-    g = gains_of(math.exp(-2.0 * math.pi * corner * period))
-    z = z_of(period, hz)
-    first = np.array([1.0, 0.0, 0.0])
-    to_state = np.eye(3) - (np.eye(3) - np.outer(g, first)) @ ALONG / z[:, None, None]
-    states = np.linalg.solve(to_state, np.broadcast_to(g.astype(complex)[:, None], (len(z), 3, 1)))[..., 0]
-    rates = ALONG[0] * [1.0, AHEAD, AHEAD * AHEAD]
-    response: ComplexArray = (1.0 + states[:, 1:] @ rates[1:]) / z**AHEAD
-    return response
 
 
 MEMORY = 0.5

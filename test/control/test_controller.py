@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.control.human import prediction_response
 from rsea_ros.control.compensation import compensation
 from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.following import closed_loop, follow
 from rsea_ros.control.grid import Lateness
 from rsea_ros.control.law import Gains, sample_rig
-from rsea_ros.control.prediction import AHEAD, Prediction, prediction_response
+from rsea_ros.control.prediction import AHEAD, Prediction
 from rsea_ros.control.reference import inverse, inverse_poles
 from rsea_ros.control.study import EFFECTS, Span, restlessness, sine, tracking_error
 from rsea_ros.control.synthesis import ControllerDesign
