@@ -188,12 +188,12 @@ def hardest(loads: Mapping[str, Rig]) -> list[BenchVariant]:
     return [case for name in loads for case in lagging_corners(name)]
 
 
-def lagging_corners(name: str, *, every: bool = False) -> list[BenchVariant]:
-    """Return the corners of K_s and b_m of a load with all of the lag and the mode: two, or all four."""
-    u, sides = Uncertainty(), ((1, 1), (-1, -1)) + (((1, -1), (-1, 1)) if every else ())
+def lagging_corners(name: str) -> list[BenchVariant]:
+    """Return the corners of a load with all of the lag and the mode, K_s and b_m both high or both low."""
+    u = Uncertainty()
     return [
-        BenchVariant(name, 1.0 + k * u.stiffness, 1.0 + b * u.damping, u.samples, u.delay, u.mode[2])
-        for k, b in sides
+        BenchVariant(name, 1.0 + k * u.stiffness, 1.0 + k * u.damping, u.samples, u.delay, u.mode[2])
+        for k in (1, -1)
     ]
 
 
@@ -205,7 +205,7 @@ def hard(loads: Mapping[str, Rig]) -> Rig:
 
 
 def disturbed_rig(loads: Mapping[str, Rig], case: BenchVariant) -> Rig:
-    """Return the bench of a case as a rig with effects; samples that are late are for the harness."""
+    """Return the bench of a case as a rig with effects; samples that are late are for `closed_loop`."""
     u, effects = Uncertainty(), []
     if case.delay:
         effects.append(EffectSetting("command_delay", {"delay": case.delay}))
