@@ -225,7 +225,7 @@ def test_few_segments_do_not_make_noise_smaller():
 def test_the_command_in_force_at_an_instant_is_the_last_one_before_it():
     command = Channel(np.arange(4.0), np.array([1.0, 2.0, np.nan, 4.0]))
     at = np.array([-1.0, 0.0, 0.9, 1.0, 2.5, 3.0, 9.0])
-    assert noise._held_before(command, at).tolist() == [1.0, 1.0, 1.0, 2.0, 0.0, 4.0, 4.0]
+    assert np.nan_to_num(command.held(at)).tolist() == [1.0, 1.0, 1.0, 2.0, 0.0, 4.0, 4.0]
 
 
 GRID = np.resize(np.arange(-3.0, 4.0), 100)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rsea_ros.nodes import watch
+from rsea_ros.nodes import watch as module
 from rsea_ros.nodes.watch import ANSWER, LOOK, WatchCommand
 
 
@@ -31,8 +31,8 @@ def bench(monkeypatch):
         return requests[-1]
 
     client = SimpleNamespace(services_are_ready=lambda: True, get_parameters=request)
-    monkeypatch.setattr(watch, "AsyncParameterClient", lambda node, name: client)
-    monkeypatch.setattr(watch, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    monkeypatch.setattr(module, "AsyncParameterClient", lambda node, name: client)
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     infos = {"joint_states": names, "torque_command": ["watch"]}
     node = SimpleNamespace(
         create_publisher=lambda *_: None,
