@@ -112,7 +112,7 @@ def test_a_torque_that_is_no_number_is_none(listener, inputs_of):
     for k, torque in enumerate([math.nan] * 15 + [1e300] * 15, 20):
         stamp = round(EPOCH + k * PERIOD)
         publishers["joint_states"].publish(joint_state_message(stamp, 0.0, 0.0, 0.0))
-        publishers["ft"].publish(wrench_message(stamp, torque))
+        publishers["ft"].publish(wrench_message(stamp, (0.0,) * 5 + (torque,)))
     listener.until(lambda: [*inputs.take()] and inputs.refused >= 30)
     assert inputs.ft_silent
 
