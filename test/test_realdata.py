@@ -43,7 +43,7 @@ DESIGNS = {
 """Travel between -4 and +4 N m, degrees; whether the current limit stops the motor at 25 N m."""
 
 
-RIVALS = {"asymmetric_friction", "backlash", "coulomb_friction", "dead_zone"}
+RIVALS = {"asymmetric_friction", "backlash", "coulomb_friction"}
 FRICTIONS = {
     "asymmetric_friction", "coulomb_friction", "load_dependent_friction", "quadratic_drag",
     "stribeck_friction",

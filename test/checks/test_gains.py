@@ -73,7 +73,7 @@ def test_an_effect_is_not_taken_for_a_wrong_unit_or_rig(effect):
     rng = np.random.default_rng(1)
     bench = drawn_bench(rng)
     bench = hide(bench, effect, drawn_parameters(effect, "strong", rng)) if effect else bench
-    findings = check_record(record_run(bench, 3, duration=8.0), RIG)
+    findings = check_record(record_run(bench, 3, duration=5.0), RIG)
     assert findings.light != "red"
     assert not {f.kind for f in findings.faults} & {"sign", "scale", "wrong_rig", "dead_channel"}
 
