@@ -19,6 +19,7 @@ from xdist.workermanage import WorkerController
 
 import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
 from rsea_ros.compiler import trusted_cache
+from rsea_ros.identification.solver import on_cores
 
 sys.path.append(str(Path(__file__).parent))  # import_graph, which is no test
 
@@ -48,8 +49,9 @@ def _take_domain() -> int:
 FIRST = "gw0"
 """The worker that keeps its priority, and gets the files that wait: the others make way for it."""
 
-if os.environ.get("PYTEST_XDIST_WORKER", FIRST) != FIRST:
-    os.nice(10)
+if (worker := os.environ.get("PYTEST_XDIST_WORKER")) is not None:
+    on_cores(1).__enter__()  # there is a worker for each core: threads that wait for each other cost a fifth
+    os.nice(0 if worker == FIRST else 10)
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(_take_domain())

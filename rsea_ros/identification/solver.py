@@ -347,4 +347,4 @@ class Pools:
 def worker_pools() -> Iterator[Pools]:
     """Hold both pools within a with statement; linear algebra keeps to one thread meanwhile."""
     with one_blas_thread(), ThreadPoolExecutor(cores()) as fits, ThreadPoolExecutor(cores()) as derivatives:
-        yield Pools(fits, in_pool(derivatives))
+        yield Pools(fits, in_pool(derivatives) if cores() > 1 else serial)

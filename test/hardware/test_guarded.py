@@ -7,6 +7,7 @@ import math
 import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.hardware.device import Refused
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits
@@ -154,6 +155,7 @@ def test_a_reading_beyond_a_limit_ends_the_torque_in_the_same_cycle(joint, devic
         ([LOST, LOST, None, LOST, LOST], None),
         ([LOST, LOST, LOST], DeviceFault("no_reply", 3, 3, "cycles", "no reply")),
         ([DeviceError("access denied")], DeviceFault("deviceerror", detail="access denied")),
+        ([Refused("access denied")], DeviceFault("refused", detail="access denied")),
     ],
 )
 def test_lost_answers_in_a_row_are_a_fault_and_other_errors_at_once(
