@@ -1,4 +1,4 @@
-"""What the syntax tree of every module says: who imports whom (docs/architecture.md), arguments, units."""
+"""What the syntax tree of every module says: who imports whom, arguments, units, who writes files."""
 
 from __future__ import annotations
 
@@ -217,3 +217,46 @@ def test_the_docs_spell_units_in_one_way():
     pages = {page.name: page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md")}
     wrong = {name: SPACED.findall(code.sub("", text)) for name, text in pages.items()}
     assert {name: found for name, found in wrong.items() if found} == {}
+
+
+WRITERS = {
+    "rsea_ros/outputs/files.py",
+    "rsea_ros/hardware/peer/serial_line.py",  # names a link to its terminal
+    "msg_adapters/compression.py",  # unpacks into a temporary folder
+}
+WRITING = {"write_text", "write_bytes", "rename", "renames", "tofile", "savez", "save", "savetxt", "to_csv"}
+"""Only files.py writes: any other code that writes could replace a file or leave a partial one."""
+
+
+def places_that_write(path: Path, tree: ast.Module) -> list[int]:
+    """Return the lines of a module that write a file without files.py."""
+    if str(path.relative_to(ROOT)) in WRITERS:
+        return []
+    return [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Call) and writes(node)]
+
+
+def writes(call: ast.Call) -> bool:
+    """Return whether a call writes a file: by its name, or by the mode that it opens one with."""
+    name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+    if name == "open":
+        modes = [a.value for a in call.args if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+        return any(set(mode) <= set("rwaxbt+") and set(mode) & set("wa+") for mode in modes)
+    method = isinstance(call.func, ast.Attribute)
+    on_os = method and isinstance(call.func.value, ast.Name) and call.func.value.id == "os"
+    return (method and name in WRITING) or (on_os and name == "replace")
+
+
+def test_a_module_writes_only_through_files():
+    assert found_in_modules(places_that_write) == []
+
+
+@pytest.mark.parametrize(
+    "source", ['p.write_text("x")', 'open(p, "w")', 'p.open("ab")', "os.replace(a, b)", "a.rename(b)"]
+)
+def test_a_place_that_writes_is_found(source):
+    assert places_that_write(ROOT, ast.parse(source)) == [1]
+
+
+@pytest.mark.parametrize("source", ["write_text(p, s)", 'p.open("xb")', 'text.replace("a", "b")', "open(p)"])
+def test_an_allowed_call_passes(source):
+    assert places_that_write(ROOT, ast.parse(source)) == []
