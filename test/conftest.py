@@ -21,8 +21,6 @@ import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting th
 from rsea_ros.compiler import trusted_cache
 from rsea_ros.identification.solver import on_cores
 
-sys.path.append(str(Path(__file__).parent))  # import_graph, which is no test
-
 gc.disable()  # until all is collected: it finds nothing in what tests are made of, in a second of each worker
 
 BYTECODE = sys.dont_write_bytecode, sys.pycache_prefix

@@ -1,6 +1,5 @@
-"""Shared by the tests of the command line: `foreign` (bags written without our code) and a short record."""
+"""Shared by the tests of the command line: a short record, and a place that must stay empty."""
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +10,6 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel, Record
-
-sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1] / "msg_adapters")]
 
 
 @pytest.fixture(scope="module")

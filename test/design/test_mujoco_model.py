@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
+from random_rigs import rigs
 
 from rsea_ros.design.mujoco_model import mjcf
 from rsea_ros.documents.units import STANDARD_GRAVITY
@@ -17,9 +16,6 @@ from rsea_ros.errors import RigError
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.rival_models import lumped_rig
-
-sys.path.append(str(Path(__file__).parents[1] / "model"))
-from random_rigs import rigs
 
 S = 2j * np.pi * np.array([0.3, 2.0, 11.0, 70.0])
 

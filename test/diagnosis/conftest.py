@@ -1,14 +1,8 @@
-"""Make the second bench importable as `independent`, and eliminations scripted."""
+"""Eliminations by a script."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.append(str(Path(__file__).resolve().parents[1]))
-sys.path.append(str(Path(__file__).parent))  # scripted and its siblings, which are no tests
 
 
 @pytest.fixture

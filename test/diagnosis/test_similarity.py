@@ -6,14 +6,9 @@ Scales are powers of 4, so that a machine 4^n times as strong gives the same to 
 from __future__ import annotations
 
 import functools
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "effects"))
-
 from similar_machine import factor, record_with, similar
 
 from rsea_ros.diagnosis.diagnose import searched_effects

@@ -1,14 +1,7 @@
 """The second bench stands in for a real one; its slow work, and the first run that is designed after it."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).resolve().parents[1]))
-sys.path.append(str(Path(__file__).parent))  # for `slow_work`
-
 from independent.bench import record_command
 from slow_work import ASKED, BENCH, CAUSES, RIG
 

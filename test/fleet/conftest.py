@@ -1,15 +1,12 @@
-"""A new store, files that stand for bags, and `fleet_stubs` importable."""
+"""A new store, and files that stand for bags."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
 from rsea_ros.fleet.store import Store, open_store
-
-sys.path.append(str(Path(__file__).parent))
 
 
 @pytest.fixture

@@ -1,27 +1,23 @@
-"""Make the second bench and the effects' bench, which are no tests, importable, and learn each law once."""
+"""Each law is learnt once."""
 
 from __future__ import annotations
 
-import sys
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
+from independent.bench import drawn_bench, record_run
 
 from rsea_ros.laws.law import LawResult
 from rsea_ros.laws.learn import learn
 from rsea_ros.model.rig_file import load_rig
 
-sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parents[1] / "effects")]
 SECONDS = 8.0
 
 
 @cache
 def learnt(values: tuple[tuple[str, float], ...], seed: int = 3) -> LawResult:
     """Return the law learnt from a record of the second bench with hidden values."""
-    from independent.bench import drawn_bench, record_run
-
     bench = drawn_bench(np.random.default_rng(seed)).with_values(**dict(values))
     return learn([record_run(bench, seed, "chirp_noise", SECONDS)], load_rig("paper_high_impedance"))
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from rsea_ros.records.record import Channel, Record
 
-sys.path.append(str(Path(__file__).parent))  # for `foreign` and `map_files`, which are no tests
 EPOCH = 1_763_000_000_123_456_789
 
 

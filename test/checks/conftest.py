@@ -1,6 +1,0 @@
-"""Make `independent`, the second bench, importable."""
-
-import sys
-from pathlib import Path
-
-sys.path.append(str(Path(__file__).parents[1]))

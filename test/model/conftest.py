@@ -1,6 +1,0 @@
-"""Make `random_rigs` and `slow`, which are no tests, importable for the tests of the model."""
-
-import sys
-from pathlib import Path
-
-sys.path.append(str(Path(__file__).parent))
