@@ -74,9 +74,3 @@ def test_identify_says_so_too_and_has_the_rig_with_the_fitted_values(play):
     assert status == 1
     assert f"times the noise (default rig {RIG}); 1 value differs from the rig" in only(printed)
     assert "continue with --rig fitted/model.yaml" in only(printed)
-
-
-def test_the_right_rig_is_not_asked_about(play):
-    for verb in ("identify", "check"):
-        _, printed = play(verb, "run.mcap", "--rig", "mine.yaml")
-        assert "right rig" not in printed and "mine.yaml" in printed and "default" not in printed

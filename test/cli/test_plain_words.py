@@ -13,20 +13,6 @@ MAP = "time: {rate: 100}\nchannels: {command: {column: u, unit: N m}}\n"
 PACKED = gzip.compress(b"u\n1\n2\n", mtime=0)
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"", "holds nothing, expected a mapping"),
-        (b"name: caf\xe9\n", "byte 9 is 0xe9, which is not UTF-8"),
-        (b"\xff\xfe\x00", "byte 0 is 0xff, which is not UTF-8"),
-    ],
-)
-def test_a_mistake_in_a_rig_is_described_in_plain_words(content, said, tmp_path, capsys):
-    (tmp_path / "rig.yaml").write_bytes(content)
-    assert main(["simulate", str(tmp_path / "rig.yaml"), "--out", str(tmp_path / "bag")]) == 2
-    _assert_plain(capsys.readouterr().err, said)
-
-
 def test_a_mistake_in_an_import_map_is_described_in_plain_words(tmp_path, capsys):
     (tmp_path / "map.yaml").write_bytes(b"")
     (tmp_path / "run.csv").write_text("u\n1\n2\n")

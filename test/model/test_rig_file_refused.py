@@ -125,10 +125,11 @@ def test_nonsense_is_refused_in_one_line_that_names_it(path, value, message, tmp
         (b"", "holds nothing, expected a mapping with the keys of a rig"),
         (b"- 1\n", "holds list, expected a mapping"),
         (b"name: [", "not YAML: "),
-        (b"\xff\xfe\x00", "not YAML: "),
+        (b"\xff\xfe\x00", "not YAML: byte 0 is 0xff, which is not UTF-8"),
+        (b"name: caf\xe9\n", "not YAML: byte 9 is 0xe9, which is not UTF-8"),
         (b"name: !!python/object:os.system {}", "not YAML: "),
     ],
-    ids=["empty", "list", "broken", "binary", "object"],
+    ids=["empty", "list", "broken", "binary", "latin 1", "object"],
 )
 def test_a_file_that_is_not_a_rig_is_refused(content, message, tmp_path):
     file = tmp_path / "bad.yaml"
