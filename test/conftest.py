@@ -68,12 +68,9 @@ WAITING = (
 """Files that wait for nodes, wires and clocks: the first worker takes them, one after the other."""
 
 COMPUTING = (
-    "diagnosis/test_hidden_effects", "test_realdata",
-    "report/", "cli/test_diagnose",
-    "test_inputs", "identification/test_identify", "model/test_pure_torque",
-    "cli/test_nothing_lost", "cli/test_output_names", "cli/test_bad_", "test_launcher",
-    "laws/test_hidden_laws", "diagnosis/test_joint", "fleet/test_task",
-    "independent/test_bench",
+    "golden/", "diagnosis/test_hidden_effects", "report/", "test_realdata", "checks/test_gains",
+    "checks/test_dead", "health/test_monitor", "test_launcher", "diagnosis/test_stated_starts", "checks/test_clocks",
+    "test_docs", "laws/test_hidden_laws", "control/test_controller", "experiment/",
 )  # fmt: skip
 """Files that compute longest, in this order, so that no worker is left with one of them at the end."""
 

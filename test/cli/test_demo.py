@@ -27,8 +27,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DOMAIN = int(os.environ["ROS_DOMAIN_ID"])
 
 
-SHORTER = "import sys\nfrom rsea_ros.cli import demo, main\ndemo.SHORT = 6.0\nsys.exit(main.main())"
-"""The demo with 6 s of excitation instead of 20."""
+SHORTER = "import sys\nfrom rsea_ros.cli import demo, main\ndemo.SHORT = 4.5\nsys.exit(main.main())"
+"""The demo with 4.5 s of excitation instead of 20."""
 
 
 def _demo(out):
@@ -78,7 +78,7 @@ def test_the_demo_finds_the_true_values_and_names_its_report(tmp_path):
 
 def _assert_that_the_bag_says_what_the_plant_did(recorded, rig):
     """Every planned command at a cycle's start, every measurement; beside a simulation only noise."""
-    planned = excitation("chirp", ExcitationSettings(duration=6.0, seed=1), 0.5)
+    planned = excitation("chirp", ExcitationSettings(duration=4.5, seed=1), 0.5)
     command = recorded["command"]
     assert np.array_equal(command.y[: len(planned)], planned)
     assert np.all(command.y[len(planned) :] == 0.0) and len(command) > len(planned)

@@ -13,13 +13,6 @@ from rsea_ros.nodes import _policies, _run, _run as _sockets
 FILE = Path(__file__).resolve().parents[2] / "config" / "security" / "policies.xml"
 
 
-def test_the_committed_policies_are_those_of_the_nodes():
-    """In a process of its own: rclpy leaves the services of a lifecycle node up, and they answer nobody."""
-    command = [sys.executable, "-m", "rsea_ros.nodes._policies"]
-    made = subprocess.run(command, cwd=FILE.parents[2], stdout=subprocess.PIPE, check=True, timeout=60).stdout
-    assert FILE.read_bytes() == made, f"python -m rsea_ros.nodes._policies > {FILE} makes it anew"
-
-
 @pytest.mark.parametrize(
     ("plural", "verb", "name", "allowed"),
     [
