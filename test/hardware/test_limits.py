@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from rsea_ros.hardware.device import State
+from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Guard, Limits
 
 PERIOD = 0.01
@@ -34,6 +35,19 @@ def test_commands_that_cease_end_in_a_ramp_and_a_fault(sign):
     assert late.allowed_torque(sign * 40.0, 0.0) == 0.0, "it is latched"
     late.clear()
     assert late.allowed_torque(sign * 40.0, 0.0) == sign * 40.0
+
+
+def test_the_first_command_does_not_act_in_full_after_start_fault_and_pause():
+    soft = guard(slew=1e6, soft_start=300.0)
+    begin = [3.0, 6.0, 9.0, 10.0]
+    assert [soft.allowed_torque(10.0, 0.0) for _ in range(4)] == begin
+    soft.trip(DeviceFault("any"))
+    assert soft.allowed_torque(10.0, 0.0) == 0.0
+    soft.clear()
+    assert [soft.allowed_torque(10.0, 0.0) for _ in range(4)] == begin
+    soft.allowed_torque(0.0, 0.0)
+    soft.allowed_torque(0.0, 9.0)
+    assert [soft.allowed_torque(10.0, 0.0) for _ in range(4)] == begin
 
 
 def test_the_default_slew_limit_is_that_of_the_driver():
