@@ -113,15 +113,6 @@ def test_the_repeats_of_a_slow_sensor_are_left_out_of_a_fit():
     assert {f.kind for f in fit.result.faults} == {"held_samples"}
 
 
-@pytest.mark.parametrize("unit", [1e3])
-def test_stamps_in_another_unit_than_seconds_are_a_red_rate(unit):
-    """Stamps in ms ended in a division by zero: a spectrum of segments of 8 s had no line at 0.28 Hz."""
-    t = unit * T
-    record = simulate(RIG, 15.0 * np.random.default_rng(0).standard_normal(len(T)), 280.0)
-    slow = Record({n: Channel(t[: len(c)], c.y) for n, c in record.channels.items()})
-    assert {f.light for f in check_record(slow, RIG).findings if f.kind == "rate"} == {"red"}
-
-
 def test_a_diagnosis_of_a_constant_command_says_that_it_could_see_nothing():
     """`Nothing is wrong with the simulation` of a bench that was never moved."""
     record = simulate(RIG, np.full(2800, 4.0), rate=280.0)

@@ -25,11 +25,9 @@ def test_vectors_of_any_orientation_and_type_are_read(tmp_path):
         ("y", "no column 'y', expected one of t, short, word, table, gain, broken, angle, cell"),
         ("short", "vectors of unequal length"),
         ("word", r"variable 'word' is char \(1,\), expected a vector of numbers"),
-        ("table", r"variable 'table' is double \(2, 3\), expected a vector"),
         ("gain", r"variable 'gain' is .* \(1, 1\), expected a vector"),
         ("broken", r"broken\[3\] is inf, expected a finite number"),
         ("angle", r"variable 'angle' is complex128 .*, expected a vector of numbers"),
-        ("cell", r"variable 'cell' is struct .*, expected a vector of numbers"),
     ],
 )
 def test_variables_that_cannot_be_a_channel_are_refused(tmp_path, column, text):
