@@ -13,6 +13,8 @@ import pytest
 from msg_adapters.records import write_overlay
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate, Remark
@@ -83,7 +85,7 @@ def identification() -> Identification:
     )
 
 
-SHORT, FRICTION = 16.0, 3.0
+SHORT, FRICTION = 10.0, 3.0
 EPOCH = 1_700_000_000_123_456_789
 
 
@@ -104,7 +106,9 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
     )
     record = synthesize(bench, Channel(np.arange(len(command)) / RATE, command), seed=5)
     record = replace(record, epoch_ns=EPOCH, source="runs/bench & <friends>")
-    diagnosis = diagnose([record], load_rig("paper_high_impedance"))
+    tried = ("coulomb_friction", "stribeck_friction", "lugre_friction", "backlash", "command_delay")
+    settings = DiagnosisSettings(without=tuple(n for n in catalogue() if n not in tried))
+    diagnosis = diagnose([record], load_rig("paper_high_impedance"), settings=settings)
     out = tmp_path_factory.mktemp("diagnosed") / "new" / "out"
     write_diagnosis(diagnosis, record, out, write_overlay)
     return Diagnosed(record, diagnosis, out)
