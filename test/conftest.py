@@ -60,12 +60,16 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 WAITING = (
-    "cli/test_demo", "nodes/", "hardware/test_faults", "cli/test_run_launch_topics",
-    "hardware/test_lost_torque", "hardware/test_protection", "hardware/test_port", "hardware/test_netft",
-    "hardware/test_line", "cli/test_bench", "watch/test_server", "watch/test_page", "msg_adapters/test_ros",
-    "cli/test_ctrl_c",
+    "cli/test_demo", "nodes/", "hardware/test_faults", "hardware/test_lost_torque",
+    "hardware/test_protection", "hardware/test_port", "hardware/test_netft", "hardware/test_line",
 )  # fmt: skip
-"""Files that wait for nodes, wires and clocks: the first worker takes them, one after the other."""
+"""Files that clocks of nodes and wires judge: the first worker alone takes them, one after the other."""
+
+PATIENT = (
+    "cli/test_run_launch_topics", "nodes/test_identify_diagnosis", "nodes/test_parameters", "watch/test_page",
+    "watch/test_server", "cli/test_bench", "cli/test_ctrl_c", "msg_adapters/test_ros",
+)  # fmt: skip
+"""Files that wait for processes and are late for nothing: any worker takes them, at the end."""
 
 COMPUTING = (
     "golden/", "diagnosis/test_hidden_effects", "report/", "test_realdata", "checks/test_gains",
@@ -75,15 +79,17 @@ COMPUTING = (
 """Files that compute longest, in this order, so that no worker is left with one of them at the end."""
 
 
-def _place(nodeid: str, names: tuple[str, ...]) -> int:
-    """Return where in names a test's file stands, behind all of them if nowhere."""
-    places = (k for k, name in enumerate(names) if nodeid.startswith(f"test/{name}"))
-    return next(places, len(names))
+def _place(nodeid: str) -> int:
+    """Return where a test's file stands in the order of the files."""
+    fits = lambda name: nodeid.startswith(f"test/{name}")  # noqa: E731
+    places = (k for k, name in enumerate(WAITING + COMPUTING) if fits(name))
+    last = len(WAITING + COMPUTING)
+    return last + 1 if any(map(fits, PATIENT)) else next(places, last)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the slowest files first and leave the others in their order."""
-    places = {item.path: _place(item.nodeid, WAITING + COMPUTING) for item in items}
+    """Put the slowest files first, the patient ones last, and leave the others in their order."""
+    places = {item.path: _place(item.nodeid) for item in items}
     items.sort(key=lambda item: places[item.path])
 
 
@@ -96,16 +102,29 @@ class OneWorker(LoadFileScheduling):
     def _split_scope(self, nodeid: str) -> str:
         return "test/report" if nodeid.startswith("test/report/") else super()._split_scope(nodeid)
 
-    def _assign_work_unit(self, node: WorkerController) -> None:
-        """Take the first file of the worker's kind, then the longest computation or the shortest wait.
+    def _next_of(self, node: WorkerController) -> str | None:
+        """Return the file that a worker takes next: the longest computation, or what only the first may take.
 
         By the worker's name: the first to report may be any of them, and one that makes way would be late.
         """
-        waits = node.gateway.id == FIRST
-        mine = (s for s in self.workqueue if (_place(s, WAITING) < len(WAITING)) == waits)
-        others = iter(self.workqueue) if waits else reversed(self.workqueue)
-        self.workqueue.move_to_end(next(mine, next(others)), last=False)
-        super()._assign_work_unit(node)
+        waits = [scope for scope in self.workqueue if _place(scope) < len(WAITING)]
+        others = [scope for scope in self.workqueue if _place(scope) >= len(WAITING)]
+        if node.gateway.id == FIRST:
+            return next(iter([*waits, *reversed(others)]), None)
+        is_first_gone = all(other.gateway.id != FIRST for other in self.nodes)
+        return next(iter([*others, *waits * is_first_gone]), None)
+
+    def _assign_work_unit(self, node: WorkerController) -> None:
+        if (scope := self._next_of(node)) is not None:
+            self.workqueue.move_to_end(scope, last=False)
+            super()._assign_work_unit(node)
+
+    def _reschedule(self, node: WorkerController) -> None:
+        """Give a worker another file before it is through, or let it end where none is left for it."""
+        if self._next_of(node) is not None:
+            super()._reschedule(node)
+        elif not node.shutting_down:
+            node.shutdown()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> OneWorker | None:

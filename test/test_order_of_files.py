@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from test.conftest import COMPUTING, WAITING
+from test.conftest import COMPUTING, PATIENT, WAITING
 
 HERE = Path(__file__).parent
 
 
 def test_what_takes_longest_is_there():
-    assert [name for name in WAITING + COMPUTING if not list(HERE.glob(f"{name}*"))] == []
+    assert [name for name in WAITING + COMPUTING + PATIENT if not list(HERE.glob(f"{name}*"))] == []
