@@ -46,34 +46,6 @@ def test_the_numbers_that_disagree_are_listed():
     assert off["b_m, viscous"] == -85.9
 
 
-@pytest.mark.parametrize(
-    ("status", "where", "number"),
-    [
-        ("found", "Nomenclature and 2.2", "motor chassis"),
-        ("found", "2.2, text on Fig. 7", "not seen"),
-        ("found", "2.3.1, Eqs. (4) and (5)", "N² once more"),
-        ("found", "Eq. (10)", "4.8 %"),
-        ("found", "3.2.1, 3.2.2", "10 N and 30 N"),
-        ("found", "3.2.2, 19 Hz", "19.8 Hz"),
-        ("found", "4.1 and Eq. (8)", "130 N·m"),
-        ("unclear", "Fig. 8, Eqs. (5) to (7)", "43.8 or 73.4 Hz"),
-        ("unclear", "3.1, Eqs. (8) and (9)", "at least 3344 N·m/rad"),
-        ("unclear", "3.2.2, Figs. 16 and 18", "19.8 Hz unlumped, 6.1 Hz lumped"),
-        ("unclear", "3.2.2, Table 2, K_ld", "6.48"),
-        ("unclear", "4.1 and Eqs. (5) to (7)", "19.9 Hz with the circular spline held (n = −160), 15.3 Hz"),
-        ("silent", "Eq. (3) and Eq. (7)", "3.44 Hz where Eq. (6) gives 53.2 Hz"),
-        ("silent", "Eq. (7)", "112.1 Hz"),
-        ("silent", "Table 2, b_m", "3.2 N·m·s/rad"),
-        ("silent", "Eq. (9)", "11.5 mm"),
-        ("silent", "3.2.2", "thermal"),
-        ("silent", "4.1 and 3.1.2", "33°"),
-        ("silent", "4.1", "13.1 mm"),
-    ],
-)
-def test_findings_carry_their_number(status, where, number):
-    assert any(f.status == status and f.where == where and number in f.text for f in findings())
-
-
 def test_contradictions_are_those_that_hold():
     """Numbers that the paper admits, of the test platform, or that rest on our J_m are no contradictions."""
     assert sum(f.status == "found" for f in findings()) == 7
