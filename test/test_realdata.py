@@ -21,7 +21,7 @@ from rsea_ros.identification.result import Statics, statics_of
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Record
-from rsea_ros.report.identification.words import statics_sentences
+from rsea_ros.report.identification import statics_sentences
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 REAL = Path(__file__).resolve().parents[2] / "shared" / "realdata"

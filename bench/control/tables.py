@@ -36,7 +36,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
 from rsea_ros.records.record import FloatArray
-from rsea_ros.report.control import tables
+from rsea_ros.report import control as tables
 
 DAMPED = (33.0, 0.3, 1.0)
 """Hz, damping ratio, participation: the other reading of a mode of 0.3."""

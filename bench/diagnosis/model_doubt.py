@@ -18,9 +18,8 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.mjcf_effects import EFFECTS, STRUCTURES
-from rsea_ros.exports.mujoco_play import RATE, play_mujoco
+from rsea_ros.exports.mjcf import EFFECTS, STRUCTURES, export_mjcf
+from rsea_ros.exports.verification import RATE, play_mujoco
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Rig

@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import write_record
-from rsea_ros.fleet.engine import Engine
-from rsea_ros.fleet.executor import Executor, Serial
+from rsea_ros.fleet.engine import Engine, RunSummary
 from rsea_ros.fleet.joints import MappedJoint
+from rsea_ros.fleet.pool import Executor, Serial
 from rsea_ros.fleet.sources import bags_of
 from rsea_ros.fleet.store import Store, TaskOutcome
-from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.task import Task, work
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig, rig_text

@@ -8,13 +8,12 @@ from contextlib import suppress
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from rsea_ros.fleet.engine import Engine, EngineLimits
-from rsea_ros.fleet.executor import Executor
+from rsea_ros.fleet.engine import Engine, EngineLimits, RunSummary
 from rsea_ros.fleet.joints import MappedJoint
+from rsea_ros.fleet.pool import Executor
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
 from rsea_ros.fleet.store import Store, TaskOutcome
-from rsea_ros.fleet.summary import RunSummary
 from rsea_ros.fleet.task import Task
 
 KNEE = MappedJoint("knee", "name: stub")

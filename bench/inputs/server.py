@@ -24,8 +24,8 @@ WALL = 1200
 MODULES = (
     "rsea_ros.cli.identify", "rsea_ros.cli.diagnose", "rsea_ros.cli.predict", "rsea_ros.cli.simulate",
     "rsea_ros.cli.control", "rsea_ros.cli.design", "rsea_ros.cli.export", "rsea_ros.cli.import_",
-    "rsea_ros.cli.check", "rsea_ros.report.diagnosis.files", "rsea_ros.report.identification.page",
-    "rsea_ros.report.control.page", "rsea_ros.report.design.page", "rsea_ros.design.mujoco_model",
+    "rsea_ros.cli.check", "rsea_ros.report.diagnosis.page", "rsea_ros.report.identification",
+    "rsea_ros.report.control", "rsea_ros.report.design", "rsea_ros.design.mujoco_model",
     "msg_adapters.records", "scipy.interpolate", "scipy.signal", "scipy.io", "rich.console", "rich.table",
 )  # fmt: skip
 FIRST = (

@@ -25,7 +25,7 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.laws.law import equation_of
 from rsea_ros.laws.learn import learn
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.report.law.words import headline
+from rsea_ros.report.law import headline
 
 
 def main(*, log: Path, only: str = "", minutes: float = 60.0) -> None:

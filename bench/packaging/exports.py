@@ -19,9 +19,8 @@ from rsea_ros.exports.bam import export_bam
 from rsea_ros.exports.fmu import export_fmu
 from rsea_ros.exports.isaac import export_isaac
 from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.mujoco_play import RATE, differences, ours, play_mujoco
 from rsea_ros.exports.urdf import export_sdf, export_urdf
-from rsea_ros.exports.verification import play_fmu
+from rsea_ros.exports.verification import RATE, differences, ours, play_fmu, play_mujoco
 from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, rig_names

@@ -15,8 +15,6 @@ from rsea_ros.documents.wording import did_you_mean, no_utf_8, quote
 from rsea_ros.errors import BenchmarkError
 from rsea_ros.records.record import Channel, Record
 
-text_of = quote
-
 
 def read_text(path: Path) -> str:
     """Return the text of a file. Raises BenchmarkError where it cannot be read."""
@@ -83,7 +81,7 @@ class Dataset:
         path = self.folder / f"{name}.csv"
         header, _, rows = read_text(path).partition("\n")
         if tuple(header.strip().split(",")) != COLUMNS:
-            raise BenchmarkError(f"{path}: columns {text_of(header)}, expected {','.join(COLUMNS)}")
+            raise BenchmarkError(f"{path}: columns {quote(header)}, expected {','.join(COLUMNS)}")
         try:
             table = np.loadtxt(rows.splitlines(), delimiter=",", ndmin=2)
         except ValueError as error:
@@ -106,17 +104,17 @@ def read_dataset(folder: Path) -> Dataset:
     path = folder / MANIFEST
     body = read_json(path)
     if body.get("version") != VERSION:
-        raise BenchmarkError(f"{path}: version = {text_of(body.get('version'))}, expected {VERSION!r}")
+        raise BenchmarkError(f"{path}: version = {quote(body.get('version'))}, expected {VERSION!r}")
     hashes, effects, limit = (body.get(key) for key in ("records", "effects", "seconds"))
     if not isinstance(hashes, dict) or not hashes:
-        raise BenchmarkError(f"{path}: records = {text_of(hashes)}, expected a hash for each record")
+        raise BenchmarkError(f"{path}: records = {quote(hashes)}, expected a hash for each record")
     wrong = [name for name in hashes if not _NAME.fullmatch(name)]
     if wrong:
-        raise BenchmarkError(f"{path}: records has {text_of(wrong[0])}, expected names such as r0001")
+        raise BenchmarkError(f"{path}: records has {quote(wrong[0])}, expected names such as r0001")
     if not isinstance(effects, dict) or not effects:
-        raise BenchmarkError(f"{path}: effects = {text_of(effects)}, expected the effects that can be named")
+        raise BenchmarkError(f"{path}: effects = {quote(effects)}, expected the effects that can be named")
     if not isinstance(limit, (int, float)) or isinstance(limit, bool) or not limit > 0.0:
-        raise BenchmarkError(f"{path}: seconds = {text_of(limit)}, expected a number > 0")
+        raise BenchmarkError(f"{path}: seconds = {quote(limit)}, expected a number > 0")
     return Dataset(folder, hashes, tuple(effects), float(limit))
 
 
@@ -147,7 +145,7 @@ def read_answers(path: Path, dataset: Dataset) -> dict[str, Answer]:
         body = json_object(line, where)
         name = body.get("record")
         if not isinstance(name, str) or name not in dataset.hashes:
-            raise BenchmarkError(f"{where}: record = {text_of(name)}, expected one of {dataset.manifest}")
+            raise BenchmarkError(f"{where}: record = {quote(name)}, expected one of {dataset.manifest}")
         if name in answers:
             raise BenchmarkError(f"{where}: a second answer to {name}, expected one")
         answer = Answer(_causes(body.get("causes"), dataset, where), _seconds(body, where))
@@ -160,17 +158,17 @@ def read_answers(path: Path, dataset: Dataset) -> dict[str, Answer]:
 def _causes(value: Any, dataset: Dataset, where: str) -> dict[str, float]:
     if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
         form = '[{"name": …, "probability": …}]'
-        raise BenchmarkError(f"{where}: causes = {text_of(value)}, expected {form}")
+        raise BenchmarkError(f"{where}: causes = {quote(value)}, expected {form}")
     causes: dict[str, float] = {}
     for item in value:
         name, probability = item.get("name"), item.get("probability")
         if name not in dataset.effects:
             near = did_you_mean(str(name), dataset.effects)
-            raise BenchmarkError(f"{where}: name = {text_of(name)}, expected an effect of the manifest{near}")
+            raise BenchmarkError(f"{where}: name = {quote(name)}, expected an effect of the manifest{near}")
         if name in causes:
             raise BenchmarkError(f"{where}: {name} twice, expected each effect once")
         if not _is_number(probability) or not 0.0 <= probability <= 1.0:
-            raise BenchmarkError(f"{where}: probability = {text_of(probability)}, expected 0 to 1")
+            raise BenchmarkError(f"{where}: probability = {quote(probability)}, expected 0 to 1")
         causes[name] = float(probability)
     return causes
 
@@ -178,7 +176,7 @@ def _causes(value: Any, dataset: Dataset, where: str) -> dict[str, float]:
 def _seconds(body: Mapping[str, Any], where: str) -> float:
     seconds = body.get("seconds", 0.0)
     if not _is_number(seconds) or not seconds >= 0.0:
-        raise BenchmarkError(f"{where}: seconds = {text_of(seconds)}, expected a number >= 0")
+        raise BenchmarkError(f"{where}: seconds = {quote(seconds)}, expected a number >= 0")
     return float(seconds)
 
 

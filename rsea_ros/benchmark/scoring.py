@@ -11,12 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.benchmark.dataset import Answer, Dataset, read_json, text_of
+from rsea_ros.benchmark.dataset import Answer, Dataset, read_json
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.diagnose import diagnose, nominal_problem, searched_effects
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.diagnosis.step_fits import StepFits
+from rsea_ros.documents.wording import quote
 from rsea_ros.errors import BenchmarkError
 from rsea_ros.identification.solver import worker_pools
 from rsea_ros.model.rig import Rig
@@ -77,7 +78,7 @@ def read_truth(path: Path, dataset: Dataset) -> dict[str, RecordTruth]:
 
 def _truth(body: object, where: str) -> RecordTruth:
     if not isinstance(body, dict):
-        raise BenchmarkError(f"{where} is {text_of(body)}, expected an object")
+        raise BenchmarkError(f"{where} is {quote(body)}, expected an object")
     causes, shows = body.get("causes"), body.get("times_noise")
     values = [*causes.values()] if isinstance(causes, dict) else [None]
     if not all(isinstance(v, dict) for v in (*values, shows)):
@@ -210,16 +211,11 @@ ENTRIES = {"diagnose": diagnosis_answer, "largest_gain": largest_gain}
 _RANDOM_SEED = 0
 
 
-def no_names(dataset: Dataset) -> dict[str, Answer]:
-    """Return answers that name nothing."""
-    return {name: Answer() for name in dataset.hashes}
-
-
 def random_names(dataset: Dataset) -> dict[str, Answer]:
     """Return answers that name one effect of the list at random, as certain."""
     rng = np.random.default_rng(_RANDOM_SEED)
     return {name: Answer({str(rng.choice(dataset.effects)): 1.0}) for name in dataset.hashes}
 
 
-BASELINES = {"no names": no_names, "random": random_names}
+BASELINES = {"no names": lambda dataset: dict.fromkeys(dataset.hashes, Answer()), "random": random_names}
 """Rows that every table of scores begins with."""

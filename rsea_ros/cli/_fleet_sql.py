@@ -4,7 +4,6 @@ import argparse
 import csv
 import json
 import sys
-from collections.abc import Sequence
 from datetime import date, datetime
 from typing import Any
 
@@ -34,8 +33,7 @@ def run(args: argparse.Namespace) -> int:
 
     names, rows = answer(open_store(args.store), args.query)
     if args.json:
-        objects = [dict(zip(names, map(_plain, row), strict=True)) for row in rows]
-        print(json.dumps(objects, indent=1, allow_nan=False, ensure_ascii=False))
+        print(_json([dict(zip(names, row, strict=True)) for row in rows], indent=1))
     elif args.csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")
         writer.writerow(map(no_formula, names))
@@ -51,21 +49,19 @@ def no_formula(value: Any) -> str:
     return f"'{text}" if isinstance(value, str) and text.startswith(_FORMULA) else text
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, (datetime, date)):
-        return value.isoformat()
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, Sequence) and not isinstance(value, (str, bytes)):
-        return [_plain(item) for item in value]
-    return strict(value) if isinstance(value, (int, float, str, bool)) or value is None else str(value)
+def _json(value: Any, indent: int | None = None) -> str:
+    return json.dumps(strict(value), default=_other, indent=indent, allow_nan=False, ensure_ascii=False)
+
+
+def _other(value: Any) -> str:
+    return value.isoformat() if isinstance(value, date) else str(value)
 
 
 def _text(value: Any) -> str:
-    plain = _plain(value)
+    plain = strict(value)
     if plain is None:
         return ""
-    return plain if isinstance(plain, str) else json.dumps(plain, ensure_ascii=False)
+    return _json(plain) if isinstance(plain, (bool, int, float, list, dict)) else _other(plain)
 
 
 def _cell(value: Any) -> str:

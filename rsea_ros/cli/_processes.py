@@ -66,13 +66,11 @@ class Processes:
 
     def start(self, node: str, parameters: Mapping[str, object]) -> None:
         """Start a node; signals of the terminal reach only this process, which then stops the node."""
-        options = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_text(value)}")]
         names = (self._logs / (f"{node}-{k}.log" if k > 1 else f"{node}.log") for k in count(1))
         self._log_of[node] = next(name for name in names if not name.exists())
         with hold_signals(), self.log(node).open("xb") as log:
-            self._running[node] = start(
-                node, ["--ros-args", *options], env=self._environment, stdout=log, stderr=subprocess.STDOUT
-            )
+            words, options = ["--ros-args", *parameter_words(parameters)], {"env": self._environment}
+            self._running[node] = start(node, words, stdout=log, stderr=subprocess.STDOUT, **options)
 
     def wait(self, node: str, timeout: float, progress: Callable[[float], None] = lambda share: None) -> None:
         """Wait until a node has ended, and report the last percentage that it logged.
@@ -111,11 +109,11 @@ class Processes:
         return RseaError(f"{node} {event}: {last} (log: {self.log(node)})")
 
 
-def _text(value: object) -> str:
-    """Return a parameter in the syntax of a ROS command line."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return json.dumps(str(value), ensure_ascii=False) if isinstance(value, (str, Path)) else str(value)
+def parameter_words(parameters: Mapping[str, object]) -> list[str]:
+    """Return parameters as words of a ROS command line, texts and booleans in its syntax."""
+    plain = {n: v if isinstance(v, (bool, int, float)) else str(v) for n, v in parameters.items()}
+    texts = (f"{name}:={json.dumps(value, ensure_ascii=False)}" for name, value in plain.items())
+    return [word for text in texts for word in ("-p", text)]
 
 
 def together(nodes: Mapping[str, Sequence[str]]) -> int:

@@ -41,8 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.control.study import study
     from rsea_ros.control.uncertainty import lightest
     from rsea_ros.model.rig_file import load_rig
-    from rsea_ros.report.control.page import control_report
-    from rsea_ros.report.control.tables import control_json
+    from rsea_ros.report.control import control_json, control_report
     from rsea_ros.report.result_files import json_text
 
     place = results_place(args, "out/control", (CONTROL_JSON, REPORT), [args.rig, args.free])
@@ -86,7 +85,7 @@ def _print(result: Study, report: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from rsea_ros.report.control import tables
+    from rsea_ros.report import control as tables
 
     console = Console()
     for line in tables.gains_words(result):

@@ -51,8 +51,7 @@ def run(args: argparse.Namespace) -> int:
     """Test the stiffness, find the stiffnesses that meet all demands, write the results."""
     from rsea_ros.design.motor_gear_units import unit_named
     from rsea_ros.design.spring_design import least_stiffness, robust_stiffness, spring_design
-    from rsea_ros.report.design.page import design_report
-    from rsea_ros.report.design.tables import design_json
+    from rsea_ros.report.design import design_json, design_report
     from rsea_ros.report.result_files import json_text
 
     place = _output.results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
@@ -79,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
     from rsea_ros.design.spring_design import by_train
     from rsea_ros.report import words
-    from rsea_ros.report.design.page import verdict
+    from rsea_ros.report.design import verdict
 
     say(verdict(asked))
     for check in asked.checks:

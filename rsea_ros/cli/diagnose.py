@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
             diagnose,  # after the bags, so that a bad one is refused at once
         )
         from rsea_ros.effects.catalogue import effect_named
-        from rsea_ros.report.diagnosis.files import write_diagnosis
+        from rsea_ros.report.diagnosis.page import write_diagnosis
 
         settings = DiagnosisSettings(args.max_causes, tuple(effect_named(name).name for name in args.without))
         choice = _topics.rig_choice(args)
@@ -98,7 +98,7 @@ def unexplained_share(result: Diagnosis) -> float:
 def _print(result: Diagnosis, report: Path) -> None:
     from rich.console import Console
 
-    from rsea_ros.report.diagnosis.terminal import terminal_lines
+    from rsea_ros.report.diagnosis.words import terminal_lines
     from rsea_ros.report.rig import command
     from rsea_ros.report.words import command_row
 

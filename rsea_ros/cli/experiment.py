@@ -119,8 +119,7 @@ def _possible(
 def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
     from rsea_ros.experiment.run_shape import run_text
-    from rsea_ros.report.experiment.page import advice_page
-    from rsea_ros.report.experiment.words import advice_json
+    from rsea_ros.report.experiment import advice_json, advice_page
     from rsea_ros.report.result_files import json_text
 
     source = _output.provenance("experiment", args.bag)
@@ -133,12 +132,12 @@ def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -
 
 def _print(advice: Advice, report: Path) -> None:
     from rsea_ros.documents.units import plain
-    from rsea_ros.report.experiment.words import limit_rows, plain_name, proof_words, verdict
+    from rsea_ros.report.experiment import limit_rows, plain_name, possible_rows, proof_words, verdict
     from rsea_ros.report.words import LABEL
 
     say(verdict(advice))
-    for h in advice.hypotheses:
-        say(f"possible    {plain_name(h.name)}: probability {h.probability:.3f}", indent=LABEL)
+    for name, sure in possible_rows(advice):
+        say(f"possible    {name}: {sure}", indent=LABEL)
     for name, probability in advice.excluded.items():
         say(f"excluded    {plain_name(name)} by the records: probability {probability:.1g}", indent=LABEL)
     p = advice.proposal

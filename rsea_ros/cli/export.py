@@ -14,9 +14,8 @@ from rsea_ros.outputs.new_files import check_free, write_file
 from rsea_ros.report.result_files import pick
 
 if TYPE_CHECKING:
-    from rsea_ros.exports.mujoco_play import Difference
     from rsea_ros.exports.others import Export
-    from rsea_ros.exports.verification import Verification
+    from rsea_ros.exports.verification import Difference, Verification
     from rsea_ros.model.rig import Rig
     from rsea_ros.records.record import FloatArray
 
@@ -115,7 +114,7 @@ def _verification(made: Export, rig: Rig, args: argparse.Namespace) -> Verificat
 def _chirp(rig: Rig, args: argparse.Namespace) -> FloatArray:
     from dataclasses import replace
 
-    from rsea_ros.exports.mujoco_play import RATE
+    from rsea_ros.exports.verification import RATE
     from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
 
     default = JOINT if rig.loop else ExcitationSettings(amplitude=10.0, noise=2.0, high=60.0)

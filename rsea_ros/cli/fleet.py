@@ -7,7 +7,7 @@ import argparse
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
@@ -19,13 +19,13 @@ from rsea_ros.cli._terminal import progress
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.fleet import FleetError, need_extra
-from rsea_ros.fleet.executor import Executor, serial
 from rsea_ros.fleet.joints import Diagnose, load_joints
-from rsea_ros.fleet.summary import RunSummary
+from rsea_ros.fleet.pool import Executor, Serial
 from rsea_ros.fleet.task import TIME_LIMIT
 from rsea_ros.processes import Stopped
 
 if TYPE_CHECKING:
+    from rsea_ros.fleet.engine import RunSummary
     from rsea_ros.fleet.store import Store
     from rsea_ros.fleet.task import Held
 
@@ -146,7 +146,7 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
             workers = args.workers or pool.cores()
             memory = int(args.memory * GIGA) if args.memory else pool.memory_for(workers)
         limits = EngineLimits(memory, time=args.time_limit * MINUTE, pages=args.pages)
-        place = _executor(args, workers, memory) if is_anything_new(store, held) else serial()
+        place = _executor(args, workers, memory) if is_anything_new(store, held) else nullcontext(Serial())
         with _reporting_what_is_left(store, held), place as places, progress("fleet") as tell:
             return Engine(store, places, work, tell, limits).run(held)
 
@@ -175,7 +175,7 @@ def _executor(
         return on_scheduler(args.scheduler)
     from rsea_ros.fleet.pool import on_this_machine
 
-    return serial() if memory is None else on_this_machine(workers, memory)
+    return nullcontext(Serial()) if memory is None else on_this_machine(workers, memory)
 
 
 def _say_waiting(holder: str) -> None:

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
         records = check_records(records, rig, topics.axis, quiet=args.json, masks=False)
         from rsea_ros.identification.identify import identify  # 0.7 s: a refused bag need not wait for it
-        from rsea_ros.report.identification.page import write_results
+        from rsea_ros.report.identification import write_results
 
         result = replace(identify(records, rig, tell), rig_choice=_topics.rig_choice(args))
         report = write_results(result, place, _output.provenance("identify", args.bags, args.rig))
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _print(result: Identification, report: Path) -> None:
-    from rsea_ros.report.identification import words
+    from rsea_ros.report import identification as words
     from rsea_ros.report.remark_words import fault_lines, remark_sentences
     from rsea_ros.report.rig import right_rig, split_off_rig
 

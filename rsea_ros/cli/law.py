@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
         records = check_records(records, rig, topics.axis, quiet=args.json, masks=True)
         from rsea_ros.laws.effect_source import LawProvenance
         from rsea_ros.laws.learn import learn
-        from rsea_ros.report.law.page import write_law
+        from rsea_ros.report.law import write_law
 
         where = _output.provenance("law", args.bags, args.rig)
         bags = {Path(path).name: digest for path, digest in list(where.files.items())[: len(args.bags)]}
@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         _output.print_file(report.parent / LAW_JSON)
     else:
-        from rsea_ros.report.law.words import gain_sentence, headline, law_lines
+        from rsea_ros.report.law import gain_sentence, headline, law_lines
         from rsea_ros.report.rig import rig_named
 
         say(headline(result))

@@ -79,7 +79,7 @@ def _share(explained: float) -> str:
 
 
 def _figures(args: argparse.Namespace) -> int:
-    from rsea_ros.report.paper.docs import documentation_figures
+    from rsea_ros.report.paper.figures import documentation_figures
 
     figures = documentation_figures()
     check_free((args.figures / name for name in figures), force=args.force)

@@ -32,14 +32,14 @@ def run(args: argparse.Namespace) -> int:
     names = node_names()
     words = [*(["--help"] if args.params else []), *ros_arguments(args.parameters), *args.pass_on]
     if args.node.endswith(".py"):
-        _become([_script(args.node), *words])
+        become([_script(args.node), *words])
     if args.node not in names:
         near = did_you_mean(args.node, names)
         raise ParameterError(f"node {args.node!r}, expected one of {', '.join(names)}{near}")
-    _become(["-m", f"rsea_ros.nodes.{args.node}", *words])
+    become(["-m", f"rsea_ros.nodes.{args.node}", *words])
 
 
-def _become(words: Sequence[str]) -> NoReturn:
+def become(words: Sequence[str]) -> NoReturn:
     """Replace this process by Python with these arguments, so that signals reach the node itself."""
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, *words])

@@ -1,14 +1,14 @@
 """`rsea watch`: the live view in a browser."""
 
 import argparse
-import os
-import sys
 from pathlib import Path
 
 from rsea_ros.cli._graph import need_ros
 from rsea_ros.cli._output import path
+from rsea_ros.cli._processes import parameter_words
 from rsea_ros.cli._terminal import positive
 from rsea_ros.cli._topics import RIG
+from rsea_ros.cli.run import become
 
 HELP = "show torques, deflection, flag and health live in a browser; record, identify and diagnose there"
 EXAMPLE = "rsea watch --rig paper_high_impedance --host 0.0.0.0"
@@ -37,15 +37,5 @@ def run(args: argparse.Namespace) -> int:
     need_ros()
     names = ("rig", "host", "port", "command", "limit", "rate", "out", "joint", "axis")
     given = {name: getattr(args, name) for name in names}
-    words = [w for name, value in given.items() for w in ("-p", f"{name}:={_text(value)}")]
     namespace = f"__ns:=/{args.namespace.strip('/')}"
-    sys.stdout.flush()
-    module = ["-m", "rsea_ros.nodes.watch", "--ros-args", "-r", namespace, *words]
-    os.execv(sys.executable, [sys.executable, *module])
-
-
-def _text(value: object) -> str:
-    """Return a value in the syntax of ROS parameters."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f"'{value}'" if isinstance(value, str | Path) else str(value)
+    become(["-m", "rsea_ros.nodes.watch", "--ros-args", "-r", namespace, *parameter_words(given)])

@@ -35,7 +35,7 @@ from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.inverse import Motion, smooth
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import BoolArray, FloatArray
-from rsea_ros.records.statistics import power_density
+from rsea_ros.records.statistics import on_even_clock, power_density
 
 _FEWEST_PERIODS = 2.0
 """As often a ripple must have repeated over the rotor's travel: one period may be anything."""
@@ -169,14 +169,6 @@ def _load(rig: Rig, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
         return rig["spring.stiffness"] * q
     inertia, damping, stiffness = (rig[f"spring_end.{n}"] for n in ("inertia", "damping", "stiffness"))
     return inertia * a + damping * v + stiffness * q
-
-
-def on_even_clock(t: FloatArray, values: FloatArray, rate: float) -> FloatArray:
-    """Return values at a rate (Hz) from the first stamp to the last, zero where none is near."""
-    place = np.rint((t - t[0]) * rate).astype(np.int64)
-    even = np.zeros(place[-1] + 1)
-    even[place] = values
-    return even
 
 
 def peaks(level: FloatArray, apart: int) -> list[int]:

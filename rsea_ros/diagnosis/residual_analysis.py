@@ -12,7 +12,7 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
-from rsea_ros.records.statistics import power_density
+from rsea_ros.records.statistics import stamped_density
 
 
 def edges_of(values: FloatArray, count: int, *, equal: bool) -> FloatArray:
@@ -58,8 +58,7 @@ def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) 
 
 def by_frequency(t: FloatArray, residual: FloatArray, noise: float, channel: str) -> list[Misfit]:
     """Return the residual's level in third-octave bands over that of white noise of the floor's size."""
-    rate = 1.0 / float(np.median(np.diff(t)))
-    frequency, level = power_density(residual, rate, min(_SEGMENT, len(residual)))
+    rate, frequency, level = stamped_density(t, residual, _SEGMENT)
     white = noise**2 / (0.5 * rate)
     edges = np.geomspace(max(frequency[1], 0.5), 0.5 * rate, 3 * 8 + 1)
     bands = []
@@ -75,11 +74,10 @@ def spectrum(
     case: Case, before: dict[str, FloatArray], after: dict[str, FloatArray], channel: str
 ) -> Spectrum:
     """Return the residual's amplitude density before and after, with the noise floor's."""
-    rate = 1.0 / float(np.median(np.diff(case.t[channel])))
     densities = []
     for outputs in (before, after):
         residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
-        frequency, level = power_density(residual, rate, min(_SEGMENT, len(residual)))
+        rate, frequency, level = stamped_density(case.t[channel], residual, _SEGMENT)
         densities.append(np.sqrt(level))
     return Spectrum(
         channel, frequency[1:], densities[0][1:], densities[1][1:], case.noise[channel] / np.sqrt(0.5 * rate)

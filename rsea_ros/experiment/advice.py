@@ -111,7 +111,10 @@ def _imitate(
     weights = np.full(len(problem.cases), 1.0)
     best, least = theta, _powers(problem, theta)
     for _ in range(_LAWSON):
-        heavy = replace(problem, cases=tuple(map(_with_weight, problem.cases, (weights * duration).tolist())))
+        lighter = [np.sqrt(max(w, 1e-6)) for w in (weights * duration).tolist()]
+        pairs = zip(problem.cases, lighter, strict=True)
+        cases = (replace(c, noise={n: v / s for n, v in c.noise.items()}) for c, s in pairs)
+        heavy = replace(problem, cases=tuple(cases))
         theta = solve(heavy, best, iterations=_ITERATIONS, run=run).theta
         powers = _powers(problem, theta)
         if powers.max() < least.max():
@@ -119,10 +122,6 @@ def _imitate(
         weights = weights * np.sqrt(powers + 1e-12 * powers.max() + 1e-300)
         weights = weights / weights.mean()
     return best, least
-
-
-def _with_weight(case: Case, weight: float) -> Case:
-    return replace(case, noise={n: v / np.sqrt(max(weight, 1e-6)) for n, v in case.noise.items()})
 
 
 def _powers(problem: Problem, theta: FloatArray) -> FloatArray:

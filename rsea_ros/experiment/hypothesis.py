@@ -91,8 +91,7 @@ class Hypothesis:
 
     def sd(self) -> FloatArray:
         """Return the standard deviation of every unknown, in the fit's coordinates, shape (n,)."""
-        result: FloatArray = np.sqrt(np.diag(np.linalg.inv(self.information)))
-        return result
+        return np.asarray(np.sqrt(np.diag(np.linalg.inv(self.information))))
 
     def beside(self, simpler: str) -> Hypothesis:
         """Return the cause with what it adds to a simpler one as its size, if it may contain that one."""
@@ -114,8 +113,7 @@ class Hypothesis:
         if not self.cause_indices or not self._may_be_none():
             return self.theta
         away, sd = self._size()
-        result: FloatArray = self._with_size(np.array([np.copysign(max(sd - abs(away), 0.0), away)]))[0]
-        return result
+        return np.asarray(self._with_size(np.array([np.copysign(max(sd - abs(away), 0.0), away)]))[0])
 
     def likely_values(self) -> FloatArray:
         """Return values that the cause may have if it is present, shape (m, n): equally likely sizes of it.
@@ -142,8 +140,7 @@ class Hypothesis:
         if self.addition is not None:
             share, back = self._room(moves), self._room(-moves)
             moves = np.where(share > 0.0, share, -back)[:, None] * moves
-        result: FloatArray = np.clip(self.theta + moves, low, high)
-        return result
+        return np.asarray(np.clip(self.theta + moves, low, high))
 
     def _room(self, moves: FloatArray) -> FloatArray:
         """Return how much of each move, up to 1, the bounds of the cause leave, shape (m,)."""

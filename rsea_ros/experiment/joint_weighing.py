@@ -164,8 +164,7 @@ def scale_of(fits: Mapping[str, Solution]) -> float:
 def information_of(solution: Solution, scale: float) -> FloatArray:
     """Return the information of prior and data together, shape (n, n)."""
     matrix = solution.jacobian
-    result: FloatArray = matrix.T @ matrix / scale + np.diag(weights_of(solution.problem))
-    return result
+    return np.asarray(matrix.T @ matrix / scale + np.diag(weights_of(solution.problem)))
 
 
 def log_evidence(solution: Solution, scale: float) -> float:

@@ -202,8 +202,7 @@ def command_of(shape: Shape, duration: float, rate: float, slew: float = np.inf)
 
 def at_rest_around(run: FloatArray, rate: float) -> FloatArray:
     """Return a run with its rest before and after."""
-    whole: FloatArray = np.pad(run, (round(LEAD * rate), round(TAIL * rate)))
-    return whole
+    return np.asarray(np.pad(run, (round(LEAD * rate), round(TAIL * rate))))
 
 
 def slow(command: FloatArray, most: float, *, is_stepped: bool) -> FloatArray:
@@ -233,8 +232,7 @@ def _flat_multisine(n: int, rate: float, low: float, top: float, tilt: float) ->
         clipped = np.fft.rfft(np.clip(signal, *(np.array([-1.0, 1.0]) * _CLIP * np.max(np.abs(signal)))))
         spectrum[lines] = size * np.exp(1j * np.angle(clipped[lines]))
     signal = np.fft.irfft(spectrum, n)
-    result: FloatArray = signal / np.max(np.abs(signal))
-    return result
+    return np.asarray(signal / np.max(np.abs(signal)))
 
 
 def _chirp(shape: Shape, n: int, rate: float) -> FloatArray:
@@ -246,8 +244,7 @@ def _chirp(shape: Shape, n: int, rate: float) -> FloatArray:
 
 def _levels(levels: FloatArray, shape: Shape, n: int, rate: float) -> FloatArray:
     which = (np.arange(n) / rate / shape.hold).astype(np.int64)
-    result: FloatArray = levels[which % len(levels)]
-    return result
+    return np.asarray(levels[which % len(levels)])
 
 
 def _top(shape: Shape, rate: float) -> float:

@@ -140,12 +140,6 @@ def refit(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial) ->
     return Refit(end.cost, power(end.residual))
 
 
-def decided_share(hypotheses: Sequence[Hypothesis], chances: FloatArray) -> float:
-    """Return the share of the cases that a run is expected to decide. chances: as chances_decided."""
-    probability = np.array([h.probability for h in hypotheses])
-    return float(probability @ chances / max(probability.sum(), 1e-300))
-
-
 def chances_decided(
     hypotheses: Sequence[Hypothesis], rows: Sequence[FloatArray], apart: BoolArray
 ) -> FloatArray:
@@ -264,4 +258,5 @@ def trial_of(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray) -
 def share_decided(rater: ShapeRater, chances: FloatArray) -> float:
     """Return the share of the cases that a run is expected to decide; in a test, of those it is for."""
     first = 1 if rater.asked.test else 0
-    return decided_share(rater.hypotheses[first:], chances[first:])
+    probability = np.array([h.probability for h in rater.hypotheses[first:]])
+    return float(probability @ chances[first:] / max(probability.sum(), 1e-300))

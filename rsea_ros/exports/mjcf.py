@@ -1,4 +1,4 @@
-"""MJCF: the model, and its loop.
+"""MJCF: the model, its loop, and effects in MuJoCo's terms: each changes the model and says how.
 
 Source: MuJoCo 4.0 XML reference (actuator delay, filterexact, dcmotor; tendon stiffness and damping as
 polynomials, springlength, springyield, frictionloss).
@@ -7,13 +7,14 @@ polynomials, springlength, springyield, frictionloss).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from xml.etree import ElementTree as xml
 
-from rsea_ros.design.mujoco_model import model_element, text
+import numpy as np
+
+from rsea_ros.design.mujoco_model import SOLIMP, SOLREF, STEP, model_element, text
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import check_rotary
-from rsea_ros.exports.mjcf_effects import EFFECTS, STRUCTURES, motor
 from rsea_ros.exports.others import (
     Export,
     Omitted,
@@ -23,8 +24,213 @@ from rsea_ros.exports.others import (
     finite_sizes,
     without_null_effects,
 )
-from rsea_ros.model.equations import with_structure
+from rsea_ros.model.equations import train_ratio, with_structure
 from rsea_ros.model.rig import Rig
+
+Parameters = Mapping[str, float]
+Effect = Callable[[xml.Element, Rig, Parameters], str]
+
+BRISTLE, BRISTLE_TIME = 5e-6, 2e-4
+"""rad, and s for each rad/s of the Stribeck velocity: how far bristles bend that stand in for a friction
+whose sign is smoothed. Shorter ones come nearer, and at speed their law outruns the model's step."""
+ELEMENTS = 8
+"""Elasto-plastic springs in parallel that stand in for a hysteresis."""
+
+
+def tendon(root: xml.Element, name: str) -> xml.Element:
+    """Return the sum of hinges of a name."""
+    return next(one for one in root.iter("fixed") if one.get("name") == name)
+
+
+def motor(root: xml.Element) -> xml.Element:
+    """Return the actuator that the command drives, as the element that has every attribute."""
+    actuator = root.find("actuator")
+    assert actuator is not None
+    first = actuator[0]
+    if first.tag == "motor":
+        first.tag = "general"
+        first.set("gainprm", "1")
+    return first
+
+
+def beside(root: xml.Element, name: str, like: str) -> xml.Element:
+    """Add and return a sum of hinges of another name."""
+    tendons = root.find("tendon")
+    assert tendons is not None
+    copy = xml.SubElement(tendons, "fixed", name=name)
+    for joint in tendon(root, like):
+        copy.append(xml.fromstring(xml.tostring(joint)))
+    return copy
+
+
+def passive(root: xml.Element, name: str, **attributes: str) -> xml.Element:
+    """Add and return a dcmotor without input on the output: its friction or cogging alone."""
+    actuator = root.find("actuator")
+    assert actuator is not None
+    fixed = {"name": name, "tendon": "motor", "input": "none", "motorconst": "0", "resistance": "1"}
+    return xml.SubElement(actuator, "dcmotor", {**fixed, **attributes})
+
+
+def _command_delay(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    if p["delay"] < STEP:
+        raise Unrepresentable(f"a delay of {p['delay']:g} s is shorter than the model's step of {STEP:g} s")
+    samples = math.ceil(p["delay"] / STEP) + 1
+    for name, value in (("delay", repr(p["delay"])), ("nsample", str(samples)), ("interp", "zoh")):
+        motor(root).set(name, value)
+    return f"actuator delay {p['delay']:g} s"
+
+
+def _current_loop_lag(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    if motor(root).tag != "general":
+        raise Unrepresentable(f"the actuator is a {motor(root).tag}, which has no filter")
+    motor(root).set("dyntype", "filterexact")
+    motor(root).set("dynprm", repr(p["time_constant"]))
+    return f"actuator dyntype filterexact, {p['time_constant']:g} s"
+
+
+def _torque_saturation(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    name = "forcerange" if motor(root).tag == "pid" else "ctrlrange"
+    limit = min(p["limit"], float(motor(root).get(name, "0 inf").split()[1]))
+    motor(root).set(name, f"{-limit!r} {limit!r}")
+    return f"actuator {name} {limit:g} N·m"
+
+
+def _torque_constant_error(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    if motor(root).tag != "general":
+        raise Unrepresentable(f"the actuator is a {motor(root).tag}, whose gain is that of its loop")
+    motor(root).set("gainprm", repr(p["gain"]))
+    return f"actuator gainprm {p['gain']:g}"
+
+
+def _coulomb_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    losses = tendon(root, "motor")
+    for name, value in (
+        ("frictionloss", repr(p["torque"])),
+        ("solreffriction", SOLREF),
+        ("solimpfriction", SOLIMP),
+    ):
+        losses.set(name, value)
+    return f"tendon frictionloss {p['torque']:g} N·m; it sticks where the rig's creeps"
+
+
+def _stribeck_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    static = p["coulomb_torque"] + p["stribeck_torque"]
+    stiffness = static / max(BRISTLE, BRISTLE_TIME * p["stribeck_velocity"])
+    damping = 2.0 * math.sqrt(stiffness * rig["rotor.reflected_inertia"])  # the rotor's swing on its bristles
+    return _lugre(root, "stribeck", stiffness, p, damping) + ", bristles in the place of creep"
+
+
+def _lugre(root: xml.Element, name: str, stiffness: float, p: Parameters, damping: float) -> str:
+    static = p["coulomb_torque"] + p["stribeck_torque"]
+    law = (stiffness, damping, p["coulomb_torque"], static, p["stribeck_velocity"])
+    passive(root, name, lugre=" ".join(map(repr, law)))
+    return f"dcmotor lugre {law[0]:g} {law[1]:g} {law[2]:g} {law[3]:g} {law[4]:g}"
+
+
+def _asymmetric_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    if p["viscous_difference"]:
+        raise Unrepresentable("damping is the same in both directions")
+    actuator = root.find("actuator")
+    assert actuator is not None
+    bias = {"gainprm": "0", "biastype": "affine", "biasprm": f"{-p['offset']!r} 0 0"}
+    xml.SubElement(actuator, "general", {"name": "offset", "tendon": "motor", **bias})
+    return f"a second actuator with the constant bias {-p['offset']:g} N·m"
+
+
+def _quadratic_drag(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    losses = tendon(root, "motor")
+    losses.set("damping", f"{losses.get('damping', '0')} {p['coefficient']!r} 0")
+    return f"tendon damping polynomial, {p['coefficient']:g} v|v|"
+
+
+def _polynomial(root: xml.Element, rig: Rig, at: int, factor: float, power: str) -> str:
+    spring = tendon(root, "spring")
+    terms = [*spring.get("stiffness", "0").split(), "0", "0"][:3]
+    terms[at] = repr(rig["spring.stiffness"] * factor)
+    spring.set("stiffness", " ".join(terms))
+    falls = "; beyond its turning point it falls, where the rig's stays level"
+    turns = falls if factor < 0.0 or at == 1 else ""
+    return f"tendon stiffness polynomial, {rig['spring.stiffness'] * factor:g} {power}{turns}"
+
+
+def _hard_stop(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    stop = beside(root, "hard_stop", "spring")
+    stop.set("stiffness", repr(p["stiffness"]))
+    stop.set("springlength", f"{-p['angle']!r} {p['angle']!r}")
+    return f"tendon of {p['stiffness']:g} N·m/rad with a dead band of {p['angle']:g} rad in springlength"
+
+
+def _spring_hysteresis(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    """Say the major loop: its branch -1 + 2 exp(-u) is twice the first loading 1 - exp(-2 u), half as steep.
+
+    (Masing's rule, which elasto-plastic springs in parallel obey; u: way over `angle`.)
+    """
+    if p["gamma"]:
+        raise Unrepresentable(f"springs that yield unload as they load, gamma is {p['gamma']:g}")
+    edges = np.concatenate([[0.0], -0.5 * np.log1p(-np.arange(1, ELEMENTS) / ELEMENTS), [2.5]])
+    levels = 1.0 - np.exp(-2.0 * edges)
+    slopes = np.append(np.diff(levels) / np.diff(edges), 0.0)
+    for k, (slope, edge) in enumerate(zip(-np.diff(slopes), edges[1:], strict=True)):
+        element = beside(root, f"hysteresis_{k}", "spring")
+        element.set("stiffness", repr(float(slope * p["torque"] / p["angle"])))
+        element.set("springyield", repr(float(edge * p["angle"])))
+    return f"{ELEMENTS} elasto-plastic springs (springyield): its large loops; small ones are too stiff"
+
+
+def _torque_ripple(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    cycles = p["cycles_per_revolution"] * train_ratio(rig)
+    cogging = (p["amplitude"] / cycles, 1, p["phase"])
+    passive(root, "ripple", gear=repr(cycles), cogging=f"{cogging[0]!r} 1 {cogging[2]!r}")
+    return f"dcmotor cogging, {cycles:g} cycles for a turn of the output"
+
+
+def _backlash(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    if math.isfinite(rig["gear.stiffness"]):
+        raise Unrepresentable("play beside a gear that gives has no place in the model")
+    return f"a hinge each for chassis and gear, the tendon between them limited to {p['gap']:g} rad in all"
+
+
+def _voltage_sag(root: xml.Element, rig: Rig, p: Parameters) -> str:
+    first = motor(root)
+    if first.tag != "general" or first.get("dyntype"):
+        raise Unrepresentable("a dcmotor has no room for the rig's loop or lag beside it")
+    if float(first.get("gainprm", "1")) != 1.0:
+        raise Unrepresentable("a dcmotor has no room for a torque constant error beside it")
+    first.tag = "dcmotor"
+    del first.attrib["gainprm"]
+    first.set("input", "ff")
+    first.set("motorconst", "1")
+    first.set("resistance", repr(p["no_load_speed"] / p["limit"]))
+    first.set("controller", f"0 0 0 0 0 {p['no_load_speed']!r}")
+    return f"dcmotor of constant 1, {p['no_load_speed'] / p['limit']:g} Ohm and Vmax {p['no_load_speed']:g} V"
+
+
+STRUCTURES: Mapping[str, str] = {
+    "gear_compliance": "a spring between the mesh's output and the chassis, each with a hinge",
+    "base_compliance": "a hinge, stiffness and damping for the end that gives",
+    "gravity_error": "mass on the free end",
+}
+"""Effects that the rig's own bodies say."""
+EFFECTS: Mapping[str, Effect] = {
+    "command_delay": _command_delay,
+    "current_loop_lag": _current_loop_lag,
+    "torque_saturation": _torque_saturation,
+    "torque_constant_error": _torque_constant_error,
+    "coulomb_friction": _coulomb_friction,
+    "stribeck_friction": _stribeck_friction,
+    "lugre_friction": lambda root, rig, p: _lugre(
+        root, "lugre", p["bristle_stiffness"], p, p["bristle_damping"]
+    ),
+    "asymmetric_friction": _asymmetric_friction,
+    "quadratic_drag": _quadratic_drag,
+    "nonlinear_spring": lambda root, rig, p: _polynomial(root, rig, 2, p["cubic"], "x^3"),
+    "lopsided_spring": lambda root, rig, p: _polynomial(root, rig, 1, p["quadratic"], "x^2"),
+    "hard_stop": _hard_stop,
+    "spring_hysteresis": _spring_hysteresis,
+    "torque_ripple": _torque_ripple,
+    "backlash": _backlash,
+    "voltage_sag": _voltage_sag,
+}
 
 
 def say_loop(rig: Rig, root: xml.Element) -> tuple[Represented, list[Omitted]]:
@@ -93,7 +299,9 @@ def export_mjcf(rig: Rig) -> Export:
                 raise Unrepresentable("MuJoCo has no element for it")
         except Unrepresentable as reason:
             omitted.append(Omitted(setting.name, str(reason)))
-    omitted += unsaid_of(rig)
+    if rig.sensors:
+        why = "sensors of MJCF are those of perfect instruments; the rig's noise and quanta stay with the rig"
+        omitted.append(Omitted("sensor noise", why))
     root.insert(0, coverage_comment(represented, omitted))
     return Export("mjcf", ".xml", text(root), tuple(represented), tuple(omitted))
 
@@ -102,9 +310,3 @@ def play_of(rig: Rig) -> float:
     """Return the play between gear output and chassis that the model has, rad."""
     gaps = [one.parameters["gap"] for one in rig.effects if one.name == "backlash"]
     return float(gaps[0]) if gaps else 0.0
-
-
-def unsaid_of(rig: Rig) -> list[Omitted]:
-    """Return the parts of the rig itself, without its effects, that the model leaves out."""
-    noise = "sensors of MJCF are those of perfect instruments; the rig's noise and quanta stay with the rig"
-    return [Omitted("sensor noise", noise)] if rig.sensors else []

@@ -15,12 +15,12 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import OutputError
 from rsea_ros.fleet.query import NoRowsError, history, recordings
 from rsea_ros.fleet.store import Store
 from rsea_ros.outputs.files import make_folder
 from rsea_ros.outputs.new_files import write_file
+from rsea_ros.report.fleet.words import sentence
 from rsea_ros.trends import Alarm, alarms
 
 FOLDER = "alarms"
@@ -53,7 +53,12 @@ def _new(store: Store, folder: Path) -> Iterator[AlarmFile]:
         file = folder / f"{alarm.joint}-{hashlib.sha256(alarm.key.encode()).hexdigest()[:12]}.json"
         with suppress(OutputError):
             write_file(file, json.dumps(webhook(alarm), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
-            yield AlarmFile(file, sentence(alarm))
+            yield AlarmFile(file, said(alarm))
+
+
+def said(alarm: Alarm) -> str:
+    """Return the event in a sentence, as the pages have it, after its joint."""
+    return f"{alarm.joint}: {sentence(alarm)}"
 
 
 def webhook(alarm: Alarm) -> dict[str, Any]:
@@ -62,7 +67,7 @@ def webhook(alarm: Alarm) -> dict[str, Any]:
     labels = {"alertname": f"{alarm.kind} {alarm.about}", "joint": alarm.joint, "about": alarm.about,
               "kind": alarm.kind}  # fmt: skip
     annotations = {
-        "summary": sentence(alarm),
+        "summary": said(alarm),
         "unit": alarm.unit,
         "size": "" if size is None else f"{size.value:.6g}",
         "low": "" if size is None else f"{size.low:.6g}",
@@ -77,18 +82,6 @@ def webhook(alarm: Alarm) -> dict[str, Any]:
            "fingerprint": alarm.key}  # fmt: skip
     return {"version": "4", "receiver": "rsea", "status": "firing", "groupKey": alarm.key, "alerts": [one],
             "commonLabels": labels, "commonAnnotations": annotations}  # fmt: skip
-
-
-def sentence(alarm: Alarm) -> str:
-    """Return a sentence on the event: joint, cause, size, date."""
-    begun = "since the first recording," if alarm.from_first else "since"
-    since = f" {begun} {_time(alarm.since_s)[:10]}" if math.isfinite(alarm.since_s) else ""
-    if alarm.size is None:
-        return f"{alarm.joint}: {alarm.about} ({alarm.kind}){since}"
-    size = with_unit(f"{alarm.size.value:+.4g}", alarm.unit)
-    interval = f"{alarm.size.low:.4g} to " + with_unit(f"{alarm.size.high:.4g}", alarm.unit)
-    name = f"{alarm.about} or a look-alike" if alarm.status == "one_of" else alarm.about
-    return f"{alarm.joint}: {name} ({alarm.kind}) {size}, {interval}{since}"
 
 
 def _time(seconds: float) -> str:

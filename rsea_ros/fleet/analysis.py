@@ -33,8 +33,16 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.records.record import UNITS, Fault, Record
-from rsea_ros.report.identification.words import identification_json
-from rsea_ros.report.result_files import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODEL, REPORT, json_text, strict
+from rsea_ros.report.identification import identification_json
+from rsea_ros.report.result_files import (
+    DIAGNOSIS_JSON,
+    IDENTIFICATION_JSON,
+    MODEL,
+    REPORT,
+    json_text,
+    pick,
+    strict,
+)
 
 _DATED_NS = 10**17
 """Stamps below (1973) count since a machine's start, not since 1970."""
@@ -124,8 +132,7 @@ def _diagnose(row: Row, record: Record, rig: Rig, *, page: bool) -> dict[str, st
     backlash for a softer spring, by an amount that depends on the day's work (docs/fleet-trends.md).
     """
     from rsea_ros.diagnosis.diagnose import diagnose
-    from rsea_ros.report.diagnosis.files import diagnosis_json
-    from rsea_ros.report.diagnosis.page import diagnosis_report
+    from rsea_ros.report.diagnosis.page import diagnosis_json, diagnosis_report
 
     try:
         check_diagnosable(record)
@@ -154,21 +161,18 @@ def identification_columns(result: Identification) -> dict[str, Any]:
     }
 
 
+def _interval(name: str, estimate: Any) -> dict[str, Any]:
+    low, high = map(strict, estimate.ci95)
+    return {"name": name, **pick(estimate, "value unit"), "low": low, "high": high}
+
+
 def _parameter(p: ParameterEstimate) -> dict[str, Any]:
-    low, high = map(strict, p.ci95)
-    identifiable = p.is_identifiable
-    return {"name": p.name, "value": strict(p.value), "low": low, "high": high, "unit": p.unit,
-            "identifiable": identifiable}  # fmt: skip
+    return {**_interval(p.name, p), "identifiable": p.is_identifiable}
 
 
 def _cause(cause: Any) -> dict[str, Any]:
-    sizes = [
-        {"name": name, "value": strict(e.value), "low": strict(e.ci95[0]), "high": strict(e.ci95[1]),
-         "unit": e.unit}
-        for name, e in cause.parameters.items()
-    ]  # fmt: skip
-    return {"name": cause.name, "status": cause.status, "probability": strict(cause.probability),
-            "gain": strict(cause.gain_holdout), "sizes": sizes}  # fmt: skip
+    sizes = [_interval(name, size) for name, size in cause.parameters.items()]
+    return {**pick(cause, "name status probability gain=gain_holdout"), "sizes": sizes}
 
 
 def excitation(record: Record) -> list[dict[str, Any]]:

@@ -20,8 +20,7 @@ from distributed.scheduler import KilledWorker
 from distributed.utils import silence_logging_cmgr
 
 from rsea_ros.fleet import FleetError
-from rsea_ros.fleet.executor import Done, Job, WorkerLost
-from rsea_ros.fleet.pool import frequent_collection
+from rsea_ros.fleet.pool import Done, Job, WorkerLost, frequent_collection
 
 PER_WORKER = 3
 """Tasks in flight for each worker: one that runs, and some that wait at the scheduler."""

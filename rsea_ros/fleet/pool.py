@@ -1,7 +1,8 @@
-"""Worker processes of this machine, reached through a pair of sockets that only parent and child hold.
+"""Where tasks run: the interface, this process, and worker processes of this machine.
 
-No port is opened: the workers of a scheduler that listened on 127.0.0.1 ran what any local user sent
-(decision 0192). One that ends, or takes more memory than it may, is replaced, and its job comes back as lost.
+Workers are reached through a pair of sockets that only parent and child hold. No port is opened: those of a
+scheduler that listened on 127.0.0.1 ran what any local user sent (decision 0192). A worker that ends or takes
+too much memory is replaced, and its job comes back as lost.
 """
 
 from __future__ import annotations
@@ -14,14 +15,72 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from rsea_ros.fleet.executor import Done, Job, WorkerLost
 from rsea_ros.processes import STOPPING, deaf_to_interrupts
+
+
+class WorkerLost(Exception):
+    """The process that ran a task has ended: it was killed, or took more memory than it may."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A function and its arguments; `attempt` counts from 0."""
+
+    function: Callable[[Any], Any]
+    argument: Any
+    attempt: int = 0
+
+
+@dataclass(frozen=True)
+class Done:
+    """The outcome of a job: a value, or an error."""
+
+    job: Job
+    value: Any = None
+    error: BaseException | None = None
+
+
+class Executor(Protocol):
+    """Runs jobs. places: how many may be in flight at once."""
+
+    @property
+    def places(self) -> int:
+        """How many jobs may be in flight at once."""
+
+    def submit(self, job: Job) -> None:
+        """Take a job."""
+
+    def next(self, timeout: float | None) -> Done | None:
+        """Wait for a job that is done; None after a timeout (s)."""
+
+
+class Serial:
+    """Runs jobs in this process, when their results are requested."""
+
+    places = 1
+
+    def __init__(self) -> None:
+        self._jobs: deque[Job] = deque()
+
+    def submit(self, job: Job) -> None:
+        """Take a job."""
+        self._jobs.append(job)
+
+    def next(self, timeout: float | None) -> Done | None:
+        """Run the oldest job."""
+        job = self._jobs.popleft()
+        try:
+            return Done(job, job.function(job.argument))
+        except Exception as error:
+            return Done(job, error=error)
+
 
 PER_WORKER = 2
 """Jobs in flight for each worker: one that runs, and one that waits here."""

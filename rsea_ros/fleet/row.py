@@ -83,9 +83,9 @@ def analysis_of(model_version: str, settings: str) -> str:
     return hashlib.sha256(f"{model_version} {settings}".encode()).hexdigest()[:8]
 
 
-def key_of(row: Mapping[str, Any]) -> str:
+def key_of(joint: str, recording: str, model_version: str, settings: str) -> str:
     """Return the unique key of a row: joint, recording, and hash of software and settings."""
-    return f"{row['joint']}/{row['recording']}-{analysis_of(row['model_version'], row['settings'])}"
+    return f"{joint}/{recording}-{analysis_of(model_version, settings)}"
 
 
 def month_of(time: datetime | None) -> str:
@@ -107,19 +107,6 @@ def write_table(table: pa.Table, path: Path) -> None:
 EXPECTED_FILES = "expected whole Parquet files: remove the damaged one, and the next run makes its rows anew"
 _LONGEST = 120
 """Characters of an error of Parquet."""
-_COLUMNS = ["recording", "model_version", "settings", "bag", "bytes", "stamp"]
-
-
-def known_rows(rows: Path) -> tuple[set[str], dict[tuple[str, int, str], str]]:
-    """Return the keys of all rows, and the recording of every bag by path, bytes and stamp."""
-    keys: set[str] = set()
-    recordings: dict[tuple[str, int, str], str] = {}
-    for file in rows.glob("joint=*/month=*/*.parquet"):
-        joint = file.parent.parent.name.removeprefix("joint=")
-        for row in read(file, _COLUMNS).to_pylist():
-            keys.add(key_of({**row, "joint": joint}))
-            recordings[row["bag"], row["bytes"], row["stamp"]] = row["recording"]
-    return keys, recordings
 
 
 def read(file: Path, columns: list[str] | None = None) -> pa.Table:
@@ -155,47 +142,36 @@ _REPLACES = b"rsea.replaces"
 _KEY = ("recording", "model_version", "settings")
 
 
-def compact(folder: Path) -> None:
-    """Make one file of a partition's rows, duplicates counted once. Raises OSError."""
-    _merge(folder, sorted(folder.glob("*.parquet")))
+def compact(folder: Path, *, loose: bool = False) -> None:
+    """Make one file of a partition's rows, duplicates counted once. Raises OSError.
 
-
-def compact_loose(folder: Path) -> None:
-    """Make one file of a partition's files of one row, and read no other: any number of rows costs the same.
-
-    Raises OSError.
+    loose: of the files of one row alone, and read no other: any number of rows costs the same.
     """
-    _merge(folder, sorted(file for file in folder.glob("*.parquet") if not file.name.startswith(_PART)))
-
-
-def take_out(rows: Path, outcomes: Collection[str]) -> None:
-    """Take the rows with some outcomes out of all files. Raises OSError."""
-    wanted = pa.array(sorted(outcomes), pa.string())
-    for file in sorted(rows.glob("joint=*/month=*/*.parquet")):
-        table = read(file)
-        kept = table.filter(pc.invert(pc.is_in(table["outcome"], wanted)))
-        if kept.num_rows == 0:
-            file.unlink()
-        elif kept.num_rows < table.num_rows:
-            plain = kept.replace_schema_metadata(
-                {key: value for key, value in (kept.schema.metadata or {}).items() if key != _REPLACES}
-            )  # the row that comes in a removed one's place may have the name of a file that is replaced
-            with NewFiles(Destination(file.parent, force=True)) as new:
-                write_table(plain, new.stage(file.name))
-
-
-def finish(rows: Path) -> None:
-    """Remove the files that killed compactions have replaced but not removed. Raises OSError."""
-    for folder in rows.glob("joint=*/month=*"):
-        for part in folder.glob(f"{_PART}*.parquet"):
-            _remove(folder, json.loads(metadata(part).get(_REPLACES, b"[]")))
-
-
-def _merge(folder: Path, files: Sequence[Path]) -> None:
-    """Make one file of some files of a partition."""
+    every = sorted(folder.glob("*.parquet"))
+    files = [file for file in every if not (loose and file.name.startswith(_PART))]
     if len(files) > 1:
         tables = [read(file) for file in files]
         _replace(folder, files, _once(pa.concat_tables(tables, promote_options="default")))
+
+
+def take_out(file: Path, outcomes: Collection[str]) -> None:
+    """Take the rows with some outcomes out of a file. Raises OSError."""
+    table = read(file)
+    kept = table.filter(pc.invert(pc.is_in(table["outcome"], pa.array(sorted(outcomes), pa.string()))))
+    if kept.num_rows == 0:
+        file.unlink()
+    elif kept.num_rows < table.num_rows:
+        plain = kept.replace_schema_metadata(
+            {key: value for key, value in (kept.schema.metadata or {}).items() if key != _REPLACES}
+        )  # the row that comes in a removed one's place may have the name of a file that is replaced
+        with NewFiles(Destination(file.parent, force=True)) as new:
+            write_table(plain, new.stage(file.name))
+
+
+def finish(folder: Path) -> None:
+    """Remove the files of a partition that a killed compaction has replaced. Raises OSError."""
+    for part in folder.glob(f"{_PART}*.parquet"):
+        _remove(folder, json.loads(metadata(part).get(_REPLACES, b"[]")))
 
 
 def _replace(folder: Path, files: Sequence[Path], table: pa.Table) -> None:

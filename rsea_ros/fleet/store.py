@@ -20,24 +20,14 @@ from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
 
-from rsea_ros.fleet import FleetError
-from rsea_ros.fleet.row import (
-    SCHEMA,
-    Row,
-    analysis_of,
-    compact,
-    compact_loose,
-    finish,
-    known_rows,
-    month_of,
-    take_out,
-    write,
-)
+from rsea_ros.fleet import FleetError, row as of_row
+from rsea_ros.fleet.row import SCHEMA, Row, analysis_of, key_of, month_of
 from rsea_ros.outputs.files import make_folder
 from rsea_ros.outputs.new_files import Destination, NewFiles, write_file
 
 MARK = "store.json"
 LOCK = ".lock"
+_COLUMNS = ["recording", "model_version", "settings", "bag", "bytes", "stamp"]
 LOOSE = 64
 """Files of one row in a partition from which they become one file: each costs a reader a millisecond."""
 
@@ -64,7 +54,17 @@ class Store:
 
     def known_rows(self) -> tuple[set[str], dict[tuple[str, int, str], str]]:
         """Return the keys of all rows, and the recording of every bag by path, bytes and stamp."""
-        return known_rows(self.rows)
+        keys: set[str] = set()
+        recordings: dict[tuple[str, int, str], str] = {}
+        for file in self._files():
+            joint = file.parent.parent.name.removeprefix("joint=")
+            for row in of_row.read(file, _COLUMNS).to_pylist():
+                keys.add(key_of(joint, row["recording"], row["model_version"], row["settings"]))
+                recordings[row["bag"], row["bytes"], row["stamp"]] = row["recording"]
+        return keys, recordings
+
+    def _files(self) -> list[Path]:
+        return sorted(self.rows.glob("joint=*/month=*/*.parquet"))
 
     def put(self, outcome: TaskOutcome) -> None:
         """Write artefacts, then the row: a killed writer leaves artefacts without a row, never the reverse.
@@ -81,24 +81,26 @@ class Store:
                     new.write(file, content)
         folder = self.rows / f"joint={row['joint']}" / f"month={month_of(row['time'])}"
         with NewFiles(folder) as new:
-            write([row], new.stage(f"{name}.parquet"))
+            of_row.write([row], new.stage(f"{name}.parquet"))
         self._loose[folder] += 1
         if self._loose[folder] >= LOOSE:
             self._loose[folder] = 0
-            compact_loose(folder)
+            of_row.compact(folder, loose=True)
 
     def finish(self) -> None:
         """Complete or remove what a killed writer has left."""
-        finish(self.rows)
+        for folder in self.rows.glob("joint=*/month=*"):
+            of_row.finish(folder)
 
     def take_out(self, outcomes: Collection[str]) -> None:
         """Take the rows with some outcomes out, so that their recordings count as new."""
-        take_out(self.rows, outcomes)
+        for file in self._files():
+            of_row.take_out(file, outcomes)
 
     def compact(self) -> None:
         """Make one file of each partition's rows."""
         for folder in sorted(self.rows.glob("joint=*/month=*")):
-            compact(folder)
+            of_row.compact(folder)
 
 
 def open_store(path: str | Path, *, create: bool = False) -> Store:

@@ -23,7 +23,7 @@ from pathlib import Path
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import MappedJoint
-from rsea_ros.fleet.row import Row, analysis_of, empty
+from rsea_ros.fleet.row import Row, empty, key_of
 from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relist
 from rsea_ros.fleet.store import Store, TaskOutcome
 from rsea_ros.identification.solver import on_cores
@@ -98,8 +98,7 @@ class Task:
     @property
     def key(self) -> str:
         """The unique key of the row."""
-        analysis = analysis_of(self.model_version, self.joint.settings)
-        return f"{self.joint.name}/{self.recording}-{analysis}"
+        return key_of(self.joint.name, self.recording, self.model_version, self.joint.settings)
 
     def row(self, **stated: object) -> Row:
         """Return the row with the stated values and the identity of the task only."""

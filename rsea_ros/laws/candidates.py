@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.signal import periodogram, welch
 
 from rsea_ros.diagnosis.initial_guess import interpolate_peak, peaks
 from rsea_ros.laws.terms import (
@@ -30,6 +29,7 @@ from rsea_ros.laws.terms import (
 )
 from rsea_ros.laws.variables import CaseModel, ResidualRows, Variables
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import stamped_density
 
 _MOST = 400.0
 """Cycles over the travel at most: more than that no record resolves."""
@@ -69,16 +69,14 @@ def periods(angle: FloatArray, torque: FloatArray, factor: FloatArray | None = N
 
 def lines(t: FloatArray, residual: FloatArray) -> list[float]:
     """Return the sharpest line of a residual's spectrum over time, Hz, in a list."""
-    rate = 1.0 / float(np.median(np.diff(t)))
-    bins, level = periodogram(residual, rate, window="hann")
+    rate, bins, level = stamped_density(t, residual, len(residual))
     level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
     return [interpolate_peak(bins, level, k) for k in peaks(level, apart=8)[:1]]
 
 
 def modes(t: FloatArray, residual: FloatArray) -> list[float]:
     """Return the frequencies of the highest broad peaks of a residual's spectrum, Hz, at most two."""
-    rate = 1.0 / float(np.median(np.diff(t)))
-    bins, level = welch(residual, rate, nperseg=min(1024, len(residual)))
+    rate, bins, level = stamped_density(t, residual, 1024)
     level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
     return [interpolate_peak(bins, level, k) for k in peaks(level, apart=12)]
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rsea_ros.documents.wording import in_docstring
+from rsea_ros.effects import signal_table
 from rsea_ros.effects.effect import Claims
 from rsea_ros.laws.law import (
     READS,
@@ -217,7 +218,7 @@ def _tables(law: Law) -> str:
 def _imports(law: Law, body: str) -> str:
     words = words_of(body)
     maths = sorted(words & {"sin", "cos", "tanh", "exp", "pi"})
-    table = sorted(set(_table_names()) & words | {"Port"})
+    table = sorted({n for n in vars(signal_table) if n.isupper()} & words | {"Port"})
     helpers = sorted(words & {"lagged", "bent", "played", "from_ring", "rung"})
     lines = [f"from math import {', '.join(maths)}\n"] if maths else []
     lines += ["import numpy as np\n"] if law.curve is not None else []
@@ -227,12 +228,6 @@ def _imports(law: Law, body: str) -> str:
               f"from rsea_ros.effects.signal_table import {', '.join(table)}"]  # fmt: skip
     lines += [f"from rsea_ros.laws.variables import {', '.join(helpers)}"] if helpers else []
     return "\n".join(lines) + "\n"
-
-
-def _table_names() -> list[str]:
-    from rsea_ros.effects import signal_table
-
-    return [n for n in vars(signal_table) if n.isupper()]
 
 
 def _effect(law: Law, claims: Claims) -> str:

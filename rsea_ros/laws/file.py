@@ -200,7 +200,7 @@ def torque_points(problem: Problem, refined: Refined, law: Law, values: dict[str
     rest = replace(problem, rig=rig.with_effects(*others), unknowns=tuple(problem.unknowns[i] for i in names))
     theta = refined.solution.theta[names]
     model = case_model(rest, theta, rest.cases[0], rest.outputs(theta)[0], law.place)
-    over = law.curve.over if law.curve is not None else _most(law, model.variables.letters)
+    over = law.curve.over if law.curve is not None else _most(law)
     letters, t = model.variables.letters, model.missing.t
     offset = 0.5 * model.variables.step if model.injector else 0.0
     at = model.variables.step * np.arange(len(letters["t"])) + offset
@@ -219,8 +219,7 @@ def _sizes(law: Law) -> set[str]:
     return {"size"} if law.is_learnt else {c for c, _ in law.names}
 
 
-def _most(law: Law, letters: dict[str, np.ndarray] | object) -> str:
+def _most(law: Law) -> str:
     """Return the variable over which a law is drawn: that of its largest term."""
-    lead = replace(law, parts=law.parts[:1])
-    used = letters_of(lead)
+    used = letters_of(replace(law, parts=law.parts[:1]))
     return next((n for n in _FIRST if n in used), "t")

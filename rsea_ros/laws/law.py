@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.effect import Claims, Effect
 from rsea_ros.laws.sparse_regression import Dependence
 from rsea_ros.laws.terms import CREEP, Place, Term
@@ -106,7 +107,7 @@ class Law:
             if values[c] != 0.0
         )
         regressors = dict.fromkeys(part.term.regressor for part in parts)
-        return replace(self, parts=parts, regressor=join_names(list(regressors)))
+        return replace(self, parts=parts, regressor=list_names(list(regressors)))
 
     def values(self, variables: Variables) -> FloatArray:
         """Return the law along a record."""
@@ -116,11 +117,6 @@ class Law:
 
         curve = np.interp(variables.letters[self.curve.over], self.curve.x, self.curve.y)
         return curve * factor_of(variables, self.place, self.curve.over, self.curve.factor)
-
-
-def join_names(names: Sequence[str]) -> str:
-    """Return names as people list them."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 _SYMBOLS = {"w": "ω", "q": "q", "theta": "θ", "d": "d", "T": "T_s", "u": "u", "t": "t", "h": "φ"}

@@ -11,6 +11,7 @@ from rsea_ros.diagnosis.criteria import is_at_floor
 from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.score import Score, gain_of as gain_of_blocks, score_on
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.solver import one_blas_thread
@@ -30,7 +31,7 @@ from rsea_ros.laws.choice import (
 )
 from rsea_ros.laws.effect_source import LawProvenance
 from rsea_ros.laws.file import Draft, Refined, draft_of, finish_laws, refine
-from rsea_ros.laws.law import FittedTerm, Law, LawResult, LearntCurve, WrittenLaw, join_names, ranges_of
+from rsea_ros.laws.law import FittedTerm, Law, LawResult, LearntCurve, WrittenLaw, ranges_of
 from rsea_ros.laws.sparse_regression import SELECTION, Dependence, Gram, SparseLaw, dependences
 from rsea_ros.laws.variables import CaseModel
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -140,7 +141,7 @@ def law_of(
         )
     laws = []
     for place, items in parts.items():
-        regressor = join_names(list(dict.fromkeys(p.term.regressor for p in items)))
+        regressor = list_names(list(dict.fromkeys(p.term.regressor for p in items)))
         law = Law(
             f"law_of_{_slug(items[0].term.regressor)}", items[0].term.place, regressor, tuple(items), {}
         )
@@ -226,7 +227,12 @@ def _result(
     provenance: LawProvenance | None,
 ) -> LawResult:  # fmt: skip
     base = search.base
-    laws = _laws(search, choice)
+    gram, candidates, cases = search.gram, search.candidates, search.cases
+    laws = (
+        law_of(gram, candidates, cases, choice.taken)
+        if choice.curve is None
+        else [curve_of(gram, candidates, cases, choice.curve)]
+    )
     drafts = [draft_of(law) for law in laws]
     with lend(*(d.effect for d in drafts)):
         refined = refined_laws(base, drafts) if drafts else None
@@ -256,9 +262,3 @@ def _with_files(rig: Rig, base: Rig, written: Sequence[WrittenLaw]) -> Rig:
     acting = {e.name for e in base.effects}
     laws = (EffectSetting(w.law.name, w.law.parameters) for w in written)
     return rig.with_effects(*(e for e in rig.effects if e.name in acting), *laws)
-
-
-def _laws(search: Search, choice: Choice) -> list[Law]:
-    if choice.curve is not None:
-        return [curve_of(search.gram, search.candidates, search.cases, choice.curve)]
-    return law_of(search.gram, search.candidates, search.cases, choice.taken)

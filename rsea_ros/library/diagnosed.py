@@ -58,7 +58,7 @@ class Diagnosed:
 
     def summary(self) -> str:
         """Return the verdict and the evidence as plain text."""
-        from rsea_ros.report.diagnosis.terminal import terminal_lines
+        from rsea_ros.report.diagnosis.words import terminal_lines
 
         return "\n".join(line.plain for line in terminal_lines(self.result))
 
@@ -84,7 +84,7 @@ class Diagnosed:
         """
         from msg_adapters.records import write_overlay
         from rsea_ros.outputs.new_files import Destination
-        from rsea_ros.report.diagnosis.files import write_diagnosis
+        from rsea_ros.report.diagnosis.page import write_diagnosis
 
         return write_diagnosis(self.result, self.record, Destination(Path(directory), force), write_overlay)
 

@@ -45,7 +45,7 @@ class Fit:
 
     def summary(self) -> str:
         """Return the verdict, faults of the data, parameters, and what the data cannot determine."""
-        from rsea_ros.report.identification.words import doubt_sentences, terminal_table, verdict_sentence
+        from rsea_ros.report.identification import doubt_sentences, terminal_table, verdict_sentence
         from rsea_ros.report.remark_words import fault_lines, remark_sentences
 
         damage = [f"data: {line}" for line in fault_lines(self.result.faults)]
@@ -69,7 +69,7 @@ class Fit:
         force: replace existing results; without it they raise OutputError.
         """
         from rsea_ros.outputs.new_files import Destination
-        from rsea_ros.report.identification.page import write_results
+        from rsea_ros.report.identification import write_results
 
         return write_results(self.result, Destination(Path(directory), force))
 
@@ -84,7 +84,7 @@ class Fit:
         return f"Fit({self.rig.name}: {values}; fit {fits})"
 
     def _repr_html_(self) -> str:
-        from rsea_ros.report.identification.page import parameter_table
+        from rsea_ros.report.identification import parameter_table
 
         return parameter_table(self.result.parameters)
 

@@ -32,10 +32,15 @@ from rsea_ros.nodes._run import run_node
 from rsea_ros.outputs.files import unused_path
 from rsea_ros.outputs.new_files import Destination
 from rsea_ros.records.record import Record
-from rsea_ros.report.diagnosis.files import write_diagnosis
+from rsea_ros.report.diagnosis.page import write_diagnosis
 from rsea_ros.report.diagnosis.words import diagnosis_sentence
-from rsea_ros.report.experiment.page import check_session_free, write_campaign
-from rsea_ros.report.experiment.words import end_sentence, known_causes, shape_words
+from rsea_ros.report.experiment import (
+    check_session_free,
+    end_sentence,
+    known_causes,
+    shape_words,
+    write_campaign,
+)
 
 DEFAULT = "out/experiment"
 TABLE = (

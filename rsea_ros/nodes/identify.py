@@ -33,7 +33,7 @@ from rsea_ros.outputs.files import unused_path
 from rsea_ros.outputs.new_files import Destination, check_free
 from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.words import diagnosis_sentence
-from rsea_ros.report.identification.words import verdict_sentence
+from rsea_ros.report.identification import verdict_sentence
 from rsea_ros.report.remark_words import fault_lines
 from rsea_ros.report.result_files import IDENTIFICATION, REPORT
 
@@ -85,7 +85,7 @@ class Diagnosing:
     def _diagnose(self, record: Record) -> Diagnosis:
         from rsea_ros.checks.carried import with_check_faults
         from rsea_ros.diagnosis.diagnose import diagnose
-        from rsea_ros.report.diagnosis.files import write_diagnosis
+        from rsea_ros.report.diagnosis.page import write_diagnosis
 
         result = diagnose([with_check_faults(record, self._rig, masks=True)], self._rig, progress=self._tell)
         self._report = write_diagnosis(result, record, Destination(self._out, fresh=True), write_overlay)
@@ -203,7 +203,7 @@ class IdentifyNode:
         """Identify and write the results, or do nothing when stopped before."""
         from rsea_ros.checks.carried import with_check_faults
         from rsea_ros.identification.identify import identify
-        from rsea_ros.report.identification.page import write_results
+        from rsea_ros.report.identification import write_results
 
         if not self._done:
             return

@@ -60,6 +60,34 @@ def cross_density(
     return np.asarray(np.fft.rfftfreq(length, 1.0 / rate), np.float64), density
 
 
+def stamped_density(
+    t: FloatArray, values: FloatArray, longest: int
+) -> tuple[float, FloatArray, FloatArray]:
+    """Return rate, Hz, frequency, Hz, and power density as above of values at stamps t, s, which rise.
+
+    longest: samples of a segment, at the most. Stamps within a step of an even clock lie on it; others decide
+    where on one of their median interval a value lies, as after lost samples or in a log of events. A pause
+    counts as one segment.
+    """
+    steps, filled = np.diff(t), 1.0
+    rate = 1.0 / float(np.mean(steps))
+    if np.abs((t - t[0]) * rate - np.arange(len(t))).max() > 1.0:
+        rate = 1.0 / float(np.median(steps))
+        t = np.concatenate([[0.0], np.cumsum(np.minimum(steps, longest / rate))])
+        values = on_even_clock(t, values, rate)
+        filled = float(np.mean(on_even_clock(t, np.ones(len(t)), rate)))
+    frequency, density = power_density(values, rate, min(longest, len(values)))
+    return rate, frequency, density / filled
+
+
+def on_even_clock(t: FloatArray, values: FloatArray, rate: float) -> FloatArray:
+    """Return values at a rate (Hz) from the first stamp to the last, zero where none is near."""
+    place = np.rint((t - t[0]) * rate).astype(np.int64)
+    even = np.zeros(place[-1] + 1)
+    even[place] = values
+    return even
+
+
 @lru_cache(maxsize=64)
 def hann(length: int) -> FloatArray:
     """Return the periodic Hann window, shape (length,), for all callers: not to be written to."""

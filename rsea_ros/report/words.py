@@ -88,6 +88,11 @@ def number(value: float, digits: int = 3) -> str:
     return minus(f"{value:.{digits - 1}e}")
 
 
+def probability(value: float) -> str:
+    """Return a probability with three digits, which never rounds to certainty."""
+    return "> 0.999" if value >= 0.9995 else f"{value:.3f}" if value >= 5e-4 else "< 0.001"
+
+
 def quantity(value: float, of: str, digits: int = 3) -> str:
     """Return a value with its unit, small ones with a prefix: 6.1e-6 rad as `6.10 µrad`."""
     factor, prefixed = unit_factor(value, of)

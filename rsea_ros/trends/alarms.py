@@ -131,11 +131,11 @@ _MOST = 2.0
 """Times the limit: what is farther off is no more urgent."""
 
 
-def urgency(alarm: Alarm, settings: TrendSettings = DEFAULT) -> float:
+def urgency(alarm: Alarm) -> float:
     """Return how soon an alarm asks for a look: by its kind, and the share of its limit that it has used
     up or the share of the days that name it."""
     if alarm.kind in ("trend", "change") and math.isfinite(alarm.relative):
-        return _BASE[alarm.kind] * min(abs(alarm.relative) / settings.limit, _MOST)
+        return _BASE[alarm.kind] * min(abs(alarm.relative) / DEFAULT.limit, _MOST)
     return _BASE[alarm.kind] * alarm.share
 
 

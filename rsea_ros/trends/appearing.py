@@ -161,8 +161,7 @@ def _ratios(named: FloatArray, usual: float) -> FloatArray:
 def _likelihood(k: FloatArray | float, n: FloatArray | float, p: FloatArray | float) -> FloatArray:
     """Return the log likelihood of k days of n that name it, each with probability p."""
     q = np.clip(p, 1e-9, _SURE)
-    value: FloatArray = k * np.log(q) + (n - k) * np.log(1.0 - q)
-    return value
+    return np.asarray(k * np.log(q) + (n - k) * np.log(1.0 - q))
 
 
 def _appearance(scan: Scan, q: float, settings: TrendSettings) -> Appearance | None:

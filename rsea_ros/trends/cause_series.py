@@ -59,18 +59,18 @@ def namings(recordings: Table) -> Iterator[Naming]:
 
 
 def _faults(joint: str, rows: np.ndarray, time_s: FloatArray, faults: npt.NDArray[Any]) -> Iterator[Naming]:
-    kinds = [{_kind(f) for f in (faults[i] if faults[i] is not None else ())} for i in rows]
+    held = (faults[i] if faults[i] is not None else () for i in rows)
+    kinds = [{str(f["kind"] if isinstance(f, Mapping) else f) for f in every} for every in held]
     for kind in sorted(set().union(*kinds)):
         yield Naming(joint, kind, "fault", rows, time_s[rows], np.array([kind in k for k in kinds]))
 
 
-def _kind(fault: Any) -> str:
-    return str(fault["kind"]) if isinstance(fault, Mapping) else str(fault)
-
-
 def _causes(joint: str, rows: np.ndarray, time_s: FloatArray, causes: npt.NDArray[Any]) -> Iterator[Naming]:
     stated = [[_stated_cause(c) for c in (causes[i] if causes[i] is not None else ())] for i in rows]
-    of_row = [{c["name"]: c for c in row if _counts(c)} for row in stated]
+    of_row = [
+        {c["name"]: c for c in row if c["status"] != "one_of" or float(c["probability"]) >= _LIKELY}
+        for row in stated
+    ]
     for name in sorted(set().union(*of_row)):
         of_recording = [row.get(name) for row in of_row]
         yield _cause(joint, str(name), rows, time_s[rows], of_recording)
@@ -81,10 +81,6 @@ def _stated_cause(cause: Any) -> Mapping[str, Any]:
     if isinstance(cause, Mapping):
         return cause
     return {"name": str(cause), "status": "confirmed", "probability": 1.0, "gain": float("nan"), "sizes": ()}
-
-
-def _counts(cause: Mapping[str, Any]) -> bool:
-    return cause["status"] != "one_of" or float(cause["probability"]) >= _LIKELY
 
 
 def _cause(

@@ -45,7 +45,8 @@ def change_test(days: Days, effect: DayEffect, prior: tuple[float, float], setti
     course = course_of(days, effect.variance, prior)
     best, _ = _best(course, settings.fewest_beside)
     beside = _effect_beside(course, best, settings)
-    z = _score(course_of(days, beside.variance, prior), best)
+    anew = course_of(days, beside.variance, prior)
+    z = float(abs(scan(anew.regression(), anew.t, best.kind)[best.index]))
     return Tested(course, effect, beside, prior, scan_p(z, _share(days, settings), beside.freedom))
 
 
@@ -55,10 +56,6 @@ def _effect_beside(course: Course, change: StepOrRamp, settings: TrendSettings) 
     effect = day_effect(course.days, settings, changed.fit_values())
     freedom = max(1, effect.freedom - 1)
     return replace(effect, variance=effect.variance * effect.freedom / freedom, freedom=freedom)
-
-
-def _score(course: Course, change: StepOrRamp) -> float:
-    return float(abs(scan(course.regression(), course.t, change.kind)[change.index]))
 
 
 def describe(test: Tested, settings: TrendSettings) -> Course:

@@ -85,8 +85,7 @@ def _on_lines(time_s: FloatArray, value: FloatArray) -> FloatArray:
     apart = t[:, j] - t[:, i]
     rise = np.where(apart > 0.0, (y[:, j] - y[:, i]) / np.where(apart > 0.0, apart, 1.0), 0.0)
     slope = np.median(rise, axis=1)
-    level: FloatArray = np.median(y - slope[:, None] * t, axis=1)
-    return level
+    return np.asarray(np.median(y - slope[:, None] * t, axis=1))
 
 
 def _scale(value: FloatArray) -> float:
@@ -168,8 +167,7 @@ def _criterion(
     def product(a: FloatArray, b: FloatArray) -> FloatArray:
         """Return the weighted product of two columns about their block means."""
         apart = np.add.reduceat(w * a, blocks, axis=1) * np.add.reduceat(w * b, blocks, axis=1) / total
-        total_of: FloatArray = np.sum(w * a * b, axis=1) - np.sum(apart, axis=1)
-        return total_of
+        return np.asarray(np.sum(w * a * b, axis=1) - np.sum(apart, axis=1))
 
     criterion = -np.sum(np.log(w), axis=1) + np.sum(np.log(total), axis=1)
     if days.warmth is None:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rsea_ros.records.statistics import MAD_TO_SD, Z95
 from rsea_ros.trends.appearing import adjust, appearances, scan_threshold, two_sided_p, with_course
 from rsea_ros.trends.cause_series import namings, size_series, temperatures
-from rsea_ros.trends.course import Course, term
-from rsea_ros.trends.course_search import Tested, change_test, describe
-from rsea_ros.trends.days import DayEffect, Days, day_effect, day_means, fleet_prior
-from rsea_ros.trends.quantities import (
+from rsea_ros.trends.course import (
+    Course,
     Dated,
     combine,
     date_course,
@@ -24,8 +22,11 @@ from rsea_ros.trends.quantities import (
     ramp_size,
     slope_after,
     step_size,
+    term,
     time_to_limit,
 )
+from rsea_ros.trends.course_search import Tested, change_test, describe
+from rsea_ros.trends.days import DayEffect, Days, day_effect, day_means, fleet_prior
 from rsea_ros.trends.result import Change, FleetTrends, Interval, Outlier, ParameterCourse, Trend
 from rsea_ros.trends.series import (
     DAY,
@@ -200,36 +201,28 @@ def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DE
     )
 
 
-@dataclass(frozen=True)
-class _Prepared:
-    series: Series
-    days: Days
-    effect: DayEffect
-
-
 def _trends(
     all_of: Sequence[Series], settings: TrendSettings
 ) -> tuple[dict[Key, Trend], dict[str, tuple[float, float]]]:
     """Return the trend of each series, and the temperature slope of each parameter over the fleet."""
-    ready, out = [], {}
+    out: dict[Key, Trend] = {}
+    ready: list[tuple[Series, Days, DayEffect]] = []
+    effects: dict[str, list[DayEffect]] = {}
     for series in all_of:
         days = day_means(series, settings)
         if len(days.t) < settings.fewest_days:
             out[series.joint, series.parameter] = _undetermined_trend(series, len(days.t), settings)
             continue
-        ready.append(_Prepared(series, days, day_effect(days, settings)))
-    priors = {name: fleet_prior([r.effect for r in group]) for name, group in _by_parameter(ready).items()}
-    tests = [change_test(r.days, r.effect, priors[r.series.parameter], settings) for r in ready]
+        ready.append((series, days, day_effect(days, settings)))
+        effects.setdefault(series.parameter, []).append(ready[-1][2])
+    priors = {name: fleet_prior(group) for name, group in effects.items()}
+    tests = [change_test(days, effect, priors[s.parameter], settings) for s, days, effect in ready]
     rates = adjust(np.array([t.p for t in tests]))
-    for r, test, q in zip(ready, tests, rates, strict=True):
-        out[r.series.joint, r.series.parameter] = _trend(r.series, test, float(q), settings)
-    warm = {r.series.parameter for r in ready if r.days.warmth is not None}
+    for (s, _, _), test, q in zip(ready, tests, rates, strict=True):
+        course = describe(test, settings) if q <= settings.false_discovery else test.course
+        out[s.joint, s.parameter] = trend_of(s, test, course, float(q), settings)
+    warm = {s.parameter for s, days, _ in ready if days.warmth is not None}
     return out, {n: p for n, p in priors.items() if n in warm}
-
-
-def _trend(series: Series, test: Tested, q: float, settings: TrendSettings) -> Trend:
-    course = describe(test, settings) if q <= settings.false_discovery else test.course
-    return trend_of(series, test, course, q, settings)
 
 
 def _undetermined_trend(series: Series, days: int, settings: TrendSettings) -> Trend:
@@ -238,10 +231,3 @@ def _undetermined_trend(series: Series, days: int, settings: TrendSettings) -> T
     determined = f"{int(np.sum(series.identifiable))} of {many} recordings determine it, on {on}"
     reason = f"{determined}; {settings.fewest_days} days are needed"
     return Trend(series, "undetermined", reason=reason)
-
-
-def _by_parameter(ready: Iterable[_Prepared]) -> Mapping[str, list[_Prepared]]:
-    groups: dict[str, list[_Prepared]] = {}
-    for r in ready:
-        groups.setdefault(r.series.parameter, []).append(r)
-    return groups

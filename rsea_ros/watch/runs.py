@@ -26,7 +26,6 @@ _TAIL = 4000
 class Evaluation:
     """A verb on a recording. state: running, done or failed; words: the last line that it said."""
 
-    verb: str
     folder: Path
     process: subprocess.Popen[bytes]
     log: IO[bytes]
@@ -95,7 +94,7 @@ class Runs:
             raise ParameterError("another recording is being evaluated, expected one at a time")
         folder = unused_path(each.bag.with_name(f"{each.bag.name}-{verb}"))
         words = ["-m", "rsea_ros", verb, str(each.bag), "--out", str(folder), *self._verb_options]
-        each.jobs[verb] = Evaluation(verb, folder, *_python(words))
+        each.jobs[verb] = Evaluation(folder, *_python(words))
 
     def report(self, name: str, verb: str) -> Path | None:
         """Return the report of a recording, or None."""

@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import Any, Protocol
 
 from tornado.httpserver import HTTPServer
@@ -32,14 +33,10 @@ def extremes(samples: Samples) -> Samples:
     known = [s for s in samples if s[1] == s[1]]
     if len(known) < 2:
         return known
-    low, high = min(known, key=_value), max(known, key=_value)
+    low, high = min(known, key=itemgetter(1)), max(known, key=itemgetter(1))
     if low is high:
         return [known[-1]]
     return [low, high] if low[0] <= high[0] else [high, low]
-
-
-def _value(sample: tuple[float, float]) -> float:
-    return sample[1]
 
 
 CHANNELS = ("command", "motor", "ft", "proximal", "distal", "disturbance", "deflection")
@@ -71,12 +68,11 @@ def frame(batch: Mapping[str, Samples], flag: bool | None) -> str | None:
     if not firsts:
         return None
     begin = min(firsts)
-    rows = {name: _flat(samples, begin) for name, samples in kept.items() if samples}
+    rows = {
+        name: [x for t, v in samples for x in (round(1e3 * (t - begin), 1), float(f"{v:.6g}"))]
+        for name, samples in kept.items() if samples
+    }  # fmt: skip
     return json.dumps({"t0": round(begin, 4), "pure": flag, **rows}, separators=(",", ":"))
-
-
-def _flat(samples: Samples, begin: float) -> Sequence[float]:
-    return [x for t, v in samples for x in (round(1e3 * (t - begin), 1), float(f"{v:.6g}"))]
 
 
 FRAME, STATE = 1.0 / 30.0, 0.5

@@ -16,10 +16,8 @@ from rsea_ros.diagnosis import diagnose
 from rsea_ros.identification import identify
 from rsea_ros.model.rig_file import RigChoice
 from rsea_ros.records.record import Record
-from rsea_ros.report import result_files
-from rsea_ros.report.design import page as design_page, tables as design_tables
-from rsea_ros.report.diagnosis import files as diagnosis_files
-from rsea_ros.report.identification import page as results, words as identification_words
+from rsea_ros.report import design as design_page, identification as results, result_files
+from rsea_ros.report.diagnosis import page as diagnosis_files
 
 RIG = "paper_high_impedance"
 MAP = "time: {column: t, unit: s}\nchannels:\n  command: {column: u, unit: N m}\n"
@@ -65,11 +63,11 @@ def prepare(record: Record, folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
         (spring_design, "spring_design", result), (spring_design, "least_stiffness", 1.0),
         (spring_design, "robust_stiffness", np.inf),
         (usable, "check_diagnosable", None), (checks, "check_record", Findings("run.mcap", RIG, (), ())),
-        (identification_words, "identification_json", JSON), (results, "identification_report", "page"),
+        (results, "identification_json", JSON), (results, "identification_report", "page"),
         (diagnosis_files, "diagnosis_json", JSON), (diagnosis_files, "diagnosis_report", "page"),
         (diagnosis_files, "overlay_records", {"/rsea": record}),
         (results, "rig_text", "rig"), (diagnosis_files, "rig_text", "rig"),
-        (design_tables, "design_json", JSON), (design_page, "design_report", "page"),
+        (design_page, "design_json", JSON), (design_page, "design_report", "page"),
     ):  # fmt: skip
         monkeypatch.setattr(module, names, lambda *words, value=value, **named: value)
 

@@ -10,7 +10,7 @@ import pytest
 import rsea_ros as rsea
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.report.diagnosis.files import diagnosis_json
+from rsea_ros.report.diagnosis.page import diagnosis_json
 
 RATE, SECONDS = 280.0, 12.0
 TEMPLATE = Path(__file__).resolve().parents[2] / "config" / "templates" / "rig.yaml"

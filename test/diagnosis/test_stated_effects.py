@@ -17,8 +17,8 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
-from rsea_ros.report.diagnosis.files import diagnosis_json
-from rsea_ros.report.diagnosis.terminal import terminal_lines
+from rsea_ros.report.diagnosis.page import diagnosis_json
+from rsea_ros.report.diagnosis.words import terminal_lines
 
 RATE, DURATION = 280.0, 8.0
 RIG = load_rig("paper_high_impedance")

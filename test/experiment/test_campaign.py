@@ -18,8 +18,7 @@ from rsea_ros.experiment.joint_weighing import causes_from, middles_of_runs, wei
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.statistics import Z95
-from rsea_ros.report.experiment.page import probability_figure, write_campaign
-from rsea_ros.report.experiment.words import run_count
+from rsea_ros.report.experiment import probability_figure, run_count, write_campaign
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from rsea_ros.experiment.joint_weighing import weigh
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_shape import RunLimits
-from rsea_ros.report.experiment.words import end_sentence, shared_words
+from rsea_ros.report.experiment import end_sentence, shared_words
 
 FRICTION = ("coulomb_friction", "stribeck_friction")
 STUCK = {"coulomb_torque": 0.8, "stribeck_torque": 0.7, "stribeck_velocity": 0.05}

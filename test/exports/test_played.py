@@ -11,11 +11,10 @@ import pytest
 
 from rsea_ros.cli.main import main
 from rsea_ros.design.mujoco_model import STEP
-from rsea_ros.exports import mujoco_play
+from rsea_ros.exports import verification
 from rsea_ros.exports.fmu import export_fmu
 from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.mujoco_play import RATE, differences, ours, play_mujoco
-from rsea_ros.exports.verification import play_fmu
+from rsea_ros.exports.verification import RATE, differences, ours, play_fmu, play_mujoco
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 
@@ -105,7 +104,7 @@ def test_a_long_excitation_is_played_in_pieces(monkeypatch):
 
     whole = play_mujoco(export_mjcf(rig).content, rig, given)
     monkeypatch.setattr(rollout, "rollout", count)
-    monkeypatch.setattr(mujoco_play, "PIECE", 20)
+    monkeypatch.setattr(verification, "PIECE", 20)
     pieces = play_mujoco(export_mjcf(rig).content, rig, given)
     hold = round(1.0 / RATE / STEP)
     assert sizes == [20 * hold] * 3 + [(len(given) - 60) * hold]

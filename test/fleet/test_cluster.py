@@ -10,7 +10,7 @@ import pytest
 
 from rsea_ros.fleet import FleetError, cluster
 from rsea_ros.fleet.cluster import OnDask, on_scheduler
-from rsea_ros.fleet.executor import Job, WorkerLost
+from rsea_ros.fleet.pool import Job, WorkerLost
 
 
 class Future:

@@ -15,7 +15,7 @@ from fleet_stubs import HIP, KNEE, stub_work
 
 from rsea_ros.fleet import FleetError, engine as engines, row as compaction
 from rsea_ros.fleet.engine import ATTEMPTS, Engine, EngineLimits
-from rsea_ros.fleet.executor import Done, Serial, WorkerLost
+from rsea_ros.fleet.pool import Done, Serial, WorkerLost
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import Bag, bags_of
 from rsea_ros.fleet.store import TaskOutcome, hold_lock, open_store

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rsea_ros.fleet.executor import Done, Job, WorkerLost
-from rsea_ros.fleet.pool import Pool, on_this_machine
+from rsea_ros.fleet.pool import Done, Job, Pool, WorkerLost, on_this_machine
 
 MEMORY = 2_000_000_000
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import redirect_stderr, redirect_stdout
@@ -100,6 +101,20 @@ def test_it_says_what_it_said(desk: Desk, name: str) -> None:
 
 def test_nothing_is_stored_that_is_not_played() -> None:
     assert {file.stem for file in SAID.iterdir()} == {Path(name).stem for name in (*VERBS, *SCRIPTS)}
+
+
+_SENSELESS = re.compile(
+    r"\b1 (recordings|joints|runs|causes|findings)\b|[\d]{7,} %|± ?[\d]{6,}|probability 1\.000"
+)
+
+
+def test_no_sentence_contradicts_its_numbers() -> None:
+    """Read on strangers' pages: “1 recordings”, “100 ± 457441254189637 %”, “1.91 → 2.01, explains part”."""
+    for file in SAID.iterdir():
+        text = file.read_text(encoding="utf-8")
+        assert (found := _SENSELESS.search(text)) is None, f"{file.name}: {found}"
+        for before, after in re.findall(r"falls from ([\d.]+) to ([\d.]+) times", text):
+            assert float(after) <= float(before), f"{file.name}: falls from {before} to {after}"
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel, Fault, Record
-from rsea_ros.report.identification.words import next_command, verdict_sentence
+from rsea_ros.report.identification import next_command, verdict_sentence
 
 PEAK, RATE = 20.0, 280.0
 

@@ -20,7 +20,7 @@ from rsea_ros.laws.learn import learn
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
-from rsea_ros.report.law.words import headline
+from rsea_ros.report.law import headline
 
 RATIO = Plant().ratio
 

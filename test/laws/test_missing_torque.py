@@ -19,7 +19,7 @@ from rsea_ros.laws.sparse_regression import SELECTION, fold_sums, gram_of
 from rsea_ros.laws.variables import case_model, rows_of
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
-from rsea_ros.report.law.words import headline
+from rsea_ros.report.law import headline
 
 
 def problem_with(extra: np.ndarray):

@@ -17,10 +17,19 @@ from rsea_ros.effects.effect import Claims
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.file import claims_of, effect_from
 from rsea_ros.laws.law import FittedTerm, Law, LearntCurve
-from rsea_ros.laws.terms import COMMAND_TERMS, GEAR_TERMS, SENSOR_TERMS, SPRING_TERMS, Term, wave_terms
+from rsea_ros.laws.terms import (
+    COMMAND_TERMS,
+    GEAR_TERMS,
+    SENSOR_TERMS,
+    SPRING_TERMS,
+    Term,
+    mode_terms,
+    wave_terms,
+)  # fmt: skip
 from rsea_ros.laws.variables import remember
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.simulation import simulate_drive, synthesize
+from rsea_ros.report.law import kin
 
 WHERE = LawProvenance("2026-01-01", "0.0", {"run.mcap": "ab12"}, "Gain: 50 %.")
 RANGES = {"w": 0.6, "q": 0.02, "theta": 10.0, "d": 0.02, "T": 30.0, "u": 24.0}
@@ -52,6 +61,13 @@ def written(request):
         case = nominal_problem([check(record, RIG)], RIG).cases[0]
         claims = claims_of(made, effect_named(made.name), RIG, case)
         yield replace(effect_named(made.name), claims=claims)
+
+
+def test_a_law_that_rings_names_the_effect_of_its_form():
+    """A mode at 31 Hz was found, and nothing said that the catalogue has it."""
+    mode = FittedTerm(mode_terms((31.0,))[0], 1.0, 31.0)
+    assert kin(Law("m", "ft", "past", (mode,), RANGES)) == ": it rings at 31 Hz, as structural resonance does"
+    assert kin(DRAG) == ""
 
 
 def test_it_holds_the_contract_of_the_effects(written):

@@ -24,7 +24,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel, Record
-from rsea_ros.report.diagnosis.files import write_diagnosis
+from rsea_ros.report.diagnosis.page import write_diagnosis
 from test.watch.browser import chromium
 
 DURATION, RATE = 160.0, 280.0

@@ -8,7 +8,7 @@ from fleet_histories import DAY, START, history, recordings
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.trends import alarms, fleet_trends
-from rsea_ros.trends.weeks import bin_days, steps_over
+from rsea_ros.trends.result import bin_days, steps_over
 
 STIFFNESS = ("a", "spring.stiffness")
 NOTHING = recordings(days=1)

@@ -1,23 +1,26 @@
-"""The report of a diagnosis, as one HTML file: the verdict first, then the evidence."""
+"""A diagnosis as files, all or none: the page, diagnosis.json, overlay.mcap and the extended model."""
 
-import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
+from pathlib import Path
+from typing import Any
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Rejected
+from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Experiment, Misfit, Rejected
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.documents.wording import list_names
+from rsea_ros.identification.result import Overlay
 from rsea_ros.identification.settings import Setting
-from rsea_ros.records.record import UNITS
-from rsea_ros.report import page as html, words
-from rsea_ros.report.diagnosis import numbers as num, words as say
-from rsea_ros.report.diagnosis.figures import sketch, spectrum_figure, time_figure
-from rsea_ros.report.diagnosis.where import profiles, where_figure
+from rsea_ros.model.rig_file import rig_text
+from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.records.record import UNITS, Channel, Record
+from rsea_ros.report import page as html, result_files as outputs, words
+from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis.figures import profiles, sketch, spectrum_figure, time_figure, where_figure
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, MEASURED, faint
-from rsea_ros.report.identification.page import parameter_table, undetermined_section
+from rsea_ros.report.identification import parameter_table, parameters_json, undetermined_section
 from rsea_ros.report.remark_words import fault_lines, found_faults, remark_sentences
-from rsea_ros.report.result_files import Provenance
-from rsea_ros.report.rig import command, rig_named, right_rig_block, split_off_rig
+from rsea_ros.report.result_files import Provenance, pick
+from rsea_ros.report.rig import command, rig_json, rig_named, right_rig_block, split_off_rig
 
 _EXCITE = ("kind", "amplitude", "noise", "low", "high", "period", "duration", "rate", "seed")
 """Settings that are parameters of the node excite."""
@@ -59,10 +62,12 @@ def _blocks(d: Diagnosis) -> Iterator[html.Block]:
 
 
 def _keys(d: Diagnosis, channel: str) -> list[tuple[str, str]]:
-    change = num.residual_change(d, d.channel)
+    change = say.residual_change(d, d.channel)
     if d.causes:
-        removed = f"of the {channel} residual removed, on held-out data"
-        return [(num.percent(num.gain(d, d.channel)), removed), (change, "times the noise, before and after")]
+        gain = say.gain(d, d.channel)
+        what = "of the {} residual removed" if gain >= 0.0 else "more {} residual than before"
+        key = (say.percent(abs(gain)), f"{what.format(channel)}, on held-out data")
+        return [key, (change, "times the noise, before and after")]
     tried = [(str(len(d.rejected)), "causes tried, none accepted")] if d.rejected else []
     explained = (f"{d.extended_fit_percent[d.channel]:.2f} %", f"of the {channel} explained")
     return [(change, f"times the noise is the {channel} residual"), *tried, explained]
@@ -70,16 +75,16 @@ def _keys(d: Diagnosis, channel: str) -> list[tuple[str, str]]:
 
 def _cause(cause: Cause, d: Diagnosis) -> html.Html:
     """Return a cause with its size, its certainty, and the evidence for it."""
-    share = f"{num.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
+    share = f"{say.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
     how_sure = status = say.status_line(cause, d.alternatives, d.at_noise_floor)
     how_sure = words.sentence(f"{say.prose(status)}.")
-    interval, train = num.percent_range(cause.gain_holdout_ci95), num.percent(cause.gain_train)
+    interval, train = say.percent_range(cause.gain_holdout_ci95), say.percent(cause.gain_train)
     rivals = list_names([words.effect(n) for n in cause.confusable_with])
     sizes = []
-    for name, p in num.sizes(cause).items():
+    for name, p in say.sizes(cause).items():
         value, doubt, unit = words.measured(p.value, *p.ci95, p.unit)
         small = f" <small>{doubt.strip()}</small>" if doubt else ""
-        model = f", of which the simulation ± {num.model_half_width(p)}" if p.model_sd > 0.0 else ""
+        model = f", of which the simulation ± {say.model_half_width(p)}" if p.model_sd > 0.0 else ""
         label = f"{name.replace('_', ' ')}, 95 % interval{model}"
         sizes.append((html.Html(f"{value}{small} {escape(unit)}"), label))
     return html.section(
@@ -95,7 +100,7 @@ def _tried(d: Diagnosis) -> html.Html:
     if not (d.causes or d.rejected):
         return html.Html()
     shown: list[tuple[Cause | Rejected, str]] = [(c, c.status.replace("_", " ")) for c in d.causes]
-    shown += [(r, say.rejection(r)) for r in fitted_rivals(d)]
+    shown += [(r, say.rejection(r)) for r in say.fitted_rivals(d)]
     others: dict[str, list[str]] = {}
     for r in d.rejected:
         if not r.is_fitted:
@@ -104,23 +109,17 @@ def _tried(d: Diagnosis) -> html.Html:
     ground = faint(GRID, 0.5)
     rows = [
         [html.named(words.sentence(words.effect(item.name)), item.name, k < len(d.causes)),
-         num.percent(item.gain_holdout),
+         say.percent(item.gain_holdout),
          html.bar(item.gain_holdout, AFTER if k < len(d.causes) else faint(MEASURED, 0.6), ground),
          say.prose(outcome)]
         for k, (item, outcome) in enumerate(shown)
     ]  # fmt: skip
     return html.section(
-        f"{len(d.causes) + len(d.rejected)} causes were tried, {len(d.causes) or 'none'} accepted",
+        f"{say.tried(d)} were tried, {len(d.causes) or 'none'} accepted",
         html.table(("Cause", "#Gain", "", "Outcome"), rows) if rows else "",
         html.bullets(reasons),
         caption="Gain: share of the residual that the cause removes, on held-out data.",
     )
-
-
-def fitted_rivals(diagnosis: Diagnosis) -> list[Rejected]:
-    """Return the effects that were fitted to all training data and rejected, largest gain first."""
-    fitted = (r for r in diagnosis.rejected if r.is_fitted)
-    return sorted(fitted, key=lambda r: -r.gain_holdout if math.isfinite(r.gain_holdout) else math.inf)
 
 
 def _channels(d: Diagnosis) -> html.Html:
@@ -129,7 +128,7 @@ def _channels(d: Diagnosis) -> html.Html:
     rows, stages = [], 2 if d.causes else 1
     for name, unit in ((n, UNITS[n]) for n in d.residual_rms):
         rms = [words.quantity(v[name], unit) for v in (d.noise_rms, d.residual_rms, d.extended_residual_rms)]
-        ratios = [words.number(v, 3) for v in num.times_noise(d, name)]
+        ratios = [words.number(v, 3) for v in say.times_noise(d, name)]
         rows.append([words.sentence(words.channel(name)), *rms[: 1 + stages], *ratios[:stages]])
     reached = "All channels are" if d.at_noise_floor else "Not all channels are"
     return html.section(f"{reached} at their noise", html.table(head, rows), caption="On held-out data.")
@@ -179,3 +178,99 @@ def _setting_value(s: Setting) -> html.Html:
 def value_text(value: float | tuple[float, ...]) -> str:
     """Return a setting's number, or its numbers, as text."""
     return ", ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else f"{value:g}"
+
+
+SCHEMA = 1
+NAMESPACES = ("/rsea", "/rsea/simulated_before", "/rsea/simulated_after")
+"""Of the three sets of topics in overlay.mcap: measured, simulated without the causes and with them."""
+OverlayWriter = Callable[[Mapping[str, Record], Path], None]
+"""Writes records by namespace into one bag file: msg_adapters.records.write_overlay."""
+
+
+def write_diagnosis(
+    diagnosis: Diagnosis, record: Record, out: Destination | str | Path, write: OverlayWriter,
+    provenance: outputs.Provenance | None = None,
+) -> Path:  # fmt: skip
+    """Write diagnosis.json, model.yaml, overlay.mcap and report.html, and return the report's path.
+
+    record: the first one diagnosed, as it was read. Raises OutputError for a name that is taken, OSError or
+    BagError where something cannot be written.
+    """
+    with NewFiles(out) as new:
+        new.write(outputs.DIAGNOSIS_JSON, outputs.json_text(diagnosis_json(diagnosis), provenance))
+        new.write(outputs.MODEL, rig_text(diagnosis.extended_rig))
+        write(overlay_records(diagnosis, record), new.stage(outputs.OVERLAY))
+        return new.write(outputs.REPORT, diagnosis_report(diagnosis, provenance))
+
+
+def overlay_records(diagnosis: Diagnosis, record: Record) -> Mapping[str, Record]:
+    """Return by namespace the record as it was read, and both simulations of its channels.
+
+    record: the first one diagnosed. Simulations have the stamps that the diagnosis used, which are the
+    record's own but for repaired faults of the clock.
+    """
+
+    def simulated(overlays: Sequence[Overlay]) -> Record:
+        return Record(
+            {o.channel: Channel(o.t, o.simulated) for o in overlays}, record.source, record.epoch_ns
+        )
+
+    records = (record, simulated(diagnosis.before), simulated(diagnosis.after))
+    return dict(zip(NAMESPACES, records, strict=True))
+
+
+def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the contents of diagnosis.json; infinite numbers and NaN are null."""
+    d, numbers = diagnosis, {s.name: outputs.strict(s.value) for s in diagnosis.settings.numbers()}
+    following = d.next_experiment
+    return {
+        "schema": SCHEMA,
+        "rig": d.rig_name,
+        **rig_json(d.rig_choice, d.remarks),
+        **pick(d, "verdict channel"),
+        "sentence": say.diagnosis_sentence(d),
+        "data": {**pick(d, "bags=sources duration_s=duration rate_hz=rate"),
+                 "faults": [outputs.fault_json(f) for f in d.faults]},
+        "baseline": {"parameters": parameters_json(d.baseline),
+                     **pick(d, "residual_rms noise_rms fit_percent")},
+        "misfit": _misfits(d.misfit),
+        "causes": [_cause_json(c) for c in d.causes],
+        "alternatives": [_alternative(a) for a in d.alternatives],
+        "rejected": [
+            {**pick(r, "name gain_holdout"), "why": say.rejection(r), "reason": r.reason,
+             "rival": r.rival or None, **pick(r, "fitted=is_fitted probability")}
+            for r in d.rejected
+        ],
+        "extended": {
+            "parameters": parameters_json(d.final),
+            **pick(d, "residual_rms=extended_residual_rms fit_percent=extended_fit_percent at_noise_floor"),
+            "misfit": _misfits(d.remaining),
+        },
+        "next_experiment": following and {"why": say.next_run(following), **pick(following, "excitation")},
+        "statements": list(remark_sentences(d.remarks)),
+        "settings": {**pick(d.settings, "max_causes without"), **numbers},
+        "noise_numbers": {name: v for name, v in numbers.items() if name.startswith("noise.")},
+    }  # fmt: skip
+
+
+def _misfits(misfits: Sequence[Misfit]) -> list[dict[str, Any]]:
+    return [pick(m, "what from=low to=high unit times_noise channel") for m in misfits]
+
+
+def _cause_json(cause: Cause) -> dict[str, Any]:
+    return {
+        **pick(cause, "name status probability channel"),
+        "parameters": _sizes(cause),
+        "gain": pick(cause, "train=gain_train holdout=gain_holdout holdout_ci95=gain_holdout_ci95"),
+        "evidence": say.evidence(cause),
+        **pick(cause, "equation confusable_with"),
+    }
+
+
+def _alternative(a: Alternative) -> dict[str, Any]:
+    gain = pick(a, "holdout=gain_holdout holdout_ci95=gain_holdout_ci95")
+    return {**pick(a, "name instead_of probability channel"), "parameters": _sizes(a), "gain": gain}
+
+
+def _sizes(cause: Cause | Alternative) -> dict[str, Any]:
+    return {n: pick(p, "value unit ci95 statistical_ci95 model_sd") for n, p in cause.parameters.items()}

@@ -1,17 +1,33 @@
-"""A diagnosis in sentences: verdict, certainty and evidence of causes, rejections, the next run."""
+"""A diagnosis in sentences and numbers: verdict, certainty, evidence, the next run; lines of a terminal."""
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Experiment, Misfit, Reason, Rejected
+import numpy as np
+from rich.text import Text
+
+from rsea_ros.diagnosis.result import (
+    Alternative,
+    Cause,
+    CauseParameter,
+    Diagnosis,
+    Experiment,
+    Misfit,
+    Reason,
+    Rejected,
+)
+from rsea_ros.documents.units import in_motion
 from rsea_ros.documents.wording import list_names
-from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.identification.result import is_unexcited, silent_channels
+from rsea_ros.records.record import UNITS
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
-from rsea_ros.report.diagnosis import numbers as num
-from rsea_ros.report.remark_words import found_faults
-from rsea_ros.report.rig import values_off
+from rsea_ros.report.figures.spectrum import peak_above
+from rsea_ros.report.remark_words import fault_lines, found_faults, remark_sentences
+from rsea_ros.report.rig import command, rig_named, right_rig, split_off_rig, values_off
+from rsea_ros.report.words import LABEL, WIDTH, command_row, row, wrap
 
 _REASONS: Mapping[Reason, str] = {
     "far_behind": "much worse than the best effect on the training data",
@@ -50,7 +66,7 @@ def diagnosis_sentence(diagnosis: Diagnosis) -> str:
 
 def _verdict(d: Diagnosis) -> tuple[str, str]:
     """Return the verdict as a title, and as a sentence with numbers."""
-    name, (before, after) = words.channel(d.channel), num.times_noise(d, d.channel)
+    name, (before, after) = words.channel(d.channel), times_noise(d, d.channel)
     at_floor = f"re-fitted the {name} residual is at the noise floor ({after:.2f} times the noise)"
     silent = list_names([words.channel(n) for n in silent_channels(d.faults)])
     if d.verdict == "nothing_wrong" and is_unexcited(d.faults):
@@ -58,43 +74,45 @@ def _verdict(d: Diagnosis) -> tuple[str, str]:
         return text, text
     if d.verdict == "nothing_wrong":
         fine = "The structure of the {} fits" if values_off(d.remarks) else "Nothing is wrong with the {}"
-        title = f"{fine.format('simulation')}: with fitted values, only sensor noise is left"
+        title = f"{fine.format('simulation')}: with fitted values, {_noise_left(d, 'only sensor noise')}"
         return title, f"{fine.format('model')}: with its values {at_floor}"
     if d.verdict == "unexplained" and silent and d.at_noise_floor:
         title = f"{words.sentence(silent)} measures nothing; in the other channels only noise is left"
         return title, f"The {silent} measures nothing and is left out; with the model's values {at_floor}"
     if d.verdict == "unexplained":
-        near = (
-            f"{math.ceil(100.0 * before) / 100.0:.2f}" if before < 2.0 else ""
-        )  # never rounded to the floor
-        said = (
-            f"{near or _digits(before)} times the noise, and no effect of the catalogue explains it",
-            f"{near or f'{before:.1f}'} times the noise; no known effect explains it",
-        )
-        return f"The {name} residual is {said[0]}", f"The {name} residual is {said[1]}"
+        # never rounded to the floor
+        near = f"{math.ceil(100.0 * before) / 100.0:.2f}" if before < 2.0 else ""
+        size = f"The {name} residual is {{}} times the noise"
+        title = f"{size.format(near or _digits(before))}, and no effect of the catalogue explains it"
+        return title, f"{size.format(near or f'{before:.1f}')}; no known effect explains it"
     explains, pronoun = ("explain", "them") if len(d.causes) > 1 else ("explains", "it")
+    rest, part = _noise_left(d, "only noise"), "part" if after < before else "no part"
     if d.verdict == "explained":
-        how, rest, end = f"{explains} the misfit", "only noise is left", ", which is the floor"
+        how, end = f"{explains} the misfit", ", which is the floor"
     elif d.at_noise_floor:
-        how, rest, end = (
-            f"probably {explains} the misfit",
-            "only noise is left",
-            ", but another law may do the same",
-        )
+        how, end = f"probably {explains} the misfit", ", but another law may do the same"
     else:
-        how, rest, end = f"{explains} part of the misfit", "the rest stays unexplained", "; " + _rest(d)
+        how, rest, end = f"{explains} {part} of the misfit", "the rest stays unexplained", "; " + _rest(d)
     left = f"{after:.2f}" if d.at_noise_floor or d.verdict == "explained" else _near(after)
     named = list_names([words.effect(c.name) for c in d.causes])
     falls = f"falls from {before:.1f} to {left}" if after < before else f"stays at {left}"
     fall = f"with {pronoun} the {name} residual {falls} times the noise"
-    return words.sentence(f"{cause_list(d.causes)} {how}; {rest}"), words.sentence(
-        f"{named} {how}: {fall}{end}"
-    )
+    title = f"{cause_list(d.causes)} {how}; {rest}"
+    return words.sentence(title), words.sentence(f"{named} {how}: {fall}{end}")
+
+
+def _noise_left(d: Diagnosis, noise: str) -> str:
+    """Return `only noise is left`, or where the figure below shows more than that."""
+    for s in d.spectra:
+        peak = peak_above(s.frequency, s.after if d.causes else s.before, s.noise)
+        if s.channel == d.channel and peak:
+            return f"little more than noise is left, at most {peak}"
+    return f"{noise} is left"
 
 
 def _rest(d: Diagnosis) -> str:
-    left = num.left_channel(d)
-    stays = f"stays at {_near(num.times_noise(d, left)[1])} times the noise" if left else ""
+    left = left_channel(d)
+    stays = f"stays at {_near(times_noise(d, left)[1])} times the noise" if left else ""
     return f"the {words.channel(left)} residual {stays}" if left else "the rest stays unexplained"
 
 
@@ -134,7 +152,7 @@ def status_line(cause: Cause, alternatives: Sequence[Alternative] = (), at_floor
     reason = _CERTAINTY[cause.status]
     if at_floor and cause.status == "leading":
         reason = "it reduces the residual to the noise, but another law may do the same"
-    elif cause.status == "leading" and cause.gain_holdout_ci95[0] <= 0.0:
+    if cause.status != "one_of" and cause.gain_holdout_ci95[0] <= 0.0:
         reason = "by itself it may gain nothing on held-out data"
     if cause.status == "one_of" and rivals:
         return f"one of: {list_names(items, 'or')}; {reason}"
@@ -155,9 +173,10 @@ def _size(item: Cause | Alternative) -> str:
 def evidence(cause: Cause) -> str:
     """Return the evidence for a cause as one sentence."""
     before, after = cause.times_noise
+    moves = "falls" if after < before else "rises" if after > before else "stays"
     return (
         f"With {effect_named(cause.name).about}, the {words.channel(cause.channel)} residual of data that "
-        f"took no part falls from {before:.2f} to {after:.2f} times the noise (gain "
+        f"took no part {moves} from {before:.2f} to {after:.2f} times the noise (gain "
         f"{words.minus(f'{100.0 * cause.gain_holdout:.1f}')} %)."
     )
 
@@ -228,3 +247,138 @@ def excitation(settings: Mapping[str, float | str]) -> str:
         parts.append(f"{known.pop('low')} to {known.pop('high')} Hz")
     parts += [f"{known.pop('duration')} s"] if "duration" in known else []
     return ", ".join(filter(None, [*parts, *(f"{k.replace('_', ' ')} {v}" for k, v in known.items())]))
+
+
+_END = 0.99
+"""Share of the upper bound from which a value stands for infinity."""
+
+
+def times_noise(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
+    """Return the held-out residual of a channel over its noise, before and after."""
+    noise = diagnosis.noise_rms.get(channel, np.nan) or np.nan
+    return diagnosis.residual_rms[channel] / noise, diagnosis.extended_residual_rms[channel] / noise
+
+
+def left_channel(diagnosis: Diagnosis) -> str:
+    """Return the worst channel above the noise where the main one has reached it; empty for none."""
+    after = {n: times_noise(diagnosis, n)[1] for n in diagnosis.extended_residual_rms}
+    reached = diagnosis.settings.floor.reached
+    if diagnosis.at_noise_floor or not after[diagnosis.channel] <= reached:
+        return ""
+    worst = max(after, key=lambda n: after[n] if after[n] > reached else 0.0)
+    return worst if after[worst] > reached else ""
+
+
+def gain(diagnosis: Diagnosis, channel: str) -> float:
+    """Return the gain of all causes together: 1 - RMS(residual after) / RMS(residual before), held out."""
+    before = diagnosis.residual_rms[channel]
+    return 1.0 - diagnosis.extended_residual_rms[channel] / before if before > 0.0 else 0.0
+
+
+def percent(share: float) -> str:
+    """Return a share as `97.3 %`, with a minus sign that is one; below −100 % as `< −100 %`."""
+    return f"{_percents(share)} %" if np.isfinite(share) else "–"
+
+
+def _percents(share: float) -> str:
+    """Return a share in percent; a residual that more than doubles is no gain, whatever its size."""
+    return words.minus(f"{100.0 * share:.1f}" if share >= -1.0 else "< -100")
+
+
+def percent_range(interval: tuple[float, float]) -> str:
+    """Return an interval of shares as `97.1 to 97.5 %`."""
+    low, high = map(_percents, interval)
+    return f"{low} to {high} %"
+
+
+def residual_change(diagnosis: Diagnosis, channel: str) -> str:
+    """Return `36.8 → 0.99`: the residual over the noise, before and after; once where nothing has changed."""
+    before, after = (words.number(v, 3 if v >= 1.0 else 2) for v in times_noise(diagnosis, channel))
+    return f"{before} → {after}" if diagnosis.causes else before
+
+
+def rms_change(diagnosis: Diagnosis, channel: str) -> str:
+    """Return the same as RMS in the channel's unit beside the noise."""
+    before, after, noise = (
+        words.quantity(v[channel], in_motion(UNITS[channel], linear=diagnosis.baseline_rig.linear))
+        for v in (diagnosis.residual_rms, diagnosis.extended_residual_rms, diagnosis.noise_rms)
+    )
+    return f"{before} → {after}, noise {noise}" if diagnosis.causes else f"{before}, noise {noise}"
+
+
+def sizes(cause: Cause) -> dict[str, CauseParameter]:
+    """Return the parameters that say how large a cause is.
+
+    One that would be infinite is left out: a drift that is a straight line has no time constant.
+    """
+    effect = catalogue().get(cause.name)
+    ends = {p.name: p.high for p in effect.parameters if p.optional and math.isinf(p.null)} if effect else {}
+    return {n: p for n, p in cause.parameters.items() if p.value < _END * ends.get(n, math.inf)}
+
+
+def model_half_width(estimate: CauseParameter) -> str:
+    """Return the half-width of the simulation's own error at 95 % with its unit: `0.0147 N·m`."""
+    factor, unit = words.unit_factor(estimate.value, estimate.unit)
+    return f"{words.number(Z95 * estimate.model_sd * factor, 2)} {unit}".rstrip()
+
+
+_STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
+_MOST = 3
+
+
+def tried(diagnosis: Diagnosis) -> str:
+    """Return `31 of the catalogue's 33 causes`: the others cannot act on this rig, or were left out."""
+    number = len(diagnosis.causes) + len(diagnosis.rejected)
+    return f"{number} of the catalogue's {len(catalogue())} causes"
+
+
+def fitted_rivals(diagnosis: Diagnosis) -> list[Rejected]:
+    """Return the effects that were fitted to all training data and rejected, largest gain first."""
+    fitted = (r for r in diagnosis.rejected if r.is_fitted)
+    return sorted(fitted, key=lambda r: -r.gain_holdout if math.isfinite(r.gain_holdout) else math.inf)
+
+
+def terminal_lines(diagnosis: Diagnosis, width: int = WIDTH) -> list[Text]:
+    """Return the verdict and the evidence, each in lines of at most `width` columns."""
+    d, (off, others) = diagnosis, split_off_rig(diagnosis.remarks)
+    style = _STYLES.get(d.verdict, "bold yellow" if off else "bold green")
+    rows = [row("rig", rig_named(d.rig_name, d.rig_choice), width)]
+    rows += [row("", sentence, width) for sentence in remark_sentences(off)]
+    if off:  # what speaks against the rig
+        again = command("identify", d.sources, d.rig_name, d.rig_choice)
+        rows.append(command_row("", right_rig(), again, width))
+    rows += [row(name, text, width) for name, text in _rows(d, remark_sentences(others))]
+    shown = (Text.assemble((text[:LABEL], "dim"), text[LABEL:]) for text in rows)
+    return [Text(wrap(headline(d), width), style=style), *shown]
+
+
+def _rows(d: Diagnosis, remarks: Sequence[str]) -> Iterator[tuple[str, str]]:
+    main = d.channel
+    ratios, rms = residual_change(d, main), rms_change(d, main)
+    yield "residual", f"{words.channel(main)} {ratios} times the noise ({rms})"
+    if left := left_channel(d):
+        yield "", f"{words.channel(left)} {residual_change(d, left)} times the noise"
+    for cause in d.causes:
+        texts = {n: words.measured_text(p.value, *p.ci95, p.unit) for n, p in sizes(cause).items()}
+        shown = ", ".join(f"{name} {text}" for name, text in texts.items()).replace("_", " ")
+        yield "cause", f"{cause.name}: {shown}"
+        gain, interval = percent(cause.gain_holdout), percent_range(cause.gain_holdout_ci95)
+        yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
+        yield "status", status_line(cause, d.alternatives, d.at_noise_floor)
+    if d.misfit and d.verdict != "nothing_wrong":
+        worst: dict[str, Misfit] = {}  # in each respect
+        for m in sorted(d.misfit, key=lambda m: -m.times_noise):
+            worst.setdefault(m.what, m)
+        yield "wrong at", "; ".join(misfit(m) for m in list(worst.values())[:_MOST])
+    for rival in fitted_rivals(d)[:_MOST]:
+        yield "rejected", f"{rival.name}: {prose(rejection(rival))}"
+    if d.rejected:
+        yield "tried", tried(d)
+    for sentence in (*confusions(d), *remarks):
+        yield "unclear", sentence
+    if (following := d.next_experiment) is not None:
+        settings = excitation(following.excitation)
+        run = f"{prose(next_run(following))}{f': {settings}' if settings else ''}"
+        yield "next run" if following.excitation else "decides", run
+    for line in fault_lines(d.faults):
+        yield "data", line

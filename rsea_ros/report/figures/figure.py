@@ -6,7 +6,7 @@ Few colours, each with one meaning on every page; colour-blind readers can disti
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,6 +46,14 @@ class Figure:
     height: int = 420
     kind: str = "plain"
     extra: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Curve(NamedTuple):
+    """Values of shape (n,) with their name on the page and their colour."""
+
+    name: str
+    colour: str
+    values: FloatArray
 
 
 def numbers(values: FloatArray, step: float = 0.0) -> list[float | None]:

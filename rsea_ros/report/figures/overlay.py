@@ -3,7 +3,6 @@
 import base64
 import gzip
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,17 @@ import numpy.typing as npt
 
 from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import MEASURED, Figure, Json, axis, faint, label, layout, names_beside
+from rsea_ros.report.figures.figure import (
+    MEASURED,
+    Curve,
+    Figure,
+    Json,
+    axis,
+    faint,
+    label,
+    layout,
+    names_beside,
+)
 
 MOST_SAMPLES = 45_000
 """Of a trace in the page: the paper's 160 s at 280 Hz. A longer one keeps its and the residual's extremes."""
@@ -25,20 +34,11 @@ _PAUSE, _PERIODS = 1.0, 10.0
 """s, and sample periods: a longer pause of the samples shows as a gap of the line."""
 
 
-@dataclass(frozen=True)
-class Simulated:
-    """A simulation of the channel at the measurement's stamps: its name on the page, its colour, values."""
-
-    name: str
-    colour: str
-    values: FloatArray
-
-
 def overlay_figure(
-    title: str, channel: str, t: FloatArray, measured: FloatArray, simulations: Sequence[Simulated],
+    title: str, channel: str, t: FloatArray, measured: FloatArray, simulations: Sequence[Curve],
     view: float = 6.0, lively: FloatArray | None = None,
 ) -> Figure:  # fmt: skip
-    """Return the figure of one channel. t: s.
+    """Return the figure of one channel. t: stamps of the measured and the simulated values, s.
 
     It opens with the `view` s in which a signal moves most. lively: that signal, by default the measured one.
     """
@@ -48,7 +48,7 @@ def overlay_figure(
     shown = measured[keep]
     shown[list(pauses)] = np.nan
 
-    def residual(simulated: Simulated) -> Json:
+    def residual(simulated: Curve) -> Json:
         values = shown - simulated.values[keep]
         y = pack(values, _fineness(values, _RESIDUAL))
         return {"name": simulated.name, "colour": simulated.colour, "y": y}
@@ -109,7 +109,7 @@ def _liveliest(t: FloatArray, signal: FloatArray, view: float) -> tuple[float, f
     return start, start + view
 
 
-def _layout(channel: str, unit: str, simulations: Sequence[Simulated], view: tuple[float, float]) -> Json:
+def _layout(channel: str, unit: str, simulations: Sequence[Curve], view: tuple[float, float]) -> Json:
     names = names_beside(
         [("measured", MEASURED), *((f"<b>{s.name}</b>", s.colour) for s in simulations)], 0.055, 1.01
     )

@@ -1,38 +1,28 @@
 """Amplitude spectral density of residuals against the noise floor."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rsea_ros.records.record import UNITS, FloatArray
-from rsea_ros.records.statistics import power_density
+from rsea_ros.records.statistics import stamped_density
 from rsea_ros.report import words
 from rsea_ros.report.figures import figure as fig
 
 _PER_DECADE = 40
 _LONGEST = 4096
-ABOVE_FLOOR = 2.0
-"""Times the noise floor, from which a density of a band stands above it and does not merely scatter."""
+_STANDS, _LIES = 2.0, 1.1
+"""Times the noise floor: from which a band stands above it and does not merely scatter, and all bands lie."""
 _TINY = 1e-300
 
 
-@dataclass(frozen=True)
-class SpectrumLine:
-    """A density: its name on the page, its colour, unit/√Hz."""
-
-    name: str
-    colour: str
-    density: FloatArray
-
-
 def residual_figure(
-    title: str, channel: str, frequency: FloatArray, curves: Sequence[SpectrumLine], noise: float,
+    title: str, channel: str, frequency: FloatArray, curves: Sequence[fig.Curve], noise: float,
     caption: str = "",
 ) -> fig.Figure:  # fmt: skip
-    """Return the densities of residuals over frequency, Hz. noise: density of the noise floor."""
+    """Return the densities of residuals (unit/√Hz) over frequency, Hz. noise: that of the noise floor."""
     unit, floor, ends = words.unit(UNITS[channel]), np.full(2, noise), frequency[[0, -1]]
-    drawn = [(c, *in_bands(frequency, c.density)) for c in curves]
+    drawn = [(c, *in_bands(frequency, c.values)) for c in curves]
     data: list[fig.Json] = [fig.line(ends, floor, "noise floor", fig.NOISE, 6.0, hoverinfo="skip")]
     data += [
         fig.line(f, d, c.name, c.colour, 1.8, hovertemplate=f"%{{y:.3g}} {unit}/√Hz") for c, f, d in drawn
@@ -49,11 +39,10 @@ def residual_figure(
     return fig.Figure(title, caption, data, fig.layout(xaxis=across, yaxis=height, annotations=names), 380)
 
 
-def density(residual: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Return Hz and the amplitude spectral density by averaged Hann segments, unit/√Hz. rate: Hz."""
-    length = min(_LONGEST, 2 * (len(residual) // 8))
-    frequency, power = power_density(residual, rate, length)
-    return frequency[2:-1], np.sqrt(power[2:-1])
+def density(t: FloatArray, residual: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """Return rate and frequency, Hz, and the amplitude spectral density, unit/√Hz. t: stamps, s."""
+    rate, frequency, power = stamped_density(t, residual, min(_LONGEST, 2 * (len(residual) // 8)))
+    return rate, frequency[2:-1], np.sqrt(power)[2:-1]
 
 
 def in_bands(frequency: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -65,14 +54,24 @@ def in_bands(frequency: FloatArray, values: FloatArray) -> tuple[FloatArray, Flo
     return np.add.reduceat(frequency, starts) / count, np.sqrt(power)
 
 
+def peak_above(frequency: FloatArray, values: FloatArray, noise: float) -> str:
+    """Return `3.1 times at 29 Hz` of a density, the most over the noise floor; empty where it lies there."""
+    f, d = in_bands(frequency, values)
+    worst, over = int(np.argmax(d)), max(noise, _TINY)
+    if d[worst] < _STANDS * over and float(np.sqrt(np.mean(values**2))) < _LIES * over:
+        return ""
+    return f"{words.number(d[worst] / over, 2)} times at {words.number(f[worst], 2)} Hz"
+
+
 def finding(frequency: FloatArray, values: FloatArray, noise: float, channel: str) -> str:
     """Return the sentence: at the noise floor, or where above it the most."""
     f, d = in_bands(frequency, values)
     ratio = d / max(noise, _TINY)
-    worst = int(np.argmax(ratio))
-    if ratio[worst] < ABOVE_FLOOR:
+    worst, above = int(np.argmax(ratio)), f[ratio > _STANDS]
+    if not (peak := peak_above(frequency, values, noise)):
         return words.sentence(f"{channel}: the residual lies at the noise floor at all frequencies")
-    above = f[ratio > ABOVE_FLOOR]
+    if not len(above):
+        return words.sentence(f"{channel}: the residual lies above the noise floor, at most {peak}")
     band = f"{words.number(above[0], 2)} to {words.number(above[-1], 2)} Hz"
     most = f"{words.number(f[worst], 2)} Hz ({words.number(ratio[worst], 2)} times)"
     return words.sentence(f"{channel}: the residual stands above the noise floor from {band}, most at {most}")

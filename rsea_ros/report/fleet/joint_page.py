@@ -1,18 +1,31 @@
-"""The page of a joint: findings, each parameter over time, causes, recordings."""
+"""The page of a joint: findings, each parameter over time, causes, recordings; and the tables of a fleet."""
 
-from collections.abc import Iterator, Sequence, Set
+import math
+from collections.abc import Iterator, Mapping, Sequence, Set
 
 import numpy as np
 
+from rsea_ros.records.statistics import Z95
+from rsea_ros.report import words
 from rsea_ros.report.fleet import words as say
-from rsea_ros.report.fleet.figures import naming_figure, parameter_figure
-from rsea_ros.report.fleet.tables import alarm_table, parameter_rows, recording_table, trends_of, undated_rows
-from rsea_ros.report.page import Block, Html, fold, key_numbers, page, section
+from rsea_ros.report.fleet.figures import determined_by, naming_figure, parameter_figure
+from rsea_ros.report.fleet.words import Links
+from rsea_ros.report.page import (
+    Block,
+    Html,
+    fold,
+    key_numbers,
+    listed,
+    named,
+    page,
+    paragraph,
+    section,
+    table,
+)
 from rsea_ros.report.words import sentence as capital
 from rsea_ros.trends.alarms import Alarm
-from rsea_ros.trends.result import FleetTrends, Trend
-from rsea_ros.trends.series import Table
-from rsea_ros.trends.weeks import Steps
+from rsea_ros.trends.result import FleetTrends, Interval, Steps, Trend
+from rsea_ros.trends.series import CLOCKS, Table
 
 _RARE = 0.02
 """Share of the recordings below which a cause or a fault has no figure, unless it appeared."""
@@ -51,7 +64,7 @@ def joint_page(
         yield key_numbers([
             *([(f"{determined} of {len(trends)}", "parameters have a trend")] if dated else []),
             (str(int(np.sum(outcome == "done"))), f"recordings used, of {len(rows)}"),
-            (str(faulty), "recordings with faults in the data"),
+            (str(faulty), f"{say.plural(faulty, 'recording')} with faults in the data"),
         ])  # fmt: skip
         if alarms:
             yield section("Findings", alarm_table(alarms, links, with_joint=False))
@@ -66,7 +79,8 @@ def joint_page(
         )
 
     footer = ["rsea fleet report. All values in SI, all times UTC."]
-    return page(f"{joint}: {title}", f"Joint {joint} · {len(rows)} recordings", blocks(), footer)
+    kicker = f"Joint {joint} · {len(rows)} {say.plural(len(rows), 'recording')}"
+    return page(f"{joint}: {title}", kicker, blocks(), footer)
 
 
 def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: Steps) -> Iterator[Block]:
@@ -107,3 +121,161 @@ def _namings(
         is_shown = appearance is not None or (share >= _RARE and not (share > _USUAL and is_parameter))
         if (appearance is not None) == appeared and is_shown:
             yield naming_figure(naming, appearance, steps)
+
+
+_LATEST = 100
+"""Recordings that a page lists: the latest."""
+_NO_PAGE = (
+    "A recording links diagnosis.json where its run kept no page. To see one as a page: rsea diagnose BAG "
+    '--rig RIG --out page. Paths: rsea fleet sql "SELECT recording, bag FROM recordings" --store STORE. '
+    "rsea fleet run --pages keeps the pages of new recordings."
+)
+
+
+def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) -> Html:
+    """Return the findings with date, size, how sure, and the recording that shows each first."""
+
+    def sure(a: Alarm) -> str:
+        return "> 99.99 %" if a.confidence > 0.9999 else f"{100.0 * a.confidence:.2f} %"
+
+    return listed(
+        alarms,
+        *([("Joint", lambda a: links.joint(a.joint))] if with_joint else []),
+        ("Finding", say.sentence),
+        ("Began", lambda a: say.doubt_of_date(a) or "–"),
+        ("#Size, 95 %", lambda a: say.value(a.size, a.unit) if a.size is not None else "–"),
+        ("#Sure", sure),
+        ("Shown first by", lambda a: links.recording(a.recording, a.artefacts) if a.recording else "–"),
+    )
+
+
+def joint_table(
+    joints: Sequence[str], fleet: FleetTrends, alarmed: Mapping[str, Sequence[Alarm]],
+    latest: Mapping[str, str], recordings: Table, links: Links,
+) -> Html:  # fmt: skip
+    """Return a row for each joint. latest: causes that its latest recording names."""
+    of, done = np.asarray(recordings["joint"], str), np.asarray(recordings["outcome"], str) == "done"
+    dated = np.isfinite(np.asarray(recordings["time_s"], float))
+    rows = []
+    for joint in joints:
+        trends, own = trends_of(joint, fleet), of == joint
+        determined = [t for t in trends if t.state != "undetermined"]
+        moved = max((t.relative for t in determined if t.changes), key=abs, default=float("nan"))
+        state = ", ".join(dict.fromkeys(a.kind for a in alarmed.get(joint, ())))
+        if not state:
+            known = "steady" if determined else "too few dated recordings"
+            state = f"now {latest[joint]}" if latest.get(joint) else known
+        rows.append((
+            links.joint(joint), state if np.any(dated & own) else "no recording has a date",
+            str(int(np.sum(own))), str(int(np.sum(own & ~done))),
+            f"{len(determined)} of {len(trends)}", say.percent(moved) if moved == moved else "–",
+        ))  # fmt: skip
+    numbers = ("#Recordings", "#Refused or broken", "#Parameters with a trend", "#Largest change")
+    return table(["Joint", "State", *numbers], rows)
+
+
+def trends_of(joint: str, fleet: FleetTrends) -> list[Trend]:
+    """Return the trends of the parameters of a joint."""
+    return [t for (j, _), t in fleet.trends.items() if j == joint]
+
+
+def parameter_rows(trends: Sequence[Trend]) -> Html:
+    """Return a row for each parameter of a joint: level, slope, scatter, least detectable step."""
+
+    def share(t: Trend, of: float) -> float:
+        return of / abs(t.now.value) if t.now is not None and t.now.value else math.nan
+
+    def slope(t: Trend) -> str:
+        a_year = share(t, t.per_year.value) if t.per_year else math.nan
+        return "–" if math.isnan(a_year) else say.percent(a_year)
+
+    def size(t: Trend, of: float) -> str:
+        return "–" if math.isnan(share(t, of)) else say.amount(share(t, of))
+
+    states = {"trending": "going on"}
+    return listed(
+        trends,
+        ("Parameter", lambda t: named(say.name(t.series.parameter), t.series.parameter)),
+        (
+            "State",
+            lambda t: (
+                say.undetermined_state(t) if t.state == "undetermined" else states.get(t.state, t.state)
+            ),
+        ),
+        ("#Now, 95 %", _level),
+        ("#A year", slope),
+        ("#Scatter of days", lambda t: size(t, t.day_sd) if t.day_sd else "–"),
+        ("#Smallest detectable step", lambda t: size(t, t.detectable)),
+        ("#Determined by", determined_by),
+    )
+
+
+def _level(trend: Trend) -> str:
+    """Return the level now; without a trend, the value of the latest recording that determines it."""
+    s = trend.series
+    if trend.now is not None:
+        return say.value(trend.now, s.unit)
+    if not np.any(s.identifiable):
+        return "–"
+    last = int(np.flatnonzero(s.identifiable)[-1])
+    v, half = float(s.value[last]), float(Z95 * s.sd[last])
+    return named(say.value(Interval(v, v - half, v + half), s.unit), "latest recording")
+
+
+def undated_rows(joint: str, history: Table) -> Html:
+    """Return the median and the range of each parameter over a joint's recordings, whose order is unknown."""
+    of, names = np.asarray(history["joint"], str) == joint, np.asarray(history["parameter"], str)
+    rows = []
+    for parameter in dict.fromkeys(n for n in names[of].tolist() if not n.startswith(CLOCKS)):
+        at = np.flatnonzero(of & (names == parameter))
+        values, unit = np.asarray(history["value"], float)[at], str(history["unit"][at[0]])
+        sure = np.asarray(history["identifiable"], bool)[at] & np.isfinite(values)
+        shown = ["–", "–", "–"]
+        if np.any(sure):
+            figures = [float(of_sure(values[sure])) for of_sure in (np.median, np.min, np.max)]
+            factor, unit = (100.0, "%") if unit == "1" else words.unit_factor(figures[0], unit)
+            shown = [f"{words.number(v * factor, 4)} {unit}" for v in figures]
+        rows.append((named(say.name(parameter), parameter), *shown, f"{int(np.sum(sure))} of {len(at)}"))
+    return table(["Parameter", "#Median", "#Least", "#Most", "#Determined by"], rows)
+
+
+def undetermined_table(undetermined: Sequence[Trend], links: Links) -> Html:
+    """Return the parameters without a trend, or of which no later recording says anything, with reasons."""
+
+    def why(t: Trend) -> str:
+        if t.state != "undetermined":
+            return f"Determined until {say.day(t.silent_since_s)}, but by no later recording"
+        return words.sentence(t.reason)
+
+    return listed(
+        undetermined,
+        ("Joint", lambda t: links.joint(t.series.joint)),
+        ("Parameter", lambda t: say.name(t.series.parameter)),
+        ("State", lambda t: say.undetermined_state(t) if t.state == "undetermined" else "silent"),
+        ("Why", why),
+    )
+
+
+def recording_table(recordings: Table, rows: np.ndarray, links: Links) -> Html:
+    """Return the latest recordings of a joint. rows: its recordings."""
+    time_s = np.asarray(recordings["time_s"], float)
+    latest = rows[np.argsort(-np.nan_to_num(time_s[rows]), kind="stable")][:_LATEST]
+
+    def text(column: str, i: int) -> str:
+        return str(recordings[column][i])
+
+    def names(column: str, key: str, i: int) -> str:
+        items = recordings[column][i]
+        held = items if isinstance(items, (list, tuple, np.ndarray)) else []
+        return ", ".join(str(x[key] if isinstance(x, dict) else x).replace("_", " ") for x in held) or "–"
+
+    lacking = any(links.lacks_page(text("artefacts", i)) for i in latest)
+    return Html(paragraph(_NO_PAGE if lacking else "") + listed(
+        latest,
+        ("Recording", lambda i: links.recording(text("recording", i), text("artefacts", i))),
+        ("Date", lambda i: say.short_day(time_s[i]) if np.isfinite(time_s[i]) else "unknown"),
+        ("Outcome", lambda i: text("outcome", i)),
+        ("Verdict", lambda i: text("verdict", i).replace("_", " ")),
+        ("Causes", lambda i: names("causes", "name", i)),
+        ("Faults", lambda i: names("faults", "kind", i)),
+    ))  # fmt: skip

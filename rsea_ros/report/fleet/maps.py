@@ -11,9 +11,8 @@ from rsea_ros.records.record import FloatArray
 from rsea_ros.report.fleet import words as say
 from rsea_ros.report.page import Html, section
 from rsea_ros.trends.alarms import Alarm
-from rsea_ros.trends.result import FleetTrends, Trend
+from rsea_ros.trends.result import FleetTrends, Steps, Trend, bin_days
 from rsea_ros.trends.series import BoolArray
-from rsea_ros.trends.weeks import Steps, bin_days
 
 _ROW = 17
 """Pixels of a row, as in fleet.css."""

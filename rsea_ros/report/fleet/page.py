@@ -9,15 +9,13 @@ import numpy as np
 from rsea_ros.documents.wording import list_names
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.report.fleet import words as say
-from rsea_ros.report.fleet.joint_page import joint_page
+from rsea_ros.report.fleet.joint_page import alarm_table, joint_page, joint_table, undetermined_table
 from rsea_ros.report.fleet.maps import heat_map, naming_map, shades, timeline
-from rsea_ros.report.fleet.tables import alarm_table, joint_table, undetermined_table
 from rsea_ros.report.page import Block, Html, bullets, fold, key_numbers, page, section
 from rsea_ros.trends.alarms import Alarm, alarms_of, by_joint, worst_first
 from rsea_ros.trends.fleet_trends import fleet_trends
-from rsea_ros.trends.result import FleetTrends
+from rsea_ros.trends.result import FleetTrends, Steps, steps_over
 from rsea_ros.trends.series import DEFAULT, Table, TrendSettings
-from rsea_ros.trends.weeks import Steps, steps_over
 
 INDEX = "index.html"
 _ROWS = 60
@@ -36,7 +34,7 @@ def write_fleet_report(
     """
     fleet = fleet_trends(history, recordings, settings)
     alarms = alarms_of(fleet, recordings)
-    steps, groups = _steps(recordings), by_joint(alarms)
+    steps, groups = steps_over(*(_period(recordings) or (0.0, 0.0))), by_joint(alarms)
     with NewFiles(out) as new:
         folder = new.folder if store is None else Path(store)
         links = say.Links(new.folder, folder, say.page_names(fleet.joints))
@@ -44,11 +42,6 @@ def write_fleet_report(
             findings = groups.get(joint, [])
             new.write(name, joint_page(joint, fleet, findings, history, recordings, steps, links))
         return new.write(INDEX, fleet_page(fleet, alarms, recordings, steps, links))
-
-
-def _steps(recordings: Table) -> Steps:
-    first, last = _period(recordings) or (0.0, 0.0)
-    return steps_over(first, last)
 
 
 def _period(recordings: Table) -> tuple[float, float] | None:
@@ -64,7 +57,7 @@ def fleet_page(
     """Return the page as HTML that opens without a network."""
     period = " to ".join(map(say.day, _period(recordings) or ())) or "no date"
     footer = [period, "rsea fleet report. All values in SI, all times UTC."]
-    kicker = f"Fleet of {len(fleet.joints)} joints · {period}"
+    kicker = f"Fleet of {len(fleet.joints)} {say.plural(len(fleet.joints), 'joint')} · {period}"
     blocks = _blocks(fleet, alarms, recordings, steps, links)
     return page(_headline(fleet, alarms, recordings), kicker, blocks, footer)
 
@@ -82,12 +75,14 @@ def _blocks(
     always = sum(a.from_first for a in causes)
     since = f", {always} from the first recording on" if always else " that appeared"
     done = int(np.sum(np.asarray(recordings["outcome"], str) == "done"))
+    latest = say.latest_causes(joints, recordings)
+    look = len({*groups, *latest}) if _has_no_trend(fleet) else len(groups)
     yield key_numbers([
-        (f"{len(groups)} of {len(fleet.joints)}", "joints need a look"),
-        (str(changes), f"{_plural(changes, 'change')}, {kinds.count('trend')} going on"),
-        (str(len(causes)), f"{_plural(len(causes), 'cause')}{since}"),
+        (f"{look} of {len(fleet.joints)}", f"{say.plural(len(fleet.joints), 'joint')} to look at"),
+        (str(changes), f"{say.plural(changes, 'change')}, {kinds.count('trend')} going on"),
+        (str(len(causes)), f"{say.plural(len(causes), 'cause')}{since}"),
         (_grouped(done), f"recordings used, of {_grouped(len(recordings['joint']))}"),
-        (str(len(silent)), f"of {len(fleet.trends)} trends not determined, or no more"),
+        (str(len(silent)), f"of {len(fleet.trends)} trends cannot be determined now"),
     ])  # fmt: skip
     style = (Path(__file__).parent / "fleet.css").read_text(encoding="utf-8")
     yield Html(f"<style>{style}{shades()}</style>")
@@ -99,7 +94,6 @@ def _blocks(
     for kind, subject in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
         naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, subject)}
         yield naming_map(subject, kind, [j for j in joints if j in naming][:_ROWS], fleet, steps, links)
-    latest = say.latest_causes(joints, recordings)
     yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
     number = "One trend" if len(silent) == 1 else f"{len(silent)} trends"
     if silent:
@@ -127,8 +121,12 @@ def _parameters_with_map(fleet: FleetTrends, shown: Sequence[str]) -> list[str]:
     return sorted((p for p in every if p in with_trend), key=movement)
 
 
+def _has_no_trend(fleet: FleetTrends) -> bool:
+    return all(t.state == "undetermined" for t in fleet.trends.values())
+
+
 def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:
-    if not any(t.state != "undetermined" for t in fleet.trends.values()):
+    if _has_no_trend(fleet):
         latest = say.latest_causes(fleet.joints, recordings)
         named = "".join(f"; the latest name {cause} in {joint}" for joint, cause in latest.items())
         if len(latest) > 1:
@@ -140,10 +138,6 @@ def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) ->
     first = next(iter(groups))
     number = f"{len(groups)} of {len(fleet.joints)} joints need" if len(groups) > 1 else "One joint needs"
     return f"{number} a look, {first} first: {say.about(groups[first][0])}"
-
-
-def _plural(number: int, word: str) -> str:
-    return word if number == 1 else f"{word}s"
 
 
 def _grouped(number: int) -> str:

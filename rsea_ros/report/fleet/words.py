@@ -43,6 +43,11 @@ def dates(*time_s: float) -> list[str]:
     return [str(s) for s in np.datetime_as_string(stamps, unit="m")]
 
 
+def plural(number: int, noun: str) -> str:
+    """Return a noun in the number of what is counted."""
+    return noun if number == 1 else f"{noun}s"
+
+
 def name(about: str) -> str:
     """Return the plain name of a parameter, a cause, or the size of one: `Coulomb friction torque`."""
     group, _, key = about.partition(".")

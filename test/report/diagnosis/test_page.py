@@ -17,8 +17,7 @@ from rsea_ros.diagnosis.result import Cause, CauseParameter, Diagnosis, Experime
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Fault
 from rsea_ros.records.statistics import Z95
-from rsea_ros.report.diagnosis.files import diagnosis_json
-from rsea_ros.report.diagnosis.page import diagnosis_report
+from rsea_ros.report.diagnosis.page import diagnosis_json, diagnosis_report
 from rsea_ros.report.result_files import DIAGNOSIS
 
 HEADINGS = (

@@ -20,17 +20,17 @@ from rsea_ros.diagnosis.result import (
     Misfit,
     Reason,
     Rejected,
+    Spectrum,
 )
 from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
 from rsea_ros.identification.result import Overlay
 from rsea_ros.records.record import Fault
 from rsea_ros.report import words
-from rsea_ros.report.diagnosis import numbers as num, words as say
-from rsea_ros.report.diagnosis.files import diagnosis_json
-from rsea_ros.report.diagnosis.page import diagnosis_report, settings_section
-from rsea_ros.report.diagnosis.terminal import terminal_lines
-from rsea_ros.report.diagnosis.where import BINS, Profile, finding, profiles, where_figure
-from rsea_ros.report.diagnosis.words import diagnosis_sentence, next_run, status_line
+from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis.figures import BINS, Profile, profile_finding, profiles, where_figure
+from rsea_ros.report.diagnosis.page import diagnosis_json, diagnosis_report, settings_section
+from rsea_ros.report.diagnosis.words import diagnosis_sentence, next_run, status_line, terminal_lines
+from rsea_ros.report.figures.spectrum import finding as finding_of
 
 
 def terminal(diagnosis):
@@ -117,7 +117,7 @@ def test_a_residual_at_high_speed_is_located_at_high_speed(diagnosed):
     assert sentence["velocity"].before[-1] == pytest.approx(30.0, rel=0.05)
     assert sentence["velocity"].before[:-2] == pytest.approx(2.0)
     assert sentence["velocity"].after == pytest.approx(0.0)
-    assert finding(list(sentence.values())).startswith("The residual depends most on speed: ")
+    assert profile_finding(list(sentence.values())).startswith("The residual depends most on speed: ")
 
 
 def test_faulty_samples_count_for_nothing(diagnosed):
@@ -157,7 +157,7 @@ def test_a_drift_that_never_settles_has_no_time_constant(diagnosed, seconds, sho
         "time_constant": CauseParameter(seconds, "s", (0.0, seconds + 490.0)),
     }
     cause = replace(diagnosed.diagnosis.causes[0], name="ft_drift", parameters=parameters)
-    assert list(num.sizes(cause)) == shown
+    assert list(say.sizes(cause)) == shown
     rows = terminal(replace(diagnosed.diagnosis, causes=(cause,)))
     (line,) = [row for row in rows if row.startswith("cause")]
     assert ("time constant" in line) == ("time_constant" in shown)
@@ -237,13 +237,22 @@ def test_no_sentence_says_more_than_its_interval(diagnosed):
     unsure = replace(DELAY, parameters=vague, gain_holdout=-1.54, gain_holdout_ci95=(-1e12, 0.42))
     assert "certainly" not in status_line(unsure)
     assert say.cause_list([unsure]) == "command delay (size open)"
-    assert num.percent_range(unsure.gain_holdout_ci95) == "< −100 to 42.0 %"
+    assert say.percent_range(unsure.gain_holdout_ci95) == "< −100 to 42.0 %"
     worse = {n: 1.1 * v for n, v in diagnosed.diagnosis.residual_rms.items()}
     d = replace(
         diagnosed.diagnosis, verdict="partly_explained", causes=(DELAY,), extended_residual_rms=worse,
         at_noise_floor=False,
     )  # fmt: skip
     assert "falls" not in diagnosis_sentence(d)
+    assert "explains no part of the misfit" in diagnosis_sentence(d)
+    assert "rises from" in say.evidence(replace(DELAY, times_noise=(1.91, 2.01)))
+    hz = np.geomspace(1.0, 100.0, 200)
+    hump = 1.0 + 2.2 * np.exp(-((hz - 29.0) ** 2))
+    d = replace(d, verdict="explained", spectra=(Spectrum(d.channel, hz, 3.0 * hump, hump, 1.0),))
+    assert "little more than noise is left, at most 3.0 times at 29 Hz" in say.headline(d)
+    white = finding_of(hz, np.full(200, 1.3), 1.0, "F/T torque")
+    assert white.startswith("F/T torque: the residual lies above the noise floor, at most 1.3 times")
+    assert (words.probability(0.99996), words.probability(0.93)) == ("> 0.999", "0.930")
 
 
 def test_file_and_page_carry_status_probability_and_alternatives(diagnosed):

@@ -8,24 +8,34 @@ import gzip
 import numpy as np
 import pytest
 
-from rsea_ros.report.figures.figure import AFTER, BEFORE, line
+from rsea_ros.diagnosis.residual_analysis import by_frequency
+from rsea_ros.report.figures.figure import AFTER, BEFORE, Curve, line
 from rsea_ros.report.figures.overlay import (
     MOST_SAMPLES,
-    Simulated,
     overlay_figure,
     pack,
     pauses_of,
     sample_extremes,
     without,
 )
-from rsea_ros.report.figures.spectrum import SpectrumLine, density, residual_figure
+from rsea_ros.report.figures.spectrum import density, residual_figure
 
 
-def test_density_of_white_noise_is_its_rms_over_the_root_of_half_the_rate() -> None:
-    noise = 0.3 * np.random.default_rng(2).standard_normal(60_000)
-    frequency, values = density(noise, 280.0)
-    assert np.sqrt(np.mean(values**2)) == pytest.approx(0.3 / np.sqrt(140.0), rel=0.01)
-    assert 0.0 < frequency[0] < frequency[-1] < 140.0
+@pytest.mark.parametrize("stamps", ["even", "rounded", "lost", "paused"])
+def test_a_line_and_the_floor_of_a_density_are_read_off_the_stamps(stamps: str) -> None:
+    """50 Hz stood at 44.6 where stamps of 280 Hz were rounded to 2 ms, at 55.5 where a tenth was lost."""
+    rng, t = np.random.default_rng(2), np.arange(60_000) / 280.0
+    keep = {"lost": rng.random(len(t)) > 0.1, "paused": (t < 20.0) | (t > 140.3)}.get(stamps, t >= 0.0)
+    t = t[keep]
+    values = 0.3 * rng.standard_normal(len(t)) + 0.3 * np.sin(2.0 * np.pi * 50.0 * t)
+    stamped = np.round(t / 2e-3) * 2e-3 if stamps == "rounded" else t
+    rate, frequency, level = density(stamped, values)
+    assert rate == pytest.approx(280.0, rel=1e-3)
+    assert frequency[np.argmax(level)] == pytest.approx(50.0, abs=0.05)
+    floor = np.abs(frequency - 50.0) > 1.0
+    assert np.sqrt(np.mean(level[floor] ** 2)) == pytest.approx(0.3 / np.sqrt(140.0), rel=0.07)
+    worst = max(by_frequency(stamped, values, 0.3, "ft"), key=lambda m: m.times_noise)
+    assert worst.low < 50.0 < worst.high
 
 
 def test_long_traces_keep_their_extremes() -> None:
@@ -47,7 +57,7 @@ def test_a_pause_of_the_samples_is_not_drawn_and_keeps_its_length() -> None:
     assert (at, seconds) == (300, pytest.approx(60.0 - 299.0 / 280.0))
     joined = np.diff(without({at: seconds}, t))[298:301]
     np.testing.assert_allclose(joined, [1.0 / 280.0, 0.0, 1.0 / 280.0], atol=1e-12)
-    figure = overlay_figure("Paused", "ft", t, np.sin(t), [Simulated("simulated", BEFORE, 0.9 * np.sin(t))])
+    figure = overlay_figure("Paused", "ft", t, np.sin(t), [Curve("simulated", BEFORE, 0.9 * np.sin(t))])
     assert figure.extra["pauses"] == [(at, seconds)]
     assert figure.extra["t"]["step"] < 2e-6
 
@@ -63,7 +73,7 @@ def test_a_curve_without_a_unit_under_the_pointer_is_refused() -> None:
 def test_every_curve_is_named_beside_the_figure_in_its_colour() -> None:
     """Centred above a peak at 0.4 Hz a name lay on the marks of the axis, on a phone."""
     frequency = np.linspace(0.1, 139.0, 500)
-    curve = SpectrumLine("measured", AFTER, 1.0 + np.exp(-((frequency - 0.4) ** 2)))
+    curve = Curve("measured", AFTER, 1.0 + np.exp(-((frequency - 0.4) ** 2)))
     drawn = residual_figure("t", "ft", frequency, [curve], 1e-2)
     names = drawn.layout["annotations"]
     assert [n["text"] for n in names] == ["<b>measured</b>", "noise floor"]

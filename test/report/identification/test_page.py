@@ -12,22 +12,28 @@ import pytest
 
 from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.report import words
-from rsea_ros.report.identification import page as results
-from rsea_ros.report.identification.page import identification_report, parameter_table
-from rsea_ros.report.identification.words import identification_json, value_text
+from rsea_ros.report.identification import (
+    identification_json,
+    identification_report,
+    parameter_table,
+    value_text,
+    write_results,
+)
 
 Browser = Callable[[str, Path], tuple[str, str]]
 LARGEST = 1_500_000
 """Bytes of a page without 3-D, here of 160 s at 280 Hz in three channels."""
 FIGURES = 8
 """Two Bode figures, then time and spectrum of three channels."""
-ZOOM = """<script>setTimeout(() => {
+ZOOM = """<script>const drawing = setInterval(() => {
   const all = [...document.querySelectorAll(".figure")];
+  if (!all.every((n) => n.dataset.drawn)) return;
+  clearInterval(drawing);
   const node = all.find((n) => n.layout.xaxis.title.text.startsWith("time"));
   Plotly.relayout(node, {"xaxis.range[0]": 40, "xaxis.range[1]": 41}).then(() => setTimeout(() => {
     document.body.dataset.zoomed = node.data[0].x.length;
   }, 500));
-}, 3000);</script></body>"""
+}, 50);</script></body>"""
 
 
 def test_browser_draws_every_figure_without_an_error(
@@ -93,7 +99,7 @@ def test_json_holds_no_infinity_and_all_that_others_rely_on(identification: Iden
 def test_a_write_that_fails_leaves_nothing(identification: Identification, tmp_path: Path) -> None:
     (tmp_path / "report.html").mkdir()
     with pytest.raises(OSError, match=r"report\.html"):
-        results.write_results(identification, tmp_path)
+        write_results(identification, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 

@@ -16,7 +16,7 @@ from rsea_ros import report
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.result import Identification
 from rsea_ros.report.diagnosis.figures import part_of, sketch
-from rsea_ros.report.identification.page import (
+from rsea_ros.report.identification import (
     correlation_finding,
     correlation_section,
     identification_report,

@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from rsea_ros.report.paper.docs import documentation_figures
-from rsea_ros.report.paper.figures import circuit, figure_9
+from rsea_ros.report.paper.figures import circuit, documentation_figures, figure_9
 
 FIGURES = Path(__file__).parents[3] / "docs" / "figures"
 drawn = functools.cache(documentation_figures)

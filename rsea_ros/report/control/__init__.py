@@ -1,1 +1,0 @@
-"""A controlled actuator: page, tables, control.json."""

@@ -1,1 +1,0 @@
-"""A design by the paper's method: page, tables, map, surface, design.json."""

@@ -1,1 +1,0 @@
-"""A designed run: page, sentences, experiment.json."""

@@ -1,1 +1,0 @@
-"""An identification as page, tables, sentences, terminal output and identification.json."""

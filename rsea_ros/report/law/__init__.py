@@ -1,1 +1,0 @@
-"""A law that no effect covers: page, sentences, law.json."""
