@@ -44,8 +44,9 @@ one times the last and the one before, these two; mean of the doubt by spreads; 
 squares over WINDOWS."""
 LONG, START = 2048.0, 16.0
 """Samples: 2048 tell a variance to 3 %; 16 are 50 ms at 280 Hz, in which friction has to show."""
-WINDOWS, LIMITS = (128.0, 16.0, 1.0), (1.48, 3.13, 32.8)
-"""Samples of shorter means of nu^2, and the part of S that these pass by chance in 1 of 10^8 (chi-square)."""
+WINDOWS, LIMITS = (128.0, 16.0, 1.0), (1.43, 3.13, 32.8)
+"""Samples of shorter means of nu^2, and the part of S that these pass by chance in 1 of 10^8, of 10^5 for the
+longest, which drifts (chi-square)."""
 WHITE = 2.0 * np.log(LONG)
 """Of n (rho_1^2 + rho_2^2), up to which the innovations are white: Schwarz, Annals of Statistics 6, 1978, for
 two coefficients. Beyond twice of it they are not, and from fewer samples than that nobody can tell."""
