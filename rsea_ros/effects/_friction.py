@@ -19,6 +19,7 @@ from rsea_ros.effects.signal_table import CREEP, GEAR_VELOCITY, GEAR_VELOCITY_SP
 
 PRESLIDING = Parameter(
     "creep_velocity", "rad/s", null=2e-3, low=1e-5, high=2e-2, typical=2e-3, logarithmic=True, optional=True,
+    ideal_at_low=True,
     reason="from 1/60000 of the largest speed, as good as rest, to 1/30, where friction is viscous",
 )
 """Below it a gear with friction creeps instead of standing still; every friction effect has it."""

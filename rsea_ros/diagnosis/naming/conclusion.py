@@ -300,7 +300,7 @@ def with_sizes_known(
 def is_held_by_bound(effect: str, last: Evaluated, near: float) -> bool:
     """Return whether a parameter of an effect ended at a bound that the law needs or the data determine.
 
-    Not a share, which may be none and all, nor what vanishes there or is typical.
+    Not a share, which may be none and all, nor what vanishes there or is typical, nor where the law is ideal.
     """
     laws = {f"{effect}.{p.name}": p for p in effect_named(effect).parameters if not p.is_share}
     theta, doubts = last.solution.theta, np.sqrt(last.confidence.covariance.diagonal())
@@ -308,6 +308,7 @@ def is_held_by_bound(effect: str, last: Evaluated, near: float) -> bool:
     return any(
         u.is_near_bound(float(at), near)
         and not any(math.isclose(u.outer(float(at)), v) for v in (laws[u.name].null, laws[u.name].typical))
+        and not (laws[u.name].ideal_at_low and u.outer(float(at)) < math.sqrt(u.low * u.high))
         and (not laws[u.name].optional or Z95 * doubt < SURE_OF_BOUND * (u.inner(u.high) - u.inner(u.low)))
         for u, at, doubt in fitted
         if u.name in laws

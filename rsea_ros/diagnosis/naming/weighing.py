@@ -33,9 +33,11 @@ from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, Selection, Trial
 from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for, is_at_edge
 from rsea_ros.diagnosis.score import Score, tempered_loss
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.identification.confidence import is_off_rig
-from rsea_ros.identification.solver import Pools
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.identification.confidence import confidence_of, is_off_rig
+from rsea_ros.identification.solver import Pools, Solution
 from rsea_ros.records.record import FloatArray
+from rsea_ros.records.statistics import Z95
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,8 @@ def weigh_rivals(
     trust = 0.0 if is_off_rig(selection.last.solution) else 1.0
     scores, weights = _race(tried, held_out, pools, settings, trust)
     if sum(w >= rule.close_weight for w in weights) > 1:
-        tried = _in_the_open(_with_close_ones_fitted(tried, weights, selection, pools), claim.name, near)
+        tried = _with_close_ones_fitted(tried, weights, claim, selection, pools)
+        tried = _in_the_open(tried, claim.name, near)
         scores, weights = _race(tried, held_out, pools, settings, trust)
     weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
@@ -124,16 +127,39 @@ def _race(
 
 
 def _with_close_ones_fitted(
-    tried: Sequence[Trial], weights: Sequence[float], selection: Selection, pools: Pools
+    tried: Sequence[Trial], weights: Sequence[float], claim: Claim, selection: Selection, pools: Pools
 ) -> list[Trial]:
-    """Return trials, those of some weight fitted to the end."""
+    """Return trials, those of some weight fitted to the end, without larger laws that a smaller one is."""
     least = selection.last.settings.evidence.close_weight
     fitted = [t for t, w in zip(tried, weights, strict=True) if w >= least]
-    ends = {t.name: t for t in pools.fits.map(lambda t: _fit_to_the_end(t, selection, pools), fitted)}
-    return [ends.get(t.name, t) for t in tried]
+    models = pools.fits.map(lambda t: _fit_to_the_end(t, selection, pools), fitted)
+    ends = {t.name: m for t, m in zip(fitted, models, strict=True)}
+    nested = {
+        name for name, model in ends.items()
+        if effect_size(name) > effect_size(claim.name) and may_be_less(model.solution, name)
+    }  # fmt: skip
+    return [
+        replace(t, problem=ends[t.name].problem, theta=ends[t.name].solution.theta) if t.name in ends else t
+        for t in tried
+        if t.name not in nested
+    ]
 
 
-def _fit_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Trial:
+def may_be_less(solution: Solution, name: str) -> bool:
+    """Return whether a part of a law may be nothing by these data, so that they show a smaller law only."""
+    nothing = {
+        f"{name}.{p.name}": p.null
+        for p in effect_named(name).parameters
+        if not (p.optional or p.logarithmic) and p.null not in (p.typical, math.inf)
+    }
+    doubts = np.sqrt(confidence_of(solution).covariance.diagonal())
+    return any(
+        u.name in nothing and abs(at - u.inner(nothing[u.name])) < Z95 * doubt
+        for u, at, doubt in zip(solution.problem.unknowns, solution.theta, doubts, strict=True)
+    )
+
+
+def _fit_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Candidate:
     """Return a trial fitted as the models that are tested: the steps of the search stop far earlier.
 
     Nearly equal laws need long fits: the values of one compensate for the other.
@@ -142,8 +168,7 @@ def _fit_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Trial:
     blocks, gain = (*TRAIN, *VALIDATION), settings.fits.final_gain
     setup = FitSetup(selection.cases, settings, pools.run, blocks=blocks, gain=gain)
     initial = fit_candidate(replace(setup, iterations=0), trial.problem, trial.theta)
-    model = refit(initial, setup)
-    return replace(trial, problem=model.problem, theta=model.solution.theta)
+    return refit(initial, setup)
 
 
 def _stack(
