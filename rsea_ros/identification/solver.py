@@ -23,7 +23,7 @@ from rsea_ros.identification.problem import Problem, simulate_cases
 from rsea_ros.identification.unknowns import Unknown, apply, bounds_of, start_vector
 from rsea_ros.records.record import FloatArray
 
-_DIFFERENCE = 1e-4
+_DIFFERENCE = 1e-5
 _CLOCK_DIFFERENCE = 1e-6
 """s. Sensors are read so much earlier and later for the derivatives by their clocks."""
 _SMALLEST_GAIN = 1e-6
