@@ -18,8 +18,12 @@ from independent.severities import drawn_parameters
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
+from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.model.prediction_errors import predict
+from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.records.record import Channel
 from rsea_ros.report.remark_words import remark_sentences
 
 RIG = load_rig("paper_high_impedance")
@@ -166,3 +170,18 @@ def test_stribeck_for_coulomb_friction_with_quadratic_drag_is_not_confirmed():
     diagnosis = diagnose_bench(("stribeck_friction", "coulomb_friction"), coulomb=1.0, quadratic_drag=8.0)
     assert diagnosis.verdict != "explained"
     assert "confirmed" not in {c.status for c in diagnosis.causes if c.name == "stribeck_friction"}
+
+
+@pytest.mark.parametrize(
+    ("name", "torque", "amplitude"), [("paper_high_impedance", 8.0, 40.0), ("paper_moving_output", 4.0, 60.0)]
+)
+def test_friction_that_lets_a_gear_rest_is_confirmed_and_no_larger_law_doubts_it(name, torque, amplitude):
+    """It was `leading`, its creep at its bound, and `one_of` beside Stribeck's law without its own part."""
+    rig, sweep = load_rig(name), {"noise": 0.0, "low": 0.2, "high": 30.0}
+    command = chirp(ExcitationSettings(rate=RATE, duration=16.0, amplitude=amplitude, **sweep))
+    hidden = EffectSetting("coulomb_friction", {"torque": torque, "creep_velocity": 1e-7})
+    record = synthesize(rig.with_effects(hidden), Channel(np.arange(len(command)) / RATE, command), seed=1)
+    found = diagnose([record], rig, settings=only("coulomb_friction", "stribeck_friction"))
+    assert [(c.name, c.status) for c in found.causes] == [("coulomb_friction", "confirmed")]
+    assert found.alternatives == ()
+    assert found.causes[0].parameters["torque"].value == pytest.approx(torque, rel=1e-3)
