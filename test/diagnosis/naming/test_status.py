@@ -223,7 +223,7 @@ def test_the_sentence_speaks_of_a_channel_that_bears_the_verdict_out(ratios):
     channel = main_channel(score, "ft") if verdict == "unexplained" else "ft"
     rms = {channel: score.ratio(channel)}
     diagnosis = SimpleNamespace(
-        verdict=verdict, channel=channel, causes=(), faults=(), remarks=(), at_noise_floor=False,
+        verdict=verdict, channel=channel, causes=(), faults=(), remarks=(), at_noise_floor=False, spectra=(),
         noise_rms={channel: 1.0}, residual_rms=rms, extended_residual_rms=rms,
     )  # fmt: skip
     sentence = diagnosis_sentence(diagnosis)
