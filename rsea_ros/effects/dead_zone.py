@@ -48,7 +48,7 @@ EFFECT = Effect(
     order=5,
     parameters=(
         Parameter(
-            "width", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
+            "width", "N m", null=0.0, low=0.0, high=50.0, typical=2.0, jumps=True,
             reason="commands below it make no torque: above the largest one, nothing would move",
         ),
         Parameter(

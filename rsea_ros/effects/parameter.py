@@ -24,6 +24,7 @@ class Parameter:
     may well have. starts: where fits begin besides `typical`, for problems with several minima.
     reason: why these bounds, with the source where one is known.
     is_fixed: the same on every machine, although its unit scales with a machine's size.
+    jumps: the law jumps where a signal reaches it, so that only steps between samples show its derivative.
     ideal_at_low: at its low bound the law is as good as the ideal one, which no other can replace.
     optional: may be left out; then it is `null`.
     spread: one sigma of its prior around its start: of its logarithm where that is
@@ -46,6 +47,7 @@ class Parameter:
     per_record: bool = False
     is_fixed: bool = False
     ideal_at_low: bool = False
+    jumps: bool = False
     reason: str = ""
 
     def at(self, scale: Scale) -> Parameter:

@@ -20,10 +20,9 @@ from scipy.linalg.blas import dger
 from threadpoolctl import threadpool_limits
 
 from rsea_ros.identification.problem import Problem, simulate_cases
-from rsea_ros.identification.unknowns import Unknown, apply, bounds_of, start_vector
+from rsea_ros.identification.unknowns import SMOOTH, Unknown, apply, bounds_of, start_vector
 from rsea_ros.records.record import FloatArray
 
-_DIFFERENCE = 1e-5
 _CLOCK_DIFFERENCE = 1e-6
 """s. Sensors are read so much earlier and later for the derivatives by their clocks."""
 _SMALLEST_GAIN = 1e-6
@@ -96,13 +95,16 @@ def jacobian_columns(
     def column(i: int) -> FloatArray:
         unknown = problem.unknowns[i]
         moved = theta.copy()
-        step = _DIFFERENCE * unknown.scale
+        step = unknown.difference * unknown.scale
         beyond = theta[i] + step > unknown.inner(unknown.high)
         moved[i] += -step if beyond else step
-        shifted = problem.residual(moved)
-        if power(shifted) == np.inf:
+        shifted, before, width = problem.residual(moved), residual, moved[i] - theta[i]
+        if unknown.difference > SMOOTH:  # of a jump the samples on either side of it
+            moved[i] -= 2.0 * width
+            before, width = problem.residual(moved), 2.0 * width
+        if np.inf in (power(shifted), power(before)):
             return np.zeros(len(residual))
-        return np.asarray((shifted - residual) / (moved[i] - theta[i]))
+        return np.asarray((shifted - before) / width)
 
     columns = dict(zip(others, run(column, others), strict=True))
     if clocks:
@@ -140,7 +142,7 @@ def central_jacobian(problem: Problem, theta: FloatArray, run: Map = serial) -> 
     def column(i: int) -> FloatArray:
         unknown, step = problem.unknowns[i], np.zeros(len(theta))
         is_offset = unknown.is_clock and not unknown.is_rate
-        step[i] = _CLOCK_DIFFERENCE if is_offset else _DIFFERENCE * unknown.scale
+        step[i] = _CLOCK_DIFFERENCE if is_offset else unknown.difference * unknown.scale
         return np.asarray((problem.residual(theta + step) - problem.residual(theta - step)) / (2.0 * step[i]))
 
     return np.column_stack(run(column, range(len(theta))))

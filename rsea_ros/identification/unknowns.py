@@ -43,6 +43,9 @@ class Clocks:
         return not any(self.offset.values()) and not any(self.rate.values())
 
 
+SMOOTH, JUMPING = 1e-5, 0.1
+"""Of an unknown's scale, over which derivatives are taken: exact enough for the end of a bent valley, and so
+wide that a law that jumps does so at some samples on either side (decision 312)."""
 WELL_KNOWN = 0.3
 """Relative prior spread up to which a fit works on the logarithm of a value."""
 
@@ -55,6 +58,7 @@ class Unknown:
     logarithmic: the fit works on its logarithm. doubt: one sigma of the prior around `start`, in the
     coordinate that the fit works in; inf for none. scale: a step of that coordinate that matters.
     inverse: the fit works on -1 / value, for what is infinite as a rule and has no slope there.
+    difference: of scale, over which its derivatives are taken.
     """
 
     name: str
@@ -66,6 +70,7 @@ class Unknown:
     doubt: float
     scale: float
     inverse: bool = False
+    difference: float = SMOOTH
 
     @property
     def spread(self) -> float:
@@ -176,7 +181,10 @@ def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
         scale = 1.0 / min(p.starts)
         return Unknown(name, start, p.unit, p.low, p.high, False, p.spread, scale, inverse=True)
     scale = 1.0 if p.logarithmic else abs(p.typical) or 1.0
-    return Unknown(name, start, p.unit, p.low, p.high, p.logarithmic, p.spread, scale)
+    difference = JUMPING if p.jumps else SMOOTH
+    return Unknown(
+        name, start, p.unit, p.low, p.high, p.logarithmic, p.spread, scale, difference=difference
+    )
 
 
 def idle(effect: Effect, rig: Rig) -> frozenset[str]:

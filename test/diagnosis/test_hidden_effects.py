@@ -27,6 +27,7 @@ from rsea_ros.records.record import Channel
 from rsea_ros.report.remark_words import remark_sentences
 
 RIG = load_rig("paper_high_impedance")
+SWEEP = {"duration": 16.0, "low": 0.2, "high": 30.0}
 
 
 def only(*names):
@@ -172,13 +173,27 @@ def test_stribeck_for_coulomb_friction_with_quadratic_drag_is_not_confirmed():
     assert "confirmed" not in {c.status for c in diagnosis.causes if c.name == "stribeck_friction"}
 
 
+def test_a_dead_zone_that_does_not_jump_has_its_width():
+    """The jump was seen from one side only, where nothing was wrong: 0.14 [0.139, 0.142] N m for 0.08."""
+    rig, hidden = load_rig("paper_high_impedance"), {"width": 2.0, "jump": 0.0}
+    command = chirp(ExcitationSettings(rate=RATE, amplitude=15.0, noise=0.0, **SWEEP))
+    true = rig.with_effects(EffectSetting("dead_zone", hidden))
+    record = synthesize(true, Channel(np.arange(len(command)) / RATE, command), seed=1)
+    (cause,) = diagnose([record], rig, settings=only("dead_zone")).causes
+    assert cause.status == "confirmed"
+    for name, value in hidden.items():
+        low, high = cause.parameters[name].ci95
+        assert low <= value <= high, name
+    assert cause.parameters["width"].value == pytest.approx(2.0, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("name", "torque", "amplitude"), [("paper_high_impedance", 8.0, 40.0), ("paper_moving_output", 4.0, 60.0)]
 )
 def test_friction_that_lets_a_gear_rest_is_confirmed_and_no_larger_law_doubts_it(name, torque, amplitude):
     """It was `leading`, its creep at its bound, and `one_of` beside Stribeck's law without its own part."""
-    rig, sweep = load_rig(name), {"noise": 0.0, "low": 0.2, "high": 30.0}
-    command = chirp(ExcitationSettings(rate=RATE, duration=16.0, amplitude=amplitude, **sweep))
+    rig = load_rig(name)
+    command = chirp(ExcitationSettings(rate=RATE, amplitude=amplitude, noise=0.0, **SWEEP))
     hidden = EffectSetting("coulomb_friction", {"torque": torque, "creep_velocity": 1e-7})
     record = synthesize(rig.with_effects(hidden), Channel(np.arange(len(command)) / RATE, command), seed=1)
     found = diagnose([record], rig, settings=only("coulomb_friction", "stribeck_friction"))
