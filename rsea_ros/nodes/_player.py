@@ -164,9 +164,13 @@ class BenchEars:
         self._ears.begin()
         self._alarm, self.last = alarm, time.monotonic()
 
+    def end(self) -> None:
+        """End the record, in the executor's thread: what is heard later is not read while it grows."""
+        self._run = self._ears.take()
+
     def record(self) -> Record:
-        """Return the record since then. Raises RseaError where none can be made."""
-        return self._ears.record(strict=False)
+        """Return the record that has ended. Raises RseaError where none can be made."""
+        return self._ears.record(strict=False, contents=self._run)
 
     def _heard(self, role: str) -> None:
         if role != "torque_command":
@@ -211,8 +215,9 @@ class LiveRun:
         return bool(self._why) or time.monotonic() - self._over_at > self._rest
 
     def close(self) -> None:
-        """Command zero torque."""
+        """Command zero torque; the record is over."""
         self._player.close()
+        self._ears.end()
 
     def record(self) -> Record:
         """Return the record. Raises DeviceError for a run that broke off."""

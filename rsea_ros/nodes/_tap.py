@@ -79,9 +79,19 @@ class Ears:
         """Start a new record."""
         self._contents = Contents()
 
-    def record(self, *, strict: bool) -> Record:
-        """Return the record since then. Raises BagError where none can be made."""
-        return record_from(self._contents, self.topics.topic("torque_command"), self.topics, strict=strict)
+    def take(self) -> Contents:
+        """Return what was heard since then, and start a new record; in the executor's thread."""
+        heard = self._contents
+        self.begin()
+        return heard
+
+    def record(self, *, strict: bool, contents: Contents | None = None) -> Record:
+        """Return the record since then, in the executor's thread, or that of contents which were taken.
+
+        Raises BagError where none can be made.
+        """
+        heard = self._contents if contents is None else contents
+        return record_from(heard, self.topics.topic("torque_command"), self.topics, strict=strict)
 
     def _keep(self, role: str, received: int, raw: bytes) -> None:
         sink = self._contents.sink(self.topics.topic(role), TYPES[role])
