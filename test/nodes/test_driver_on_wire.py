@@ -13,6 +13,7 @@ from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from test.nodes.on_wire import Driven, newest_value
+from test.nodes.stalls import is_stall
 
 
 @pytest.fixture(scope="module")
@@ -120,19 +121,25 @@ def test_excite_waits_for_an_active_driver_and_stops_at_a_fault(wire, listener, 
     listener.until(lambda: sum(message.effort[0] != 0.0 for message in commands) > 50)
     assert wire.trigger("stop").success
     listener.until(lambda: not excite.is_running())
-    assert excite.wait() == 2 and "has latched a fault, stopped" in excite.output[-1]
+    told = excite.output[-1].split("has latched a fault, ")[-1]
+    assert excite.wait() == 2 and (told.startswith("stopped") or is_stall(told)), excite.output[-1]
     assert commands[-1].effort[0] == 0.0
     assert wire.trigger("clear_fault").success
 
 
-def test_a_port_that_comes_back_is_opened_again_by_clear_fault(wire, listener):
-    health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+def test_a_port_that_comes_back_is_opened_again_by_clear_fault(wire):
     wire.drive()
     wire.bench.ask("vanish")
-    wire.push(lambda: newest_value(health, "main", "fault") not in (None, "", "none"))  # one cycle later
-    answer = wire.trigger("clear_fault")
-    assert not answer.success and "port" in answer.message
-    wire.bench.ask("appear")
+    answers = []
+
+    def is_refused():
+        answers.append(wire.trigger("clear_fault"))
+        return not answers[-1].success and "port" in answers[-1].message
+
+    try:
+        wire.push(is_refused)  # from the next cycle on
+    finally:
+        wire.bench.ask("appear")
     answer = wire.trigger("clear_fault")
     assert answer.success, answer.message
     wire.drive()
