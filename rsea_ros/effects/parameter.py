@@ -25,7 +25,7 @@ class Parameter:
     reason: why these bounds, with the source where one is known.
     is_fixed: the same on every machine, although its unit scales with a machine's size.
     jumps: the law jumps where a signal reaches it, so that only steps between samples show its derivative.
-    ideal_at_low: at its low bound the law is as good as the ideal one, which no other can replace.
+    ideal_at_low: at its low bound the law is the ideal one, so that this bound is no sign of another law.
     optional: may be left out; then it is `null`.
     spread: one sigma of its prior around its start: of its logarithm where that is
     fitted, else absolute; inf for nothing. `reason` names the source.

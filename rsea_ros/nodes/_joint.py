@@ -202,7 +202,7 @@ def stop(joints: Sequence[DrivenJoint]) -> str:
 
 
 def answer_stop(joints: Sequence[DrivenJoint], offers: Sequence[Offer]) -> None:
-    """Note that a stop is answered now. offers: the services whose requests may have come before that.
+    """Note that a stop is answered now. offers: services of which requests that wait came before that.
 
     The middleware hands the requests of several services over in any order, and a busy executor late.
     """

@@ -129,7 +129,7 @@ def _race(
 def _with_close_ones_fitted(
     tried: Sequence[Trial], weights: Sequence[float], claim: Claim, selection: Selection, pools: Pools
 ) -> list[Trial]:
-    """Return trials, those of some weight fitted to the end, without larger laws that a smaller one is."""
+    """Return trials, those of some weight fitted to the end, but no larger law that may be a smaller one."""
     least = selection.last.settings.evidence.close_weight
     fitted = [t for t, w in zip(tried, weights, strict=True) if w >= least]
     models = pools.fits.map(lambda t: _fit_to_the_end(t, selection, pools), fitted)
