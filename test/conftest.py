@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import gc
 import os
+import platform
 import signal
 import sys
 import tempfile
@@ -16,6 +17,9 @@ import pytest
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
 from xdist.workermanage import WorkerController
+
+if platform.machine() == "x86_64":  # of one kernel are the stored numbers: fits far from a truth show rounding
+    os.environ.setdefault("OPENBLAS_CORETYPE", "Haswell")
 
 import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
 from rsea_ros.compiler import trusted_cache
