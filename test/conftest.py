@@ -18,7 +18,7 @@ from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
 from xdist.workermanage import WorkerController
 
-if platform.machine() == "x86_64":  # of one kernel are the stored numbers: fits far from a truth show rounding
+if platform.machine() == "x86_64":  # stored numbers are one kernel's: fits far from a truth show rounding
     os.environ.setdefault("OPENBLAS_CORETYPE", "Haswell")
 
 import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
