@@ -1,11 +1,7 @@
 """Where the fit of an effect begins: guesses from the residual, and the peaks that the residual has.
 
-The missing torque is the torque that a model lacks for the measured motion:
-
-    J_m a + b_m v + T,   of the residuals: measured less simulated motion and load
-
-The parts that the model has right, the command with its lags included, cancel. A simulated rotor angle of a
-502:1 gear loses its phase; the measured one does not.
+A torque that repeats with the rotor is sought in the missing torque, over the measured angle: the simulated
+one of a 502:1 gear loses its phase.
 
 The typical sizes of the catalogue are those of an actuator of some 20 N m; a servo of 1 N m would stick fast.
 For a joint in a position loop, the largest torque bounds the size of an effect in N m.
@@ -26,6 +22,7 @@ import numpy as np
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE, Port
+from rsea_ros.identification.missing_torque import Injector, missing_torque
 from rsea_ros.identification.noise_level import residual_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.start import LARGEST, torque_size
@@ -55,10 +52,10 @@ _MOST_PEAKS = 2
 
 def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
     """Return cycles per revolution, amplitude (N m) and phase (rad) of the strongest repetitions."""
-    missing = missing_torque(case, rig, outputs)
-    if missing is None:
+    along = torque_along(case, rig, outputs)
+    if along is None:
         return []
-    position, torque = missing
+    position, torque = along
     ratio = rig["gear.ratio"]
     angle, torque = ratio * position, torque - np.mean(torque)
     cycles = _repetitions(angle, torque)
@@ -127,48 +124,30 @@ def _periodogram(angle: FloatArray, torque: FloatArray) -> tuple[FloatArray, Flo
     return np.arange(len(power)) / _REVOLUTIONS, power
 
 
-def missing_torque(
+def torque_along(
     case: Case, rig: Rig, outputs: Mapping[str, FloatArray]
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return the measured position (rad) and the torque that is missing at it, N m.
+    """Return the measured position (rad) and the torque that is missing at the gear there, N m.
 
-    outputs: simulated channels of the case. None without a position, or for a free housing.
+    outputs: simulated channels of the case. None without a position.
     """
     if isinstance(case.drive, Motion):
         return _along(case.drive, case, outputs)
-    if "position" not in case.measured or "housing_end" not in rig.clamped:
+    if "position" not in case.measured:
         return None
-    t, q = case.t["position"], residual_of(case, outputs, "position")
-    v = _residual_at(t, case, outputs, "velocity", np.gradient(q, t))
-    a = np.pad((v[2:] - v[:-2]) / (t[2:] - t[:-2]), 1)
-    load = _residual_at(t, case, outputs, "ft", _load(rig, q, v, a))
-    inertia = rig["rotor.reflected_inertia"] + rig["chassis.inertia"]
-    torque = (inertia * a + rig["rotor.reflected_damping"] * v + load)[1:-1]
-    keep = case.mask["position"][1:-1]
-    return case.measured["position"][1:-1][keep], torque[keep]
+    t, keep = case.t["position"], case.mask["position"]
+    residual = {n: np.where(case.mask[n], residual_of(case, outputs, n), 0.0) for n in outputs}
+    injector, period = Injector(rig, case.drive, case.t), float(np.median(np.diff(t)))
+    missing = missing_torque(case, residual, injector, period)
+    middle = case.drive.start + missing.t + 0.5 * period
+    known = np.interp(middle, t, keep.astype(float)) == 1.0
+    return np.interp(middle, t, case.measured["position"])[known], missing.torque[known]
 
 
 def _along(motion: Motion, case: Case, outputs: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return the angles of a measured motion (rad), and the torque that its motor did not need, N m."""
     keep = case.mask["motor_torque"]
     return motion.q[keep], (outputs["motor_torque"] - case.measured["motor_torque"])[keep]
-
-
-def _residual_at(
-    t: FloatArray, case: Case, outputs: Mapping[str, FloatArray], channel: str, otherwise: FloatArray
-) -> FloatArray:
-    """Return the residual of a channel at the stamps t, s; `otherwise`, shape of t, without that channel."""
-    if channel not in case.measured:
-        return otherwise
-    return np.interp(t, case.t[channel], residual_of(case, outputs, channel))
-
-
-def _load(rig: Rig, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
-    """Return the torque, N m, that carries a motion beyond the gear: of the spring, or of the load itself."""
-    if not rig.rigid_spring:
-        return rig["spring.stiffness"] * q
-    inertia, damping, stiffness = (rig[f"spring_end.{n}"] for n in ("inertia", "damping", "stiffness"))
-    return inertia * a + damping * v + stiffness * q
 
 
 def peaks(level: FloatArray, apart: int) -> list[int]:

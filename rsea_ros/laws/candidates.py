@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from rsea_ros.diagnosis.initial_guess import interpolate_peak, peaks
+from rsea_ros.identification.missing_torque import Place
 from rsea_ros.laws.terms import (
     COMMAND_TERMS,
     CREEP,
@@ -20,7 +21,6 @@ from rsea_ros.laws.terms import (
     MOTOR_TERMS,
     SENSOR_TERMS,
     SPRING_TERMS,
-    Place,
     Term,
     hum_terms,
     mode_terms,

@@ -10,8 +10,9 @@ import numpy as np
 
 from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.effect import Claims, Effect
+from rsea_ros.identification.missing_torque import Place
 from rsea_ros.laws.sparse_regression import Dependence
-from rsea_ros.laws.terms import CREEP, Place, Term
+from rsea_ros.laws.terms import CREEP, Term
 from rsea_ros.laws.variables import Variables
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import RigChoice

@@ -24,8 +24,8 @@ from functools import cached_property
 import numpy as np
 
 from rsea_ros.diagnosis.data_split import TEST
+from rsea_ros.identification.missing_torque import Place
 from rsea_ros.laws.candidates import TermCandidate
-from rsea_ros.laws.terms import Place
 from rsea_ros.laws.variables import GROUPS, ResidualRows
 from rsea_ros.records.record import FloatArray, IntArray
 

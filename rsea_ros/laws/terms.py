@@ -16,17 +16,10 @@ from typing import Literal, cast
 
 import numpy as np
 
-from rsea_ros.effects.signal_table import Port
+from rsea_ros.identification.missing_torque import Place
 from rsea_ros.records.record import FloatArray
 
 Memory = Literal["", "lag", "delay", "dahl", "play", "heat", "ring"]
-Place = Literal["command", "motor", "gear", "spring", "load", "ft", "encoder"]
-"""Where a law acts: at the command, which the measured current shows, or behind that; on the gear; in the
-spring; on the end that is free; in what the F/T sensor or the encoder shows."""
-PORTS: Mapping[Place, Port] = {
-    "command": Port.COMMAND, "motor": Port.MOTOR, "gear": Port.GEAR, "spring": Port.SPRING, "load": Port.GEAR,
-    "ft": Port.SENSOR, "encoder": Port.SENSOR,
-}  # fmt: skip
 _ARRAYS = {
     "abs": np.abs, "sin": np.sin, "cos": np.cos, "tanh": np.tanh, "exp": np.exp, "sign": np.sign,
     "min": np.minimum, "max": np.maximum, "pi": math.pi,

@@ -18,11 +18,11 @@ from scipy.interpolate import CubicSpline
 from rsea_ros.compiler import njit
 from rsea_ros.diagnosis.data_split import blocks_of, set_of
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.identification.missing_torque import PORTS, Injector, MissingTorque, Place, missing_torque
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import apply
-from rsea_ros.laws.injection import Injector, MissingTorque, missing_torque
-from rsea_ros.laws.terms import PORTS, Place, Term
+from rsea_ros.laws.terms import Term
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.inverse import Motion, smooth
 from rsea_ros.model.rig import Rig

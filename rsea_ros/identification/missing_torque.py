@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -30,13 +31,19 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.effect import compiled
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.problem import Case
-from rsea_ros.laws.terms import PORTS, Place
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build, run, sample
 from rsea_ros.model.step import OUTPUTS, Calls
 from rsea_ros.records.record import FloatArray
 
+Place = Literal["command", "motor", "gear", "spring", "load", "ft", "encoder"]
+"""Where a torque or an error acts: at the command, which the measured current shows, or behind that; on the
+gear; in the spring; on the end that is free; in what the F/T sensor or the encoder shows."""
+PORTS: Mapping[Place, Port] = {
+    "command": Port.COMMAND, "motor": Port.MOTOR, "gear": Port.GEAR, "spring": Port.SPRING, "load": Port.GEAR,
+    "ft": Port.SENSOR, "encoder": Port.SENSOR,
+}  # fmt: skip
 _SHARE = 1e-3
 """Of the largest command: the torque whose answer is taken; a linear rig answers alike to any."""
 
