@@ -98,7 +98,6 @@ def _initial(rig: Rig, drive: Drive, measured: FloatArray) -> tuple[float, float
         drive,
         command=drive.command[:steps],
         at={"position": drive.at["position"][: len(measured)]},
-        impulse={"position": drive.impulse["position"][: len(measured)]},
     )
     speed = np.ptp(measured) / max(drive.step * steps, 1e-9)
     state, scale = np.array([measured[0], 0.0]), np.array([1e-3 * np.ptp(measured), 1e-3 * speed])

@@ -111,11 +111,7 @@ def as_often_as_commands(case: Case) -> Case:
         return case
     period = drive.hold * drive.step
     every = {n: slice(None, None, _samples_in(period, t)) for n, t in case.t.items()}
-    thinner = replace(
-        drive,
-        at={n: at[every[n]] for n, at in drive.at.items()},
-        impulse={n: i[every[n]] for n, i in drive.impulse.items()},
-    )
+    thinner = replace(drive, at={n: at[every[n]] for n, at in drive.at.items()})
     return case.keep(every, thinner)
 
 
@@ -158,7 +154,6 @@ def _piece(
     cut = replace(
         drive, start=start, command=drive.command[first:last],
         at={n: drive.at[n][keep] - first for n, keep in inside.items()},
-        impulse={n: drive.impulse[n][keep] for n, keep in inside.items()},
         reference=drive.reference[first:last], angle=drive.angle[first:last], initial=state, spring=spring,
         origin=drive.origin + first * drive.step, whole=drive.drift_time,
         restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last), spans=(),

@@ -125,8 +125,8 @@ def _simulate(
     outputs = simulate_drive(rig, drive)
     shown = {n: outputs[n] for n in like.measured}
     case = Case(
-        replace(drive, at={n: drive.at[n] for n in shown}, impulse={n: drive.impulse[n] for n in shown}),
-        {n: blank[n].t for n in shown}, shown, like.noise, {n: np.ones(len(t), bool) for n in shown},
+        replace(drive, at={n: drive.at[n] for n in shown}), {n: blank[n].t for n in shown},
+        shown, like.noise, {n: np.ones(len(t), bool) for n in shown},
     )
     return case, outputs
 

@@ -138,7 +138,6 @@ def on_slots(case: Case, slots: Sequence[int] | IntArray, settings: DiagnosisSet
     keep = {n: _inside(t - case.start, times) for n, t in case.t.items()}
     cut = replace(
         drive, at={n: at[keep[n]] for n, at in drive.at.items()},
-        impulse={n: i[keep[n]] for n, i in drive.impulse.items()},
         restarts=tuple(sorted([*drive.restarts, *anew])), spans=spans,
     )
     return case.keep(keep, cut)

@@ -8,6 +8,7 @@ Electrical Drives, 2001 (the closed current loop as a lag).
 
 import math
 
+from rsea_ros.effects._held import fade
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
 
@@ -21,6 +22,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     u = s[STEP] / p[0]
     s[COMMAND] = command - behind * math.expm1(-u) / u
     x[0] = s[CURRENT] = command + behind * math.exp(-u)
+    fade(s, p[0])
 
 
 EFFECT = Effect(

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from rsea_ros.effects._held import fade
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
 
@@ -31,6 +32,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     s[COMMAND] = command - moved / h
     x[0], x[1] = command + after, rate_after
     s[CURRENT] = x[0]
+    fade(s, p[0])
 
 
 def response(p: Sequence[float], s: Any) -> Any:

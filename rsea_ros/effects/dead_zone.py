@@ -10,12 +10,22 @@ of Systems with Actuator and Sensor Nonlinearities, 1996, section 2.1.
 import math
 from collections.abc import Sequence
 
+from rsea_ros.compiler import njit
+from rsea_ros.effects._held import both_held, put_both
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
-from rsea_ros.effects.signal_table import COMMAND, CURRENT, Port
+from rsea_ros.effects.signal_table import CURRENT, Port
 
 RAMP = 0.001
 """Of the width. A fit needs a slope where samples cross the edge."""
+
+
+@njit(inline="always")
+def _left_of(command, p):  # type: ignore[no-untyped-def]
+    """Return the torque that a command makes, N m."""
+    beyond = abs(command) - p[0]
+    begun = p[1] * p[0] * min(max(beyond / (RAMP * p[0]) + 0.5, 0.0), 1.0)
+    return math.copysign(max(beyond, 0.0) + begun, command)
 
 
 @compiled
@@ -23,10 +33,9 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Take the zone out of the command, and out of the current that shows it."""
     if p[0] == 0.0:
         return
-    for signal in (COMMAND, CURRENT):
-        beyond = abs(s[signal]) - p[0]
-        begun = p[1] * p[0] * min(max(beyond / (RAMP * p[0]) + 0.5, 0.0), 1.0)
-        s[signal] = math.copysign(max(beyond, 0.0) + begun, s[signal])
+    before, after = both_held(s)
+    put_both(s, _left_of(before, p), _left_of(after, p))
+    s[CURRENT] = _left_of(s[CURRENT], p)
 
 
 _SHOWN = 0.3

@@ -16,7 +16,8 @@ class Port(IntEnum):
     OUTPUT_VELOCITY, at the end of the last step, or of this one at SENSOR.
 
     COMMAND: once a step, changes s[COMMAND], the mean over the step, and s[CURRENT], which the measured
-        current shows at the end of the step.
+        current shows at the end of the step. A law that bends takes the mean of what it makes of both
+        commands of the step (_held.py), not what it makes of their mean.
     MOTOR: once a step, changes s[COMMAND] after that, which the measured current does not show.
     GEAR: at every evaluation of the torques, with the signals at the middle of the step; adds to
         s[GEAR_TORQUE], s[JOINT_TORQUE], s[HOUSING_TORQUE] or s[DISTAL_TORQUE].
@@ -85,5 +86,8 @@ SENSED = 38  # 1, share of the spring's torque that the F/T sensor sees at once
 PLAY = 39  # rad, what the spring turns more than DEFLECTION: where in the play its chassis is
 SPRING_ANGLE = 40  # rad, deflection of the spring as its own encoder sees it
 TARGETED = 41  # 1 where positions command the bench: then REFERENCE is its command
+BEFORE = 42  # N m, by how much the command that the step begins with exceeds COMMAND, its mean over the step
+AFTER = 43  # N m, likewise the one that it ends with; both 0 where one is held over the whole step
+HELD = 44  # N m, as COMMAND where that jumps from one held value to another; constant where nothing jumps
 
-SIZE = 42
+SIZE = 45

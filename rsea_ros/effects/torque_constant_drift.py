@@ -8,14 +8,15 @@ efficiency of PM motors, IEEE Trans. Ind. Appl. 31, 1995.
 """
 
 from rsea_ros.effects._drift import SETTLING, progress
+from rsea_ros.effects._held import scale
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import COMMAND, DURATION, STEP, TIME, Port
+from rsea_ros.effects.signal_table import DURATION, STEP, TIME, Port
 
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Scale the motor torque as in the middle of the step, after the current was measured."""
-    s[COMMAND] *= 1.0 + p[0] * progress(s[TIME] + 0.5 * s[STEP], s[DURATION], p[1])
+    scale(s, 1.0 + p[0] * progress(s[TIME] + 0.5 * s[STEP], s[DURATION], p[1]))
 
 
 EFFECT = Effect(

@@ -9,15 +9,16 @@ Motors and Drives, 2013, ch. 3 (torque and current).
 
 from collections.abc import Sequence
 
+from rsea_ros.effects._held import scale
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
-from rsea_ros.effects.signal_table import COMMAND, Port
+from rsea_ros.effects.signal_table import Port
 
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Scale the motor torque, after the current was measured."""
-    s[COMMAND] *= p[0]
+    scale(s, p[0])
 
 
 _LOW, _HIGH = 0.2, 3.0

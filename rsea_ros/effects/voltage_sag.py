@@ -9,9 +9,10 @@ Drury, Electric Motors and Drives, 2013, section 3.4 (torque-speed line at const
 
 import math
 
+from rsea_ros.effects._held import both_held, put_both
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import at_limits
-from rsea_ros.effects.signal_table import COMMAND, CURRENT, OUTPUT_VELOCITY, Port
+from rsea_ros.effects.signal_table import CURRENT, OUTPUT_VELOCITY, Port
 
 
 @compiled
@@ -22,7 +23,8 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     x[0] = w
     if not math.isinf(p[0]):
         low, high = min(-p[0] * (1.0 + share), 0.0), max(p[0] * (1.0 - share), 0.0)
-        s[COMMAND] = min(max(s[COMMAND], low), high)
+        before, after = both_held(s)
+        put_both(s, min(max(before, low), high), min(max(after, low), high))
         s[CURRENT] = min(max(s[CURRENT], low), high)
 
 

@@ -61,16 +61,13 @@ def claims_of(law: Law, effect: Effect, rig: Rig, case: Case) -> Claims:
 def _beginning(drive: Drive) -> Drive:
     steps = min(len(drive.command), int(_LONGEST / drive.step))
     kept = {n: at[at <= steps] for n, at in drive.at.items()}
-    impulse = {n: drive.impulse[n][: len(at)] for n, at in kept.items()}
     still = replace(drive, initial=(0.0, 0.0), restarts=())
-    return replace(still, command=drive.command[:steps], at=kept, impulse=impulse)
+    return replace(still, command=drive.command[:steps], at=kept)
 
 
 def _change(law: Law, effect: Effect, rig: Rig, drive: Drive, factor: float) -> Mapping[str, FloatArray]:
     """Return the change of every channel by the law, under the command times a factor."""
-    scaled = replace(
-        drive, command=factor * drive.command, impulse={n: factor * v for n, v in drive.impulse.items()}
-    )
+    scaled = replace(drive, command=factor * drive.command)
     setting = EffectSetting(effect.name, law.parameters)
     linear = rig.with_effects()
     without, with_it = (simulate_drive(r, scaled) for r in (linear, linear.with_effects(setting)))

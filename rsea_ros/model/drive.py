@@ -202,20 +202,6 @@ def mean_of_curve(finer: int, knots: FloatArray, y: FloatArray, count: int) -> F
     return np.concatenate([means, np.full(count, y[-1])])[:count]
 
 
-def beside_mean(knots: FloatArray, y: FloatArray, means: FloatArray, at: FloatArray) -> FloatArray:
-    """Return the integral of the held signal minus the integral of its means, at instants; all in steps."""
-    off_grid = at != np.rint(at)
-    if not off_grid.any() or (knots == np.rint(knots)).all():
-        return np.zeros(len(at))
-    last = float(len(means))
-    end = max(last, float(knots[-1]))
-    held = np.concatenate([[0.0], np.cumsum(y * np.diff(knots, append=end))])
-    stepped = np.concatenate([[0.0], np.cumsum(means)])
-    inside = np.clip(at, 0.0, last)
-    beside = np.interp(inside, np.append(knots, end), held) - np.interp(inside, np.arange(last + 1), stepped)
-    return np.where(off_grid, beside, 0.0)
-
-
 LONGEST_STEP = 4.5e-4
 """s. The step is a whole fraction of the command's period and not longer than this."""
 
@@ -242,7 +228,6 @@ class Drive:
     N m, or of the held target of a position loop, rad, shape (steps,). reference: rad, shape (steps,) or
     empty. angle: measured position at the end of each step, rad, or empty. at: for each channel the
     sampling instants in steps since `start`.
-    impulse: of the held command up to each instant beyond its mean over the step, N m s.
     initial: position (rad) and velocity (rad/s) at the start; spring: what its sensor shows there, where that
     counts. hold: steps in a command period.
     origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
@@ -256,7 +241,6 @@ class Drive:
     start: float
     command: FloatArray
     at: Mapping[str, FloatArray]
-    impulse: Mapping[str, FloatArray]
     reference: FloatArray
     angle: FloatArray
     initial: tuple[float, float]
@@ -277,11 +261,6 @@ class Drive:
     def kinks(self) -> FloatArray:
         """Command by step where velocities have a kink: nowhere for one that does not jump."""
         return self.command if self.jumps else np.zeros(len(self.command))
-
-    @cached_property
-    def impulsive(self) -> frozenset[str]:
-        """The channels that are read where the held command has brought more or less than its mean."""
-        return frozenset(n for n, impulse in self.impulse.items() if impulse.any())
 
     @property
     def drift_time(self) -> float:
@@ -348,11 +327,9 @@ def drive_from(
     means = {"zero": mean_of_held, "first": mean_of_line, "band": partial(mean_of_curve, steps)}
     held = means[hold](knots, torque, count)
     at = {n: in_steps(record[n].t, start, step) for n in OUTPUTS if n in record}
-    beside = {n: beside_mean(knots, torque, held, a) if jumps else np.zeros(len(a)) for n, a in at.items()}
     ends = np.asarray(start + step * np.arange(1, count + 1), np.float64)
     return Drive(
         step=step, start=start, command=held, at=MappingProxyType(at),
-        impulse=MappingProxyType({n: step * b for n, b in beside.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
         angle=angle_at(record, ends),
         initial=(0.0, 0.0) if from_rest else first_state(record) if targeted else initial_state(record),
@@ -370,17 +347,9 @@ def coarser(drive: Drive) -> Drive:
     pairs = drive.command[:steps].reshape(-1, 2)
     if drive.hold % 2 or not np.array_equal(pairs[:, 0], pairs[:, 1]):
         return drive
-    brought = np.concatenate([[0.0], np.cumsum(drive.command[:steps])])
-
-    def beside(at: FloatArray) -> FloatArray:
-        inside, ends = np.clip(at, 0.0, float(steps)), np.arange(steps + 1)
-        pairwise = np.interp(inside, ends[::2], brought[::2])
-        return np.asarray(drive.step * (np.interp(inside, ends, brought) - pairwise))
-
     return replace(
         drive, step=2.0 * drive.step, command=pairs.mean(axis=1),
         at={n: at / 2.0 for n, at in drive.at.items()},
-        impulse={n: i + beside(drive.at[n]) for n, i in drive.impulse.items()},
         reference=drive.reference[:steps:2], angle=drive.angle[1:steps:2], hold=drive.hold // 2,
         restarts=tuple((k // 2, state) for k, state in drive.restarts),
         spans=tuple((first // 2, end // 2) for first, end in drive.spans),

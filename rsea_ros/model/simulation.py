@@ -73,6 +73,22 @@ def _sample_held(values, at):  # type: ignore[no-untyped-def]
     return out
 
 
+@njit(cache=True, nogil=True)
+def _beside_mean(within, at):  # type: ignore[no-untyped-def]
+    """Return the integral of what is held beyond its mean from the begin of a step on, at instants in steps.
+
+    within: HELD, BEFORE and AFTER of each step, N m (model/step.py).
+    """
+    out = np.zeros(len(at))
+    for i in range(len(at)):
+        k = int(max(at[i], 0.0))
+        if k < len(within) and within[k, 1] != within[k, 2]:
+            before, after = within[k, 1], within[k, 2]
+            passed, share = at[i] - k, after / (after - before)
+            out[i] = before * min(passed, share) + after * max(passed - share, 0.0)
+    return out
+
+
 def sample(name: str, values: FloatArray, at: FloatArray, command: FloatArray) -> FloatArray:
     """Return a simulated channel at instants in steps since the start.
 
@@ -179,22 +195,23 @@ def _drive_outputs(
     spans = drive.simulated
     edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
     for part, (first, end) in enumerate(spans):
-        out, kinks = _over_span(machine, rig, drive, ridden, first, end), drive.kinks[first:end]
+        out, within = _over_span(machine, rig, drive, ridden, first, end)
+        kinks, jumps = within[:, 0] if rig.loop is None else drive.kinks[first:end], within[:, 1].any()
         for at, sampled in zip(wanted, results, strict=True):
             for n, k in channels.items():
                 inside = np.searchsorted(edges, at[n]) == part if edges else slice(None)
-                sampled[n][inside] = sample(n, out[:, k], at[n][inside] - first, kinks)
-    for n in drive.impulsive.intersection(channels):
-        for sampled in results:
-            sampled[n] += _kick(machine, n) * drive.impulse[n]
+                since = at[n][inside] - first
+                sampled[n][inside] = sample(n, out[:, k], since, kinks)
+                if jumps and (kick := _kick(machine, n)) != 0.0:
+                    sampled[n][inside] += kick * drive.step * _beside_mean(within, since)
     return results
 
 
 def _over_span(
     machine: Machine, rig: Rig, drive: Drive, ridden: FloatArray, first: int, end: int
-) -> FloatArray:
-    """Return OUTPUTS at the ends of the steps of a span, those at its beginning first."""
-    out = np.empty((end - first + 1, len(OUTPUTS)))
+) -> tuple[FloatArray, FloatArray]:
+    """Return OUTPUTS at the ends of the steps of a span, those at its beginning first, and `within`."""
+    out, within = np.empty((end - first + 1, len(OUTPUTS))), np.empty((end - first, 3))
     torque, reference = drive.command, drive.reference
     if rig.loop is not None:
         torque, reference = np.zeros(len(drive.command)), drive.command
@@ -206,10 +223,13 @@ def _over_span(
         machine.begin(initial, drive.spring if k == 0 else None)
         start = k - first
         out[start] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
-        inputs = StepInputs(torque[k:stop], reference[k:stop], ridden[k:stop], drive.origin + k * drive.step)
+        inputs = StepInputs(
+            torque[k:stop], reference[k:stop], ridden[k:stop], drive.origin + k * drive.step,
+            drive.jumps and rig.loop is None, within[start : stop - first],
+        )  # fmt: skip
         advance(machine.linear, machine.calls, inputs, state, out[start + 1 : stop - first + 1])
         out[start, 2] = out[start + 1, 2]
-    return out
+    return out, within
 
 
 def _instants(rig: Rig, drive: Drive, channel: str, at: FloatArray) -> FloatArray:
@@ -238,7 +258,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
     """Advance a machine over the steps of `command`, in place; `out` gets OUTPUTS of every step."""
     empty = np.empty(0)
     reference, ridden = (empty if v is None else v for v in (reference, ridden))
-    inputs = StepInputs(command, reference, ridden, start)
+    inputs = StepInputs(command, reference, ridden, start, True, np.empty((0, 3)))
     advance(machine.linear, machine.calls, inputs, StepState(machine.x, machine.table, machine.effect_x), out)
 
 

@@ -22,6 +22,7 @@ from numba.extending import intrinsic
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
+from rsea_ros.effects._held import put_beside
 from rsea_ros.records.record import FloatArray, IntArray
 
 
@@ -84,13 +85,17 @@ class StepInputs(NamedTuple):
     """What drives a run of steps.
 
     command: N m, held over each step. reference: rad, target of a position loop; ridden: rad, measured rotor
-    angle at the middle of each step; both may be empty. start: time of the first step, s.
+    angle at the middle of each step; both may be empty. start: time of the first step, s. jumps: the command
+    is held between its stamps. within: gets HELD, BEFORE and AFTER of each step behind the effects, shape
+    (steps, 3); or (0, 3).
     """
 
     command: FloatArray
     reference: FloatArray
     ridden: FloatArray
     start: float
+    jumps: bool
+    within: FloatArray
 
 
 class StepState(NamedTuple):
@@ -183,16 +188,23 @@ def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
 
     Without numba's counted references (_nrt): a count is an atomic addition, and took half of a step.
     """
-    command, reference, ridden, start = inputs
+    command, reference, ridden, start, jumps, within = inputs
     s, effect_x = state.table, state.effect_x
     h, x = s[st.STEP], _state(state.x, linear.rest)
     s_at, p_at, effect_x_at = s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data
-    for k in range(len(command)):
+    last = len(command) - 1
+    for k in range(last + 1):
         s[st.TIME], s[st.COMMAND], s[st.CURRENT] = start + k * h, command[k], command[k]
+        s[st.HELD] = 0.0
+        if jumps:
+            s[st.HELD] = command[k]
+            put_beside(s, command[max(k - 1, 0)], command[min(k + 1, last)])
         if len(reference) > 0:
             s[st.REFERENCE] = reference[k]
         call_port(_COMMAND, calls, s_at, p_at, effect_x_at)
         call_port(_MOTOR, calls, s_at, p_at, effect_x_at)
+        if len(within) > 0:
+            within[k, 0], within[k, 1], within[k, 2] = s[st.HELD], s[st.BEFORE], s[st.AFTER]
         free = end = _free(linear, s[st.COMMAND], x)
         if calls.nonlinear:
             s[st.TIME], s[st.COMMIT] = start + (k + 0.5) * h, 0.0
@@ -217,5 +229,6 @@ def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
         call_port(_SENSOR, calls, s_at, p_at, effect_x_at)
         out[k, 0], out[k, 1], out[k, 2] = s[st.POSITION], s[st.VELOCITY], s[st.CURRENT]
         out[k, 3], out[k, 4] = s[st.FT], s[st.SPRING_ANGLE]
+    s[st.BEFORE] = s[st.AFTER] = 0.0
     for i in range(len(x)):
         state.x[i] = x[i]

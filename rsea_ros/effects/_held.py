@@ -1,0 +1,50 @@
+"""A command that changes within a step: what a law of it makes over the step, to the exact mean.
+
+The step knows the mean m of a held command. Where it lies between the means of its neighbours, m_b and m_a,
+the command changed from one to the other after a share (m_a - m) / (m_a - m_b) of the step. Stamps that are
+not on the grid, and a delay, make such steps. The mean of a clipped command is not the mean command, clipped.
+"""
+
+import math
+
+from rsea_ros.compiler import njit
+from rsea_ros.effects.signal_table import AFTER, BEFORE, COMMAND, STEP
+
+
+@njit(inline="always")
+def put_beside(s, before, after):  # type: ignore[no-untyped-def]
+    """Note the commands (N m) of the steps before and after, where this one's mean lies between them."""
+    s[BEFORE], s[AFTER] = before - s[COMMAND], after - s[COMMAND]
+    if s[BEFORE] * s[AFTER] >= 0.0:
+        s[BEFORE] = s[AFTER] = 0.0
+
+
+@njit(inline="always")
+def both_held(s):  # type: ignore[no-untyped-def]
+    """Return the commands (N m) that the step begins and ends with."""
+    return s[COMMAND] + s[BEFORE], s[COMMAND] + s[AFTER]
+
+
+@njit(inline="always")
+def put_both(s, before, after):  # type: ignore[no-untyped-def]
+    """Put what a law makes of both commands (N m) in their place, and its mean over the step."""
+    share = s[AFTER] / (s[AFTER] - s[BEFORE]) if s[AFTER] != s[BEFORE] else 1.0
+    s[COMMAND] = share * before + (1.0 - share) * after
+    s[BEFORE], s[AFTER] = before - s[COMMAND], after - s[COMMAND]
+
+
+@njit(inline="always")
+def scale(s, gain):  # type: ignore[no-untyped-def]
+    """Multiply the command by a gain."""
+    s[COMMAND] *= gain
+    s[BEFORE] *= gain
+    s[AFTER] *= gain
+
+
+@njit(inline="always")
+def fade(s, time_constant):  # type: ignore[no-untyped-def]
+    """Leave of a jump within the step what has passed a lag (s) in the mean over a step."""
+    steps = time_constant / s[STEP]
+    passed = 1.0 + steps * math.expm1(-1.0 / steps)
+    s[BEFORE] *= passed
+    s[AFTER] *= passed
