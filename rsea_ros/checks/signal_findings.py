@@ -37,8 +37,6 @@ _MOSTLY = 0.5
 _WORTH_TELLING = 0.02
 _LOUD = 10.0
 """Times the rig's noise: friction and play leave up to seven times that without the command's coherence."""
-_MORE = 2.0
-"""Times the rig's noise, from which it is told why that is no fault."""
 _EXCITE = "excite it: `rsea simulate --help` lists the excitations, the node `excite` plays them"
 
 
@@ -81,6 +79,8 @@ def _rest(share: float) -> list[Finding]:
 def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]:
     """Return the noise of every sensor beside the rig's. record: finite values, rising stamps.
 
+    The floor of the spectrum holds what friction and play add; differences from sample to sample do not. Both
+    must be loud; else the smaller is the noise, and not less than what the rig states.
     but: channels of which a part was masked and bridged.
     """
     findings = []
@@ -88,8 +88,9 @@ def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]
         if name not in record or name in but or "command" not in record or len(record[name]) < 64:
             continue
         stated = max(sensor.noise, 0.5 * sensor.quantum)
-        noise = noise_floor(record, name, sensor)
-        loud = stated > 0.0 and min(noise, _rough(record[name])) > _LOUD * stated and name != "motor_torque"
+        floor, rough = noise_floor(record, name, sensor), _rough(record[name])
+        loud = stated > 0.0 and min(floor, rough) > _LOUD * stated and name != "motor_torque"
+        noise = floor if loud else min(floor, max(rough, stated))
         unit = UNITS[name]
         findings.append(
             Finding(
@@ -107,11 +108,10 @@ def _rough(channel: Channel) -> float:
 
 
 def _times(noise: float, stated: float) -> str:
-    """Return the noise over the rig's, and what may make it larger without a fault of the sensor."""
+    """Return the noise over the rig's."""
     if stated <= 0.0:
         return "the rig states none"
-    larger = ", as friction and play may make it" if _MORE < noise / stated <= _LOUD else ""
-    return f"{noise / stated:.2g} times the rig's{larger}"
+    return f"{noise / stated:.2g} times the rig's"
 
 
 _LARGE, _FAR = 1.0, 3.0
