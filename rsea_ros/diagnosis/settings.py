@@ -133,6 +133,10 @@ class FitSettings:
         20.0, "1", "times the noise up to which that fall grows with the residual",
         "small falls of a residual far above the noise mean nothing",
     )  # fmt: skip
+    step_error: float = number(
+        0.25, "1", "of the noise: change by half a step from which a model is simulated on shorter ones",
+        "adds 3 % to a residual of noise alone; a finished search asks for 4 %",
+    )  # fmt: skip
     final_gain: float = number(
         1e-6, "1", "the same for the models that are tested", "far below the doubt of a parameter"
     )

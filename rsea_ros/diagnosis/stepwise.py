@@ -26,6 +26,7 @@ from rsea_ros.diagnosis.candidate import (
     effect_size,
     fit_candidate,
     leaves_only_noise,
+    on_fine_steps,
     prior_cost,
     refit,
     rescore,
@@ -228,7 +229,7 @@ def select_stepwise(
             break
         rivals[step.accepted.newest] = step.equals
         trials.append(trial_of(step.accepted, step.accepted.newest, current, "replaced"))
-        models.append(refit(with_noise_reestimated(step.accepted), setup))
+        models.append(on_fine_steps(refit(with_noise_reestimated(step.accepted), setup), setup))
     cases = models[-1].cases
     return Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)
 

@@ -8,7 +8,7 @@ import slow
 from random_rigs import WITH_SPRING
 
 from rsea_ros.errors import ChannelError, IdentificationError
-from rsea_ros.model.drive import LONGEST_STEP, coarser, drive_from, steps_per_sample
+from rsea_ros.model.drive import LONGEST_STEP, coarser, drive_from, finer, steps_per_sample
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, simulate_drive
@@ -223,3 +223,18 @@ def test_what_becomes_of_a_command_that_changes_within_a_step_is_known_there_too
     coarse, fine = (simulate_drive(rig, drive_from(record, refine=n)) for n in (1, 16))
     for channel in SIGNALS:
         assert np.std(coarse[channel] - fine[channel]) < 0.15 * rig.sensors[channel].noise
+
+
+@pytest.mark.parametrize("hold", ["zero", "first"])
+def test_a_finer_drive_is_that_of_the_record_on_half_the_step(hold):
+    dice = np.random.default_rng(5)
+    t = np.cumsum(2.5e-3 * (0.7 + dice.exponential(0.3, 400)))
+    record = record_of(t, white(400), t[5:])
+    halved, read = finer(drive_from(record, hold=hold)), drive_from(record, hold=hold, refine=2)
+    assert halved.step == pytest.approx(read.step) and halved.hold == read.hold
+    if hold == "zero":
+        np.testing.assert_allclose(halved.command, read.command[: len(halved.command)], atol=1e-9)
+    rig = load_rig("paper_moving_output")
+    ours, theirs = (simulate_drive(rig, d) for d in (halved, read))
+    for channel in SIGNALS:
+        assert np.std(ours[channel] - theirs[channel]) < 0.3 * rig.sensors[channel].noise
