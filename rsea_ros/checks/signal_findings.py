@@ -37,6 +37,8 @@ _MOSTLY = 0.5
 _WORTH_TELLING = 0.02
 _LOUD = 10.0
 """Times the rig's noise: friction and play leave up to seven times that without the command's coherence."""
+_MORE = 2.0
+"""Times the rig's noise, from which a motion that is as rough explains it."""
 _EXCITE = "excite it: `rsea simulate --help` lists the excitations, the node `excite` plays them"
 
 
@@ -108,10 +110,11 @@ def _rough(channel: Channel) -> float:
 
 
 def _times(noise: float, stated: float) -> str:
-    """Return the noise over the rig's."""
+    """Return the noise over the rig's: an upper bound where a motion as rough would look the same."""
     if stated <= 0.0:
         return "the rig states none"
-    return f"{noise / stated:.2g} times the rig's"
+    times = f"{noise / stated:.2g} times the rig's"
+    return f"at most {times}: the motion may be as rough" if _MORE < noise / stated <= _LOUD else times
 
 
 _LARGE, _FAR = 1.0, 3.0
