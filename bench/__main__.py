@@ -11,24 +11,22 @@ lines `name: …` of its text are their help.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import importlib
 import inspect
-import io
 import re
 import sys
 import tempfile
 import time
 import typing
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
 
 # isort: split
-from bench.results import Row, add_run, keep_last, tables_of, write_pages
-from bench.topics import DRIVER, EVERY, TOPICS, index
+from bench.results import Row, add_run, keep_last, write_pages
+from bench.topics import EVERY, TOPICS, index
 
 
 def main(argv: Sequence[str]) -> int:
@@ -79,12 +77,8 @@ def _parser(topic: str, functions: dict[str, Callable[..., Any]]) -> argparse.Ar
 
 
 def _parameters(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
-    """Return what a function takes; the sections of the driver take all of DRIVER as one namespace."""
-    taken = dict(inspect.signature(function).parameters)
-    if "args" not in taken:
-        return taken
-    option = inspect.Parameter.KEYWORD_ONLY
-    return {n: inspect.Parameter(n, option, default=value) for n, value in DRIVER.items()}
+    """Return what a function takes of the command line: all but an empty `folder`."""
+    return {n: p for n, p in inspect.signature(function).parameters.items() if n != "folder"}
 
 
 def _add(parser: argparse.ArgumentParser, p: inspect.Parameter, kind: Any, told: str) -> None:
@@ -123,36 +117,40 @@ def _one_of(choices: Sequence[str]) -> Callable[[str], str]:
     return read
 
 
-class _Both(io.StringIO):
-    """Text that is printed and kept."""
-
-    def write(self, text: str) -> int:
-        if sys.__stdout__ is not None:
-            sys.__stdout__.write(text)
-            sys.__stdout__.flush()
-        return super().write(text)
-
-
 def _run(topic: str, name: str, function: Callable[..., Any], args: argparse.Namespace) -> int:
-    """Run a section: its rows are what it yields, or the tables and lines that it prints."""
-    begin, said, rows = time.monotonic(), _Both(), list[Row]()
+    """Run a section: print and keep its tables and lines."""
+    begin = time.monotonic()
     print(f"== {topic} {name}")
-    with contextlib.redirect_stdout(said), tempfile.TemporaryDirectory() as folder:
-        taken = inspect.signature(function).parameters
-        given = {n: getattr(args, n) for n in _parameters(function)}
-        result = function(args, Path(folder)) if "args" in taken else _called(function, given)
-        for row in result if isinstance(result, Iterable) else ():
-            rows.append(Row(*row) if isinstance(row, tuple) else Row(row, "", ""))
-            widths = zip(rows[-1], (58, 22, 0), strict=True)
-            print("".join(f"{text!s:{width}} " for text, width in widths), flush=True)
-    add_run(topic, name, [rows] if rows else tables_of(said.getvalue()), time.monotonic() - begin)
-    return result if isinstance(result, int) else 0
+    with tempfile.TemporaryDirectory() as folder:
+        arguments = inspect.signature(function).bind_partial()
+        given = {"folder": Path(folder), **vars(args)}
+        arguments.arguments.update({n: given[n] for n in arguments.signature.parameters})
+        tables, status = _print(iter(function(*arguments.args, **arguments.kwargs)))
+    add_run(topic, name, tables, time.monotonic() - begin)
+    return status
 
 
-def _called(function: Callable[..., Any], given: dict[str, Any]) -> Any:
-    arguments = inspect.signature(function).bind_partial()
-    arguments.arguments.update(given)
-    return function(*arguments.args, **arguments.kwargs)
+def _print(rows: Iterator[Row | tuple[Any, ...] | str]) -> tuple[list[list[Row]], int]:
+    """Print what a section yields; return its tables, or its lines as one, and what it returns at its end."""
+    tables, lines, head = list[list[Row]](), list[Row](), tuple[str, ...]()
+    while True:
+        try:
+            row = next(rows)
+        except StopIteration as end:
+            return tables or [lines], end.value or 0
+        if isinstance(row, str):
+            head = ()
+            lines.append(Row(row.strip(), "", ""))
+            print(row, flush=True)
+            continue
+        row = Row(*row)
+        (names, cells), before = row.cells(), head
+        head = names
+        if head != before:
+            tables.append([])
+            print(f"\n| {' | '.join(head)} |\n|{'---|' * len(head)}")
+        tables[-1].append(row)
+        print(f"| {' | '.join(cells)} |", flush=True)
 
 
 if __name__ == "__main__":

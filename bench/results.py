@@ -33,6 +33,17 @@ class Row(NamedTuple):
     required: str
     measured: str | Mapping[str, str]
 
+    def cells(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Return head and cells of it in a table."""
+        each = {"measured": self.measured} if isinstance(self.measured, str) else self.measured
+        asked = {"required": self.required} if self.required or isinstance(self.measured, str) else {}
+        return ("row", *asked, *each), tuple(map(_cell, (self.row, *asked.values(), *each.values())))
+
+
+def _cell(text: str) -> str:
+    """Return a text as it may stand in a table."""
+    return re.sub(r"(?<!\\)\|", r"\\|", text)
+
 
 def read_lines(path: Path) -> list[dict[str, Any]]:
     """Return the entries of a file of JSON lines; none if it does not exist."""
@@ -77,23 +88,6 @@ def add_run(topic: str, section: str, tables: Sequence[Sequence[Row]], seconds: 
             append_line(RUNS, {"topic": topic, "section": name, **row._asdict(), **run})
 
 
-def tables_of(text: str) -> list[list[Row]]:
-    """Return the rows of each Markdown table in a text, or its lines as one where it has none."""
-    tables: list[list[Row]] = []
-    head: list[str] = []
-    for line in text.splitlines():
-        if not line.startswith("|"):
-            head = []
-        elif not head:
-            head = _cells(line)
-            tables.append([])
-        elif set(line) - set("|-: "):
-            first, *cells = _cells(line)
-            values = dict(zip(head[1:], cells, strict=False))
-            tables[-1].append(Row(first, values.pop("required", ""), values))
-    return tables or [[Row(line.strip(), "", "") for line in text.splitlines() if line.strip()]]
-
-
 def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip())[1:-1]]
 
@@ -136,7 +130,7 @@ def _table(found: re.Match[str], kept: Sequence[Mapping[str, Any]]) -> str:
     rows = [r for r in kept if (r["topic"], r["section"]) == (topic, section)]
     if not rows:
         raise SystemExit(f"{topic} {section}: no row in {KEPT}, expected those of a table of docs/")
-    text = "".join(f"| {' | '.join(_columns(r, _cells(head)))} |\n" for r in rows)
+    text = "".join(f"| {' | '.join(map(_cell, _columns(r, _cells(head))))} |\n" for r in rows)
     return f"<!-- rows: {topic} {section} -->\n{head}{rule}{text}"
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from bench import ROOT
 
@@ -19,37 +18,34 @@ def _mains(*modules: str) -> dict[str, str]:
 
 TOPICS: Mapping[str, Mapping[str, str]] = {
     "driver": {
-        **{name: f"{name}:{name}" for name in ("timing", "loss", "faults")},
-        "random": "random_faults:random_faults", **_named("controller", "controller", "restarts"),
-        "stream": "stream:stream", "fuzz": "fuzz:fuzz",
+        "timing": "timing:timing", "faults": "faults:faults", "random": "random_faults:random_faults",
+        **_named("controller", "controller", "restarts"),
     },
     "observer": {
-        "rigs": "errors:rigs", "lacks": "lacks:lacks", "noise": "flag:noise",
-        "flag": "flag_error:flag", "tight": "tight:tight", "timing": "timing:timing",
+        "lacks": "lacks:lacks", "noise": "flag:noise",
+        "flag": "flag:flag", "tight": "timing:tight", "timing": "timing:timing",
     },
-    "health": _named("score", "alarms", "faults", "cost", "node"),
-    "diagnosis": _mains("score", "coverage", "overlap", "intervals", "settings", "model_doubt"),
+    "health": _named("score", "alarms", "faults", "node"),
+    "diagnosis": {
+        "score": "score", **_named("hidden", "coverage", "overlap"),
+        **_mains("intervals", "settings", "model_doubt"),
+    },
     "frozen": _mains("play", "ablation"),
     "calibration": _named("run", "make", "fit", "score"),
-    "control": _mains("tables", "nodes"),
-    "experiment": _named("score", "causes", "summary", "wire", "limits"),
-    "fleet": _mains("cost", "faults", "trends", "trends_played", "pages"),
+    "control": _mains("tables"),
+    "experiment": _named("score", "causes", "summary", "limits"),
+    "fleet": {"cost": "cost", **_named("trends", "trends", "pages")},
     "inputs": _mains("score"),
-    "laws": _mains("score", "real"),
+    "laws": _mains("score"),
     "mutants": _mains("score"),
-    "packaging": _mains("pythons", "pages", "exports", "watch"),
+    "packaging": _mains("pythons", "watch"),
     "peers": _mains("score"),
     "public": _mains("score", "emps"),
 }  # fmt: skip
 """By topic the sections, each a `module:function`, or a module's `main`: it yields rows (what, required,
-measured) or lines, or prints, and returns the exit status. The first is run where none is named."""
+measured) and lines, and returns the exit status. The first is run where none is named."""
 EVERY = ("driver", "observer", "health")
 """Topics of which all sections are run where none is named."""
-DRIVER: Mapping[str, Any] = {
-    "seconds": 30.0, "rate": (280.0, 1000.0), "priority": (0, 80), "strings": 1_000_000, "minutes": 1.0,
-    "seed": 1,
-}  # fmt: skip
-"""The options that the sections of the driver share, as one namespace beside a folder."""
 
 
 def index() -> Iterator[tuple[str, str, str]]:

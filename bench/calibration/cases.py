@@ -14,10 +14,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from independent.bench import drawn_bench, record_command
 from independent.excitations import chirp_noise, odd_multisine
-from independent.hidden import OFF_CATALOGUE, hide, hide_off_catalogue
+from independent.hidden import OFF_CATALOGUE
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
 
 from bench.calibration.laws import LAWS, RATE
+from bench.diagnosis.cases import RIG, hide_all, kin_of
+from bench.diagnosis.commands import work
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.model.rig_file import load_rig
@@ -93,7 +95,7 @@ def _plan(k: int, rng: np.random.Generator) -> Plan:
         duration=float(rng.choice((10.0, 12.0))),
         hidden=hidden,
         off=off,
-        without=_kin(names[0]) if group == "taken_out" else _unknown(family, off),
+        without=kin_of(names[0]) if group == "taken_out" else _unknown(family, off),
         coloured=float(rng.choice((0.0, 0.0, 0.05, 0.2))),
     )
 
@@ -126,12 +128,6 @@ def _drawn_effects(family: str, count: int, rng: np.random.Generator) -> list[st
     return chosen
 
 
-def _kin(name: str) -> tuple[str, ...]:
-    effects = catalogue()
-    alike = [n for n, e in effects.items() if name in e.claims.confusable_with]
-    return (name, *dict.fromkeys([*effects[name].claims.confusable_with, *alike]))
-
-
 def simulate_plan(plan: Plan) -> tuple[Record, Rig]:
     """Simulate a plan; return the record and the rig that a user would diagnose it with."""
     rng = np.random.default_rng(plan.seed)
@@ -149,35 +145,10 @@ def _command(plan: Plan, rng: np.random.Generator) -> FloatArray:
     return levels + noise * rng.normal(size=len(levels))
 
 
-def work(duration: float, rng: np.random.Generator, smooth: bool) -> FloatArray:
-    """Return a log of normal work, -1 to 1: levels held for 0.2 to 1.2 s, smoothed moves between if asked."""
-    held = levels(round(duration * RATE), rng)
-    return smoothed(held, 0.15) if smooth else held
-
-
-def levels(n: int, rng: np.random.Generator, seconds: tuple[float, float] = (0.2, 1.2)) -> FloatArray:
-    """Return n samples of levels, -1 to 1, each held for some seconds."""
-    held: list[FloatArray] = []
-    while sum(map(len, held)) < n:
-        held.append(np.full(round(rng.uniform(*seconds) * RATE), rng.uniform(-1.0, 1.0)))
-    return np.concatenate(held)[:n]
-
-
-def smoothed(values: FloatArray, seconds: float) -> FloatArray:
-    """Return values under a Hann window of some seconds."""
-    window = np.hanning(round(seconds * RATE) + 2)[1:-1]
-    smooth: FloatArray = np.convolve(values, window / window.sum(), mode="same")
-    return smooth
-
-
 def _second(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
-    bench = drawn_bench(rng)
-    for effect, parameters in plan.hidden.items():
-        bench = hide(bench, effect, parameters)
-    if plan.off:
-        bench = hide_off_catalogue(bench, *plan.off)
+    bench = hide_all(drawn_bench(rng), plan.hidden, plan.off)
     record = record_command(bench, _command(plan, rng), rng)
-    return _with_colour(record, plan, rng), load_rig("paper_high_impedance")
+    return _with_colour(record, plan, rng), load_rig(RIG)
 
 
 def _simulate(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
@@ -225,7 +196,7 @@ def rig_of(family: str) -> Rig:
     """Return the rig of a family as a user would state it."""
     if family == "rigid":
         return replace(load_rig("bare_drive"), controller=PositionLoop(15.0, 120.0, 200.0))
-    rig = load_rig("paper_high_impedance")
+    rig = load_rig(RIG)
     if family == "loop":
         return replace(rig, controller=PositionLoop(15.0, 80.0, 80.0))
     if family != "sea":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,39 +64,33 @@ def _sensor(channel: str, error: Callable[..., FloatArray]) -> Callable:
     return apply
 
 
+def _walk(rng: np.random.Generator, y: FloatArray) -> FloatArray:
+    return np.cumsum(rng.normal(size=len(y))) / np.sqrt(RATE)
+
+
+DRIVEN, WITH_FT = ("open", "sea"), ("open", "sea", "loop")
+FT: Mapping[str, tuple[Callable[..., FloatArray], str]] = {
+    "quadratic_ft": (lambda y, t, rng: 0.004 * y**2, ""),
+    "thermal_ft": (lambda y, t, rng: -np.expm1(-t / (0.2 * t[-1])), "ft_drift"),
+    "walking_ft": (lambda y, t, rng: 0.15 * _walk(rng, y), ""),
+    "cubic_ft": (lambda y, t, rng: 2.0e-4 * y**3 / (1.0 + 0.01 * y**2), ""),
+}
+TORQUE: Mapping[str, Callable[..., FloatArray]] = {
+    "torque_by_position": lambda y, t, rng: 1.5 * np.sin(2.0 * np.pi * t / 1.7),
+    "torque_squared": lambda y, t, rng: 0.01 * y * np.abs(y),
+    "torque_walk": lambda y, t, rng: 0.5 * _walk(rng, y),
+}
 LAWS = {
-    "dead_zone": Law(("open", "sea"), command=_dead_zone, known_as="dead_zone"),
-    "rate_limit": Law(("open", "sea"), command=_rate_limit),
-    "fade": Law(("open", "sea"), command=_fade, known_as="torque_constant_drift"),
-    "one_sided_gain": Law(("open", "sea"), command=_one_sided),
-    "overshoot": Law(("open", "sea"), command=_overshoot, known_as="current_loop_overshoot"),
-    "quadratic_ft": Law(("open", "sea", "loop"), sensor=_sensor("ft", lambda y, t, rng: 0.004 * y**2)),
-    "thermal_ft": Law(
-        ("open", "sea", "loop"),
-        sensor=_sensor("ft", lambda y, t, rng: -np.expm1(-t / (0.2 * t[-1]))),
-        known_as="ft_drift",
-    ),
-    "walking_ft": Law(
-        ("open", "sea", "loop"),
-        sensor=_sensor("ft", lambda y, t, rng: 0.15 * np.cumsum(rng.normal(size=len(y))) / np.sqrt(RATE)),
-    ),
-    "cubic_ft": Law(
-        ("open", "sea", "loop"), sensor=_sensor("ft", lambda y, t, rng: 2.0e-4 * y**3 / (1.0 + 0.01 * y**2))
-    ),
+    "dead_zone": Law(DRIVEN, command=_dead_zone, known_as="dead_zone"),
+    "rate_limit": Law(DRIVEN, command=_rate_limit),
+    "fade": Law(DRIVEN, command=_fade, known_as="torque_constant_drift"),
+    "one_sided_gain": Law(DRIVEN, command=_one_sided),
+    "overshoot": Law(DRIVEN, command=_overshoot, known_as="current_loop_overshoot"),
+    **{name: Law(WITH_FT, sensor=_sensor("ft", law), known_as=known) for name, (law, known) in FT.items()},
     "eccentric_encoder": Law(
-        ("open", "sea", "loop"),
-        sensor=_sensor("position", lambda y, t, rng: 1.0e-4 * np.sin(502.0 * y)),
+        WITH_FT, sensor=_sensor("position", lambda y, t, rng: 1.0e-4 * np.sin(502.0 * y)),
         known_as="encoder_eccentricity",
     ),
-    "torque_by_position": Law(
-        ("rigid",), sensor=_sensor("motor_torque", lambda y, t, rng: 1.5 * np.sin(2.0 * np.pi * t / 1.7))
-    ),
-    "torque_squared": Law(("rigid",), sensor=_sensor("motor_torque", lambda y, t, rng: 0.01 * y * np.abs(y))),
-    "torque_walk": Law(
-        ("rigid",),
-        sensor=_sensor(
-            "motor_torque", lambda y, t, rng: 0.5 * np.cumsum(rng.normal(size=len(y))) / np.sqrt(RATE)
-        ),
-    ),
-}
+    **{name: Law(("rigid",), sensor=_sensor("motor_torque", law)) for name, law in TORQUE.items()},
+}  # fmt: skip
 """Laws outside the catalogue by name."""

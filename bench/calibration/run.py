@@ -1,15 +1,10 @@
-"""Make, fit and score the probabilities of causes.
-
-python -m bench calibration make           diagnose records of known truth (resumes)
-python -m bench calibration fit            coefficients, from the project's own plants
-python -m bench calibration score          reliability, Brier score, wrong names, on the other
-"""
+"""Make, fit and score the probabilities of causes."""
 
 from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -18,7 +13,7 @@ from typing import Any
 from bench import ROOT
 from bench.calibration import score as scores
 from bench.calibration.cases import Plan, plans, simulate_plan
-from bench.results import read_lines, resumed
+from bench.results import Row, read_lines, resumed
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.criteria import is_at_floor
 from rsea_ros.diagnosis.diagnose import nominal_problem, search
@@ -31,7 +26,7 @@ CACHE = Path("out/calibration/evidence.jsonl")
 TABLE = ROOT / "rsea_ros/diagnosis/naming/status.py"
 
 
-def make(*, cache: Path = CACHE, records: int = 600, seed: int = 12) -> None:
+def make(*, cache: Path = CACHE, records: int = 600, seed: int = 12) -> Iterator[str]:
     """Diagnose records of known truth and keep the evidence; goes on where it stopped.
 
     cache: JSON lines, a record each
@@ -40,10 +35,10 @@ def make(*, cache: Path = CACHE, records: int = 600, seed: int = 12) -> None:
     """
     works = ((plan.name, partial(_entry, plan)) for plan in plans(records, seed))
     for entry in resumed(cache, works, "name"):
-        print(_line(entry), flush=True)
+        yield _line(entry)
 
 
-def fit(*, cache: Path = CACHE) -> None:
+def fit(*, cache: Path = CACHE) -> Iterator[str]:
     """Fit the coefficients to the plants that do not judge, and write their table.
 
     cache: JSON lines, a record each
@@ -53,22 +48,19 @@ def fit(*, cache: Path = CACHE) -> None:
     items = "".join(f'        "{name}": {value},\n' for name, value in coefficients.items())
     head, _, _ = TABLE.read_text().partition("COEFFICIENTS = ")
     TABLE.write_text(f"{head}COEFFICIENTS = MappingProxyType(\n    {{\n{items}    }}\n)\n")
-    print(f"{len(entries)} records of {', '.join(sorted({e['family'] for e in entries}))}: {TABLE}")
-    print("\n".join(f"{name:<12}{value:8.3f}" for name, value in coefficients.items()))
+    yield f"{len(entries)} records of {', '.join(sorted({e['family'] for e in entries}))}: {TABLE}"
+    yield from (f"{name:<12}{value:8.3f}" for name, value in coefficients.items())
 
 
-def score(*, cache: Path = CACHE, svg: Path | None = None) -> None:
+def score(*, cache: Path = CACHE) -> Iterator[Row | str]:
     """Score the probabilities on the plant that judges, and on those of the fit.
 
     cache: JSON lines, a record each
-    svg: gets the reliability diagram
     """
     for title, chosen in (("The plant that judges", True), ("The plants that were fitted to", False)):
         entries = [e for e in usable(cache) if (e["family"] == scores.JUDGES) == chosen]
-        causes = list(scores.probabilities_of(entries))
-        print(f"**{title}**: {len(entries)} records", "", *scores.table(causes), "", sep="\n")
-        if chosen and svg:
-            svg.write_text(scores.diagram(scores.reliability(causes)))
+        yield f"\n**{title}**: {len(entries)} records"
+        yield from scores.table(list(scores.probabilities_of(entries)))
 
 
 def usable(cache: Path) -> list[dict[str, Any]]:
@@ -105,17 +97,14 @@ def _weigh(plan: Plan) -> dict[str, Any]:
 
 def _place(place: CauseAndRivals) -> list[dict[str, Any]]:
     """Return the evidence for a cause and its rivals, with the size that each has."""
-    return [
-        asdict(w.evidence) | {"values": _values(w.claim.problem, w.claim.theta, w.claim.name)}
-        for w in (place.cause, *place.rivals)
-    ]
-
-
-def _values(problem: Any, theta: Any, name: str) -> dict[str, float]:
-    unknowns_of_cause = [
-        (u, t) for u, t in zip(problem.unknowns, theta, strict=True) if u.name.startswith(name + ".")
-    ]
-    return {u.name.split(".")[1]: u.outer(float(t)) for u, t in unknowns_of_cause}
+    weighed = []
+    for w in (place.cause, *place.rivals):
+        sizes = zip(w.claim.problem.unknowns, w.claim.theta, strict=True)
+        values = {
+            u.name.split(".")[1]: u.outer(float(t)) for u, t in sizes if u.name.startswith(f"{w.claim.name}.")
+        }
+        weighed.append(asdict(w.evidence) | {"values": values})
+    return weighed
 
 
 def _line(entry: Mapping[str, Any]) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from bench.results import Row
 from rsea_ros.diagnosis.naming.evidence import Evidence, Signature
 from rsea_ros.diagnosis.naming.flexible import Flexible
 from rsea_ros.diagnosis.naming.status import COEFFICIENTS, features, probabilities_and_status
@@ -31,16 +31,13 @@ _RIDGE = 1.0
 """Of each coefficient, the intercept apart: a standard deviation of 1 around what is expected."""
 _ITERATIONS = 50
 EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.85, 0.95, 0.99, 1.0)
-"""Of the bins of the reliability diagram; 0.85 to 0.95 are the causes with a probability of about 90 %."""
+"""Of the bins of the reliability; 0.85 to 0.95 are the causes with a probability of about 90 %."""
 
 
-@dataclass(frozen=True)
-class Said:
+class Said(NamedTuple):
     """One named cause of one record: its probability, whether it is right, whether it is only a rival."""
 
-    record: str
     group: str
-    name: str
     probability: float
     status: str | None
     right: bool
@@ -48,8 +45,7 @@ class Said:
     has_right_rival: bool
 
 
-@dataclass(frozen=True)
-class Bin:
+class Bin(NamedTuple):
     """Causes with a probability of low to high: how many, their mean probability, the share that is right."""
 
     low: float
@@ -98,10 +94,8 @@ def probabilities_of(
             likely, status = probabilities_and_status(evidence, record["at_floor"], coefficients=coefficients)
             rights = [e.name in record["truth"] for e in evidence]
             rest = any(rights[1:])
-            for k, (e, p, right) in enumerate(zip(evidence, likely, rights, strict=True)):
-                yield Said(
-                    record["name"], record["group"], e.name, p, None if k else status, right, k > 0, rest
-                )
+            for k, (p, right) in enumerate(zip(likely, rights, strict=True)):
+                yield Said(record["group"], p, None if k else status, right, k > 0, rest)
 
 
 def reliability(causes: Sequence[Said]) -> list[Bin]:
@@ -115,53 +109,21 @@ def reliability(causes: Sequence[Said]) -> list[Bin]:
     return bins
 
 
-def brier(causes: Sequence[Said]) -> float:
-    """Return the mean square of probability less outcome."""
-    return float(np.mean([(c.probability - c.right) ** 2 for c in causes]))
+def table(causes: Sequence[Said]) -> Iterator[Row | str]:
+    """Yield the Brier score of the probabilities, their reliability, and how many of each status are right.
 
-
-def table(causes: Sequence[Said]) -> list[str]:
-    """Return the score of the probabilities as lines of Markdown."""
-    lines = [f"{len(causes)} causes and rivals weighed, Brier score {brier(causes):.3f}", ""]
-    lines += ["| stated probability | causes | mean stated | right |", "|---|--:|--:|--:|"]
+    `one_of` is right when one of its rivals is.
+    """
+    brier = float(np.mean([(c.probability - c.right) ** 2 for c in causes]))
+    yield f"{len(causes)} causes and rivals weighed, Brier score {brier:.3f}"
     for b in reliability(causes):
-        lines.append(f"| {b.low:.2f} to {b.high:.2f} | {b.count} | {b.said:.2f} | {b.right:.2f} |")
-    lines += ["", "| status | causes | right | wrong | wrong, % | of the wrong, law not in the catalogue |"]
-    lines += ["|---|--:|--:|--:|--:|--:|"]
-    return [*lines, *(_status_line(causes, status) for status in ("confirmed", "leading", "one_of", None))]
-
-
-def _status_line(causes: Sequence[Said], status: str | None) -> str:
-    """Return how many causes of a status are right; `one_of` is when one of its rivals is."""
-    of = [c for c in causes if not c.is_rival and c.status == status]
-    wrong = [c for c in of if not (c.right or (status == "one_of" and c.has_right_rival))]
-    outside = [c for c in wrong if c.group.startswith(OUTSIDE)]
-    share = 100.0 * len(wrong) / max(len(of), 1)
-    counts = f"{len(of)} | {len(of) - len(wrong)} | {len(wrong)} | {share:.1f} | {len(outside)}"
-    return f"| {status or 'not named'} | {counts} |"
-
-
-def diagram(bins: Sequence[Bin]) -> str:
-    """Return the reliability diagram as SVG: share that is right over stated probability, size by count."""
-    size, edge = 320.0, 40.0
-    at = [(edge + size * b.said, edge + size * (1.0 - b.right)) for b in bins]
-    dots = "".join(
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{3.0 + np.sqrt(b.count):.1f}" fill="#0072b2" opacity="0.6">'
-        f"<title>{b.count} causes said with {b.said:.2f}: {b.right:.2f} right</title></circle>"
-        for (x, y), b in zip(at, bins, strict=True)
-    )
-    marks = "".join(
-        f'<text x="{edge + size * v:.0f}" y="{edge + size + 16:.0f}" text-anchor="middle">{v:g}</text>'
-        f'<text x="{edge - 6:.0f}" y="{edge + size * (1.0 - v) + 4:.0f}" text-anchor="end">{v:g}</text>'
-        for v in (0.0, 0.25, 0.5, 0.75, 1.0)
-    )
-    whole = size + 2.0 * edge
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {whole:g} {whole:g}" font-family="sans-serif" '
-        f'font-size="12"><rect width="{whole:g}" height="{whole:g}" fill="#fff"/>'
-        f'<rect x="{edge:g}" y="{edge:g}" width="{size:g}" height="{size:g}" fill="none" stroke="#999"/>'
-        f'<path d="M{edge:g} {edge + size:g}L{edge + size:g} {edge:g}" stroke="#999" stroke-dasharray="4 4"/>'
-        f'{marks}{dots}<text x="{edge + size / 2:g}" y="{whole - 8:g}" text-anchor="middle">'
-        f'stated probability</text>'
-        f'<text x="{edge:g}" y="{edge - 12:g}">share that is right; area by count</text></svg>\n'
-    )
+        told = {"causes": str(b.count), "mean stated": f"{b.said:.2f}", "right": f"{b.right:.2f}"}
+        yield Row(f"{b.low:.2f} to {b.high:.2f}", "", told)
+    for status in ("confirmed", "leading", "one_of", None):
+        of = [c for c in causes if not c.is_rival and c.status == status]
+        wrong = [c for c in of if not (c.right or (status == "one_of" and c.has_right_rival))]
+        counts = {"causes": len(of), "right": len(of) - len(wrong), "wrong": len(wrong)}
+        told = {n: str(count) for n, count in counts.items()}
+        told |= {"wrong, %": f"{100.0 * len(wrong) / max(len(of), 1):.1f}"}
+        outside = sum(c.group.startswith(OUTSIDE) for c in wrong)
+        yield Row(status or "not named", "", told | {"of the wrong, law not in the catalogue": str(outside)})

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
+from bench.results import Row
 from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.law import Gains
 from rsea_ros.control.study import amplitude_of, disturbed_rig
@@ -203,8 +204,8 @@ def ours(rig: Rig, rate: float, gains: Gains) -> Step:
     return lambda ft, velocity, r: controller.step(Measurement(ft, velocity, 0.0), r)
 
 
-def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
-    """Print the gains of each, and its error on each bench; some minutes a rate."""
+def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[Row | str]:
+    """Print the gains of each, and its error of 5 Hz on each bench, %; some minutes a rate."""
     loads = load_range(rig, free)
     for rate in rates:
         made: dict[str, Callable[[], Step]] = {}
@@ -212,14 +213,13 @@ def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
             yield f"{rate:g} Hz, {name}: {', '.join(f'{value:.3g}' for value in x) or 'no gains'}"
             made[name] = partial(METHODS[name][0], rig, 1.0 / rate, x)
         made["this project's"] = partial(ours, rig, rate, design(rig, loads, rate).gains)
-        yield f"| {rate:g} Hz, error of 5 Hz, % | " + " | ".join(cases()) + " |"
         for name, begin in made.items():
-            cells = []
-            for case in cases().values():
+            cells = {}
+            for where, case in cases().items():
                 amplitude = amplitude_of(variant_rig(loads[case.load], case))
                 error = error_of(begin(), disturbed_rig(loads, case), rate, amplitude, case.samples)
-                cells.append(f"{100.0 * error:.1f}" if error < UNSTABLE else "unstable")
-            yield f"| {name} | " + " | ".join(cells) + " |"
+                cells[where] = f"{100.0 * error:.1f}" if error < UNSTABLE else "unstable"
+            yield Row(name, "", cells)
 
 
 _searched: dict[str, Any] = {}

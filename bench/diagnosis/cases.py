@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import permutations
 
 import numpy as np
@@ -14,6 +16,7 @@ from independent.bench import Bench, drawn_bench, record_run
 from independent.faults import FAULTS
 from independent.hidden import (
     BESIDE_THE_CONTRACT,
+    CATALOGUE,
     OFF_CATALOGUE,
     hide,
     hide_beside_the_contract,
@@ -21,11 +24,31 @@ from independent.hidden import (
 )
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
 
-from bench.diagnosis.played import Played
+from bench import SHARED
+from bench.diagnosis.played import Entry, Played
+from msg_adapters import read_record
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig
 
 RIG = "paper_high_impedance"
+RIG_VALUES = {
+    "rotor.reflected_inertia": "j_m",
+    "rotor.reflected_damping": "b_m",
+    "spring.stiffness": "k_s",
+    "spring.damping": "b_s",
+}
+"""Value of the rig, and its name on the second bench."""
+FOLDER = SHARED / "cases"
+"""Bags from a plant outside this repository, with their truth beside them."""
+IN_TRUTH = {
+    ("coulomb_friction", "torque"): "coulomb", ("backlash", "gap"): "backlash",
+    ("structural_resonance", "frequency"): "par_f", ("structural_resonance", "damping_ratio"): "par_zeta",
+    ("structural_resonance", "participation"): "par_mass", ("command_delay", "delay"): "delay",
+    ("nonlinear_spring", "cubic"): "k_cubic", ("torque_constant_error", "gain"): "torque_gain",
+    ("mains_interference", "amplitude"): "hum", ("mains_interference", "frequency"): "hum_f",
+    ("damping_drift", "relative_change"): "damp_drift",
+}  # fmt: skip
+"""Parameters that have another name in the truth file of the shared cases."""
 PAIRS = (
     ("coulomb_friction", "structural_resonance"),
     ("coulomb_friction", "backlash"),
@@ -68,6 +91,22 @@ READINGS = (
 """Effect, its size, and values of the bench that stand for another reading of its definition."""
 
 
+def hide_all(
+    bench: Bench, effects: Mapping[str, Mapping[str, float]], off: tuple[str, float] | None = None
+) -> Bench:
+    """Return a bench with effects of the catalogue and a law outside it (name, relative size)."""
+    for effect, parameters in effects.items():
+        bench = hide(bench, effect, parameters)
+    return hide_off_catalogue(bench, *off) if off else bench
+
+
+def kin_of(name: str) -> tuple[str, ...]:
+    """Return an effect with all that are confused with it."""
+    effects = catalogue()
+    alike = [n for n, e in effects.items() if name in e.claims.confusable_with]
+    return (name, *dict.fromkeys([*effects[name].claims.confusable_with, *alike]))
+
+
 @dataclass(frozen=True)
 class Plan:
     """The ingredients of a case; without: effects that the diagnosis may not use.
@@ -91,14 +130,10 @@ class Plan:
 
     def bench(self) -> Bench:
         """Return the bench that this case is measured on."""
-        bench = drawn_bench(np.random.default_rng(self.seed))
-        for effect, parameters in self.hidden.items():
-            bench = hide(bench, effect, parameters)
+        bench = hide_all(drawn_bench(np.random.default_rng(self.seed)), self.hidden)
         if self.newer:
             bench = hide_beside_the_contract(bench, *self.newer)
-        if self.off:
-            bench = hide_off_catalogue(bench, *self.off)
-        return bench.with_values(**self.values)
+        return hide_all(bench, {}, self.off).with_values(**self.values)
 
     def make(self, fresh: bool = True, duration: float | None = None) -> Played:
         """Simulate the case: its record with the faults put in, and a fresh record without.
@@ -171,12 +206,11 @@ def _off_catalogue(rng: np.random.Generator) -> Iterator[Plan]:
 
 def _taken_out(rng: np.random.Generator) -> Iterator[Plan]:
     """Every effect hidden, and taken out of the catalogue with all effects that are confused with it."""
-    for k, (name, effect) in enumerate(catalogue().items()):
+    for k, name in enumerate(catalogue()):
         if name in SIZES:
-            kin = [n for n, e in catalogue().items() if name in e.claims.confusable_with]
-            without = (name, *dict.fromkeys([*effect.claims.confusable_with, *kin]))
             hidden = {name: drawn_parameters(name, "medium", rng)}
-            yield Plan(f"taken_out-{name}", "taken_out", _seed(rng), _excitation(k), hidden, without=without)
+            seed = _seed(rng)
+            yield Plan(f"taken_out-{name}", "taken_out", seed, _excitation(k), hidden, without=kin_of(name))
 
 
 def _faulty(rng: np.random.Generator) -> Iterator[Plan]:
@@ -221,3 +255,22 @@ def _readings(rng: np.random.Generator) -> Iterator[Plan]:
         for excitation in ("chirp_noise", "multisine"):
             name = f"reading-{effect}-{excitation}"
             yield Plan(name, "reading", _seed(rng), excitation, {effect: parameters}, values)
+
+
+def shared_records() -> Iterator[Entry]:
+    """Yield the shared cases by their number, none where the folder is not there."""
+    for folder in sorted(FOLDER.glob("[0-9]*")):
+        yield Entry(f"shared-{folder.name}", partial(_shared, folder.name))
+
+
+def _shared(number: str) -> Played:
+    """Return a shared case; no second bag of the same bench exists for it."""
+    entry = json.loads((FOLDER / "truth" / "truth.json").read_text())[number]
+    causes = tuple(entry["causes"])
+    names = {c: {n: IN_TRUTH.get((c, n), n) for n in CATALOGUE[c]} for c in causes}
+    sizes = {
+        c: {n: entry["bench"][alias] for n, alias in aliases.items() if alias in entry["bench"]}
+        for c, aliases in names.items()
+    }
+    about = {"group": ("clean", "single", "pair")[min(len(causes), 2)]}
+    return Played(read_record(FOLDER / number), load_rig(RIG), (), causes, sizes, about=about)

@@ -27,7 +27,7 @@ from independent.severities import SEVERITIES, drawn_parameters
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # `rsea benchmark make` runs this file
 
-from bench.diagnosis.coverage_cases import COMMANDS
+from bench.diagnosis.commands import COMMANDS
 from rsea_ros.benchmark.dataset import COLUMNS, LIMIT, MANIFEST, VERSION, truth_path
 from rsea_ros.benchmark.scoring import RecordTruth, truth_hash
 from rsea_ros.effects.catalogue import catalogue

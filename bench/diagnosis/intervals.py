@@ -1,24 +1,22 @@
-"""How often identify's 95 % intervals hold the truth, on records of the second bench with something wrong.
-
-python -m bench diagnosis intervals --seeds 100 [--scenarios NAME ...] [--duration 20] [--first 0]
-"""
+"""How often identify's 95 % intervals hold the truth, on records of the second bench with something wrong."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated
 
 import numpy as np
 from independent.bench import drawn_bench, record_run
 from scipy.signal import lfilter
 
-from bench.diagnosis.coverage_cases import RIG_VALUES
+from bench.diagnosis.cases import RIG, RIG_VALUES
+from bench.results import Row
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 
-RIG = "paper_high_impedance"
+SYMBOLS = dict(zip(RIG_VALUES, ("J_m", "b_m", "K_s", "b_s"), strict=True))
 COLOURED = {"ft": 0.06, "position": 1.5e-5}
 """RMS of the coloured noise, N m and rad."""
 CLOCKS = {"ft": "ft", "command": "command", "position": "joint", "velocity": "joint", "motor_torque": "joint"}
@@ -80,33 +78,26 @@ def outcome(name: str, seed: int, duration: float) -> tuple[Identification, dict
     return identify([record], load_rig(RIG)), {n: plant[alias] for n, alias in RIG_VALUES.items()}
 
 
-def row(name: str, seeds: Sequence[int], duration: float) -> str:
-    """Return one line of the table: coverage by parameter, and the median half width of K_s."""
-    inside = dict.fromkeys(RIG_VALUES, 0)
-    widths, ratios = [], []
-    for seed in seeds:
-        result, true = outcome(name, seed, duration)
-        for p in result.parameters:
-            if p.name in true:
-                inside[p.name] += p.ci95[0] <= true[p.name] <= p.ci95[1]
-                if p.name == "spring.stiffness":
-                    widths.append(50.0 * (p.ci95[1] - p.ci95[0]) / p.value)
-        ratios.append(max(v / result.noise_rms[n] for n, v in result.residual_rms.items()))
-    shares = "".join(f"{100.0 * inside[n] / len(seeds):10.0f}" for n in RIG_VALUES)
-    return f"{name:30}{shares}{np.median(widths):14.3g}{np.median(ratios):12.2f}"
-
-
 def main(
     *, seeds: int = 100, first: int = 0, duration: float = 20.0,
     scenarios: Annotated[tuple[str, ...], SCENARIOS] = tuple(SCENARIOS),
-) -> None:  # fmt: skip
-    """Print the table.
+) -> Iterator[Row]:  # fmt: skip
+    """Print the share of truths inside by parameter, and the medians of K_s's half width and the residual.
 
     seeds: records a scenario
     first: first seed
     duration: s, of a record
     """
-    print(f"truth inside the 95 % interval, %, of {seeds} records of {duration:g} s")
-    print(f"{'':30}{'J_m':>10}{'b_m':>10}{'K_s':>10}{'b_s':>10}{'K_s ± %':>14}{'x noise':>12}")
     for name in scenarios:
-        print(row(name, range(first, first + seeds), duration), flush=True)
+        inside, widths, ratios = dict.fromkeys(RIG_VALUES, 0), [], []
+        for seed in range(first, first + seeds):
+            result, true = outcome(name, seed, duration)
+            found = {p.name: p for p in result.parameters if p.name in true}
+            for n, p in found.items():
+                inside[n] += p.ci95[0] <= true[n] <= p.ci95[1]
+            k_s = found["spring.stiffness"]
+            widths.append(50.0 * (k_s.ci95[1] - k_s.ci95[0]) / k_s.value)
+            ratios.append(max(v / result.noise_rms[n] for n, v in result.residual_rms.items()))
+        shares = {SYMBOLS[n]: f"{100.0 * count / seeds:.0f}" for n, count in inside.items()}
+        shares |= {"half-width of K_s, %": f"{np.median(widths):.3g}"}
+        yield Row(name, "", shares | {"residual over noise": f"{np.median(ratios):.2f}"})

@@ -1,7 +1,5 @@
 """How far two right simulations of one bench differ in fitted parameters: MuJoCo's against ours.
 
-    python -m bench diagnosis model_doubt [--rig paper_high_impedance] [--seconds 16] [--effects NAME ...]
-
 MuJoCo plays the exported model of a rig with one effect, and the rig with that effect is fitted to the play.
 Each line shows the fitted over the true value, less 1, of every parameter whose interval by noise reaches no
 farther than NARROW. The last line shows their RMS, for `sizes.model_error`. The coverage of intervals is
@@ -36,7 +34,7 @@ BENCH = ExcitationSettings(amplitude=10.0, noise=2.0, low=0.2, high=60.0, seed=3
 
 def main(
     *, rig: str = "paper_high_impedance", seconds: float = 16.0, effects: tuple[str, ...] = ("", *NATIVE)
-) -> None:
+) -> Iterator[str]:
     """Print the table and the RMS of all deviations.
 
     seconds: of each run
@@ -47,14 +45,14 @@ def main(
         try:
             deviations = dict(deviations_of(played.with_effect(name) if name else played, seconds))
         except RseaError as error:
-            print(f"{name or 'nominal':24} {error}", flush=True)
+            yield f"{name or 'nominal':24} {error}"
             continue
         cells = ", ".join(f"{n} {100.0 * d:+.2f} %" for n, d in deviations.items())
-        print(f"{name or 'nominal':24} {cells}", flush=True)
+        yield f"{name or 'nominal':24} {cells}"
         every += deviations.values()
     median, largest = np.median(np.abs(every)), np.max(np.abs(every))
-    print(f"{len(every)} parameters: RMS {100.0 * np.sqrt(np.mean(np.square(every))):.2f} %, "
-          f"median {100.0 * median:.2f} %, largest {100.0 * largest:.2f} %")  # fmt: skip
+    yield (f"{len(every)} parameters: RMS {100.0 * np.sqrt(np.mean(np.square(every))):.2f} %, "
+           f"median {100.0 * median:.2f} %, largest {100.0 * largest:.2f} %")  # fmt: skip
 
 
 def deviations_of(rig: Rig, seconds: float) -> Iterator[tuple[str, float]]:

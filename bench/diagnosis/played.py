@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib
+import itertools
 import json
 import math
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
+from bench.results import append_line, read_lines
 from rsea_ros.diagnosis.result import CauseParameter, Diagnosis
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.errors import RseaError
@@ -68,6 +74,35 @@ def play(name: str, played: Played, settings: DiagnosisSettings = DEFAULT) -> di
         line |= _beside_truth(result, played)
     processor, seconds = time.process_time() - clock, time.perf_counter() - begin
     return line | {"seconds": round(seconds, 1), "processor": round(processor, 1)}
+
+
+def play_entry(entry: Entry, settings: DiagnosisSettings = DEFAULT) -> dict[str, Any]:
+    """Make a record where it is played, and diagnose it."""
+    return play(entry.name, entry.make(), settings)
+
+
+def play_all(
+    entries: Iterable[Entry], log: Path | None, settings: DiagnosisSettings = DEFAULT,
+    minutes: float = math.inf, jobs: int = 1,
+) -> Iterator[str]:  # fmt: skip
+    """Play the records that a log lacks, and append their lines; yield what is said of each.
+
+    minutes: none is begun after that. jobs: processes.
+    """
+    done = {line["record"] for line in (read_lines(log) if log else ())}
+    left = [entry for entry in entries if entry.name not in done]
+    stop = time.monotonic() + 60.0 * minutes
+    with ProcessPoolExecutor(jobs) if jobs > 1 else contextlib.nullcontext() as pool:
+        begun = itertools.takewhile(lambda _: time.monotonic() < stop, left)
+        ask = partial(play_entry, settings=settings)
+        for line in pool.map(ask, left) if pool else map(ask, begun):
+            if log:
+                append_line(log, line)
+            found = line.get("found", ())
+            sizes = ", ".join(f"{name} {value:.4g} of {truth:.4g}" for _, name, truth, value, *_ in found)
+            mark = "" if line["truth"] is None else "ok   " if is_right(line) else "not  "
+            sizes = f" ({sizes})" if sizes else ""
+            yield f"{mark}{line['record']}: {said(line)}{sizes}, {line['seconds']:.1f} s"
 
 
 def _told(result: Diagnosis) -> dict[str, Any]:
@@ -166,6 +201,22 @@ def said(line: Line) -> str:
     """Return verdict, names and statuses of a line."""
     names = ", ".join(f"{c['name']} ({c['status']})" for c in line["causes"])
     return f"{line['verdict']}: {names or 'no cause'}"
+
+
+class Verdict(NamedTuple):
+    """Beside the truth: names that are missed and wrong, wrong ones told as sure, and whether all is sure."""
+
+    missed: frozenset[str]
+    wrong: frozenset[str]
+    surely_wrong: frozenset[str]
+    sure: bool
+
+
+def verdict_on(line: Line) -> Verdict:
+    """Return what a line names beside its truth; an effect that the diagnosis lacks is none of it."""
+    hidden = frozenset(() if line.get("group") in OUTSIDE else line["truth"] or ())
+    named, confirmed = frozenset(names_of(line)), frozenset(confirmed_of(line))
+    return Verdict(hidden - named, named - hidden, confirmed - hidden, confirmed == hidden)
 
 
 def is_error(line: Line) -> bool:

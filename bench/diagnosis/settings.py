@@ -13,11 +13,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from bench.diagnosis.cases import Plan, plan
-from bench.diagnosis.played import OUTSIDE, is_right, names_of, play
-from bench.results import append_line, read_lines
+from bench.diagnosis.played import Line, is_right, play, said, verdict_on
+from bench.results import Row, append_line, read_lines
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.report.diagnosis.page import value_text
 
@@ -48,7 +48,7 @@ IN_USE = {s.name: s.value for s in DEFAULT.numbers() if not isinstance(s.value, 
 def main(
     setting: Annotated[str, IN_USE] = "", values: tuple[float, ...] = (), *, list_: bool = False,
     select: str = "", limit: int = 0, log: Path = Path("out/settings.jsonl"),
-) -> None:  # fmt: skip
+) -> Iterator[Row | str]:  # fmt: skip
     """Print a table for each setting: right, wrong, missed and changed over its values.
 
     setting: to change, GROUP.FIELD
@@ -60,7 +60,7 @@ def main(
     """
     if list_:
         for s in DEFAULT.numbers():
-            print(f"{s.name:<30}{value_text(s.value):>8} {s.unit:<3} {s.meaning}: {s.reason}")
+            yield f"{s.name:<30}{value_text(s.value):>8} {s.unit:<3} {s.meaning}: {s.reason}"
         return
     curves, plans = CURVES, [replace(p, duration=DURATION) for p in plan() if p.name in CASES]
     if setting:
@@ -69,14 +69,12 @@ def main(
         count = min(limit or len(plans), len(plans))
         plans = [plans[k * len(plans) // count] for k in range(count)]
     for name, tried in curves.items():
-        print(f"{name}, {len(plans)} records\n| value | right | wrong | missed | changed |")
-        print("|---|---|---|---|---|")
-        base = [_played(p, name, float(IN_USE[name]), log) for p in plans]
-        for value in sorted({*map(float, tried), float(IN_USE[name])}):
-            shown = f"**{value:g}**" if value == IN_USE[name] else f"{value:g}"
-            cells = _counts([_played(p, name, value, log) for p in plans], base)
-            print(f"| {shown} | {' | '.join(map(str, cells))} |", flush=True)
-        print()
+        yield f"\n{name}, {len(plans)} records"
+        used = float(IN_USE[name])
+        base = [_played(p, name, used, log) for p in plans]
+        for value in sorted({*map(float, tried), used}):
+            counts = _counts([_played(p, name, value, log) for p in plans], base)
+            yield Row(f"**{value:g}**" if value == used else f"{value:g}", "", counts)
 
 
 def with_value(name: str, value: float) -> DiagnosisSettings:
@@ -86,23 +84,22 @@ def with_value(name: str, value: float) -> DiagnosisSettings:
     return replace(DEFAULT, **{group: changed})
 
 
-def _played(case: Plan, setting: str, value: float, log: Path) -> Mapping[str, Any]:
-    """Return the outcome of a record with a value, from the log where it is there. The value in use: once."""
-    key = {"case": case.name, "duration": case.duration}
-    key |= {} if value == IN_USE[setting] else {"setting": setting, "value": value}
-    for line in read_lines(log):
-        if {k: v for k, v in line.items() if k != "outcome"} == key:
-            return dict(line["outcome"])
-    line = play(case.name, case.make(), with_value(setting, value))
-    outcome = {"truth": () if case.group in OUTSIDE else [*line["truth"]], "named": names_of(line),
-               "statuses": [c["status"] for c in line["causes"]], "verdict": line["verdict"],
-               "right": is_right(line)}  # fmt: skip
-    append_line(log, {**key, "outcome": outcome})
-    return outcome
+def _played(case: Plan, setting: str, value: float, log: Path) -> Line:
+    """Return the line of a record with a value, from the log where it is there. The value in use: once."""
+    changed = "" if value == IN_USE[setting] else f"/{setting}={value:g}"
+    name = f"{case.name}/{case.duration:g}{changed}"
+    known = next((line for line in read_lines(log) if line["record"] == name), None)
+    if known is None:
+        known = play(name, case.make(), with_value(setting, value))
+        append_line(log, known)
+    return known
 
 
-def _counts(played: Sequence[Mapping[str, Any]], base: Sequence[Mapping[str, Any]]) -> Iterator[int]:
-    yield sum(p["right"] for p in played)
-    yield sum(len({*p["named"]} - {*p["truth"]}) for p in played)
-    yield sum(len({*p["truth"]} - {*p["named"]}) for p in played)
-    yield sum(p != b for p, b in zip(played, base, strict=True))
+def _counts(lines: Sequence[Line], base: Sequence[Line]) -> dict[str, str]:
+    verdicts = [verdict_on(line) for line in lines]
+    return {
+        "right": str(sum(map(is_right, lines))),
+        "wrong": str(sum(len(v.wrong) for v in verdicts)),
+        "missed": str(sum(len(v.missed) for v in verdicts)),
+        "changed": str(sum(said(a) != said(b) for a, b in zip(lines, base, strict=True))),
+    }

@@ -41,18 +41,6 @@ class BareLoop:
         return np.load(self._file)
 
 
-def may_have(priority: int) -> bool:
-    """Return whether this process may have a priority."""
-    if priority == 0:
-        return True
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except PermissionError:
-        return False
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    return True
-
-
 def exchange(descriptor: int) -> None:
     """Write a torque of zero and read a sample, as a driver does."""
     for frame, size in ((ZERO, EMPTY), (SAMPLE, EMPTY + 15)):

@@ -9,7 +9,6 @@ answer the question: it is repeated, and the repeats are reported.
 
 from __future__ import annotations
 
-import argparse
 import os
 import signal
 import time
@@ -18,14 +17,10 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from bench.driver.loop import Loop
+from bench.driver.loop import RATE, Loop
 from bench.driver.requests import requests
-from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.peer.remote import RemoteBench
-from rsea_ros.nodes._devices import limits_of
-from rsea_ros.nodes.driver import TABLE
 
-RATE = 280.0
 RUNS, AGAIN = 3, 10
 QUICK, SLOW = 4.0, 300.0
 """Periods within which the torque must be zero: for faults seen in each cycle, and once a second."""
@@ -158,11 +153,11 @@ FAULTS: dict[str, Trial] = {
 }  # fmt: skip
 
 
-def faults(args: argparse.Namespace, folder: Path) -> Iterator[tuple[str, str, str]]:
+def faults(folder: Path) -> Iterator[tuple[str, str, str]]:
     """Provoke each fault several times, then the requests and motors of requests.py."""
     with RemoteBench(folder / "tty") as bench:
         bench.hurry()
-        loop = Loop(bench, RATE, limits=limits_of({p.name: p.default for p in TABLE}))
+        loop = Loop(bench)
         for name, trial in FAULTS.items():
             runs, again, why = _runs(loop, bench, trial)
             zero, cycles = [run.periods for run in runs], [run.cycles for run in runs]
@@ -200,7 +195,7 @@ def _runs(loop: Loop, bench: RemoteBench, trial: Trial) -> tuple[list[Run], int,
 
 def _once(loop: Loop, bench: RemoteBench, trial: Trial) -> Run:
     """Run a trial once."""
-    _calm(loop)
+    loop.drive()
     age = 0.0
     if trial.wrong[0] == "host":
         begun = bench.ask("torque")["t"]
@@ -252,19 +247,6 @@ def _recover(loop: Loop, service: str) -> str:
     """Call the service until it ends the fault; return its answer."""
     loop.guarded.interlock.halted = False
     for attempt in range(1, 6):
-        try:
-            getattr(loop.guarded, service)()
-        except DeviceError:
-            continue
-        return service if attempt == 1 else f"{service} at attempt {attempt}"
+        if loop.call(service) == "done":
+            return service if attempt == 1 else f"{service} at attempt {attempt}"
     return "nothing"
-
-
-def _calm(loop: Loop) -> None:
-    """Run until torque acts; clear what a stall of the machine has latched."""
-    while True:
-        for _ in range(20):
-            loop.cycle(10.0)
-        if loop.guarded.fault is None:
-            return
-        _recover(loop, "clear")

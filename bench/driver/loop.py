@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
+from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.motor import Motor
@@ -13,25 +13,29 @@ from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.nodes._devices import limits_of
+from rsea_ros.nodes.driver import TABLE
 
-STIFFNESS = 1530.456
+RATE, STIFFNESS = 280.0, 1530.456
 
 
 class Loop:
-    """A device on a bench and its limits, `rate` cycles a second. spent: time in each cycle, s."""
+    """A device on a bench and its limits, 280 cycles a second; by default those of config/nodes.
 
-    def __init__(self, bench: RemoteBench, rate: float, *, lost_cycles: int = 3, ft_timeout: float = 0.01,
-                 latency: float = 0.0, limits: Limits | None = None) -> None:  # fmt: skip
-        limits = limits or Limits(68.0, lost_cycles=lost_cycles)
+    spent: time in each cycle, s.
+    """
+
+    def __init__(self, bench: RemoteBench, limits: Limits | None = None) -> None:
+        limits = limits or limits_of({p.name: p.default for p in TABLE})
         self.bench = bench
         self.device = DynamixelNetft(
-            Motor(MotorConnection(bench.port, 4_000_000, latency=latency or usual_latency(rate))),
-            SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, ft_timeout), limits, STIFFNESS,
+            Motor(MotorConnection(bench.port, 4_000_000, latency=usual_latency(RATE))),
+            SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, 0.01), limits, STIFFNESS,
         )  # fmt: skip
-        self.guarded = GuardedDevice(self.device, limits, rate)
+        self.guarded = GuardedDevice(self.device, limits, RATE)
         self.guarded.open()
         self.guarded.enable()
-        self._period, self._due = 1e9 / rate, float(time.monotonic_ns())
+        self._period, self._due = 1e9 / RATE, float(time.monotonic_ns())
         self.states: list[State] = []
         self.spent: list[float] = []
 
@@ -47,7 +51,19 @@ class Loop:
             self.states.append(state)
         return state
 
-    def run(self, seconds: float, torque: Callable[[int], float]) -> None:
-        """Run for some seconds; torque: N m, by the number of the cycle."""
-        for k in range(round(seconds * 1e9 / self._period)):
-            self.cycle(torque(k))
+    def call(self, service: str) -> str:
+        """Call a service; return `done`, or its error."""
+        try:
+            getattr(self.guarded, service)()
+        except DeviceError as error:
+            return f"{error}"
+        return "done"
+
+    def drive(self) -> None:
+        """Run until torque acts; clear what a stall of the machine has latched."""
+        while True:
+            for _ in range(20):
+                self.cycle(10.0)
+            if self.guarded.fault is None:
+                return
+            self.call("clear")

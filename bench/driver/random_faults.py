@@ -11,7 +11,6 @@ it.
 
 from __future__ import annotations
 
-import argparse
 import random
 import threading
 import time
@@ -20,20 +19,16 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from bench.driver.loop import Loop
+from bench.driver.loop import RATE, Loop
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.peer.remote import RemoteBench
-from rsea_ros.nodes._devices import limits_of
-from rsea_ros.nodes.driver import TABLE
 
-RATE = 280.0
 CALM = {
     "drop": 0.0, "delay": 0.0, "corrupt": 0.0, "wrong_crc": 0.0, "silent": False, "ft_silent": False,
     "twin": False,
 }  # fmt: skip
 MODE_SEEN = 1_200_000_000
 """ns of cycles after which a driver has switched off a motor in another mode."""
-LIMITS = limits_of({p.name: p.default for p in TABLE})
 LONGEST, GRACE = 100_000_000, 50_000_000
 """ns for which a command allows a torque, and after a fault: its cycle, the ramp, a lost write."""
 
@@ -42,7 +37,7 @@ class Watched:
     """A loop, the faults that it suffers, and the violations of its torque."""
 
     def __init__(self, bench: RemoteBench, seed: int) -> None:
-        self.bench, self.loop, self.dice = bench, Loop(bench, RATE, limits=LIMITS), random.Random(seed)
+        self.bench, self.loop, self.dice = bench, Loop(bench), random.Random(seed)
         self.commanded = self.since = 0
         self.silent = 0
         self.violations: list[str] = []
@@ -164,10 +159,10 @@ class Watched:
                     self.cleared = max(self.cleared, asked)
 
 
-def random_faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
+def random_faults(folder: Path, *, minutes: float = 1.0, seed: int = 1) -> list[tuple[str, str, str]]:
     """Run for --minutes with --seed."""
     with RemoteBench(folder / "tty") as bench:
-        watched, end = Watched(bench, args.seed), time.monotonic() + 60.0 * args.minutes
+        watched, end = Watched(bench, seed), time.monotonic() + 60.0 * minutes
         while time.monotonic() < end:
             watched.cycle()
             watched.look()
@@ -176,7 +171,7 @@ def random_faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str
             watched.service.join()
         with suppress(DeviceError):
             watched.loop.device.close()
-    what = f"{args.minutes:g} min of random faults, seed {args.seed}: violations"
+    what = f"{minutes:g} min of random faults, seed {seed}: violations"
     first = f": {' | '.join(watched.violations[:5])}" if watched.violations else ""
     told = f"{len(watched.violations)}{first}; {watched.faults} faults, {watched.stops} stops"
     told += f", torque in {watched.seen} cycles"

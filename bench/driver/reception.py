@@ -5,20 +5,23 @@ from __future__ import annotations
 import struct
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rclpy
 from rclpy.qos import QoSProfile
 
+from bench.driver.bare_loop import BareLoop
+from bench.processes import cpu_time
 from msg_adapters.cdr import STAMP
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._mailbox import Polled
 from rsea_ros.nodes._waiter import Waiter
 from rsea_ros.records.record import FloatArray
 
-PATIENCE = 120.0
-TICK = 0.1
+PATIENCE, SETTLE, TICK = 120.0, 4.0, 0.1
+"""s."""
 
 
 class Reception:
@@ -67,3 +70,23 @@ class Reception:
         for waiter in self._waiters:
             waiter.stop()
         self._node.destroy_node()
+
+
+def beside_bare_loop(
+    pid: int, topics: Mapping[str, tuple[Any, QoSProfile]], rate: float, seconds: float, folder: Path,
+    priority: int,
+) -> tuple[Mapping[str, FloatArray], np.ndarray, float]:  # fmt: skip
+    """Measure a node beside a bare loop, once its first topic arrives and all has settled.
+
+    Returns the delays of topics, ms, the cycles of the loop, and the share of a core.
+    """
+    reception = Reception(topics)
+    reception.wait(next(iter(topics)))
+    time.sleep(SETTLE)
+    reception.forget()
+    bare, cpu = BareLoop(rate, seconds, folder, priority), cpu_time(pid)
+    time.sleep(seconds)
+    cpu = cpu_time(pid) - cpu
+    delays, cycles = {topic: reception.delays(topic) for topic in topics}, bare.cycles()
+    reception.close()
+    return delays, cycles, cpu / seconds

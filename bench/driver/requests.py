@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from bench.driver.loop import Loop
+from bench.driver.loop import RATE, Loop
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.interlock import DeviceFault
@@ -20,8 +20,7 @@ from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._devices import limits_of
 from rsea_ros.nodes.driver import TABLE
 
-RATE, CYCLES, SETTLED = 280.0, 60, 4
-DEFAULTS = {p.name: p.default for p in TABLE}
+CYCLES, SETTLED = 60, 4
 Row = tuple[str, str, str]
 FAULT = DeviceFault("ft", detail="made by the bench")
 NO_TORQUE = "no torque"
@@ -47,7 +46,7 @@ def _loop(bench: RemoteBench) -> Loop:
     """Return a loop; a busy machine loses the replies to a configure now and then."""
     while True:
         with suppress(NoReply):
-            return Loop(bench, RATE, limits=limits_of(DEFAULTS))
+            return Loop(bench)
 
 
 Trial = Callable[[Loop], tuple[str, str, bool]]
@@ -79,14 +78,14 @@ def meanwhile(service: str, request: str, *, first: str = "") -> Trial:
     """
 
     def trial(loop: Loop) -> tuple[str, str, bool]:
-        _drive(loop)
+        loop.drive()
         loop.bench.ask("misbehave", ft_silent=True)
         while loop.guarded.fault is None:
             loop.cycle(10.0)
         if first:
             getattr(loop.guarded, first)()
         answers: list[str] = []
-        thread = threading.Thread(target=lambda: answers.append(_called(loop, service)))
+        thread = threading.Thread(target=lambda: answers.append(loop.call(service)))
         thread.start()
         for _ in range(round(0.3 * RATE)):
             loop.cycle(10.0)
@@ -107,30 +106,12 @@ _REQUESTS: Mapping[str, Callable[[Loop], object]] = {
 }
 
 
-def _called(loop: Loop, service: str) -> str:
-    try:
-        getattr(loop.guarded, service)()
-    except DeviceError as error:
-        return f"{error}"
-    return "done"
-
-
-def _drive(loop: Loop) -> None:
-    """Run until torque acts; clear what a stall of the machine has latched."""
-    while True:
-        for _ in range(20):
-            loop.cycle(10.0)
-        if loop.guarded.fault is None:
-            return
-        _called(loop, "clear")
-
-
 def stop_then_reboot(loop: Loop) -> tuple[str, str, bool]:
     """A reboot after a stop."""
-    _drive(loop)
+    loop.drive()
     loop.guarded.stop()
     loop.cycle(10.0)
-    answer = _called(loop, "reboot")
+    answer = loop.call("reboot")
     acted, late = _acting(loop, loop.bench.ask("torque")["t"])
     return NO_TORQUE, f"{late} writes of a torque, reboot: {answer}", acted == 0
 
@@ -140,7 +121,7 @@ def stop_in_activation(loop: Loop) -> tuple[str, str, bool]:
     loop.guarded.disable()
     enable, guarded = loop.device.enable, loop.guarded
     loop.device.enable = lambda: (guarded.stop(), enable())  # type: ignore[method-assign,assignment]
-    answer = _called(loop, "enable")
+    answer = loop.call("enable")
     acted, late = _acting(loop, loop.bench.ask("torque")["t"])
     return NO_TORQUE, f"{late} writes of a torque, activation: {answer}", acted == 0 and answer != "done"
 
@@ -149,14 +130,14 @@ def other_motor(service: str, *, done: bool = False, **how: int) -> Trial:
     """Return a trial of a service after the motor was exchanged or set. done: whether it may be done then."""
 
     def trial(loop: Loop) -> tuple[str, str, bool]:
-        _drive(loop)
+        loop.drive()
         loop.guarded.guard.trip(FAULT)
         loop.cycle(10.0)
         if service == "enable":
             loop.guarded.clear()
             loop.guarded.disable()
         since = loop.bench.ask("model" if "number" in how else "set", **how)["t"]
-        answer = _called(loop, service)
+        answer = loop.call(service)
         acted, _ = _acting(loop, since)
         if not done:
             return "refused, no torque", f"{acted} writes: {answer}", acted == 0 and answer != "done"
@@ -169,23 +150,23 @@ def other_motor(service: str, *, done: bool = False, **how: int) -> Trial:
 
 def renamed_adapter(loop: Loop) -> tuple[str, str, bool]:
     """The adapter was pulled out and got another name."""
-    _drive(loop)
+    loop.drive()
     loop.bench.ask("vanish")
     loop.bench.ask("appear", name="another")
     for _ in range(20):
         loop.cycle(10.0)
-    cause, answer = loop.guarded.fault, _called(loop, "clear")
+    cause, answer = loop.guarded.fault, loop.call("clear")
     loop.bench.ask("vanish")
     loop.bench.ask("appear")
-    again = _called(loop, "clear")
+    again = loop.call("clear")
     good = cause is not None and cause.cause == "portlost" and "port" in answer and again == "done"
     return "portlost until it is back", f"{cause}; clear: {answer}; back: {again}", good
 
 
 def tare_under_torque(loop: Loop) -> tuple[str, str, bool]:
     """zero_ft at 10 N m."""
-    _drive(loop)
-    answer = _called(loop, "zero_ft")
+    loop.drive()
+    answer = loop.call("zero_ft")
     torque = loop.states[-1].wrench[5] if loop.states[-1].wrench else 0.0
     return "refused", f"{answer}; ft {torque:.2f} N·m", "expected 0 N·m" in answer and torque > 8.0
 
@@ -204,11 +185,11 @@ def no_room() -> Iterator[None]:
 def full_disk(loop: Loop) -> tuple[str, str, bool]:
     """Cycles, a stop and a clear without room on the disk."""
     with no_room():
-        _drive(loop)
+        loop.drive()
         loop.guarded.stop()
         loop.cycle(10.0)
         stopped = loop.bench.torque()[0]
-        answer = _called(loop, "clear")
+        answer = loop.call("clear")
         acted, _ = _acting(loop, loop.bench.ask("torque")["t"])
     told = f"stopped at {stopped}, clear: {answer}, then {acted} writes of a torque"
     return "as with room", told, stopped == 0 and answer == "done" and acted > 50
@@ -218,7 +199,7 @@ def _wraps(bench: RemoteBench) -> Row:
     """An encoder whose counts pass 2^31."""
     bench.ask("set", homing_offset=2**31 - 1234 - 4)
     loop = _loop(bench)
-    _drive(loop)
+    loop.drive()
     last, fault = loop.states[-1].position, loop.guarded.fault
     loop.device.close()
     _restore(bench)
@@ -231,7 +212,7 @@ def _wrong_unit(bench: RemoteBench, name: str, value: float, unit: str) -> Row:
     """A limit that was written in another unit."""
     try:
         values: dict[str, Any] = {p.name: p.check(value if p.name == name else p.default) for p in TABLE}
-        Loop(bench, RATE, limits=limits_of(values)).device.close()
+        Loop(bench, limits_of(values)).device.close()
         told = "accepted"
     except ParameterError as error:
         told = f"{error}"

@@ -9,38 +9,35 @@ priority. A driver is late less often only where it does not wait for a reply.
 
 from __future__ import annotations
 
-import argparse
-import os
-import random
-import time
 from pathlib import Path
 
 import numpy as np
 
-from bench.driver.bare_loop import BareLoop, may_have
-from bench.driver.hurried_wire import hurried_wire
-from bench.driver.node import Node
-from bench.driver.reception import Reception
+from bench.driver.bare_loop import BareLoop
+from bench.driver.reception import beside_bare_loop
+from bench.processes import hurried_wire, may_have, own_domain, run_node
 from msg_adapters.ros import JointState
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import MEASUREMENT
 from rsea_ros.records.record import FloatArray
 
 Row = tuple[str, str, str]
-SETTLE, LATE = 4.0, 0.3
-"""s; ms more than a period are a late cycle."""
+LATE = 0.3
+"""ms more than a period are a late cycle."""
 
 
-def timing(args: argparse.Namespace, folder: Path) -> list[Row]:
+def timing(
+    folder: Path, *, rate: tuple[float, ...] = (280.0, 1000.0), priority: tuple[int, ...] = (0, 80),
+    seconds: float = 30.0,
+) -> list[Row]:  # fmt: skip
     """Measure each rate with each priority."""
-    os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    own_domain()
     rows: list[Row] = []
-    for rate in args.rate:
-        for priority in filter(may_have, args.priority):
-            place = folder / f"{rate:g}_{priority}"
+    for hz in rate:
+        for fifo in filter(may_have, priority):
+            place = folder / f"{hz:g}_{fifo}"
             place.mkdir()
-            rows += _at(rate, args.seconds, priority, place)
+            rows += _at(hz, seconds, fifo, place)
     return rows
 
 
@@ -50,29 +47,20 @@ def _at(rate: float, seconds: float, priority: int, folder: Path) -> list[Row]:
     with RemoteBench(folder / "tty") as bench, hurried_wire(priority and priority - 1):
         if priority:
             bench.hurry(priority + 1)
-        node = Node(
-            folder, rate=rate, baud=4_000_000, realtime_priority=priority, **bench.parameters(), **patient
-        )
-        reception = Reception({"joint_states": (JointState, MEASUREMENT)})
-        reception.wait("joint_states")
-        time.sleep(SETTLE)
-        reception.forget()
-        bare = BareLoop(rate, seconds, folder, priority)
-        cpu = node.cpu()
-        time.sleep(seconds)
-        cpu = node.cpu() - cpu
-        delays = reception.delays("joint_states")
-        alone, times = bare.cycles(), node.stop()
-        reception.close()
+        patient |= {"rate": rate, "baud": 4_000_000, "realtime_priority": priority, **bench.parameters()}
+        with run_node("driver/node", folder=folder, **patient) as node:
+            topics = {"joint_states": (JointState, MEASUREMENT)}
+            delays, alone, cpu = beside_bare_loop(node.pid, topics, rate, seconds, folder, priority)
+        times = np.load(folder / "driver-node.npy")
+        times = times[(times[:, 1] > alone[0, 1]) & (times[:, 1] < alone[-1, 1])]
         alone_for = min(0.5 * seconds, 60.0)
         floor = _wire_alone(rate, alone_for, priority, folder, bench)
-    times = times[(times[:, 1] > alone[0, 1]) & (times[:, 1] < alone[-1, 1])]
     setup = f"{rate:g} Hz, {seconds:g} s" + (f", FIFO {priority}" if priority else "")
     return [
         *_cycles(setup, rate, times[:, :2], alone),
-        *_latencies(setup, times[:, 2:], delays),
+        *_latencies(setup, times[:, 2:], delays["joint_states"]),
         (f"{setup}: late cycles of the two requests alone, {alone_for:g} s", "", floor),
-        (f"{setup}: CPU of the driver", "< 20 % at 280 Hz", f"{100 * cpu / seconds:.1f} %"),
+        (f"{setup}: CPU of the driver", "< 20 % at 280 Hz", f"{100 * cpu:.1f} %"),
     ]
 
 

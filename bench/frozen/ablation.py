@@ -18,10 +18,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bench.diagnosis.played import Entry, confirmed_of, names_of, play as diagnosed, said, steps
+from bench.diagnosis.played import Entry, Line, play as diagnosed, said, steps, verdict_on
 from bench.frozen.cases import bench_records, lab_records, small_records
 from bench.frozen.play import KEPT
-from bench.results import append_line, read_lines
+from bench.results import Row, append_line, read_lines
 from rsea_ros.diagnosis.backward_elimination import ReducedModels
 from rsea_ros.diagnosis.candidate import Candidate
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
@@ -158,24 +158,17 @@ def _same(a: Any, b: Any) -> bool:
     return a is b or (isinstance(a, bool | float | str) and a == b)
 
 
-class _Search(NamedTuple):
-    """The search of a record, from whose end the late branches go on."""
-
-    found: tuple[Any, Any]
-    seconds: float
-
-
 @contextlib.contextmanager
-def _kept_search(kept: list[_Search]) -> Iterator[None]:
-    """Keep the search of the first diagnosis within a with statement, and take it in the others."""
+def _kept_search(kept: list[tuple[Any, float]]) -> Iterator[None]:
+    """Keep the search of the first diagnosis within a with statement and its s, and take it in the others."""
     before = steps.search
 
     def search(*args: Any, **kwargs: Any) -> Any:
         if not kept:
             begin = time.process_time()
             found = before(*args, **kwargs)
-            kept.append(_Search(found, time.process_time() - begin))
-        return kept[0].found
+            kept.append((found, time.process_time() - begin))
+        return kept[0][0]
 
     steps.search = search
     try:
@@ -188,7 +181,7 @@ def play(entry: Entry) -> Iterator[dict[str, Any]]:
     """Yield a line of a record as it is, then one without each branch that does something on it."""
     played = entry.make()
     acts: Counter[str] = Counter()
-    kept: list[_Search] = []
+    kept: list[tuple[Any, float]] = []
     with _noting(acts), _kept_search(kept):
         first = diagnosed(entry.name, played)
     yield {**first, "branch": "", "acts": dict(acts)}
@@ -196,7 +189,7 @@ def play(entry: Entry) -> Iterator[dict[str, Any]]:
         branch = BRANCHES[name]
         with _without(branch), _kept_search(kept) if branch.late else contextlib.nullcontext():
             line = diagnosed(entry.name, played, _settings(branch))
-        saved = kept[0].seconds if branch.late and kept else 0.0
+        saved = kept[0][1] if branch.late and kept else 0.0
         yield {**line, "branch": name, "processor": round(line["processor"] + saved, 1)}
 
 
@@ -214,7 +207,7 @@ def records() -> Iterator[Entry]:
             yield entry
 
 
-def main(*, log: Path = KEPT / "ablation.jsonl", minutes: float = math.inf) -> None:
+def main(*, log: Path = KEPT / "ablation.jsonl", minutes: float = math.inf) -> Iterator[Row | str]:
     """Play the records that the log lacks, and print the table.
 
     log: a line of JSON each
@@ -225,40 +218,37 @@ def main(*, log: Path = KEPT / "ablation.jsonl", minutes: float = math.inf) -> N
     left = [entry for entry in records() if entry.name not in done] if minutes else []
     if left:
         diagnosed("", left[0].make())  # loads what is compiled: no record's time holds that
-    for entry in left:
-        if time.monotonic() > stop:
-            break
-        for line in play(entry):
+    for entry in itertools.takewhile(lambda _: time.monotonic() < stop, left):
+        for line in (*play(entry), {"record": entry.name, "branch": "end"}):
             append_line(log, line)
-        append_line(log, {"record": entry.name, "branch": "end"})
-        print(entry.name, flush=True)
-    print(table(read_lines(log)))
+        yield entry.name
+    yield from table(read_lines(log))
 
 
-def is_right(line: Mapping[str, Any], truth: Sequence[str] | None) -> bool:
+def is_right(line: Line, truth: Sequence[str] | None) -> bool:
     """Return whether no wrong name is told as sure, and every hidden cause is named where there is one."""
-    return confirmed_of(line) <= set(truth or ()) <= set(names_of(line))
+    verdict = verdict_on({**line, "truth": truth})
+    return not verdict.surely_wrong and not verdict.missed
 
 
-def table(lines: Iterable[Mapping[str, Any]]) -> str:
-    """Return for each branch how often it acts and decides, what is right with and without, and its cost."""
-    by_record: dict[str, dict[str, Mapping[str, Any]]] = {}
+def table(lines: Iterable[Line]) -> Iterator[Row]:
+    """Yield for each branch how often it acts and decides, what is right with and without, and its cost."""
+    by_record: dict[str, dict[str, Line]] = {}
     for line in lines:
         by_record.setdefault(line["record"], {})[line["branch"]] = line
     whole = {name: played for name, played in by_record.items() if "end" in played}
-    rows = [
-        "| branch | acts on | decides on: name, status, verdict | right with; without | only a number | "
-        "processor, % |",
-        "|---|--:|---|--:|--:|--:|",
-    ]
     for name in BRANCHES:
-        rows.append(_row(name, [p for p in whole.values() if name in p]))
+        yield Row(name, "", _counts([(p[""], p[name]) for p in whole.values() if name in p]))
     others = sum(n.startswith("plants") for n in whole)
-    return "\n".join([*rows, f"| *records played; from ../shared/plants* | {len(whole)}; {others} | | | | |"])
+    yield Row("*records played; from ../shared/plants*", "", _cells(f"{len(whole)}; {others}"))
 
 
-def _row(name: str, played: Sequence[Mapping[str, Mapping[str, Any]]]) -> str:
-    pairs = [(p[""], p[name]) for p in played]
+def _cells(acts: str, decides: str = "", right: str = "", number: str = "", processor: str = "") -> Any:
+    return {"acts on": acts, "decides on: name, status, verdict": decides, "right with; without": right,
+            "only a number": number, "processor, %": processor}  # fmt: skip
+
+
+def _counts(pairs: Sequence[tuple[Line, Line]]) -> Any:
     decided = [(a, b) for a, b in pairs if said(a) != said(b)]
     moved = sum(a["digest"] != b["digest"] or a["remarks"] != b["remarks"] for a, b in pairs) - len(decided)
     kinds = Counter(kind for a, b in decided for kind in _kinds(a, b))
@@ -266,11 +256,11 @@ def _row(name: str, played: Sequence[Mapping[str, Mapping[str, Any]]]) -> str:
     right = "; ".join(str(sum(is_right(pair[k], pair[0]["truth"]) for pair in decided)) for k in (0, 1))
     before, after = (sum(pair[k]["processor"] for pair in pairs) for k in (0, 1))
     cost = f"{100.0 * (before / after - 1.0):+.0f}" if after else ""
-    return f"| {name} | {len(pairs)} | {f'{len(decided)}: {where}' if decided else '0'} |" \
-        f" {right if decided else ''} | {moved} | {cost} |"
+    told = (f"{len(decided)}: {where}", right) if decided else ("0", "")
+    return _cells(str(len(pairs)), *told, str(moved), cost)
 
 
-def _kinds(a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[str]:
+def _kinds(a: Line, b: Line) -> Iterator[str]:
     names = [{c["name"]: c["status"] for c in line["causes"]} for line in (a, b)]
     if names[0].keys() != names[1].keys():
         yield "name"

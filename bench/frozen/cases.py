@@ -14,9 +14,8 @@ from types import ModuleType
 import numpy as np
 
 from bench import SHARED
-from bench.diagnosis.cases import plan
+from bench.diagnosis.cases import plan, shared_records
 from bench.diagnosis.played import Entry, Played
-from bench.diagnosis.shared import shared_case, shared_names
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.cli.maps import map_path
 from rsea_ros.model.rig_file import load_rig
@@ -33,8 +32,8 @@ def bench_records(seed: int = 2024, duration: float | None = None) -> Iterator[E
 
 def case_records() -> Iterator[Entry]:
     """Yield the recorded bags of ../shared/cases."""
-    for name in shared_names():
-        yield Entry(f"cases/{name.removeprefix('shared-')}", partial(shared_case, name))
+    for entry in shared_records():
+        yield Entry(f"cases/{entry.name.removeprefix('shared-')}", entry.make)
 
 
 REAL: Mapping[str, tuple[str, Sequence[str]]] = {

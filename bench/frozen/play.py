@@ -2,49 +2,42 @@
 
 A line for each record: its verdict; of each cause the name, status, probability to 0.01 and sizes to a tenth
 of their sigma; seconds; and a digest of every number to the last bit.
-
-    python -m bench frozen play                                    the quick set against the kept lines
-    python -m bench frozen play --plants FOLDER --out L.jsonl      generators of another hand, scored
-    python -m bench frozen play --plants FOLDER --before L.jsonl   the same after a change
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any
+from typing import Annotated
 
-from bench.diagnosis.played import Entry, confirmed_of, names_of, play, said
+from bench.diagnosis.played import Line, play_all, said, verdict_on
 from bench.frozen.cases import SETS, generated
-from bench.results import read_lines, resumed
+from bench.results import read_lines
 
 KEPT = Path(__file__).resolve().parent / "kept"
 WITHIN = 0.1
 """Sigmas by which a size may differ where two pieces of code became one."""
 
 
-def score(lines: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def score(lines: Sequence[Line]) -> Iterator[str]:
     """Yield the records that are not named rightly and surely, and a last line that counts."""
-    right, wrong, sure = [], [], []
-    known = [line for line in lines if line.get("truth") is not None]
-    for line in known:
-        hidden, named, confirmed = set(line["truth"]), set(names_of(line)), confirmed_of(line)
-        right.append(named == hidden)
-        sure.append(confirmed == hidden)
-        wrong.append(not confirmed <= hidden)
-        if confirmed != hidden or named != hidden:
-            mark = "not so" if confirmed <= hidden else "WRONG"
-            yield f"{mark}: {line['record']}, hidden {', '.join(sorted(hidden)) or 'nothing'}; {said(line)}"
-    processor = sum(line["processor"] for line in known)
-    yield f"{len(known)} records: {sum(right)} with all hidden named and no other, {sum(sure)} with all"\
-        f" confirmed, {sum(wrong)} with a wrong one confirmed; {processor:.0f} s of processor"
+    known = [(line, verdict_on(line)) for line in lines if line.get("truth") is not None]
+    right = [not v.missed and not v.wrong for _, v in known]
+    for (line, v), is_named in zip(known, right, strict=True):
+        if not (v.sure and is_named):
+            mark = "WRONG" if v.surely_wrong else "not so"
+            hidden = ", ".join(sorted(line["truth"])) or "nothing"
+            yield f"{mark}: {line['record']}, hidden {hidden}; {said(line)}"
+    sure, wrong = sum(v.sure for _, v in known), sum(bool(v.surely_wrong) for _, v in known)
+    processor = sum(line["processor"] for line, _ in known)
+    yield f"{len(known)} records: {sum(right)} with all hidden named and no other, {sure} with all"\
+        f" confirmed, {wrong} with a wrong one confirmed; {processor:.0f} s of processor"
 
 
-def compare(lines: Iterable[Mapping[str, Any]], kept: Iterable[Mapping[str, Any]], exact: bool) -> list[str]:
+def compare(lines: Iterable[Line], kept: Iterable[Line], exact: bool) -> list[str]:
     """Return a sentence for each record whose line differs from the kept one of its name.
 
     exact: to the last bit; else names, statuses and verdict alike, probabilities within 0.01 and sizes within
@@ -58,7 +51,7 @@ def compare(lines: Iterable[Mapping[str, Any]], kept: Iterable[Mapping[str, Any]
     ]
 
 
-def _differences(now: Mapping[str, Any], before: Mapping[str, Any], exact: bool) -> Iterator[str]:
+def _differences(now: Line, before: Line, exact: bool) -> Iterator[str]:
     if said(now) != said(before):
         yield f"{said(before)} -> {said(now)}"
     elif exact and now["digest"] != before["digest"]:
@@ -77,7 +70,7 @@ def main(
     *, subset: Annotated[str, SETS] = "quick", exact: bool = False, keep: bool = False,
     minutes: float = math.inf, out: Path | None = None, plants: Path | None = None,
     seeds: tuple[int, ...] = (1,), only: str = "", before: Path | None = None,
-) -> int:  # fmt: skip
+) -> Generator[str, None, int]:  # fmt: skip
     """Play a set and compare it with the kept file, or keep it; status 1 where something differs.
 
     subset: the records
@@ -94,17 +87,12 @@ def main(
     entries = [e for e in (generated(plants, seeds) if plants else SETS[subset]()) if re.search(only, e.name)]
     with TemporaryDirectory() as folder:
         log = kept if keep and not plants else out or Path(folder) / "lines.jsonl"
-        for line in resumed(log, ((e.name, partial(_made, e)) for e in entries), "record", minutes):
-            print(line["record"], flush=True)
+        yield from play_all(entries, log, minutes=minutes)
         lines = read_lines(log)
     if plants:
-        print("\n".join(score(lines)))
+        yield from score(lines)
     if keep or (plants and not before):
         return 0
     differing = compare(lines, read_lines(kept), exact)
-    print("\n".join(differing) or f"{len(lines)} records: all as kept")
+    yield from differing or [f"{len(lines)} records: all as kept"]
     return int(bool(differing))
-
-
-def _made(entry: Entry) -> dict[str, Any]:
-    return play(entry.name, entry.make())

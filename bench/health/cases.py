@@ -74,9 +74,9 @@ def faulty(bench: Bench, fault: Fault) -> Bench:
     return bench.with_values(**{k: v * now[k] if fault.times else v for k, v in fault.change.items()})
 
 
-def work(seconds: float, rng: np.random.Generator, rate: float = RATE) -> FloatArray:
+def work(seconds: float, rng: np.random.Generator) -> FloatArray:
     """Return commands of work, N m: bouts of periodic or reaching movements of any size, with rests."""
-    t = np.arange(round(seconds * rate)) / rate
+    t = np.arange(round(seconds * RATE)) / RATE
     u, at = np.zeros(len(t)), 0.0
     while at < seconds:
         length = rng.uniform(4.0, 25.0)

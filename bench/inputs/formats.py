@@ -21,12 +21,22 @@ from types import FrameType
 
 import numpy as np
 
-from bench.inputs.binaries import bag_of_views, damaged_mcap, damaged_npz, damaged_parquet, damaged_sqlite
-from bench.inputs.bytes_damage import damage_bytes
-from bench.inputs.documents import damaged_json, damaged_table, damaged_yaml
-from bench.inputs.outcome import REFUSED, RESULT, Outcome, Play, call, failed, limit_child
-from bench.inputs.server import RIG, WALL, Work
-from bench.inputs.tables import CSV, LISTED, MAPS, STRUCTS, damaged_gzip, play_import, tables_as
+from bench.inputs.damage import (
+    Damage,
+    bag_of_views,
+    damage_bytes,
+    damaged_gzip,
+    damaged_json,
+    damaged_mcap,
+    damaged_npz,
+    damaged_parquet,
+    damaged_setting,
+    damaged_sqlite,
+    damaged_table,
+    damaged_yaml,
+)
+from bench.inputs.outcome import REFUSED, RESULT, RIG, WALL, Outcome, Play, Work, call, failed, limit_child
+from bench.inputs.tables import CSV, LISTED, MAPS, STRUCTS, play_import, tables_as
 from msg_adapters import iterate, read_record, write_record
 from rsea_ros.cli.simulate import parse_effect
 from rsea_ros.design.motor_gear_units import catalogue
@@ -40,8 +50,7 @@ from rsea_ros.records.record import Channel, Record
 BATCH, SLOW = 50, 20
 """Files of a batch; s of processor for one, above which it counts as endless: all of them are small."""
 EVERY = 8
-"""One in this many accepted files goes on into a verb that computes with it."""
-Damage = Callable[[random.Random, bytes, bytes], bytes]
+"""One in this many files goes on into a verb that computes with it."""
 
 
 @dataclass(frozen=True)
@@ -78,19 +87,49 @@ def _bag(name: str, file: str = "") -> bytes:
         return (Path(folder) / name / file).read_bytes() if file else (Path(folder) / name).read_bytes()
 
 
-def _play_bag(suffix: str) -> Play:
+Verb = Callable[[Path, str, int], list[str]]
+"""In a folder, of a file and its number: the words of a call."""
+
+
+def read(
+    name: str, *readers: Callable[[Path], object], verb: Verb | None = None, often: bool = False
+) -> Play:
+    """Return what writes a file of a name and calls readers with it; some go on into a verb.
+
+    often: every one that is accepted; else one in EVERY.
+    """
+
     def play(folder: Path, data: bytes, number: int) -> Outcome:
-        bag = folder / f"bag{suffix}"
-        bag.write_bytes(data)
-        outcome = try_readers(lambda: read_record([bag]), lambda: read_record([bag], strict=False),
-                        lambda: sum(1 for _ in iterate([bag])))  # fmt: skip
-        if number % EVERY == 0:
-            return call([("predict", "identify", "diagnose")[number // EVERY % 3],
-                         *([RIG] if number // EVERY % 3 == 0 else []), str(bag),
-                         "--out", str(folder / f"out{number}")])  # fmt: skip
+        file = folder / name
+        file.write_bytes(data)
+        outcome = try_readers(*(partial(reader, file) for reader in readers))
+        if verb and (number % EVERY == 0 or (often and outcome.kind == RESULT)):
+            return call(verb(folder, str(file), number))
         return outcome
 
     return play
+
+
+def _bag_verb(folder: Path, file: str, number: int) -> list[str]:
+    verb = ("predict", "identify", "diagnose")[number // EVERY % 3]
+    rig = [RIG] if verb == "predict" else []
+    return [verb, *rig, file, "--out", str(folder / f"out{number}")]
+
+
+def _rig_verb(folder: Path, file: str, number: int) -> list[str]:
+    simulated = ["simulate", file, "--out", str(folder / f"rig{number}.mcap"), "--duration", "1"]
+    target = ("mjcf", "urdf", "sdf", "isaac", "bam")[number // 3 % 5]
+    return (
+        [*simulated, "--excitation", "white_noise"],
+        ["export", f"--{target}", file, "--no-play", "--out", str(folder / f"rig{number}.out")],
+        [*simulated, "--no-noise", "--excitation", "steps"],
+    )[number % 3]
+
+
+BAG_READERS = (
+    lambda bag: read_record([bag]), lambda bag: read_record([bag], strict=False),
+    lambda bag: sum(1 for _ in iterate([bag])),
+)  # fmt: skip
 
 
 def _play_metadata(folder: Path, data: bytes, number: int) -> Outcome:
@@ -99,35 +138,15 @@ def _play_metadata(folder: Path, data: bytes, number: int) -> Outcome:
     (bag / "metadata.yaml").write_bytes(data)
     (bag / "bag.mcap").write_bytes(_bag("bag.mcap"))
     (bag / f"bag{number}.mcap").write_bytes(_bag("bag.mcap"))
-    return try_readers(lambda: read_record([bag]), lambda: read_record([bag], strict=False))
+    return try_readers(*(partial(reader, bag) for reader in BAG_READERS[:2]))
 
 
-EXPORTED = ("mjcf", "urdf", "sdf", "isaac", "bam")
+def _units_verb(folder: Path, file: str, number: int) -> list[str]:
+    return ["design", "--catalogue", file, "--out", str(folder / "design")]
 
 
-def _play_rig(folder: Path, data: bytes, number: int) -> Outcome:
-    rig = folder / "rig.yaml"
-    rig.write_bytes(data)
-    outcome = try_readers(lambda: load_rig(rig))
-    if outcome.kind != RESULT and number % EVERY:
-        return outcome
-    bag = folder / f"rig{number}.mcap"
-    exported = str(folder / f"rig{number}.out")
-    verbs = (
-        ["simulate", str(rig), "--out", str(bag), "--duration", "1", "--excitation", "white_noise"],
-        ["export", f"--{EXPORTED[number // 3 % len(EXPORTED)]}", str(rig), "--no-play", "--out", exported],
-        ["simulate", str(rig), "--out", str(bag), "--duration", "1", "--no-noise", "--excitation", "steps"],
-    )
-    return call(verbs[number % 3])
-
-
-def _play_units(folder: Path, data: bytes, number: int) -> Outcome:
-    file = folder / "units.yaml"
-    file.write_bytes(data)
-    outcome = try_readers(lambda: catalogue(file))
-    if outcome.kind == RESULT and number % EVERY == 0:
-        return call(["design", "--catalogue", str(file), "--out", str(folder / "design")])
-    return outcome
+def _page(file: Path) -> object:
+    return parse(file.read_bytes()).wrench((1, 2, 3, 4, 5, 6))
 
 
 PAGE = b"""<?xml version="1.0" encoding="utf-8"?><netft><cfgcpf>1000000</cfgcpf><cfgcpt>1000000</cfgcpt>
@@ -137,20 +156,11 @@ BOMB = (b'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' +
         b"]><netft><cfgcpf>&j;</cfgcpf></netft>")  # fmt: skip
 
 
-def _play_page(folder: Path, data: bytes, number: int) -> Outcome:
-    return try_readers(lambda: parse(data).wrench((1, 2, 3, 4, 5, 6)))
-
-
-def _noise() -> bytes:
-    names = ("ft", "position", "velocity", "motor_torque")
-    body = {"schema": 1, "noise_rms": dict.fromkeys(names, 0.01), "residual_rms": dict.fromkeys(names, 0.02)}
-    return json.dumps(body).encode()
-
-
-def _play_noise(folder: Path, data: bytes, number: int) -> Outcome:
-    file = folder / "identification.json"
-    file.write_bytes(data)
-    return try_readers(lambda: noise_from(load_rig(RIG), str(file)))
+NOISE = json.dumps({
+    "schema": 1,
+    **{n: dict.fromkeys(("ft", "position", "velocity", "motor_torque"), 0.01)
+       for n in ("noise_rms", "residual_rms")},
+}).encode()  # fmt: skip
 
 
 def _setting(name: str) -> bytes:
@@ -167,31 +177,17 @@ def _play_setting(folder: Path, data: bytes, number: int) -> Outcome:
     )
 
 
-def _damaged_setting(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    text = data.decode("utf-8", "replace")
-    odd = ("nan", "inf", "-inf", "-1", "1e308", "1e-300", "0", "0x1", "1_0", "", "x", "=", "1,1", "1e999")
-    kind = rng.randrange(4)
-    if kind == 0 and "=" in text:
-        parts = text.split("=")
-        at = rng.randrange(1, len(parts))
-        _, comma, rest = parts[at].partition(",")
-        parts[at] = rng.choice(odd) + comma + rest
-        return "=".join(parts).encode()
-    if kind == 1:
-        return (text + "," + text.partition(":")[2]).encode()
-    return damage_bytes(rng, data, other)
-
-
 def _files(folder: Path, pattern: str) -> list[bytes]:
     return [file.read_bytes() for file in sorted(folder.glob(pattern))]
 
 
 FORMATS = (
-    Format("mcap", lambda: [_bag("bag.mcap")], damaged_mcap, _play_bag(".mcap")),
+    Format("mcap", lambda: [_bag("bag.mcap")], damaged_mcap, read("bag.mcap", *BAG_READERS, verb=_bag_verb)),
     Format("sqlite", lambda: [*[_bag("bag.db3")] * 30, bag_of_views(_bag("bag.db3"))], damaged_sqlite,
-           _play_bag(".db3")),
+           read("bag.db3", *BAG_READERS, verb=_bag_verb)),
     Format("metadata", lambda: [_bag("bag", "metadata.yaml")], damaged_yaml, _play_metadata),
-    Format("rig", lambda: _files(rig_folders()[0], "*.yaml"), damaged_yaml, _play_rig),
+    Format("rig", lambda: _files(rig_folders()[0], "*.yaml"), damaged_yaml,
+           read("rig.yaml", load_rig, verb=_rig_verb, often=True)),
     Format("map", lambda: list(map(str.encode, MAPS)), damaged_yaml, play_import("run.csv", is_map=True)),
     Format("structs.mat", lambda: tables_as("struct"), damage_bytes, play_import("run.mat", STRUCTS)),
     Format("npz", lambda: tables_as("npz"), damaged_npz, play_import("run.npz", LISTED)),
@@ -202,10 +198,11 @@ FORMATS = (
     Format("csv.gz", lambda: [gzip.compress(CSV.encode())], damaged_gzip, play_import("run.csv.gz")),
     Format("mat", lambda: tables_as("mat"), damage_bytes, play_import("run.mat")),
     Format("catalogue", lambda: _files(rig_folders()[0].parent / "design", "motor_gear_units.yaml"),
-           damaged_yaml, _play_units),
-    Format("calibration", lambda: [PAGE, BOMB], damage_bytes, _play_page),
-    Format("json", lambda: [_noise()], damaged_json, _play_noise),
-    Format("effect", lambda: [_setting(name) for name in effects()], _damaged_setting, _play_setting),
+           damaged_yaml, read("units.yaml", catalogue, verb=_units_verb)),
+    Format("calibration", lambda: [PAGE, BOMB], damage_bytes, read("page.xml", _page)),
+    Format("json", lambda: [NOISE], damaged_json,
+           read("identification.json", lambda file: noise_from(load_rig(RIG), str(file)))),
+    Format("effect", lambda: [_setting(name) for name in effects()], damaged_setting, _play_setting),
 )  # fmt: skip
 SHARES = {"mcap": 5, "sqlite": 3, "metadata": 2, "rig": 5, "map": 3, "csv": 3, "mat": 3}
 """Parts of all files; one part for a format that is not named here."""

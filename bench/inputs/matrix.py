@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.inputs.bags import CHANNELS, COMMANDS, SENSORS, STAMPS, bag_of
-from bench.inputs.outcome import Outcome, call, limit_child
-from bench.inputs.server import Work
+from bench.inputs.outcome import Outcome, Work, call, limit_child
 from rsea_ros.cli.main import verbs
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.excitation import KINDS

@@ -1,10 +1,5 @@
 """Bad and unusual inputs, as a bench or a recorder may make them, through the command line, with ceilings.
 
-    python -m bench inputs                    all parts, a table
-    python -m bench inputs --quick            a few minutes of them
-    python -m bench inputs --part matrix --only "verb=diagnose"
-    python -m bench inputs --part matrix --log matrix.jsonl     goes on after a break
-
 matrix: every rig, verb and subset of channels, pairwise rates, lengths, commands, clocks and dead sensors.
 mutations: damaged files of every format that is read. The promise: a result, or status 2 and one line.
 """
@@ -17,14 +12,13 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
 from bench.inputs import formats, matrix
-from bench.inputs.outcome import FAULTS, REFUSED, RESULT, Outcome
-from bench.inputs.server import Work, serve, warm
-from bench.results import append_line, read_lines
+from bench.inputs.outcome import FAULTS, REFUSED, RESULT, Outcome, Work, serve, warm
+from bench.results import Row, append_line, read_lines
 
 PARTS = ("matrix", "mutations")
 
@@ -33,7 +27,7 @@ def main(
     *, quick: bool = False, part: Annotated[tuple[str, ...], PARTS] = PARTS, jobs: int = 2, seed: int = 1,
     count: int = 6000, samples: float = math.inf, only: tuple[str, ...] = (), log: Path | None = None,
     keep: Path | None = None, verbose: bool = False,
-) -> int:  # fmt: skip
+) -> Generator[Row | str, None, int]:  # fmt: skip
     """Play the requested parts and print the table; status 1 when a promise was broken.
 
     quick: a small part of each
@@ -63,8 +57,8 @@ def main(
                     print(f"\r{title}: {len(outcomes)}\033[K", end="\r", file=sys.stderr)
         if outcomes:
             took = time.monotonic() - began
-            print(f"\n{title}: {len(outcomes)}, those of {len(left)} works in {took:.0f} s")
-            broken += table(outcomes, verbose)
+            yield f"\n{title}: {len(outcomes)}, those of {len(left)} works in {took:.0f} s"
+            broken += yield from table(outcomes, verbose)
     return int(broken > 0)
 
 
@@ -81,24 +75,26 @@ def _parts(
         yield "mutated files", formats.batches(seed, count, keep)
 
 
-def table(outcomes: Sequence[tuple[str, Outcome]], verbose: bool) -> int:
-    """Print how many there are of each kind by verb or format, then each broken promise once with a case."""
+def table(
+    outcomes: Sequence[tuple[str, Outcome]], verbose: bool
+) -> Generator[Row | str, None, int]:
+    """Yield how many there are of each kind by verb or format, then each broken promise once with a case."""
     kinds: Counter[tuple[str, str]] = Counter()
     for name, outcome in outcomes:
         verb = re.search(r"verb=(\w+)", name)
         kinds[verb[1] if verb else name.split()[0], outcome.kind] += 1
     kinds += Counter(("all", outcome.kind) for _, outcome in outcomes)
+    shown = [k for k in (RESULT, REFUSED, *FAULTS) if kinds["all", k]]
     for what in dict.fromkeys(what for what, _ in kinds):
-        counts = ", ".join(f"{kinds[what, k]} {k}" for k in (RESULT, REFUSED, *FAULTS) if kinds[what, k])
-        print(f"  {what:<24} {counts}")
+        yield Row(what, "", {k: str(kinds[what, k]) for k in shown})
     slowest = max(outcomes, key=lambda item: item[1].seconds)
     largest = max(outcomes, key=lambda item: item[1].megabytes)
-    print(f"  longest {slowest[1].seconds:.1f} s of processor: {slowest[0]}")
-    print(f"  largest {largest[1].megabytes:.0f} MB: {largest[0]}")
+    yield f"  longest {slowest[1].seconds:.1f} s of processor: {slowest[0]}"
+    yield f"  largest {largest[1].megabytes:.0f} MB: {largest[0]}"
     broken = [(name, outcome) for name, outcome in outcomes if outcome.is_fault]
     for (kind, where), count in Counter((o.kind, o.where) for _, o in broken).most_common():
         name, example = next((n, o) for n, o in broken if (o.kind, o.where) == (kind, where))
-        print(f"  {count:4d} × {kind}: {where}\n         {name}")
+        yield f"  {count:4d} × {kind}: {where}\n         {name}"
         if verbose:
-            print("         " + example.detail.replace("\n", "\n         "))
+            yield "         " + example.detail.replace("\n", "\n         ")
     return len(broken)

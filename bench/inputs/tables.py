@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import gzip
 import io
 import json
-import random
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -14,8 +12,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from scipy.io import savemat
 
-from bench.inputs.bytes_damage import damage_bytes
-from bench.inputs.documents import damaged_table
 from bench.inputs.outcome import Outcome, Play, call
 
 CSV = "t,phi,i,load\n" + "".join(f"{k / 100:.2f},{k % 7},{k % 11 - 5},{k}\n" for k in range(60))
@@ -91,14 +87,3 @@ def tables_as(kind: str) -> list[bytes]:
         write(buffer)
         files.append(buffer.getvalue())
     return files
-
-
-def damaged_gzip(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
-    """Return a compressed table damaged in its text or its bytes, or one that unpacks to 400 MB."""
-    try:
-        plain = gzip.decompress(data)
-    except Exception:
-        return damage_bytes(rng, data, other)
-    if rng.random() < 0.02:
-        return gzip.compress(bytes(400_000_000), compresslevel=1)
-    return gzip.compress(damaged_table(rng, plain)) if rng.random() < 0.5 else damage_bytes(rng, data, other)

@@ -44,22 +44,21 @@ class LawCase:
 
     def records(self, duration: float) -> tuple[Record, Record]:
         """Return a record to learn from and one that judges."""
+        seeds = (10 * self.seed, 10 * self.seed + 1)
         if self.values is not None:
-            rng = np.random.default_rng(self.seed)
-            bench = drawn_bench(rng).with_values(**self.values)
-            return record_run(bench, 10 * self.seed, "chirp_noise", duration), record_run(
-                bench, 10 * self.seed + 1, "multisine", duration
-            )
+            bench = drawn_bench(np.random.default_rng(self.seed)).with_values(**self.values)
+            kinds = zip(seeds, ("chirp_noise", "multisine"), strict=True)
+            first, second = (record_run(bench, seed, kind, duration) for seed, kind in kinds)
+            return first, second
+        effects = (self.effect,) if self.effect else ()
         rig = _move(load_rig(self.rig), self.seed)
-        hidden = (
-            rig.with_effects(EffectSetting(self.effect.name, dict(self.parameters))) if self.effect else rig
-        )
+        rig = rig.with_effects(*(EffectSetting(e.name, dict(self.parameters)) for e in effects))
         made = []
-        with lend(*([self.effect] if self.effect else [])):
+        with lend(*effects):
             for k, excitation in enumerate((chirp_noise, odd_multisine)):
                 command = excitation(duration, np.random.default_rng([self.seed, k]))
                 channel = Channel(np.arange(len(command)) / RATE, command)
-                made.append(synthesize(hidden, channel, seed=10 * self.seed + k))
+                made.append(synthesize(rig, channel, seed=seeds[k]))
         return made[0], made[1]
 
 

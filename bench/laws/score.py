@@ -14,16 +14,16 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from bench.laws.cases import LawCase, cases
-from bench.results import read_lines, resumed
+from bench.results import Row, read_lines, resumed
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import Score, score
@@ -31,6 +31,7 @@ from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import simulate_cases
+from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws.law import LawResult
 from rsea_ros.laws.learn import gain_of, learn
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -41,7 +42,7 @@ from rsea_ros.records.record import Record
 def main(
     *, group: Annotated[str, ("catalogue", "unknown", "clean", "time")] = "catalogue", select: str = "",
     clean: int = 50, duration: float = 0.0, log: Path = Path("out/laws.jsonl"), table: bool = False,
-) -> int:  # fmt: skip
+) -> Iterator[Row | str]:  # fmt: skip
     """Run the cases that the log lacks, or print its figures.
 
     select: only cases with this text in their name
@@ -51,28 +52,25 @@ def main(
     table: print the figures of the log
     """
     if table:
-        print(figures(read_lines(log)))
+        yield from figures(read_lines(log))
     elif group == "time":
-        return _time(duration or 160.0)
+        yield _time(duration or 160.0)
     else:
         chosen = (c for c in cases(clean) if c.group == group and select in c.name)
         for row in resumed(log, ((c.name, partial(_keep, c, duration or 30.0)) for c in chosen), "name"):
-            print(_line(row), flush=True)
-    return 0
+            yield _line(row)
 
 
-def _keep(case: LawCase, duration: float) -> dict[str, object]:
+def _keep(case: LawCase, duration: float) -> dict[str, Any]:
     """Return the outcome of a case, or that it broke: one must not stop the others."""
     try:
         return outcome(case, duration)
     except Exception:
         traceback.print_exc()
-        blank = {"seconds": 0.0, "terms": 0, "learnt": False, "places": [], "right": False, "gain": 0.0}
-        broken = {"names": ["broken"], "regressors": ["broken"], "true_gain": 1.0}
-        return {"name": case.name, "group": case.group, **blank, **broken}
+        return {"name": case.name, "group": case.group, "names": ["broken"]}
 
 
-def outcome(case: LawCase, duration: float) -> dict[str, object]:
+def outcome(case: LawCase, duration: float) -> dict[str, Any]:
     """Return the outcome of a case."""
     record, fresh = case.records(duration)
     rig = load_rig(case.rig)
@@ -80,7 +78,7 @@ def outcome(case: LawCase, duration: float) -> dict[str, object]:
     result = learn([record], rig)
     seconds = time.process_time() - start
     laws = [w.law for w in result.laws]
-    row: dict[str, object] = {
+    row: dict[str, Any] = {
         "name": case.name, "group": case.group, "seconds": round(seconds, 1), "at_floor": result.at_floor,
         "terms": sum(len(law.parts) for law in laws), "learnt": any(law.is_learnt for law in laws),
         "regressors": [law.regressor for law in laws], "places": [law.place for law in laws],
@@ -108,8 +106,6 @@ def fresh_gains(
 
 def _fit(rig: Rig, record: Record) -> tuple[Rig, object]:
     """Return a rig refitted to a record with its effects and clocks: `identify` with the law."""
-    from rsea_ros.identification.unknowns import apply
-
     problem = nominal_problem([check(record, rig)], rig)
     solution, _, _ = fit(problem.cases, rig)
     return apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
@@ -123,43 +119,39 @@ def _score(fitted: tuple[Rig, object], fresh: Record, rig: Rig) -> Score:
     return score(replace(problem, rig=rig), problem.cases, outputs, DEFAULT.blocks)
 
 
-def _time(duration: float) -> int:
+def _time(duration: float) -> Row:
     case = next(c for c in cases(0) if c.name == "stribeck_friction")
     record, _ = case.records(duration)
     start, used = time.perf_counter(), time.process_time()
     result = learn([record], load_rig(case.rig))
     wall, cpu = time.perf_counter() - start, time.process_time() - used
-    print(f"{duration:g} s of data: {wall:.1f} s, {cpu:.1f} s of processor; gain {100 * result.gain:.1f} %")
-    return int(wall > 60.0)
+    told = f"{wall:.1f} s, {cpu:.1f} s of processor; gain {100 * result.gain:.1f} %"
+    return Row(f"{duration:g} s of data", "<= 60 s", told)
 
 
-def _line(row: Mapping[str, object]) -> str:
+def _line(row: Mapping[str, Any]) -> str:
     share = ""
     if "true_gain" in row:
         share = f" gain {row['gain']:.3f} of {row['true_gain']:.3f} {'right' if row['right'] else 'WRONG'}"
-    law = f"terms {row['terms']} {row['places']} {row['regressors']}"
-    return f"{row['name']:<28}{share} {law} {row['seconds']} s"
+    law = f"terms {row.get('terms')} {row.get('places')} {row.get('regressors')}"
+    return f"{row['name']:<28}{share} {law} {row.get('seconds')} s"
 
 
-def figures(rows: Sequence[dict[str, object]]) -> str:
-    """Return the figures of a log, required and measured."""
-    lines = ["| figure | asked | measured |", "|---|---|---|"]
-    for group, share, asked in (("catalogue", 0.9, 80), ("unknown", 0.7, 80)):
+def figures(rows: Sequence[Mapping[str, Any]]) -> Iterator[Row]:
+    """Yield the figures of a log, required and measured; a case that broke has none of them."""
+    for group, share in (("catalogue", 0.9), ("unknown", 0.7)):
         some = [r for r in rows if r["group"] == group]
         if not some:
             continue
-        right = [bool(r["right"]) for r in some]
-        enough = [float(r["gain"]) >= share * float(r["true_gain"]) for r in some]  # type: ignore[arg-type]
-        short = [int(r["terms"]) <= 5 and not r["learnt"] for r in some]  # type: ignore[call-overload]
+        right = [bool(r.get("right")) for r in some]
+        enough = [r.get("gain", 0.0) >= share * r.get("true_gain", 1.0) for r in some]
+        short = [r.get("terms", 99) <= 5 and not r["learnt"] for r in some]
         whole = np.logical_and.reduce([right, enough, short]) if group == "catalogue" else np.array(right)
         what = "at most 5 terms, gain and regressor" if group == "catalogue" else "regressor"
-        lines.append(f"| {group}: {what} | ≥ {asked} % | {100 * np.mean(whole):.0f} % of {len(some)} |")
-        lines.append(f"| {group}: right regressor | | {100 * np.mean(right):.0f} % |")
-        lines.append(f"| {group}: at least {share:g} of the true gain | | {100 * np.mean(enough):.0f} % |")
-    clean = [r for r in rows if r["group"] == "clean"]
+        yield Row(f"{group}: {what}", ">= 80 %", f"{100 * np.mean(whole):.0f} % of {len(some)}")
+        yield Row(f"{group}: right regressor", "", f"{100 * np.mean(right):.0f} %")
+        yield Row(f"{group}: at least {share:g} of the true gain", "", f"{100 * np.mean(enough):.0f} %")
+    clean = [not r["names"] for r in rows if r["group"] == "clean"]
     if clean:
-        nothing = [not r["names"] for r in clean]
-        lines.append(
-            f"| clean benches without a law | ≥ 98 % | {100 * np.mean(nothing):.0f} % of {len(clean)} |"
-        )
-    return "\n".join(lines)
+        told = f"{100 * np.mean(clean):.0f} % of {len(clean)}"
+        yield Row("clean benches without a law", ">= 98 %", told)

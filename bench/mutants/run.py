@@ -1,35 +1,33 @@
-"""Runs the tests of a module once for each of its mutants, each in a fork of a process that is warm.
+"""Runs tests against one mutant of a module, in a process in which the module is imported with its fault.
 
-Two forks: one for each module has imported all that the tests need and that does not import the module; from
-it one for each mutant, in which the module is imported with its fault and the tests are collected and run.
+The other processes that the tests start import it so too.
 """
 
 from __future__ import annotations
 
 import ast
-import gc
-import importlib.machinery
-import importlib.util
 import os
 import resource
-import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
-from typing import Any
 
-from bench.mutants.imports import ROOT, warm
+from bench import ROOT
 from bench.mutants.operators import Mutant, mutate
 from rsea_ros.compiler import SHARED
 
-KILLED, SURVIVED, TIMEOUT = "killed", "survived", "timeout"
+PACKAGES = ("rsea_ros", "msg_adapters", "bench")
+KILLED, SURVIVED = "killed", "survived"
 MEMORY = 8 * 2**30
 """Bytes that a mutant may take."""
-CHILD = """
+CUSTOM = """
+import os
+import subprocess
 import sys
 from importlib.machinery import SourceFileLoader
 from importlib.util import spec_from_file_location
@@ -44,158 +42,106 @@ class Finder:
             return spec_from_file_location(name, {path!r}, loader=Loader(name, {path!r}))
 
 sys.meta_path.insert(0, Finder())
+begin = subprocess.Popen.__init__
+
+def init(self, *args, env=None, **options):
+    env = dict(os.environ if env is None else env)
+    env["PYTHONPATH"] = os.pathsep.join(filter(None, [{folder!r}, env.get("PYTHONPATH")]))
+    begin(self, *args, env=env, **options)
+
+subprocess.Popen.__init__ = init
 """
-"""Python runs it first in every process that the tests start."""
+"""Python runs it first in every process: the module is made of a text, also where a test states its own
+environment."""
 
 
 class BenchError(Exception):
     """The tests do not pass without a fault, or do not run."""
 
 
-def outcomes(
-    target: str,
-    tests: Sequence[Sequence[str]],
-    mutants: Sequence[Mutant],
-    tell: Callable[[Mutant, str, float], None],
-    limit: float | None = None,
-) -> None:
-    """Run the tests of a module for each mutant; tell outcome and seconds of each.
+def outcome(target: str, tests: Sequence[str], mutant: Mutant, limit: float | None = None) -> str:
+    """Return whether tests, one after the other, notice a mutant.
 
-    tests: groups of them, played one after the other up to the first that notices the mutant; the outcome
-    names its number where there are several. limit: s of CPU for a mutant, where the tests are known to pass;
-    by default they are played without a fault first. Raises BenchError where they fail without one.
+    limit: s of CPU, where the tests are known to pass; by default they are played without the fault first.
+    Raises BenchError where they fail without it.
     """
-    inlet, outlet = os.pipe()
-    pid = os.fork()
-    if pid == 0:
-        os.close(inlet)
-        _serve(target, tests, mutants, outlet, limit)
-    os.close(outlet)
-    with os.fdopen(inlet) as lines:
-        for line in lines:
-            place, outcome, seconds = line.split()
-            if place == "baseline":
-                if outcome != SURVIVED:
-                    os.waitpid(pid, 0)
-                    words = " ".join(f"test/{test}" for group in tests for test in group)
-                    raise BenchError(
-                        f"{target}: its tests do not pass without a fault ({outcome}), expected that of"
-                        f" ./rsea test {words} -n 0"
-                    )
-                continue
-            tell(mutants[int(place)], outcome, float(seconds))
-    if os.waitpid(pid, 0)[1] != 0:
-        raise BenchError(f"{target}: the process that runs its mutants has died")
+    source = (ROOT / "rsea_ros" / f"{target}.py").read_text()
+    cpu, wall = limit or 0.0, 5.0 * (limit or 0.0)
+    if limit is None:
+        passed, took, longest = _played(target, tests, ast.parse(source), 600.0, 600.0)
+        if passed != SURVIVED:
+            words = " ".join(f"test/{test}" for test in tests)
+            raise BenchError(
+                f"{target}: its tests do not pass without a fault, expected that of ./rsea test {words} -n 0"
+            )
+        cpu, wall = 3.0 * took + 3.0, 5.0 * longest + 15.0
+    return _played(target, tests, mutate(source, mutant), cpu, wall)[0]
 
 
-def _serve(
-    target: str, tests: Sequence[Sequence[str]], mutants: Sequence[Mutant], outlet: int, limit: float | None
-) -> None:
-    """Run all mutants of a module, write a line for each, and end this process."""
-    status = 1
-    try:
-        name, path = f"rsea_ros.{target.replace('/', '.')}", ROOT / "rsea_ros" / f"{target}.py"
-        groups = [[ROOT / "test" / test for test in group] for group in tests]
-        warm(name, [file for group in groups for file in group if file.exists()])
-        gc.freeze()
-        source = path.read_text()
-        outcome, cpu, wall = SURVIVED, (limit or 0.0) / 3.0, limit or 0.0
-        if limit is None:
-            every = [file for group in groups for file in group]
-            outcome, cpu, wall = _fork(lambda: _play(name, path, ast.parse(source), every), 600.0, 600.0)
-        os.write(outlet, f"baseline {outcome} {cpu}\n".encode())
-        for k, mutant in enumerate(mutants if outcome == SURVIVED else ()):
-            tree, took = mutate(source, mutant), 0.0
-            for number, group in enumerate(groups):
-                outcome, _, seconds = _fork(
-                    lambda tree=tree, group=group: _play(name, path, tree, group),
-                    3.0 * cpu + 3.0, 5.0 * wall + 15.0,
-                )  # fmt: skip
-                took += seconds
-                if outcome != SURVIVED:
-                    outcome += f"-by-{number}" * (len(groups) > 1)
-                    break
-            os.write(outlet, f"{k} {outcome} {took:.2f}\n".encode())
-        status = 0
-    finally:
-        os._exit(status)
-
-
-def _fork(work: Callable[[], int], cpu: float, wall: float) -> tuple[str, float, float]:
-    """Run some work in a fork; return its outcome, the s of CPU and of the clock that it took."""
-    begun = time.monotonic()
-    pid = os.fork()
-    if pid == 0:
-        try:
-            resource.setrlimit(resource.RLIMIT_CPU, (int(cpu) + 1, int(cpu) + 2))
-            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-            signal.signal(signal.SIGALRM, signal.SIG_DFL)
-            signal.setitimer(signal.ITIMER_REAL, wall)
-            os._exit(work())
-        finally:
-            os._exit(1)
-    _, status, usage = os.wait4(pid, 0)
-    if os.WIFSIGNALED(status):
-        late = os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
-        outcome = TIMEOUT if late else KILLED
-    else:
-        outcome = SURVIVED if os.WEXITSTATUS(status) == 0 else KILLED
-    return outcome, usage.ru_utime + usage.ru_stime, time.monotonic() - begun
-
-
-def _play(name: str, path: Path, tree: ast.Module, files: Sequence[Path]) -> int:
-    """Import a module from a syntax tree, here and in children; return pytest's status on some files."""
-    import numba
-    import pytest
-
-    quiet = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(quiet, 1)
-    os.dup2(quiet, 2)
-    sys.meta_path.insert(0, _Finder(name, path, tree))
-    os.chdir(ROOT)
+def _played(
+    target: str, tests: Sequence[str], tree: ast.Module, cpu: float, wall: float
+) -> tuple[str, float, float]:
+    """Play tests with a module made of a syntax tree; return the outcome, s of CPU and of the clock."""
+    name, path = f"rsea_ros.{target.replace('/', '.')}", ROOT / "rsea_ros" / f"{target}.py"
     without = ("cacheprovider", "unraisableexception", "threadexception")  # the last two collect garbage
-    flags = [flag for name in without for flag in ("-p", f"no:{name}")]
-    flags += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of plugins that are imported already
+    flags = [flag for plugin in without for flag in ("-p", f"no:{plugin}")]
+    words = [sys.executable, "-m", "pytest", "-x", "-q", *flags, *(str(ROOT / "test" / t) for t in tests)]
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (int(cpu) + 1, int(cpu) + 2))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
     with tempfile.TemporaryDirectory() as folder:
-        child = CHILD.format(source=ast.unparse(tree), name=name, path=str(path))
-        Path(folder, "sitecustomize.py").write_text(child)
-        _start_all_with(folder)
-        if any(fnmatch(str(path.relative_to(ROOT / "rsea_ros")), pattern) for pattern in SHARED):
-            numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = folder  # compiled into other files
-        return int(pytest.main(["-x", "-q", *flags, *map(str, files)]))
+        text = CUSTOM.format(source=ast.unparse(tree), name=name, path=str(path), folder=folder)
+        Path(folder, "sitecustomize.py").write_text(text)
+        environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONPATH": f"{folder}:{ROOT}"}
+        if any(fnmatch(f"{target}.py", pattern) for pattern in SHARED):
+            environment["NUMBA_CACHE_DIR"] = folder  # compiled into other files
+        begun, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        quiet = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+        try:
+            done = subprocess.run(
+                words, cwd=ROOT, env=environment, timeout=wall, preexec_fn=limit, check=False, **quiet
+            )
+            status = done.returncode
+        except subprocess.TimeoutExpired:
+            status = 1
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
+    return SURVIVED if status == 0 else KILLED, spent, time.monotonic() - begun
 
 
-def _start_all_with(folder: str) -> None:
-    """Let every process that is started look into a folder first of all."""
-    begin: Any = subprocess.Popen.__init__
-
-    def init(self: Any, *args: Any, env: Any = None, **options: Any) -> None:
-        env = dict(os.environ if env is None else env)
-        env["PYTHONPATH"] = os.pathsep.join(filter(None, [folder, env.get("PYTHONPATH")]))
-        begin(self, *args, env=env, **options)
-
-    subprocess.Popen.__init__ = init  # type: ignore[method-assign]
-
-
-class _Loader(importlib.machinery.SourceFileLoader):
-    """Loads a module from a syntax tree in place of its file."""
-
-    def __init__(self, name: str, path: Path, tree: ast.Module) -> None:
-        super().__init__(name, str(path))
-        self._tree = tree
-
-    def get_code(self, fullname: str) -> object:
-        return compile(self._tree, self.path, "exec")
+@cache
+def reachable(name: str) -> frozenset[str]:
+    """Return the modules of this repository that a module imports, directly or not, with their packages."""
+    reached: set[str] = set()
+    waiting = [name]
+    while waiting:
+        of = waiting.pop()
+        path, package = _path(of), of.rpartition(".")[0]
+        fresh = {package, *(imported(path) if path else ())} - {"", *reached}
+        reached |= fresh
+        waiting += fresh
+    return frozenset(reached)
 
 
-class _Finder:
-    """Finds one module, for which a syntax tree is given."""
+@cache
+def imported(path: Path) -> frozenset[str]:
+    return frozenset(_names(ast.parse(path.read_text())))
 
-    def __init__(self, name: str, path: Path, tree: ast.Module) -> None:
-        self._name, self._path, self._tree = name, path, tree
 
-    def find_spec(self, fullname: str, path: object = None, target: object = None) -> object:
-        if fullname != self._name:
-            return None
-        loader = _Loader(fullname, self._path, self._tree)
-        return importlib.util.spec_from_file_location(fullname, self._path, loader=loader)
+def _names(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import(names=aliases):
+                yield from (a.name for a in aliases)
+            case ast.ImportFrom(module=str(module), names=aliases, level=0):
+                yield module
+                yield from (n for a in aliases if _path(n := f"{module}.{a.name}"))
+
+
+def _path(name: str) -> Path | None:
+    if name.split(".")[0] not in PACKAGES:
+        return None
+    stem = ROOT.joinpath(*name.split("."))
+    return next((p for p in (stem.with_suffix(".py"), stem / "__init__.py") if p.is_file()), None)

@@ -1,9 +1,5 @@
 """Mutation run: a random sample of small faults in rsea_ros, each against the tests that are near its module.
 
-    python -m bench mutants --random 60 --seed 4              60 faults, each as likely as any other
-    python -m bench mutants --in hardware/limits              of one module or folder
-    python -m bench mutants --in hardware/limits --list       the faults themselves
-
 It stops after some minutes, and the same command goes on: outcomes are kept in out/mutants-*.jsonl, which you
 delete after a change. Prints each fault that nobody notices, and a table by folder; status 1 where under 85 %
 are noticed.
@@ -23,22 +19,16 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from random import Random
 from typing import TextIO
 
-import hypothesis  # noqa: F401  what every test needs, once
-import numpy  # noqa: F401
-import pytest  # noqa: F401
-import scipy  # noqa: F401
-import xdist.scheduler  # noqa: F401
-
-from bench.mutants.imports import PACKAGES, ROOT, imported, reachable
+from bench import ROOT
 from bench.mutants.operators import Mutant, mutants_of
-from bench.mutants.run import SURVIVED, BenchError, outcomes
-from bench.results import append_line, read_lines
+from bench.mutants.run import PACKAGES, SURVIVED, BenchError, imported, outcome, reachable
+from bench.results import Row, append_line, read_lines
 
 LEAST = 0.85
 """Share of the faults that tests must notice."""
@@ -46,8 +36,8 @@ WAIT = re.compile(r"^(nodes/|hardware/test_(faults|lost|port|netft|line)|watch/|
 """Tests that wait for nodes and wires."""
 WIRED = ("nodes", "hardware", "hardware/netft", "hardware/peer", "hardware/dynamixel", "watch", "cli")
 """Folders whose faults they are played for."""
-FIRST, DIRECT, FAR, WIRES = 3, 8, 2, 3
-"""Files of tests that are played: first; in all, of those that import the module, reach it, and wait."""
+DIRECT, FAR, WIRES = 8, 2, 3
+"""Files of tests that are played, of those that import the module, reach it, and wait."""
 LIMIT = 240.0
 """s of CPU for a fault."""
 GOLDEN = "golden/test_golden.py"
@@ -55,7 +45,7 @@ GOLDEN = "golden/test_golden.py"
 
 def main(
     *, random: int = 60, seed: int = 0, in_: str = "", minutes: float = 8.0, list_: bool = False
-) -> int:
+) -> Generator[Row | str, None, int]:
     """Play a sample, or go on with it.
 
     random: so many faults
@@ -66,7 +56,7 @@ def main(
     """
     chosen = _sample(random, seed, in_)
     if list_:
-        print(*(f"{target}.py:{_text(mutant)}" for target, mutant in chosen), sep="\n")
+        yield from (f"{target}.py:{_text(mutant)}" for target, mutant in chosen)
         return 0
     log = ROOT / "out" / f"mutants-{in_.replace('/', '-') or 'all'}-{random}-{seed}.jsonl"
     told = {(line["target"], line["fault"]): line["outcome"] for line in read_lines(log)}
@@ -74,46 +64,38 @@ def main(
     for target, mutant in chosen:
         fault = _text(mutant)
         if (target, fault) not in told and time.monotonic() - begun < 60.0 * minutes:
-            outcome = _outcome(target, mutant, steps.get(target, ()))
-            told[target, fault] = outcome
-            append_line(log, {"target": target, "fault": fault, "outcome": outcome})
-            print(f"{target}.py:{fault}: {outcome}", file=sys.stderr, flush=True)
-    return _show(told, len(chosen) - len(told), seed)
+            told[target, fault] = noticed = _outcome(target, mutant, steps.get(target, ()))
+            append_line(log, {"target": target, "fault": fault, "outcome": noticed})
+            yield f"{target}.py:{fault}: {noticed}"
+    return (yield from _shown(told, len(chosen) - len(told), seed))
 
 
 def _text(m: Mutant) -> str:
     return f"{m.line} {m.where}: {m.text} ({m.place}, {m.choice})"
 
 
-def _show(told: Mapping[tuple[str, str], str], left: int, seed: int) -> int:
-    for (target, fault), outcome in told.items():
-        if outcome == SURVIVED:
-            print(f"  {target}.py:{fault}")
-    print("\n| folder | faults | noticed | % |\n|---|--:|--:|--:|")
-    for folder in (*sorted({target.split("/")[0] for target, _ in told}), "all"):
-        these = [o for (t, _), o in told.items() if folder in ("all", t.split("/")[0])]
+def _shown(told: Mapping[tuple[str, str], str], left: int, seed: int) -> Generator[Row | str, None, int]:
+    yield from (f"  {target}.py:{fault}" for (target, fault), seen in told.items() if seen == SURVIVED)
+    whole = f"all, seed {seed}"
+    for folder in (*sorted({target.split("/")[0] for target, _ in told}), whole):
+        these = [o for (t, _), o in told.items() if folder in (t.split("/")[0], whole)]
         seen = len(these) - these.count(SURVIVED)
-        name = f"all, seed {seed}" if folder == "all" else folder
-        print(f"| {name} | {len(these)} | {seen} | {100.0 * seen / max(1, len(these)):.1f} |")
+        share = f"{100.0 * seen / max(1, len(these)):.1f}"
+        yield Row(folder, "", {"faults": str(len(these)), "noticed": str(seen), "%": share})
     if left:
-        print(f"{left} faults are left: the same command goes on", file=sys.stderr)
+        yield f"{left} faults are left: the same command goes on"
     return int(seen < LEAST * len(these))
 
 
 def _outcome(target: str, mutant: Mutant, steps: Sequence[str]) -> str:
-    """Play a fault against its tests, some at a time, up to the first that notices it."""
+    """Play a fault against its tests, one after the other, up to the first that notices it."""
     near, wires = tests_of(target)
-    groups = [near[:FIRST], (*near[FIRST:], *steps)]
-    for tests, limit in ((groups, LIMIT), ([wires], None)):
-        found: list[str] = []
+    for tests, limit in (((*near, *steps), LIMIT), (wires, None)):
         try:
-            if any(tests):
-                kept = [group for group in tests if group]
-                outcomes(target, kept, [mutant], lambda m, o, s, found=found: found.append(o), limit)
+            if tests and outcome(target, tests, mutant, limit) != SURVIVED:
+                return "noticed"
         except BenchError as error:
             print(error, file=sys.stderr, flush=True)
-        if found and found[0] != SURVIVED:
-            return "noticed"
     return SURVIVED
 
 
@@ -154,10 +136,6 @@ def tests_of(target: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(where for _, where in near), tuple(where for _, where in sorted(wires)[:WIRES])
 
 
-def _step(name: str) -> str:
-    return f"{GOLDEN}::test_it_says_what_it_said[{name}]"
-
-
 def _steps() -> dict[str, list[str]]:
     """Return the steps of test/golden that call a module, the shortest first, by module.
 
@@ -178,7 +156,7 @@ def _steps() -> dict[str, list[str]]:
         kept.write_text(json.dumps(known))
     found: dict[str, list[str]] = defaultdict(list)
     for _, step, target in sorted((float(seconds), step, target) for seconds, step, target in known["calls"]):
-        found[target].append(_step(step))
+        found[target].append(f"{GOLDEN}::test_it_says_what_it_said[{step}]")
     return found
 
 

@@ -14,16 +14,15 @@ from typing import Any
 
 import numpy as np
 
-MARK = "RSEA_BENCH_TIMES"
+from bench.processes import NOTES
+from rsea_ros.model.observer import Observer
+from rsea_ros.model.pure_torque_error import ErrorFlag
+from rsea_ros.model.torque_band import TorqueBand
+from rsea_ros.nodes import model
 
 
 def main() -> int:
     """Run the node with a note of its times."""
-    from rsea_ros.model.observer import Observer
-    from rsea_ros.model.pure_torque_error import ErrorFlag
-    from rsea_ros.model.torque_band import TorqueBand
-    from rsea_ros.nodes import model
-
     rows: list[tuple[int, ...]] = []
     spent = [0, 0]
 
@@ -53,7 +52,7 @@ def main() -> int:
     note(TorqueBand, "take")
     note(ErrorFlag, "take")
     model.ModelNode._work = wake  # type: ignore[method-assign]
-    atexit.register(lambda: np.save(os.environ[MARK], np.array(rows, dtype=np.int64).reshape(-1, 5)))
+    atexit.register(lambda: np.save(os.environ[NOTES], np.array(rows, dtype=np.int64).reshape(-1, 5)))
     return model.main()
 
 

@@ -1,8 +1,5 @@
 """Test every supported Python: the locked environment, the wheel and the fast part of the suite.
 
-    python -m bench packaging pythons                    all versions from 3.10 to 3.14 on this machine
-    python -m bench packaging pythons --only 3.13
-
 Nodes are left out: .ci/run tries them, on GitHub with each version. A missing version counts as untried.
 """
 
@@ -14,10 +11,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Generator
 from pathlib import Path
 from typing import Annotated
 
 from bench import ROOT
+from bench.results import Row
 
 VERSIONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
 FAST = (
@@ -28,24 +27,25 @@ NODES = re.compile(r"rclpy|msg_adapters\.ros|rsea_ros\.nodes")
 USE = "import rsea_ros as rsea; rsea.simulate('paper_high_impedance', [0.0, 1.0] * 300, rate=280.0)"
 
 
-def main(*, only: Annotated[tuple[str, ...], VERSIONS] = VERSIONS) -> int:
-    """Try each version and print a line for it; status 1 when one fails."""
-    results = [try_version(version) for version in only]
-    return 1 if "failed" in results else 0
+def main(*, only: Annotated[tuple[str, ...], VERSIONS] = VERSIONS) -> Generator[Row, None, int]:
+    """Try each version; status 1 when one fails."""
+    failed = []
+    for version in only:
+        begun = time.monotonic()
+        result = try_version(version)
+        failed += [version] * result.startswith("failed")
+        yield Row(version, "", {"result": result, "time, s": f"{time.monotonic() - begun:.0f}"})
+    return int(bool(failed))
 
 
 def try_version(version: str) -> str:
-    """Try a version, print the outcome, and return passed, failed or untried."""
+    """Try a version and return passed, at which step it failed, or untried."""
     interpreter = interpreter_of(version)
     if interpreter is None:
-        print(f"{version}: untried, this machine has none")
-        return "untried"
-    begun = time.monotonic()
+        return "untried: not installed on this machine"
     with tempfile.TemporaryDirectory() as folder:
         failed = next((name for name, command in steps(interpreter, Path(folder)) if not runs(command)), None)
-    took = f"{time.monotonic() - begun:.0f} s"
-    print(f"{version}: {f'failed at: {failed}' if failed else 'passed'} ({took})", flush=True)
-    return "failed" if failed else "passed"
+    return f"failed at: {failed}" if failed else "passed"
 
 
 def interpreter_of(version: str) -> str | None:

@@ -14,7 +14,6 @@ import importlib
 import json
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -63,8 +62,9 @@ class NotApplicable(Exception):
 
 
 def main(name: str, source: str, target: str, budget: str) -> None:
-    """Run the function `fit` of with_NAME.py on a case."""
-    fit = importlib.import_module(f"with_{name}").fit
+    """Run a peer, MODULE:FUNCTION, on a case."""
+    module, _, function = name.partition(":")
+    fit = getattr(importlib.import_module(module), function)
     data = np.load(source)
     arrays = (np.array(data[n]) for n in ("t", "u", "y", "position", "velocity"))
     case = PeerCase(*arrays, int(data["split"]), json.loads(str(data["meta"])), float(budget))
@@ -88,23 +88,6 @@ def scale(case: PeerCase) -> tuple[Array, Array, float, float]:
     """Return u and the known y, both scaled by the training samples; and mean and deviation of y."""
     u, y = case.u, case.y[: case.split]
     return (u - u[: case.split].mean()) / u[: case.split].std(), (y - y.mean()) / y.std(), y.mean(), y.std()
-
-
-def free_run(step: Callable[[Array], float], u: Array, y: Array, lags: int) -> Array:
-    """Return y continued by a one-step predictor of `lags` past outputs and inputs."""
-    longest = 10.0 * float(np.max(np.abs(y)))
-    out = np.concatenate([y, np.zeros(len(u) - len(y))])
-    for k in range(len(y), len(u)):
-        row = np.concatenate([out[k - lags : k][::-1], u[k - lags : k + 1][::-1]])
-        out[k] = np.clip(step(row), -longest, longest)
-    return out[len(y) :]
-
-
-def narx_rows(u: Array, y: Array, lags: int) -> tuple[Array, Array]:
-    """Return regressors, shape (n, 2 lags + 1), and the outputs that belong to them, shape (n,)."""
-    columns = [y[lags - k : len(y) - k] for k in range(1, lags + 1)]
-    columns += [u[lags - k : len(y) - k] for k in range(lags + 1)]
-    return np.column_stack(columns), y[lags:]
 
 
 if __name__ == "__main__":

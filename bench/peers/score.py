@@ -1,8 +1,5 @@
 """Peers on the same records: each in its own environment, the same blocks, the same budget of processor time.
 
-    python -m bench peers --realdata ../shared/realdata
-    python -m bench peers --peers gp lstm --cases sea --budget 30
-
 Runs every peer that has an environment (ENVS/NAME, PINS says with what) on every case and prints the table;
 results stay in OUT, and only missing ones are run again. What is compared, with
 which settings, and who is at home where: docs/peers.md.
@@ -15,12 +12,14 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from bench.peers.cases import REAL, SIMULATED, PeerRecord
+from bench.results import Row
 
 HERE = Path(__file__).resolve().parent
 PINS = {
@@ -34,11 +33,11 @@ PINS = {
     "gp": "scikit-learn==1.9.1 scipy==1.16.3",
 }
 """By peer: the versions that were compared, for who makes its environment; nothing here installs them."""
-PEERS = ("rsea", *PINS)
-HEAD = (
-    "| case | peer | residual / noise | fit, % | values off, % | cause | s | note |\n"
-    "|---|---|--:|--:|--:|---|--:|---|\n"
-)
+PEERS = {
+    "rsea": "with_rsea", "mujoco_sysid": "with_mujoco_sysid", "bam": "joints", "cma_pace": "joints",
+    **dict.fromkeys(("sysidentpy", "jax_sysid", "pysindy", "lstm", "gp"), "black_boxes"),
+}  # fmt: skip
+"""By peer: the module with a function of its name."""
 PATIENCE = 8.0
 """Times the budget: wall seconds after which a peer is stopped; the machine may be busy with others."""
 DIVERGED = -1000.0
@@ -46,10 +45,10 @@ DIVERGED = -1000.0
 
 
 def main(
-    *, peers: Annotated[tuple[str, ...], PEERS] = PEERS, cases: tuple[str, ...] = (),
-    realdata: Path | None = None,
-    budget: float = 20.0, envs: Path = Path("out/peers/envs"), out: Path = Path("out/peers"),
-) -> None:  # fmt: skip
+    *, peers: Annotated[tuple[str, ...], PEERS] = tuple(PEERS), cases: tuple[str, ...] = (),
+    realdata: Path | None = None, budget: float = 20.0, envs: Path = Path("out/peers/envs"),
+    out: Path = Path("out/peers"),
+) -> Iterator[Row]:  # fmt: skip
     """Run what is missing, and print the table.
 
     cases: names of cases, all where none is named
@@ -60,12 +59,9 @@ def main(
     """
     made = [make() for make in SIMULATED] + [make(realdata) for make in REAL if realdata]
     out.mkdir(parents=True, exist_ok=True)
-    rows = []
     for case in (c for c in made if not cases or c.name in cases):
         for peer in peers:
-            rows.append(_row(peer, case, _result(peer, case, out, envs, budget)))
-            print(rows[-1], file=sys.stderr, flush=True)
-    print(HEAD + "\n".join(rows) + "\n")
+            yield _row(peer, case, _result(peer, case, out, envs, budget))
 
 
 def _result(peer: str, case: PeerRecord, out: Path, envs: Path, budget: float) -> dict[str, Any]:
@@ -79,7 +75,7 @@ def _result(peer: str, case: PeerRecord, out: Path, envs: Path, budget: float) -
         return {"not_run": reason or "not yet"}
     source = out / f"{stem}.npz"
     np.savez(source, meta=json.dumps(case.meta), **case.arrays)  # type: ignore[arg-type]
-    command = [python, HERE / "common.py", peer, source, target, str(budget)]
+    command = [python, HERE / "common.py", f"{PEERS[peer]}:{peer}", source, target, str(budget)]
     one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         done = subprocess.run(
@@ -100,17 +96,20 @@ def _python(peer: str, envs: Path) -> tuple[Path, str]:
     return python, "" if python.exists() else f"no environment {envs / peer}, expected one with {PINS[peer]}"
 
 
-def _row(peer: str, case: PeerRecord, result: dict[str, Any]) -> str:
+def _row(peer: str, case: PeerRecord, result: dict[str, Any]) -> Row:
+    columns = ("residual / noise", "fit, %", "values off, %", "cause", "s", "note")
     if "not_run" in result:
-        return f"| {case.name} | {peer} | not run: {_cell(result['not_run'])} | | | | | |"
-    error = np.array(result["prediction"]) - case.y[case.split :]
-    rms = float(np.sqrt(np.mean(error**2)))
-    fit = 100.0 * (1.0 - rms / float(case.y[case.split :].std()))
-    cause = _cell(result["cause"] or "none named")
-    fits = _number(fit) if fit > DIVERGED else "diverges"
-    texts = [_number(rms / case.noise), fits, _number(_values_off(case, result)), cause]
-    cells = (case.name, peer, *texts, f"{result['seconds']:.1f}", _cell(result["note"]))
-    return f"| {' | '.join(cells)} |"
+        texts = (f"not run: {_cell(result['not_run'])}", *[""] * 5)
+    else:
+        error = np.array(result["prediction"]) - case.y[case.split :]
+        rms = float(np.sqrt(np.mean(error**2)))
+        fit = 100.0 * (1.0 - rms / float(case.y[case.split :].std()))
+        texts = (
+            _number(rms / case.noise), _number(fit) if fit > DIVERGED else "diverges",
+            _number(_values_off(case, result)), _cell(result["cause"] or "none named"),
+            f"{result['seconds']:.1f}", _cell(result["note"]),
+        )  # fmt: skip
+    return Row(case.name, "", {"peer": peer, **dict(zip(columns, texts, strict=True))})
 
 
 def _values_off(case: PeerRecord, result: dict[str, Any]) -> float:

@@ -22,7 +22,7 @@ stiffness="{stiffness}" frictionloss="{friction}"/></body></worldbody>
 MODIFIED = {"inertia": "armature", "damping": "damping", "stiffness": "stiffness", "friction": "frictionloss"}
 
 
-def fit(case: PeerCase) -> PeerResult:
+def mujoco_sysid(case: PeerCase) -> PeerResult:
     """Fit what the case states, and dry friction."""
     if case.meta["physics"] not in ("sea", "drive", "joint"):
         raise NotApplicable("no joint of MuJoCo: a hardening spring or no physics at all")

@@ -1,6 +1,6 @@
 """This project: `diagnose` on the training samples with the rig of the case, then a free run of its model.
 
-Silverbox has a rig whose effects are stated; there the rig is fitted as in bench/public/silverbox.py.
+Silverbox has a rig whose effects are stated; there the rig is fitted as in bench/public/score.py.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PARAMETERS = {
 """The sums of a rig's values that a peer's value is."""
 
 
-def fit(case: PeerCase) -> PeerResult:
+def rsea(case: PeerCase) -> PeerResult:
     """Diagnose and predict."""
     physics = case.meta["physics"]
     if physics == "duffing":

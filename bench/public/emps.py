@@ -12,6 +12,7 @@ In its loop, by `identify` and `predict`: the targets are the commands, and noth
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
@@ -19,6 +20,7 @@ import numpy as np
 from scipy.io import loadmat
 
 from bench.public.fit import DATA, RIGS, Score, case_of, error_of, fit_rig, record_of, rig_of
+from bench.results import Row
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.cli.maps import map_path
 from rsea_ros.identification.identify import identify
@@ -52,12 +54,13 @@ def scores() -> list[Score]:
     return [free, Score("EMPS, free run in its loop, targets as input", _error_in_loop(), "mm", none, np.inf)]
 
 
-def main() -> None:
+def main() -> Iterator[Row]:
     """Print what the law fitted to each whole record leaves of both, mm."""
     records = [_record(name) for name in FILES]
     rigs = [_fit(r, r.stop - r.start, HELD) for r in records]
-    rows = [" | ".join(f"{_error(rig, r):.2f}" for r in records) for rig in rigs]
-    print(*(f"fitted to {name}: {row} mm" for name, row in zip(FILES, rows, strict=True)), sep="\n")
+    for name, rig in zip(FILES, rigs, strict=True):
+        left = {on: f"{_error(rig, r):.2f} mm" for on, r in zip(FILES, records, strict=True)}
+        yield Row(f"fitted to {name}", "", left)
 
 
 def _error_in_loop() -> float:

@@ -11,9 +11,9 @@ from typing import Annotated
 import pytest
 import yaml
 
-from bench.__main__ import _parser, index, main as run_bench
+from bench.__main__ import _parser, _print, index, main as run_bench
 from bench.frozen.cases import generated
-from bench.results import read_lines, resumed, tables_of, write_pages
+from bench.results import read_lines, resumed, write_pages
 from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli.main import main
 from rsea_ros.errors import DeviceError
@@ -103,10 +103,16 @@ def test_every_benchmark_is_listed_with_what_it_measures(capsys):
     assert all(what and f"{topic:12} {name}" in listed for topic, name, what in index())
 
 
-def test_a_run_keeps_each_table_that_it_prints_by_rows_and_columns():
-    text = "found:\n| a | required | b |\n|---|--:|---|\n| x | <= 1 | 0.5 |\n\n| a |\n|---|\n| y |\n"
-    (first,), (second,) = tables_of(text)
-    assert first == ("x", "<= 1", {"b": "0.5"}) and second == ("y", "", {})
+def test_a_run_keeps_each_table_that_it_prints_by_rows_and_columns(capsys):
+    def section():
+        yield "found:"
+        yield "x", "<= 1", {"b": "0|5"}
+        yield "y", "", "z"
+        return 1
+
+    ((first,), (second,)), status = _print(section())
+    assert first == ("x", "<= 1", {"b": "0|5"}) and second == ("y", "", "z") and status == 1
+    assert capsys.readouterr().out.splitlines()[-1] == "| y |  | z |"
 
 
 def section(

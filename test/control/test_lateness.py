@@ -1,13 +1,14 @@
 """Commands that act late: feedback fades with lateness, and lateness that persists is a fault."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bench.control.tables import Arrivals, irregular
 from rsea_ros.control.controller import Measurement, TorqueController
-from rsea_ros.control.grid import Lateness, Tolerance
+from rsea_ros.control.following import ControlTrace, reading
+from rsea_ros.control.grid import Grid, Lateness, Tolerance
 from rsea_ros.control.law import Gains
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
@@ -53,6 +54,48 @@ def test_feedback_that_fades_with_lateness_stays_stable(rate):
         assert ft < 13.0 and limited == 0.0
 
 
+PARTS = 10
+"""Of a period, between which the simulation distinguishes instants."""
+LONG_AGO = 10**12
+"""ns, stamp of the first measurement."""
+
+
+def irregular(rate, desired, taken, acting, ft_age=0.0):
+    """Run a controller on a simulated rig with measurements and commands that come when they come.
+
+    As the node does it: a grid gives each stamp its place, lateness fades the feedback. Held to a part
+    PARTS of a period. In periods, for each sample: taken: by how much each measurement is taken after its
+    place; nan for one that is lost. acting: by how much the resulting command acts after its sample. ft_age:
+    by how much its torque is older than the rest of it.
+    """
+    controller = TorqueController(RIG, rate, RATES[rate])
+    plant, grid, lateness = Plant(RIG, rate * PARTS), Grid(1e9 / rate), Lateness(rate)
+    due = {round((k + off) * PARTS): k for k, off in enumerate(taken) if np.isfinite(off)}
+    commands, ages = {}, np.broadcast_to(ft_age, len(desired))
+    rows, torque, command, numbers = [], 0.0, 0.0, np.arange(len(desired))
+    sample = plant.step(0.0)
+    torques = [sample.ft]
+    controller.start(reading(sample), float(desired[0]))
+    for part in range(len(desired) * PARTS):
+        if part in due:
+            periods = grid.place(round(part / PARTS / rate * 1e9 + LONG_AGO))
+            late = float(acting[due[part]])
+            trust = lateness.take(max(late, periods - 1), max(1, periods))
+            if periods:
+                wanted = float(np.interp((grid.at - LONG_AGO) * 1e-9 * rate, numbers, desired))
+                back = min(round(ages[due[part]] * PARTS), part)
+                read = replace(reading(sample), ft=torques[part - back], ft_age=back / PARTS)
+                command = controller.step(read, wanted, periods - 1, trust=trust, offset=grid.offset)
+                commands[part + round((1.0 + late) * PARTS)] = command
+        if part % PARTS == 0:
+            rows.append((sample.ft, command, sample.velocity))
+        torque = commands.pop(part, torque)
+        sample = plant.step(torque)
+        torques.append(sample.ft)
+    n = np.array(rows)
+    return ControlTrace(np.arange(len(n)) / rate, np.asarray(desired), n[:, 0], n[:, 1], n[:, 2])
+
+
 def every(n, **offsets):
     """Return the instants of n measurements; of each 97, some from the 60th on are late by given amounts."""
     taken = np.zeros(n)
@@ -87,8 +130,7 @@ def test_irregular_measurements_make_no_kick(rate, kind):
     n = round(1.2 * rate)
     taken, acting = KINDS[kind]
     wanted = 10.0 * np.sin(2.0 * math.pi * 5.0 * np.arange(n) / rate)
-    controller = TorqueController(RIG, rate, RATES[rate])
-    run = irregular(RIG, rate, controller, wanted, Arrivals(taken(n), np.full(n, acting)))
+    run = irregular(rate, wanted, taken(n), np.full(n, acting))
     settled = run.t > 0.5
     assert np.abs(run.ft[settled]).max() < 13.0
     assert np.abs(run.command[settled]).max() < 0.75 * 68.0
@@ -100,11 +142,8 @@ def test_a_torque_sensor_with_its_own_clock_costs_no_accuracy(rate):
     n = round(2.0 * rate)
     wanted = 10.0 * np.sin(2.0 * math.pi * 5.0 * np.arange(n) / rate)
     ages = 0.5 * np.random.default_rng(3).random(n)
-    kinds = [Arrivals(np.zeros(n), np.zeros(n), age) for age in (np.zeros(n), ages)]
-    even, aged = (
-        irregular(RIG, rate, TorqueController(RIG, rate, RATES[rate]), wanted, kind).error(0.6)
-        for kind in kinds
-    )
+    kinds = (np.zeros(n), ages)
+    even, aged = (irregular(rate, wanted, np.zeros(n), np.zeros(n), age).error(0.6) for age in kinds)
     assert aged < 1.1 * even
 
 

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from bench.driver.bare_loop import may_have
+from bench.processes import may_have
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """

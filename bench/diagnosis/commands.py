@@ -1,59 +1,36 @@
-"""Records for the coverage table: one effect, one kind of work, one severity, on test/independent.
-
-That plant shares no code with the project. Six kinds of work: commands of benches, and motions of
-machines at work.
-"""
+"""Commands of benches, and of machines at work: six kinds, each for a bench of test/independent."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from independent.bench import Bench, drawn_bench, record_command
+from independent.bench import Bench
 from independent.equations import DG, DH, SIZE, G, H
-from independent.excitations import chirp_noise, odd_multisine
-from independent.hidden import hide
-from independent.severities import drawn_parameters
+from independent.excitations import RATE, chirp_noise, odd_multisine
 from independent.solvers import _pieces, _rk4
 from numba import njit
 
-from bench.calibration.cases import RATE, work
-from bench.diagnosis.cases import RIG
-from bench.diagnosis.played import Played
-from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import FloatArray
 
-RIG_VALUES = {
-    "rotor.reflected_inertia": "j_m",
-    "rotor.reflected_damping": "b_m",
-    "spring.stiffness": "k_s",
-    "spring.damping": "b_s",
-}
-"""Value of the rig, and its name on the second bench."""
-STIFF, DAMPED = 900.0, 15.0
-"""Gains of the closed loop on the deflection, N m/rad and N m s/rad."""
-SOFTNESS = 25.0 / 1500.0
-"""Largest target of the closed loop, rad."""
+STIFF, DAMPED, STIFFNESS = 900.0, 15.0, 1500.0
+"""Of the closed loop on the deflection: gains, N m/rad and N m s/rad, and feed-forward, N m/rad."""
 
 
-def make_record(effect: str, excitation: str, severity: str, seed: int, duration: float) -> Played:
-    """Return a record (duration in s) of a hidden effect with its truth."""
-    rng = np.random.default_rng([seed, *map(ord, effect + excitation + severity)])
-    parameters = drawn_parameters(effect, severity, rng)
-    drawn = drawn_bench(rng)
-    bench = hide(drawn, effect, parameters)
-    record = record_command(bench, COMMANDS[excitation](bench, duration, rng), rng)
-    values = {name: getattr(drawn.plant, n) for name, n in RIG_VALUES.items()}
-    return Played(record, load_rig(RIG), (), (effect,), {effect: parameters}, values)
+def work(duration: float, rng: np.random.Generator, smooth: bool) -> FloatArray:
+    """Return a log of normal work, -1 to 1: levels held for 0.2 to 1.2 s, smoothed moves between if asked."""
+    held: list[FloatArray] = []
+    n = round(duration * RATE)
+    while sum(map(len, held)) < n:
+        held.append(np.full(round(rng.uniform(0.2, 1.2) * RATE), rng.uniform(-1.0, 1.0)))
+    levels: FloatArray = np.concatenate(held)[:n]
+    window = np.hanning(round(0.15 * RATE) + 2)[1:-1]
+    return np.convolve(levels, window / window.sum(), mode="same") if smooth else levels
 
 
 def _work(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:
     levels = 30.0 * work(duration, rng, smooth=True)
     return levels + rng.normal(size=len(levels))
-
-
-def _steps(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:
-    return 30.0 * work(duration, rng, smooth=False)
 
 
 def _slow_sweep(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:
@@ -65,7 +42,7 @@ def _slow_sweep(bench: Bench, duration: float, rng: np.random.Generator) -> Floa
 
 def _closed_loop(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:
     """The commands of a PD loop that follows a log of work in angle, on noisy readings."""
-    reference = SOFTNESS * work(duration, rng, smooth=True)
+    reference = 25.0 / STIFFNESS * work(duration, rng, smooth=True)
     noise = rng.normal(size=(2, len(reference))) * np.array([[2.0e-5], [5.0e-3]])
     plant = bench.plant._replace(duration=duration)
     steps = 72 if plant.gap > 0.0 or plant.gear_k > 0.0 else 24
@@ -81,7 +58,7 @@ def _follow(reference, noise, period, whole, part, steps, p, limit):
     first = int(np.ceil(part * steps))
     for k in range(reference.size):
         angle, speed = x[G] - x[H] + noise[0, k], x[DG] - x[DH] + noise[1, k]
-        wanted = 1500.0 * reference[k] + STIFF * (reference[k] - angle) - DAMPED * speed
+        wanted = STIFFNESS * reference[k] + STIFF * (reference[k] - angle) - DAMPED * speed
         commands[k] = min(max(wanted, -68.0), 68.0)
         late = min(max(commands[k - whole - 1], -limit), limit) if k > whole else 0.0
         now = min(max(commands[k - whole], -limit), limit) if k >= whole else 0.0
@@ -97,7 +74,7 @@ COMMANDS: Mapping[str, Callable[[Bench, float, np.random.Generator], FloatArray]
     "multisine": lambda bench, duration, rng: odd_multisine(duration, rng, period=5.0),
     "work": _work,
     "loop": _closed_loop,
-    "steps": _steps,
+    "steps": lambda bench, duration, rng: 30.0 * work(duration, rng, smooth=False),
     "sweep": _slow_sweep,
 }
 """Commands of each kind of work, N m."""
