@@ -52,7 +52,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     early = max(1.0 - part - _until(middle, last, x[MEANS + new]), 0.0)  # last acts already
     mean = late * first + (1.0 - late - early) * middle + early * last
     if targeted:
-        s[REFERENCE] = mean
+        s[REFERENCE] = s[HELD] = mean
     else:
         s[COMMAND], s[CURRENT], s[HELD] = mean, x[MEANS + new], mean
         put_beside(s, first if late > 0.0 else middle, last if early > 0.0 else middle)

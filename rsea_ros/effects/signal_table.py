@@ -88,6 +88,6 @@ SPRING_ANGLE = 40  # rad, deflection of the spring as its own encoder sees it
 TARGETED = 41  # 1 where positions command the bench: then REFERENCE is its command
 BEFORE = 42  # N m, by how much the command that the step begins with exceeds COMMAND, its mean over the step
 AFTER = 43  # N m, likewise the one that it ends with; both 0 where one is held over the whole step
-HELD = 44  # N m, as COMMAND where that jumps from one held value to another; constant where nothing jumps
+HELD = 44  # N m, or rad of a target: what is held, and jumps; 0 where the command is no held one
 
 SIZE = 45

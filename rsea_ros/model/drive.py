@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -256,11 +256,6 @@ class Drive:
     def simulated(self) -> tuple[tuple[int, int], ...]:
         """First step and end of each part that is simulated."""
         return self.spans or ((0, len(self.command)),)
-
-    @cached_property
-    def kinks(self) -> FloatArray:
-        """Command by step where velocities have a kink: nowhere for one that does not jump."""
-        return self.command if self.jumps else np.zeros(len(self.command))
 
     @property
     def drift_time(self) -> float:

@@ -201,7 +201,7 @@ def _drive_outputs(
         if on_angle:
             steady = _without_noise(drive, out[1:, 0], first, end) * rig["gear.ratio"]
             out, within = _over_span(machine, rig, drive, steady, first, end)
-        kinks, jumps = within[:, 0] if rig.loop is None else drive.kinks[first:end], within[:, 1].any()
+        kinks, jumps = within[:, 0], within[:, 1].any()
         for at, sampled in zip(wanted, results, strict=True):
             for n, k in channels.items():
                 inside = np.searchsorted(edges, at[n]) == part if edges else slice(None)
@@ -240,7 +240,7 @@ def _over_span(
         out[start] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
         inputs = StepInputs(
             torque[k:stop], reference[k:stop], ridden[k:stop], drive.origin + k * drive.step,
-            drive.jumps and rig.loop is None, within[start : stop - first],
+            drive.jumps, within[start : stop - first],
         )  # fmt: skip
         advance(machine.linear, machine.calls, inputs, state, out[start + 1 : stop - first + 1])
         out[start, 2] = out[start + 1, 2]

@@ -197,7 +197,7 @@ def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
         s[st.TIME], s[st.COMMAND], s[st.CURRENT] = start + k * h, command[k], command[k]
         s[st.HELD] = 0.0
         if jumps:
-            s[st.HELD] = command[k]
+            s[st.HELD] = reference[k] if s[st.TARGETED] != 0.0 else command[k]
             put_beside(s, command[max(k - 1, 0)], command[min(k + 1, last)])
         if len(reference) > 0:
             s[st.REFERENCE] = reference[k]
