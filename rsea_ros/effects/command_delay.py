@@ -54,8 +54,9 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     if targeted:
         s[REFERENCE] = s[HELD] = mean
     else:
-        s[COMMAND], s[CURRENT], s[HELD] = mean, x[MEANS + new], mean
-        put_beside(s, first if late > 0.0 else middle, last if early > 0.0 else middle)
+        s[COMMAND] = s[HELD] = mean
+        s[CURRENT] = last if early > 0.0 else middle
+        put_beside(s, first if late > 0.0 else middle, s[CURRENT])
 
 
 EFFECT = Effect(

@@ -18,7 +18,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
-from rsea_ros.model.drive import Drive, SpringStart, drive_from, steps_per_sample, zero_unknown
+from rsea_ros.model.drive import ON_GRID, Drive, SpringStart, drive_from, steps_per_sample, zero_unknown
 from rsea_ros.model.equations import Mechanics, mechanics, train_ratio, with_structure
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
@@ -65,11 +65,19 @@ def _newton(v, left, right, u):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _sample_held(values, at):  # type: ignore[no-untyped-def]
-    """Return the value of the step that ends nearest to each instant (a hold that just ended)."""
-    out = np.empty(len(at))
+def _sample_held(values, at, within, early):  # type: ignore[no-untyped-def]
+    """Return what was held `early` steps before each instant: a hold that just ended counts.
+
+    within: of each step, see _beside_mean; empty where no command changes within one.
+    """
+    out, last = np.empty(len(at)), len(values) - 2
     for i in range(len(at)):
-        out[i] = values[min(max(int(np.rint(at[i])), 1), len(values) - 1)]
+        back = min(max(at[i] - early, 0.0), last + 0.5)
+        k = int(back)
+        out[i] = values[k + 1]
+        if k < len(within) and within[k, 1] != within[k, 2]:
+            share = within[k, 2] / (within[k, 2] - within[k, 1])
+            out[i] = within[k, 3] if back - k < share else values[k + 1]
     return out
 
 
@@ -77,7 +85,7 @@ def _sample_held(values, at):  # type: ignore[no-untyped-def]
 def _beside_mean(within, at):  # type: ignore[no-untyped-def]
     """Return the integral of what is held beyond its mean from the begin of a step on, at instants in steps.
 
-    within: HELD, BEFORE and AFTER of each step, N m (model/step.py).
+    within: HELD, BEFORE, AFTER and first current of each step, N m (model/step.py).
     """
     out = np.zeros(len(at))
     for i in range(len(at)):
@@ -89,14 +97,21 @@ def _beside_mean(within, at):  # type: ignore[no-untyped-def]
     return out
 
 
-def sample(name: str, values: FloatArray, at: FloatArray, command: FloatArray) -> FloatArray:
+NOTHING_WITHIN = np.empty((0, 4))
+
+
+def sample(
+    name: str, values: FloatArray, at: FloatArray, within: FloatArray = NOTHING_WITHIN, *, late: bool = False
+) -> FloatArray:
     """Return a simulated channel at instants in steps since the start.
 
-    values: at the ends of the steps, the initial one first, shape (steps + 1,). command: of each step.
+    values: at the ends of the steps, the initial one first, shape (steps + 1,). within: what is held in each
+    step and jumps, shape (steps, 4), or nothing. late: the command acts at a time of its own; otherwise a
+    current read up to half a step after a command is still that of the command before.
     """
-    smooth = name != "motor_torque"
-    result: FloatArray = _sample_smooth(values, at, command) if smooth else _sample_held(values, at)
-    return result
+    if name == "motor_torque":
+        return np.asarray(_sample_held(values, at, within, ON_GRID if late else 0.5))
+    return np.asarray(_sample_smooth(values, at, within[:, 0] if len(within) else np.zeros(len(values) - 1)))
 
 
 SLOW = 0.1
@@ -192,6 +207,7 @@ def _drive_outputs(
     """Return the channels of a drive at the instants of each reading, from its own beginning."""
     ridden = _middles(drive.angle) * rig["gear.ratio"] if on_angle else np.empty(0)
     channels = {n: OUTPUTS.index(n) for n in drive.at if rig.measures(n)}
+    late = any("delay" in effect_named(e.name).tags and any(e.parameters.values()) for e in rig.effects)
     wanted = [{n: _instants(rig, drive, n, at[n]) for n in channels} for at in readings]
     results = [{n: np.empty(len(at[n])) for n in channels} for at in wanted]
     spans = drive.simulated
@@ -201,12 +217,12 @@ def _drive_outputs(
         if on_angle:
             steady = _without_noise(drive, out[1:, 0], first, end) * rig["gear.ratio"]
             out, within = _over_span(machine, rig, drive, steady, first, end)
-        kinks, jumps = within[:, 0], within[:, 1].any()
+        jumps = within[:, 1].any()
         for at, sampled in zip(wanted, results, strict=True):
             for n, k in channels.items():
                 inside = np.searchsorted(edges, at[n]) == part if edges else slice(None)
                 since = at[n][inside] - first
-                sampled[n][inside] = sample(n, out[:, k], since, kinks)
+                sampled[n][inside] = sample(n, out[:, k], since, within, late=late)
                 if jumps and (kick := _kick(machine, n)) != 0.0:
                     sampled[n][inside] += kick * drive.step * _beside_mean(within, since)
     return results
@@ -226,7 +242,7 @@ def _over_span(
     machine: Machine, rig: Rig, drive: Drive, ridden: FloatArray, first: int, end: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return OUTPUTS at the ends of the steps of a span, those at its beginning first, and `within`."""
-    out, within = np.empty((end - first + 1, len(OUTPUTS))), np.empty((end - first, 3))
+    out, within = np.empty((end - first + 1, len(OUTPUTS))), np.empty((end - first, 4))
     torque, reference = drive.command, drive.reference
     if rig.loop is not None:
         torque, reference = np.zeros(len(drive.command)), drive.command
@@ -273,7 +289,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
     """Advance a machine over the steps of `command`, in place; `out` gets OUTPUTS of every step."""
     empty = np.empty(0)
     reference, ridden = (empty if v is None else v for v in (reference, ridden))
-    inputs = StepInputs(command, reference, ridden, start, True, np.empty((0, 3)))
+    inputs = StepInputs(command, reference, ridden, start, True, NOTHING_WITHIN)
     advance(machine.linear, machine.calls, inputs, StepState(machine.x, machine.table, machine.effect_x), out)
 
 

@@ -146,7 +146,7 @@ def _propagate(model, state, t):  # type: ignore[no-untyped-def]
         model.held[1] = dt
     model.calls.p[0] = state.extra[0] + state.clock[ERROR]
     command, out, none = np.full(count, state.clock[FORCED]), np.empty((count, len(OUTPUTS))), np.empty(0)
-    inputs = StepInputs(command, none, none, state.clock[NOW], False, np.empty((0, 3)))
+    inputs = StepInputs(command, none, none, state.clock[NOW], False, np.empty((0, 4)))
     advance(model.linear, model.calls, inputs, StepState(state.x, state.table, state.effect_x), out)
     n = len(state.x)
     for i in range(n):
