@@ -210,8 +210,10 @@ def on_fine_steps(model: Candidate, setup: FitSetup) -> Candidate:
     """Return a candidate on steps so short that its simulation errs less than the sensors; itself if it does.
 
     The error of a step is the change by half of it. Where half of that changes as much, as in contacts that
-    bounce, a shorter step is no better, and none is taken.
+    bounce, a shorter step is no better, and none is taken. Nor is one of a loop, which samples as it steps.
     """
+    if model.problem.rig.loop is not None:
+        return model
     limit, error = setup.settings.fits.step_error, np.inf
     best = cases, outputs = model.cases, model.outputs
     for _ in range(_HALVINGS + 1):

@@ -5,10 +5,8 @@ the command changed from one to the other after a share (m_a - m) / (m_a - m_b) 
 not on the grid, and a delay, make such steps. The mean of a clipped command is not the mean command, clipped.
 """
 
-import math
-
 from rsea_ros.compiler import njit
-from rsea_ros.effects.signal_table import AFTER, BEFORE, COMMAND, STEP
+from rsea_ros.effects.signal_table import AFTER, BEFORE, COMMAND, CURRENT, CURRENT_BEFORE
 
 
 @njit(inline="always")
@@ -17,6 +15,7 @@ def put_beside(s, before, after):  # type: ignore[no-untyped-def]
     s[BEFORE], s[AFTER] = before - s[COMMAND], after - s[COMMAND]
     if s[BEFORE] * s[AFTER] >= 0.0:
         s[BEFORE] = s[AFTER] = 0.0
+    s[CURRENT_BEFORE], s[CURRENT] = both_held(s)
 
 
 @njit(inline="always")
@@ -26,11 +25,31 @@ def both_held(s):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
+def until_change(s):  # type: ignore[no-untyped-def]
+    """Return the share of the step in which the first of both commands is held; 1 where there is one."""
+    return s[AFTER] / (s[AFTER] - s[BEFORE]) if s[AFTER] != s[BEFORE] else 1.0
+
+
+@njit(inline="always")
 def put_both(s, before, after):  # type: ignore[no-untyped-def]
     """Put what a law makes of both commands (N m) in their place, and its mean over the step."""
-    share = s[AFTER] / (s[AFTER] - s[BEFORE]) if s[AFTER] != s[BEFORE] else 1.0
+    share = until_change(s)
     s[COMMAND] = share * before + (1.0 - share) * after
     s[BEFORE], s[AFTER] = before - s[COMMAND], after - s[COMMAND]
+
+
+@njit(inline="always")
+def put_lagged(s, changed, end, moved, moved_first):  # type: ignore[no-untyped-def]
+    """Put a lagged current in the command's place: at the change and at the end of the step, N m.
+
+    moved, moved_first: what the lag has kept back over the step, and until the change, in N m steps.
+    """
+    share, first = until_change(s), s[COMMAND] + s[BEFORE]
+    s[COMMAND] -= moved
+    if share < 1.0:
+        s[BEFORE] = first - moved_first / share - s[COMMAND]
+        s[AFTER] = -share / (1.0 - share) * s[BEFORE]
+    s[CURRENT], s[CURRENT_BEFORE] = end, changed
 
 
 @njit(inline="always")
@@ -39,12 +58,3 @@ def scale(s, gain):  # type: ignore[no-untyped-def]
     s[COMMAND] *= gain
     s[BEFORE] *= gain
     s[AFTER] *= gain
-
-
-@njit(inline="always")
-def fade(s, time_constant):  # type: ignore[no-untyped-def]
-    """Leave of a jump within the step what has passed a lag (s) in the mean over a step."""
-    steps = time_constant / s[STEP]
-    passed = 1.0 + steps * math.expm1(-1.0 / steps)
-    s[BEFORE] *= passed
-    s[AFTER] *= passed

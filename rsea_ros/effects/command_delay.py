@@ -12,7 +12,7 @@ import numpy as np
 from rsea_ros.compiler import njit
 from rsea_ros.effects._held import put_beside
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import AFTER, COMMAND, CURRENT, HELD, REFERENCE, STEP, TARGETED, Port
+from rsea_ros.effects.signal_table import AFTER, COMMAND, HELD, REFERENCE, STEP, TARGETED, Port
 
 LENGTH = 1023
 """Steps that are kept: 60 ms at a step of 60 us."""
@@ -55,8 +55,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
         s[REFERENCE] = s[HELD] = mean
     else:
         s[COMMAND] = s[HELD] = mean
-        s[CURRENT] = last if early > 0.0 else middle
-        put_beside(s, first if late > 0.0 else middle, s[CURRENT])
+        put_beside(s, first if late > 0.0 else middle, last if early > 0.0 else middle)
 
 
 EFFECT = Effect(

@@ -8,9 +8,9 @@ Electrical Drives, 2001 (the closed current loop as a lag).
 
 import math
 
-from rsea_ros.effects._held import fade
+from rsea_ros.effects._held import both_held, put_lagged, until_change
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
+from rsea_ros.effects.signal_table import STEP, Port
 
 
 @compiled
@@ -18,11 +18,11 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Replace the command by the mean of the lagged one; x[0] is that at the end of the step."""
     if p[0] == 0.0:
         return
-    command, behind = s[COMMAND], x[0] - s[COMMAND]
-    u = s[STEP] / p[0]
-    s[COMMAND] = command - behind * math.expm1(-u) / u
-    x[0] = s[CURRENT] = command + behind * math.exp(-u)
-    fade(s, p[0])
+    u, (before, after), share = s[STEP] / p[0], both_held(s), until_change(s)
+    changed = before + (x[0] - before) * math.exp(-share * u)
+    end = after + (changed - after) * math.exp(-(1.0 - share) * u)
+    put_lagged(s, changed, end, (end - x[0]) / u, (changed - x[0]) / u)
+    x[0] = end
 
 
 EFFECT = Effect(

@@ -11,9 +11,29 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from rsea_ros.effects._held import fade
+from rsea_ros.compiler import njit
+from rsea_ros.effects._held import both_held, put_lagged, until_change
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
+from rsea_ros.effects.signal_table import STEP, Port
+
+
+@njit(inline="always")
+def _later(at, rate, command, time, p):  # type: ignore[no-untyped-def]
+    """Return the filtered command and its rate some time (s) later."""
+    log = math.log(p[1])
+    zeta = -log / math.sqrt(math.pi * math.pi + log * log)
+    decay, turn, behind = zeta / p[0], math.sqrt(1.0 - zeta * zeta) / p[0], at - command
+    e, c, n = math.exp(-decay * time), math.cos(turn * time), math.sin(turn * time) / turn
+    after = command + e * (behind * (c + decay * n) + rate * n)
+    return after, e * (rate * (c - decay * n) - behind * n / (p[0] * p[0]))
+
+
+@njit(inline="always")
+def _kept(at, rate, x, p, h):  # type: ignore[no-untyped-def]
+    """Return what the filter has kept back since the state x, N m steps: by its equation."""
+    log = math.log(p[1])
+    zeta = -log / math.sqrt(math.pi * math.pi + log * log)
+    return (p[0] * p[0] * (rate - x[1]) + 2.0 * zeta * p[0] * (at - x[0])) / h
 
 
 @compiled
@@ -21,18 +41,11 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Replace the command by the mean of the filtered one; x: that at the end of the step, and its rate."""
     if p[0] == 0.0:
         return
-    command, h, log = s[COMMAND], s[STEP], math.log(p[1])
-    zeta = -log / math.sqrt(math.pi * math.pi + log * log)
-    decay, turn = zeta / p[0], math.sqrt(1.0 - zeta * zeta) / p[0]
-    behind, rate = x[0] - command, x[1]
-    e, c, n = math.exp(-decay * h), math.cos(turn * h), math.sin(turn * h) / turn
-    after = e * (behind * (c + decay * n) + rate * n)
-    rate_after = e * (rate * (c - decay * n) - behind * n / (p[0] * p[0]))
-    moved = p[0] * p[0] * (rate_after - rate) + 2.0 * zeta * p[0] * (after - behind)
-    s[COMMAND] = command - moved / h
-    x[0], x[1] = command + after, rate_after
-    s[CURRENT] = x[0]
-    fade(s, p[0])
+    h, (before, after), share = s[STEP], both_held(s), until_change(s)
+    changed, rate = _later(x[0], x[1], before, share * h, p)
+    end, rate_end = _later(changed, rate, after, (1.0 - share) * h, p)
+    put_lagged(s, changed, end, _kept(end, rate_end, x, p, h), _kept(changed, rate, x, p, h))
+    x[0], x[1] = end, rate_end
 
 
 def response(p: Sequence[float], s: Any) -> Any:

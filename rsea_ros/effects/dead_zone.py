@@ -14,7 +14,7 @@ from rsea_ros.compiler import njit
 from rsea_ros.effects._held import both_held, put_both
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
-from rsea_ros.effects.signal_table import CURRENT, Port
+from rsea_ros.effects.signal_table import CURRENT, CURRENT_BEFORE, Port
 
 RAMP = 0.001
 """Of the width. A fit needs a slope where samples cross the edge."""
@@ -35,7 +35,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
         return
     before, after = both_held(s)
     put_both(s, _left_of(before, p), _left_of(after, p))
-    s[CURRENT] = _left_of(s[CURRENT], p)
+    s[CURRENT_BEFORE], s[CURRENT] = _left_of(s[CURRENT_BEFORE], p), _left_of(s[CURRENT], p)
 
 
 _SHOWN = 0.3

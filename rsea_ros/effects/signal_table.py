@@ -89,5 +89,6 @@ TARGETED = 41  # 1 where positions command the bench: then REFERENCE is its comm
 BEFORE = 42  # N m, by how much the command that the step begins with exceeds COMMAND, its mean over the step
 AFTER = 43  # N m, likewise the one that it ends with; both 0 where one is held over the whole step
 HELD = 44  # N m, or rad of a target: what is held, and jumps; 0 where the command is no held one
+CURRENT_BEFORE = 45  # N m, as CURRENT when the command changes within the step
 
-SIZE = 45
+SIZE = 46

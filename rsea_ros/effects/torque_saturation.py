@@ -10,7 +10,7 @@ import math
 from rsea_ros.effects._held import both_held, put_both
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import at_limits
-from rsea_ros.effects.signal_table import CURRENT, Port
+from rsea_ros.effects.signal_table import CURRENT, CURRENT_BEFORE, Port
 
 
 @compiled
@@ -18,6 +18,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Clip the command."""
     before, after = both_held(s)
     put_both(s, min(max(before, -p[0]), p[0]), min(max(after, -p[0]), p[0]))
+    s[CURRENT_BEFORE] = min(max(s[CURRENT_BEFORE], -p[0]), p[0])
     s[CURRENT] = min(max(s[CURRENT], -p[0]), p[0])
 
 

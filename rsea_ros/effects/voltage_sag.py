@@ -12,7 +12,7 @@ import math
 from rsea_ros.effects._held import both_held, put_both
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import at_limits
-from rsea_ros.effects.signal_table import CURRENT, OUTPUT_VELOCITY, Port
+from rsea_ros.effects.signal_table import CURRENT, CURRENT_BEFORE, OUTPUT_VELOCITY, Port
 
 
 @compiled
@@ -25,6 +25,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
         low, high = min(-p[0] * (1.0 + share), 0.0), max(p[0] * (1.0 - share), 0.0)
         before, after = both_held(s)
         put_both(s, min(max(before, low), high), min(max(after, low), high))
+        s[CURRENT_BEFORE] = min(max(s[CURRENT_BEFORE], low), high)
         s[CURRENT] = min(max(s[CURRENT], low), high)
 
 

@@ -85,7 +85,7 @@ def _sample_held(values, at, within, early):  # type: ignore[no-untyped-def]
 def _beside_mean(within, at):  # type: ignore[no-untyped-def]
     """Return the integral of what is held beyond its mean from the begin of a step on, at instants in steps.
 
-    within: HELD, BEFORE, AFTER and first current of each step, N m (model/step.py).
+    within: HELD, BEFORE, AFTER, CURRENT_BEFORE of each step, N m (model/step.py).
     """
     out = np.zeros(len(at))
     for i in range(len(at)):

@@ -86,8 +86,8 @@ class StepInputs(NamedTuple):
 
     command: N m, held over each step. reference: rad, target of a position loop; ridden: rad, measured rotor
     angle at the middle of each step; both may be empty. start: time of the first step, s. jumps: the command
-    is held between its stamps. within: gets HELD, BEFORE and AFTER of each step behind the effects, and the
-    current that it begins with, shape (steps, 4); or (0, 4).
+    is held between its stamps. within: gets HELD, BEFORE and AFTER of each step behind the effects, and
+    CURRENT_BEFORE, shape (steps, 4); or (0, 4).
     """
 
     command: FloatArray
@@ -199,15 +199,13 @@ def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
         if jumps:
             s[st.HELD] = reference[k] if s[st.TARGETED] != 0.0 else command[k]
             put_beside(s, command[max(k - 1, 0)], command[min(k + 1, last)])
-            s[st.CURRENT] += s[st.AFTER]
         if len(reference) > 0:
             s[st.REFERENCE] = reference[k]
         call_port(_COMMAND, calls, s_at, p_at, effect_x_at)
-        before = s[st.CURRENT] + s[st.BEFORE] - s[st.AFTER]
         call_port(_MOTOR, calls, s_at, p_at, effect_x_at)
         if len(within) > 0:
             within[k, 0], within[k, 1] = s[st.HELD], s[st.BEFORE]
-            within[k, 2], within[k, 3] = s[st.AFTER], before
+            within[k, 2], within[k, 3] = s[st.AFTER], s[st.CURRENT_BEFORE]
         free = end = _free(linear, s[st.COMMAND], x)
         if calls.nonlinear:
             s[st.TIME], s[st.COMMIT] = start + (k + 0.5) * h, 0.0
