@@ -16,6 +16,7 @@ import hashlib
 import logging
 import os
 import stat
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -226,16 +227,23 @@ def tell_once() -> None:
     _log.info("compiling the simulation for this machine: up to a minute, once")
 
 
+_SETTING = threading.Lock()
+
+
 @contextmanager
 def _own_cache() -> Iterator[None]:
-    """Let numba keep code in the package's folder, unless the user has named one (NUMBA_CACHE_DIR)."""
+    """Let numba keep code in the package's folder, unless the user has named one (NUMBA_CACHE_DIR).
+
+    One thread at a time: the setting is numba's own, for all of them.
+    """
     settings: Any = numba_config
-    users = settings.CACHE_DIR
-    settings.CACHE_DIR = users or _folder()
-    try:
-        yield
-    finally:
-        settings.CACHE_DIR = users
+    with _SETTING:
+        users = settings.CACHE_DIR
+        settings.CACHE_DIR = users or _folder()
+        try:
+            yield
+        finally:
+            settings.CACHE_DIR = users
 
 
 @lru_cache(maxsize=1)

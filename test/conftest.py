@@ -76,9 +76,9 @@ PATIENT = (
 """Files that wait for processes and are late for nothing: any worker takes them, at the end."""
 
 COMPUTING = (
-    "golden/", "diagnosis/test_hidden_effects", "report/", "test_realdata", "checks/test_gains",
-    "checks/test_dead", "health/test_monitor", "test_launcher", "diagnosis/test_stated_starts",
-    "checks/test_clocks", "test_docs", "laws/test_hidden_laws", "control/test_controller", "experiment/",
+    "golden/", "diagnosis/test_hidden_effects", "test_realdata", "test_launcher", "health/test_monitor",
+    "checks/test_dead", "experiment/", "checks/test_clocks", "checks/test_gains", "laws/test_hidden_laws",
+    "report/", "effects/", "diagnosis/test_stated_starts", "control/test_controller", "test_docs",
 )  # fmt: skip
 """Files that compute longest, in this order, so that no worker is left with one of them at the end."""
 

@@ -17,6 +17,12 @@ def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
+@cache
+def nodes(tree: ast.Module) -> list[ast.AST]:
+    """Return all nodes of a tree: to walk through the modules takes as long as to parse them."""
+    return list(ast.walk(tree))
+
+
 def found_in_modules(offences: Callable[[Path, ast.Module], Iterable[object]]) -> list[str]:
     """Return the offences of all modules, each with the path of its module."""
     found = ((path, each) for path in MODULES for each in offences(path, tree_of(path)))
@@ -31,7 +37,7 @@ def name_of(path: Path) -> str:
 
 def imports(path: Path, source: str | ast.Module) -> Iterator[tuple[str, int]]:
     """Yield every module that a source imports, at any depth, by its absolute name, with its line."""
-    for node in ast.walk(ast.parse(source) if isinstance(source, str) else source):
+    for node in nodes(ast.parse(source) if isinstance(source, str) else source):
         if isinstance(node, ast.Import):
             yield from ((alias.name, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

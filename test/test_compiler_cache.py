@@ -10,9 +10,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from pathlib import Path
 
 import pytest
+from import_graph import tree_of
 from numba.core import config
 
 from rsea_ros import compiler, compiler as compiler_cache
@@ -20,38 +22,6 @@ from rsea_ros.compiler import SHARED, _own_cache, cache_folder, njit, shared_key
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "rsea_ros"
-EVALUATE = """
-import ctypes
-from rsea_ros.effects.coulomb_friction import EFFECT
-from rsea_ros.effects.signal_table import CREEP, GEAR_TORQUE, GEAR_VELOCITY, SIZE
-table, own = (ctypes.c_double * SIZE)(), (ctypes.c_double * 1)()
-table[GEAR_VELOCITY], table[CREEP] = 1.0, 2e-3
-EFFECT.function.ctypes(table, (ctypes.c_double * 1)(3.0), own)
-print(table[GEAR_TORQUE])
-"""
-
-
-def evaluate(root: Path, cache: Path) -> float:
-    environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
-    environment |= {"PYTHONPATH": str(root), "XDG_CACHE_HOME": str(cache)}
-    done = subprocess.run(
-        [sys.executable, "-c", EVALUATE], env=environment, cwd=root, capture_output=True, text=True,
-        check=True,
-    )
-    return float(done.stdout)
-
-
-def test_a_changed_helper_is_recompiled(tmp_path):
-    copy = shutil.copytree(PACKAGE, tmp_path / "rsea_ros", ignore=shutil.ignore_patterns("__pycache__"))
-    assert evaluate(tmp_path, tmp_path / "cache") == -3.0
-    helper = copy / "effects" / "_friction.py"
-    text = helper.read_text()
-    assert text.count("        return size\n") == 1
-    helper.write_text(text.replace("        return size\n", "        return size * 2.0\n"))
-    assert evaluate(tmp_path, tmp_path / "cache") == -6.0
-    assert len(list((tmp_path / "cache" / "rsea_ros").iterdir())) == 2
-
-
 def compiled_functions(tree: ast.Module) -> list[ast.FunctionDef]:
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     return [
@@ -77,7 +47,7 @@ def test_the_key_covers_every_file_compiled_into_others():
     shared = {file for pattern in SHARED for file in PACKAGE.glob(pattern)}
     seen = 0
     for file in PACKAGE.rglob("*.py"):
-        tree = ast.parse(file.read_text(encoding="utf-8"))
+        tree = tree_of(file)
         files = imported_files(tree)
         for function in compiled_functions(tree):
             body = (node for statement in function.body for node in ast.walk(statement))
@@ -93,8 +63,9 @@ def test_the_key_follows_the_contents(tmp_path):
     assert shared_key(copy) == shared_key(PACKAGE)
     (copy / "model" / "rig.py").write_text("")
     assert shared_key(copy) == shared_key(PACKAGE)
-    (copy / "effects" / "signal_table.py").write_text("")
+    (copy / "effects" / "_friction.py").write_text("")
     assert shared_key(copy) != shared_key(PACKAGE)
+    assert cache_folder().name == shared_key(PACKAGE), "where compiled code is kept"
 
 
 @pytest.fixture
@@ -270,6 +241,26 @@ def test_functions_of_other_packages_keep_their_cache(monkeypatch):
     with _own_cache():
         assert Path(config.CACHE_DIR) == cache_folder()
     assert config.CACHE_DIR == ""
+
+
+def test_a_thread_does_not_take_the_folder_from_another(monkeypatch):
+    """Code compiled in two threads at once was kept in the working directory."""
+    monkeypatch.setattr(config, "CACHE_DIR", "")
+    entered, left, seen = threading.Event(), threading.Event(), []
+
+    def other():
+        with _own_cache():
+            entered.set()
+            left.wait(10.0)
+            seen.append(config.CACHE_DIR)
+
+    thread = threading.Thread(target=other)
+    with _own_cache():
+        thread.start()
+        entered.wait(0.1)
+    left.set()
+    thread.join()
+    assert (seen, config.CACHE_DIR) == ([str(cache_folder())], "")
 
 
 def test_a_cache_folder_that_the_user_names_is_used(monkeypatch):

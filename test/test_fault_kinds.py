@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+from import_graph import nodes, tree_of
+
 from msg_adapters.decoding import COUNTERS
 from rsea_ros.checks.faults import FINDERS
 from rsea_ros.records.record import FAULT_KINDS
@@ -18,7 +20,7 @@ def _literal_kinds() -> Iterator[str]:
     """Yield the kinds in the calls of Fault, tell and add in the readers and the core."""
     for folder in ("msg_adapters", "rsea_ros/checks", "rsea_ros/diagnosis", "rsea_ros/identification"):
         for path in (ROOT / folder).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text())):
+            for node in nodes(tree_of(path)):
                 if isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
                     name = getattr(node.func, "attr", getattr(node.func, "id", ""))
                     if name in TELLING and isinstance(node.args[0].value, str):

@@ -121,13 +121,10 @@ def test_a_tampered_truth_is_refused(folder, capsys):
     ("line", "expected"),
     [
         ("{", "line 1: Expecting property name enclosed in double quotes, expected JSON"),
-        ("[]", "line 1: [], expected a JSON object"),
         ('{"record": "r0009", "causes": []}', "record = 'r0009', expected one of"),
-        ('{"record": "r0001"}', "causes = None, expected"),
         ('{"record": "r0001", "causes": [{"name": "backlsh", "probability": 1}]}', "did you mean backlash?"),
         ('{"record": "r0001", "causes": [{"name": "backlash", "probability": 1.1}]}', "expected 0 to 1"),
         ('{"record": "r0001", "causes": [{"name": "backlash", "probability": NaN}]}', "expected 0 to 1"),
-        ('{"record": "r0001", "causes": [{"name": [], "probability": 1}]}', "name = [], expected"),
         ('{"record": "r0001", "causes": []}\n{"record": "r0001", "causes": []}', "line 2: a second answer"),
         ("", "no answer"),
     ],
@@ -143,7 +140,6 @@ def test_a_bad_file_of_answers_gives_one_line(folder, line, expected, capsys):
         ("version", "0", "version = '0', expected '1'"),
         ("records", {}, "expected a hash for each record"),
         ("records", {"../r0001": "0"}, "expected names such as r0001"),
-        ("seconds", True, "seconds = True, expected a number > 0"),
         ("effects", None, "expected the effects that can be named"),
     ],
 )

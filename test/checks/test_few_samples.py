@@ -25,9 +25,9 @@ def first(record, name, count):
     return record.with_channels(**{name: Channel(channel.t[:count], channel.y[:count])})
 
 
-@pytest.mark.parametrize("name", ["ft", "position"])
 @pytest.mark.parametrize(
-    ("count", "kind"), [(1, "missing_topic"), (2, "partly_recorded"), (20, "partly_recorded")]
+    ("name", "count", "kind"),
+    [("ft", 1, "missing_topic"), ("ft", 2, "partly_recorded"), ("position", 20, "partly_recorded")],
 )
 def test_a_channel_of_a_few_samples_is_reported_and_left_out_of_the_fit(record, name, count, kind):
     """One sample was a bug of rsea in every verb, up to nine were not reported, up to 31 refused the rest."""

@@ -1,4 +1,4 @@
-"""Gains by synthesis: the demands are kept, and no neighbour within the margins leaves less friction."""
+"""Gains by synthesis: no neighbour within the margins leaves less friction, and what no gains can keep."""
 
 from dataclasses import replace
 
@@ -7,7 +7,6 @@ import pytest
 
 from rsea_ros.control.law import Gains
 from rsea_ros.control.margins import impedance
-from rsea_ros.control.robustness import robustness
 from rsea_ros.control.synthesis import check, design
 from rsea_ros.control.uncertainty import LOCKED, load_range
 from rsea_ros.errors import ParameterError
@@ -25,14 +24,6 @@ def designed():
     return design(RIG, LOADS, RATE)
 
 
-def test_the_demands_are_kept_with_every_load(designed):
-    """|S| <= 2 is 6 dB and 29 degrees; <= 3 over the set's corners; |Z| over the spring's at most 1.2."""
-    for margin in designed.margins.values():
-        assert margin.sensitivity <= 2.02 and margin.phase >= 28.9 and margin.gain >= 5.95
-        assert margin.delay >= 1.0
-    assert designed.sensitivity <= 3.1 and designed.impedance <= 1.21
-
-
 def test_no_neighbour_that_keeps_the_demands_is_clearly_better(designed):
     """Less friction or a softer feel costs one of the demands."""
 
@@ -47,14 +38,6 @@ def test_no_neighbour_that_keeps_the_demands_is_clearly_better(designed):
             other = check(RIG, LOADS, RATE, gains)
             short = other.sensitivity > 3.01 or other.impedance > 1.0 + designed.impedance - 0.999
             assert short or worth(other) > worth(designed) - 0.05
-
-
-def test_the_whole_set_is_stable_and_its_worst_is_stated(designed):
-    """The set between its corners: loads, K_s, b_m, a sample, 2 ms, the mode."""
-    few = {name: LOADS[name] for name in (LOCKED, "free x 0.5", "free x 10")}
-    swept = robustness(RIG, few, designed, steps=3)
-    assert swept.cases == 3 * 3 * 3 * 6 * 3 and swept.unstable == 0
-    assert swept.sensitivity < 3.2 and swept.margins.delay > 1.0 and swept.margins.phase > 19.0
 
 
 def test_gains_of_the_nominal_bench_alone_are_refused_for_the_set():

@@ -104,22 +104,18 @@ def test_an_outer_loop_that_learns_no_load_learns_the_timing_all_the_same():
     assert abs(gain) < 0.015 and abs(math.degrees(phase)) < 1.5
 
 
-def follow(part, late=0, n=600):
+def follow(part, n=600):
     """Return the part that is learned of a motor whose measured torque has `part` of the new command."""
     acted, commands = Acted(1.0 / 280.0), np.cumsum(np.random.default_rng(1).normal(size=n))
     measured = (1.0 - part) * commands[:-1] + part * commands[1:]
     for k in range(1, n - 1):
-        acted.over_sample(float(measured[k - late]), float(commands[k]), float(commands[k + 1]))
+        acted.over_sample(float(measured[k]), float(commands[k]), float(commands[k + 1]))
     return acted.part
 
 
 @pytest.mark.parametrize("part", [0.0, 0.3, 1.0])
 def test_which_command_a_measured_torque_shows_is_learned(part):
     assert follow(part) == pytest.approx(part, abs=0.01)
-
-
-def test_commands_that_come_late_are_not_taken_for_the_new_ones():
-    assert follow(0.0, late=1) < 0.1
 
 
 def test_without_a_measured_torque_or_a_change_nothing_is_learned():

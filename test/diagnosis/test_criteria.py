@@ -175,18 +175,14 @@ LOST = Fault("frozen_samples", "ft", 0.1)
         ([FINE], [], [LOST], "nothing_wrong"),
         ([FINE], [], [DEAD], "unexplained"),
         ([BAD], [], [], "unexplained"),
-        ([BAD], [], [DEAD], "unexplained"),
         ([BAD, FINE], [None], [], "unexplained"),
         ([FINE, BAD], [None], [], "nothing_wrong"),
         ([BAD, FINE], ["confirmed"], [], "explained"),
         ([BAD, FINE], ["confirmed"], [DEAD], "explained"),
         ([BAD, FINE], ["leading"], [], "partly_explained"),
-        ([BAD, FINE], ["one_of"], [], "partly_explained"),
         ([BAD, BAD], ["confirmed"], [], "partly_explained"),
         ([BAD, BAD, FINE], ["confirmed", "confirmed"], [], "explained"),
-        ([BAD, FINE, BAD], ["confirmed", "confirmed"], [], "partly_explained"),
         ([BAD, BAD, FINE], ["leading", "confirmed"], [], "partly_explained"),
-        ([BAD, BAD, FINE], [None, "confirmed"], [], "partly_explained"),
     ],
 )
 def test_the_verdict_follows_from_scores_statuses_and_faults(scores, statuses, faults, verdict):

@@ -35,8 +35,6 @@ def test_every_phase_of_an_excitation_that_repeats_is_in_every_set(period):
         (160.0, BlockSettings(), 1.0),
         (60.0, BlockSettings(), 0.5),
         (8.0, BlockSettings(), 0.25),
-        (160.0, BlockSettings(longest=0.5), 0.5),
-        (60.0, BlockSettings(enough=60), 1.0),
         (8.0, BlockSettings(shortest=0.05), 8.0 / 120),
     ],
 )

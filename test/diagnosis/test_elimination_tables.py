@@ -4,18 +4,52 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import scripted
-from scripted import script, unknown
+from scripted import POOLS, Script, script
 
 from rsea_ros.diagnosis import backward_elimination as elimination
-from rsea_ros.diagnosis.backward_elimination import fitted_parameters, nested_sequence
+from rsea_ros.diagnosis.backward_elimination import ReducedModels, eliminate_backwards, nested_sequence
 from rsea_ros.diagnosis.evaluation import Selection, trial_of
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
 
 FRICTION, STRIBECK, LUGRE = "coulomb_friction", "stribeck_friction", "lugre_friction"
 GAP, STOP, CUBIC = "backlash", "hard_stop", "nonlinear_spring"
-DELAY, LAG, DRIFT, BIAS = "command_delay", "current_loop_lag", "ft_drift", "ft_bias"
+DELAY, LAG, BIAS = "command_delay", "current_loop_lag", "ft_bias"
+
+
+class World:
+    """Rivals and their fits from a script. guesses: by rival. impossible: rivals that the rig cannot have."""
+
+    def __init__(self, monkeypatch, fits: Script, *effects):
+        self.fits, self.guesses, self.impossible = fits, {}, set()
+        self.models = ReducedModels([effect_named(n) for n in effects], POOLS, DEFAULT)
+        monkeypatch.setattr(elimination, "fit_candidate", fits.fit)
+        monkeypatch.setattr(elimination, "apply", lambda rig, unknowns, theta: (rig, None))
+        monkeypatch.setattr(elimination, "RecordView", lambda case, rig, outputs: (case, rig, outputs))
+        monkeypatch.setattr(elimination, "initial_guesses", lambda effect, view: [{"from": "residual"}])
+        monkeypatch.setattr(elimination, "screen", self.screen)
+
+    def screen(self, solution, rival, guesses, rule):
+        assert rule is DEFAULT.forward
+        self.guesses[rival.name] = guesses
+        if rival.name in self.impossible:
+            return None
+        made = scripted.problem(*solution.problem.added, rival.name)
+        return SimpleNamespace(problem=made, theta=np.zeros(len(made.unknowns)))
+
+    def eliminate(self, *causes):
+        """Return the selection that is left of some causes."""
+        selection = Selection((self.fits.candidate(), self.fits.candidate(*causes)))
+        return eliminate_backwards(selection, self.models.effects, POOLS, DEFAULT)
+
+
+@pytest.fixture
+def world(monkeypatch):
+    """Make a backward elimination on scripted fits, with some effects as rivals."""
+    return lambda fits, *effects: World(monkeypatch, fits, *effects)
 
 
 def reasons(selection):
@@ -72,25 +106,6 @@ def test_redundant_causes_go_one_after_the_other(world):
     assert [t.beside.causes for t in selection.trials] == [(FRICTION, DELAY), (FRICTION,)]
 
 
-@pytest.mark.parametrize(("ratio", "quick"), [(1.0, False), (6.0, True)])
-def test_far_from_the_floor_fits_are_quick_and_in_units_of_what_is_left(world, ratio, quick):
-    scripted_run = world(script({"": 90.0, FRICTION: 40.0, GAP: 40.0, f"{FRICTION}+{GAP}": ratio}))
-    scripted_run.eliminate(FRICTION, GAP)
-    assert all(was is quick for _, was in scripted_run.fits.log)
-    for setup, _ in scripted_run.fits.setups:
-        assert setup.weights.ratio("ft") == ratio and setup.cases is scripted_run.fits.cases
-
-
-def test_a_cause_pays_for_its_own_parameters_alone(monkeypatch, world):
-    """Friction gains a loss of 5.7 over 100 samples; its parameters cost 2 each, both models' more."""
-    monkeypatch.setattr(scripted, "SAMPLES", 2.5)
-    scripted_run = world(script({f"{FRICTION}+{GAP}": 1.0, GAP: 1.03}))
-    both, without = scripted_run.fits.candidate(FRICTION, GAP), scripted_run.fits.candidate(GAP)
-    assert 2.0 * (both.parameters - without.parameters) < 5.7 < 2.0 * (both.parameters + without.parameters)
-    assert scripted_run.models.is_needed(both, without)
-    assert not scripted_run.models.is_needed(without, both)
-
-
 SIMPLER = {"": 9.0, STRIBECK: 1.0, FRICTION: 1.0, "spring_hysteresis": 4.0}
 
 
@@ -145,12 +160,6 @@ def test_far_from_the_floor_priors_decide_nothing(world, both):
     assert scripted_run.guesses == {}
 
 
-def test_a_single_cause_is_not_compared_with_its_equals_again(world):
-    scripted_run = world(script({"": 9.0, DELAY: 1.0, LAG: 1.0}, {DELAY: 9.0}), LAG)
-    assert scripted_run.eliminate(DELAY).last.causes == (DELAY,)
-    assert scripted_run.guesses == {}
-
-
 def test_a_replacement_is_followed_by_the_next(world):
     """LuGre friction is replaced by Stribeck's, which is replaced by Coulomb's."""
     ratios = {"": 9.0, LUGRE: 1.0, STRIBECK: 1.0, FRICTION: 1.0}
@@ -201,10 +210,6 @@ def test_a_time_within_the_clocks_error_goes_though_it_is_needed(world, monkeypa
     assert reasons(left) == [(LAG, "at_bound", "")]
 
 
-FRICTION, STRIBECK, GAP = "coulomb_friction", "stribeck_friction", "backlash"
-STOP, CUBIC, BASE = "hard_stop", "nonlinear_spring", "base_compliance"
-
-
 @pytest.mark.parametrize(
     ("cause", "rival", "typical"),
     [(STRIBECK, FRICTION, {"torque"}), (STOP, CUBIC, None)],  # N m for N m; 1/rad^2 for rad
@@ -222,19 +227,6 @@ def test_a_rival_begins_with_the_size_of_the_cause_where_that_is_one(world, caus
         assert begun[1:] == [{**effect_named(rival).typical, effect_named(rival).main.name: 0.75}]
 
 
-@pytest.mark.parametrize(("beside", "is_used"), [((), True), ((GAP,), False)])
-def test_a_rival_begins_where_its_trial_beside_the_same_causes_ended(world, beside, is_used):
-    scripted = world(
-        script({"": 9.0, STRIBECK: 1.0, FRICTION: 4.0, GAP: 5.0, f"{FRICTION}+{GAP}": 4.0}), FRICTION
-    )
-    tried = scripted.fits.candidate(*beside, FRICTION)
-    tried.solution.theta[1:] = 0.5
-    trial = trial_of(tried, FRICTION, scripted.fits.candidate(*beside), "explains_less")
-    scripted.models.with_rivals(scripted.fits.candidate(STRIBECK), [trial])
-    reached = {p.name: 0.5 for p in effect_named(FRICTION).parameters}
-    assert scripted.guesses[FRICTION][0] == (reached if is_used else {"from": "residual"})
-
-
 def test_a_rival_begins_where_the_latest_of_its_trials_ended(world):
     """The noise is estimated again after each step: the last trial has seen the least of other causes."""
     scripted = world(script({"": 9.0, STRIBECK: 1.0, FRICTION: 4.0}), FRICTION)
@@ -246,18 +238,3 @@ def test_a_rival_begins_where_the_latest_of_its_trials_ended(world):
     scripted.models.with_rivals(scripted.fits.candidate(STRIBECK), trials)
     assert set(scripted.guesses[FRICTION][0].values()) == {0.5}
     assert len(scripted.guesses[FRICTION]) == 2, "beside it only the size of the cause"
-
-
-@pytest.mark.parametrize(
-    ("effect", "parameter", "begins_with"),
-    [
-        (BASE, "stiffness", {"stiffness": 9.0, "spring.stiffness": 4.0}),  # two springs in series: both
-        (FRICTION, "torque", {"torque": 9.0}),  # the rig's values are those of the fit
-    ],
-)
-def test_only_a_mode_brings_the_rigs_values_along(effect, parameter, begins_with):
-    names = ("spring.stiffness", "backlash.gap", f"{effect}.{parameter}")
-    trial = SimpleNamespace(
-        problem=SimpleNamespace(unknowns=tuple(map(unknown, names))), theta=(4.0, 0.01, 9.0)
-    )
-    assert fitted_parameters(trial, effect_named(effect)) == begins_with

@@ -65,7 +65,7 @@ def test_a_rig_that_is_wrong_decides_between_no_two_causes():
     name, value, cause, rival = "spring.stiffness", 1.6, "ft_gain_error", "torque_constant_error"
     stated = load_rig("paper_high_impedance")
     truth = with_effect(stated.with_values({name: value * stated[name]}), cause, {"gain": 0.88})
-    asked = ExcitationSettings(rate=280.0, duration=20.0, amplitude=15.0, noise=0.3, low=0.1, high=60.0)
+    asked = ExcitationSettings(rate=280.0, duration=12.0, amplitude=15.0, noise=0.3, low=0.1, high=60.0)
     command = chirp(asked)
     record = synthesize(truth, Channel(np.arange(len(command)) / 280.0, command), seed=7)
     tried = {cause, rival, "current_loop_lag", "coulomb_friction"}

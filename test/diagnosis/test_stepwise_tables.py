@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scripted
-from scripted import POOLS, RIG, script, settings
+from scripted import POOLS, script, settings
 
 from rsea_ros.diagnosis import stepwise
 from rsea_ros.diagnosis.evaluation import trial_of
@@ -58,6 +58,7 @@ class World:
             "ForwardStep": Step,
             "refit": self.refit,
             "with_noise_reestimated": self.reestimate_noise,
+            "on_fine_steps": lambda model, setup: model,
             "rescore": self.scored,
             "leaves_only_noise": lambda model, limit: model.validation.ratio("ft") < limit,
             "vector_of": lambda unknowns, start: (unknowns, start),
@@ -116,13 +117,6 @@ def test_coloured_noise_may_hide_a_cause(world):
     assert causes(world(fits, {(): (FRICTION,)}).select()) == [(), (FRICTION,)]
 
 
-def test_each_step_begins_with_the_last_model_and_says_its_number(world):
-    search = world(script({**BOTH, f"{FRICTION}+{GAP}": 3.0}), ALONG)
-    search.select()
-    names = tuple(e.name for e in OTHERS)
-    assert search.runs == [(0, (), names), (1, (FRICTION,), names), (2, (FRICTION, GAP), names)]
-
-
 @pytest.mark.parametrize("most", [1, 2])
 def test_no_more_causes_are_accepted_than_max_causes(world, most):
     ratios = {**BOTH, f"{FRICTION}+{GAP}": 3.0, f"{FRICTION}+{GAP}+{DELAY}": 1.0}
@@ -170,15 +164,6 @@ def test_every_model_is_fitted_again_in_its_noise_and_all_are_scored_in_that_of_
     each = [(what, c) for c in ((), (FRICTION,), (FRICTION, GAP)) for what in ("noise", "refit")]
     assert search.events == [*each, ("scored", ()), ("scored", (FRICTION,))]
     assert [m.outputs for m in selection.models] == [[{"scored": True}]] * 2 + [[{}]]
-
-
-@pytest.mark.parametrize("start", [None, RIG])
-def test_the_first_fit_has_more_iterations_and_begins_at_the_given_values(world, start):
-    search = world(script({"": 1.0}))
-    search.select(start=start)
-    ((setup, theta),) = search.fits.setups
-    assert setup.iterations == DEFAULT.fits.first_iterations
-    assert theta == (None if start is None else (search.nominal.unknowns, RIG))
 
 
 def replacement(search, *current, effects=OTHERS):

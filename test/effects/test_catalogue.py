@@ -90,7 +90,7 @@ def test_the_step_is_short_enough(effect: Effect):
 
 @every_effect
 def test_the_simulation_is_finite_over_the_whole_bounds(effect: Effect):
-    driven, corners = drive(duration=1.0), [(p.low, p.typical, p.high) for p in effect.parameters]
+    driven, corners = drive(duration=0.5), [(p.low, p.typical, p.high) for p in effect.parameters]
     for bench in map(load_rig, RIGS):
         if effect.name == "base_compliance" and "spring_end" not in bench.clamped:
             with pytest.raises(ParameterError, match="spring_end is free, expected clamped"):

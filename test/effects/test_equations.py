@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import hybrid_play
 import numpy as np
 import pytest
 import slow_equations
 from effect_bench import ON_THE_BENCH, RIG, SIGNALS, command, drive, record_of, rms, simulate
+from independent.bench import Bench, record_command
 from scipy.integrate import solve_ivp
 from slow_equations import B_M, B_S, DURATION, K_S, J, motion
 
@@ -159,7 +159,7 @@ def beta_of(gamma: float) -> float:
 
 
 @pytest.mark.parametrize("gamma", GAMMAS)
-@pytest.mark.parametrize("z", [-0.9, -0.2, 0.0, 0.7])
+@pytest.mark.parametrize("z", [-0.9, 0.7])
 def test_motion_in_one_direction_is_exact(gamma: float, z: float):
     beta, way = beta_of(gamma), 1.7
 
@@ -243,32 +243,24 @@ def test_a_gear_at_rest_takes_few_steps(monkeypatch):
     assert len(rounds) <= 5 * 9
 
 
-RATE, NEAR = 280.0, 1e-4
-FREE = load_rig("paper_moving_output")
-T = np.arange(280) / RATE
+T = np.arange(280) / 280.0
 COMMANDS = {
     "noise": 30.0 * np.random.default_rng(3).standard_normal(len(T)),
     "chirp": 30.0 * np.sin(2.0 * np.pi * (0.5 + 9.75 * T) * T),
 }
+PLASTIC = {"contact_k": 1e6, "contact_b": 2.0 * math.sqrt(1e6 * slow_equations.J_SC)}
+"""Flanks of the second bench that do not bounce."""
+NOISELESS = dict.fromkeys(("ft_noise", "position_quantum", "velocity_noise", "velocity_quantum"), 0.0)
 
 
 @pytest.mark.parametrize("gap", [1e-3, 4e-3])
 @pytest.mark.parametrize("name", COMMANDS)
-def test_torque_and_position_are_those_of_the_event_driven_model(name, gap):
+def test_play_beside_a_free_housing_moves_as_on_the_second_bench(name, gap):
     """Asked: 1 % RMS. With impacts that owe the next step nothing it was 5 % and more at 4 mrad."""
-    command = COMMANDS[name]
-    expected, impacts = hybrid_play.response(command, 1.0 / RATE, gap)
-    worn = FREE.with_effects(EffectSetting("backlash", {"gap": gap}))
-    record = synthesize(worn, Channel(T, command), noise=False)
-    far = np.abs(record["ft"].t[:, None] - impacts).min(axis=1) > NEAR
-    assert len(impacts) > 10 and np.count_nonzero(~far) < 5
-    for channel, of in (("position", expected[:, 0]), ("ft", expected[:, 1])):
-        assert np.std((record[channel].y - of)[far]) < 0.01 * np.std(of)
-
-
-def test_the_event_driven_model_is_the_benchs():
-    values = ("rotor.reflected_inertia", "chassis.inertia", "rotor.reflected_damping", "spring.stiffness",
-              "spring.damping", "gear.ratio", "housing_end.inertia", "housing_end.damping",
-              "housing_end.stiffness")  # fmt: skip
-    names = ("J_M", "J_SC", "B_M", "K_S", "B_S", "RATIO", "J_H", "B_H", "K_H")
-    assert [FREE[value] for value in values] == [getattr(hybrid_play, name) for name in names]
+    bench = Bench().with_values(housing_free=1.0, gap=gap, **PLASTIC, **NOISELESS)
+    expected = record_command(bench, COMMANDS[name], np.random.default_rng(0))
+    worn = load_rig("paper_moving_output").with_effects(EffectSetting("backlash", {"gap": gap}))
+    record = synthesize(worn, Channel(T, COMMANDS[name]), noise=False)
+    for channel in ("position", "ft"):
+        of = expected[channel].y
+        assert np.std(record[channel].y - of) < 0.01 * np.std(of), channel

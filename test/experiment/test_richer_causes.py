@@ -74,9 +74,8 @@ class KnownFriction(Known):
         return ["stribeck_friction"]
 
 
-@pytest.mark.parametrize("chance", [0.9, 0.1])
-def test_a_name_waits_for_the_run_that_may_show_a_richer_cause(log, proposal, chance):
-    tried = replace(proposal, names=("current_loop_lag", "hard_stop"), chances=(0.0, chance))
+def test_a_name_waits_for_the_run_that_may_show_a_richer_cause(log, proposal):
+    tried = replace(proposal, names=("current_loop_lag", "hard_stop"), chances=(0.0, 0.1))
     asked = []
     work = Campaign(RIG, CAUSES, ASKED, lambda _: None, choose=lambda _, a, *__: asked.append(a) or tried)
     assert work.go([log], Known()).end == "declined"
@@ -136,15 +135,13 @@ def test_what_a_richer_cause_adds_is_rated_within_what_is_known(stuck):
     assert values.sum(axis=1) == pytest.approx(held.theta[held.cause_indices[0]], abs=3.0 * sd)
 
 
-@pytest.mark.parametrize(("torque", "end"), [(0.6, "undecidable"), (6.0, "declined")])
-def test_a_stuck_joint_is_decided_only_by_what_frees_it(stuck, log, torque, end):
+def test_a_stuck_joint_is_not_decided_by_what_does_not_free_it(stuck, log):
     sure = replace(stuck, probability={"coulomb_friction": 0.96, "stribeck_friction": 0.04})
-    asked = replace(ASKED, limits=RunLimits(torque=torque))
+    asked = replace(ASKED, limits=RunLimits(torque=0.6), longest=1.0)
     outcome = Campaign(RIG, FRICTION, asked, lambda _: None).go([log], sure)
-    assert outcome.end == end
-    if end == "undecidable":
-        assert outcome.shared is not None and outcome.shared.names == FRICTION
-        assert outcome.shared.torque is not None and 1.2 <= outcome.shared.torque <= 9.6
+    assert outcome.end == "undecidable"
+    assert outcome.shared is not None and outcome.shared.names == FRICTION
+    assert outcome.shared.torque is not None and 1.2 <= outcome.shared.torque <= 9.6
 
 
 def test_a_run_that_leaves_what_is_known_as_it_is_resolves_nothing(stuck):

@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 import re
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main
-from rsea_ros.design.mujoco_model import STEP
+from rsea_ros.design.mujoco_model import STEP, mjcf
+from rsea_ros.errors import RigError
 from rsea_ros.exports import verification
 from rsea_ros.exports.fmu import export_fmu
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.verification import RATE, differences, ours, play_fmu, play_mujoco
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.rival_models import lumped_rig
 
 MUJOCO = pytest.mark.skipif(
     sys.version_info < (3, 11), reason="MuJoCo 4 has no wheel for Python 3.10: nothing is played in it there"
@@ -46,10 +49,30 @@ def apart(rig):
 
 
 @MUJOCO
-@pytest.mark.parametrize("name", ["paper_high_impedance", "paper_moving_output", "prototype_knee"])
-def test_a_nominal_rig_moves_alike_in_mujoco(name):
-    """The knee's rotor turns at -160; the engine is given only bodies and teeth."""
-    assert max(apart(load_rig(name)).values()) < 0.01
+@pytest.mark.parametrize("train", [None, "star", "spur"])
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("paper_high_impedance", {}),
+        ("paper_moving_output", {"housing_end.gravity": 5.0, "gear.stiffness": 1e4}),
+        ("prototype_knee", {}),
+        ("two_moving_outputs", {}),
+        ("separate_stiffnesses", {}),
+    ],
+)
+def test_a_nominal_rig_moves_alike_in_mujoco(name, values, train):
+    """The knee's rotor turns at -160; the engine is given only bodies, springs and teeth."""
+    rig = load_rig(name).with_values(values)
+    assert max(apart(replace(rig, train=train or rig.train)).values()) < 0.01
+
+
+def test_a_rig_that_mujoco_cannot_represent_is_refused():
+    with pytest.raises(RigError, match="a rigid spring cannot be exported"):
+        mjcf(load_rig("bare_drive"))
+    with pytest.raises(RigError, match="lumped train cannot be exported"):
+        mjcf(lumped_rig(load_rig("paper_moving_output")))
+    with pytest.raises(RigError, match="chassis has inertia 0 kg·m²"):
+        mjcf(load_rig("paper_moving_output").with_values({"chassis.inertia": 0.0}))
 
 
 SHARE = {"spring_hysteresis": 0.25, "stribeck_friction": 0.15, "asymmetric_friction": 0.05}

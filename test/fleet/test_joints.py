@@ -78,7 +78,6 @@ def test_a_joint_travels_to_another_process(mapped):
     [
         (("namespace:", "namespaces:"), ("line 8", "unknown key 'namespaces'", "did you mean namespace?")),
         (("rig: my_rig.yaml", "rig: my_rigg.yaml"), ("line 13", "joints.right_knee.rig", "my_rigg.yaml")),
-        (("import: so101", "import: so102"), ("line 16", "import = 'so102'")),
         (("bags: left/*.mcap", 'date: "%Q"'), ("line 7", "date = '%Q'", "such as %Y-%m-%d")),
         (("topics: {ft:", "topics: {force:"), ("line 9", "'force'", "torque_command")),
         (("  rig: paper_high_impedance\n", ""), ("line 5", "joints.left_knee", "no rig")),

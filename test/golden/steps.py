@@ -19,18 +19,20 @@ from rsea_ros.model.rig_file import rig_names, rig_text
 from rsea_ros.report.fleet.page import write_fleet_report
 
 RIG = "paper_high_impedance"
-KNOWN = "coulomb_friction stribeck_friction lugre_friction spring_hysteresis"
-PLAY = ("backlash", "hard_stop", "ft_sensor_lag", "current_loop_lag", "command_delay", "coulomb_friction")
-BUT_PLAY = " ".join(n for n in catalogue() if n not in PLAY)
+DRAGS = ("quadratic_drag", "load_dependent_friction", "asymmetric_friction", "damping_drift", "torque_ripple")
+PLAY = ("backlash", "hard_stop", "ft_sensor_lag", "coulomb_friction")
+NO_DRAG, NO_PLAY = (" ".join(n for n in catalogue() if n not in tried) for tried in (DRAGS, PLAY))
 
 VERBS: dict[str, tuple[str, ...]] = {
     "bag": (f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 16 --seed 5 --out bag",),
     "check": ("check bag", "check bag --json"),
     "identified": ("identify bag --out identified",),
     "diagnosed": ("diagnose bag --out diagnosed",),
-    "diagnosis_without_friction": (f"diagnose bag --without {KNOWN} --max-causes 1 --json --from 2 --to 12",),
+    "diagnosis_without_friction": (
+        f"diagnose bag --without {NO_DRAG} --max-causes 1 --json --from 2 --to 12",
+    ),
     "predicted.csv": ("predict diagnosed/model.yaml bag --out predicted.csv",),
-    "law": ("law bag --out law --from 1",),
+    "law": ("law bag --out law --from 8",),
     "run": ("experiment play.yaml drag.yaml --limits torque=40,deflection=0.1 --longest 4 --out run",),
     "designed": ("design --out designed",),
     "controlled": (f"control {RIG} --rate 280 --out controlled",),
@@ -44,7 +46,7 @@ VERBS: dict[str, tuple[str, ...]] = {
     "rigs": ("rig new mine", *(f"rig check {name}" for name in rig_names())),
     "imported": ("import spoiled.csv --map map.yaml --out imported",),
     "spoiled": ("check imported --rig pendulum", "check imported", "identify imported --json"),
-    "spoiled_diagnosis": (f"diagnose imported --json --max-causes 2 --without {BUT_PLAY}",),
+    "spoiled_diagnosis": (f"diagnose imported --json --max-causes 2 --without {NO_PLAY}",),
     "fleet": (
         "fleet run right left --map joints.yaml --serial --out months",
         "fleet run right left --map joints.yaml --serial --out months",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification import clocks
-from rsea_ros.identification.clocks import RequiredClocks, free_clocks, required_clocks, without_needless
+from rsea_ros.identification.clocks import RequiredClocks, free_clocks, without_needless
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown
 
@@ -19,8 +19,7 @@ def unknown(name, doubt=math.inf):
 
 
 FT, POSITION = unknown("clock.ft"), unknown("clock.position")
-FT_RATE, POSITION_RATE = unknown("clock_rate.ft"), unknown("clock_rate.position")
-LEFT = [FT, POSITION, FT_RATE, POSITION_RATE]
+FT_RATE = unknown("clock_rate.ft")
 
 
 @dataclass(frozen=True)
@@ -28,11 +27,6 @@ class Problem:
     """The part of a problem that the test of the clocks uses."""
 
     unknowns: tuple
-    cases: tuple = ("one", "two")
-    rig: str = "rig"
-
-    def present(self, case):
-        return {"one": ["ft"], "two": ["ft", "position"]}[case]
 
 
 def solution(residual, *columns, doubt=math.inf, theta=None, names=None):
@@ -86,22 +80,6 @@ def test_a_second_clock_is_asked_for_beside_the_first(doubt, z):
 
 
 @pytest.mark.parametrize(
-    ("doubt", "taken", "left"),
-    [
-        (math.inf, [], math.sqrt((16 + 25) / 4)),  # the fit takes the 3
-        (math.inf, [(0, 1, 0, 0)], math.sqrt(25 / 4)),  # and the clock the 4
-        (0.5, [], math.sqrt((2.4**2 + 16 + 25) / 4)),  # a fifth of it where zero is known to a half
-        (0.5, [(0, 1, 0, 0)], math.sqrt((2.4**2 + 3.2**2 + 25) / 4)),
-    ],
-)
-def test_the_cost_that_a_fit_with_clocks_would_leave_is_predicted(doubt, taken, left):
-    fit = solution((3, 4, 0, 5), (1, 0, 0, 0), doubt=doubt)
-    columns = np.array(taken, float).reshape(len(taken), 4).T
-    free = [unknown("clock.ft", doubt)] * len(taken)
-    assert clocks._remainder(fit, columns, free) == pytest.approx(left)
-
-
-@pytest.mark.parametrize(
     ("doubt", "clock_doubt", "wider"),
     [
         (math.inf, math.inf, 2.0),  # 1/2 becomes 1: the inverse of (2 1, 1 1)
@@ -123,89 +101,6 @@ def test_clocks_cost_an_unknown_nothing_that_the_data_do_not_show(shown):
     fit = solution((0, 0), (shown, shown), (1e8, 0))
     cost = clocks._cost(fit, np.array([[1.0], [0.0]]), [FT])
     assert list(cost) == ["value.1"]
-
-
-class World:
-    """Scripted scores. z: by clock and the set of those taken before it, 0 where nothing is said."""
-
-    def __init__(self, monkeypatch):
-        self.z, self.left, self.inverse, self.cost = {}, 1.0, False, None
-        for name, stand_in in {
-            "clock_columns": lambda problem, theta, left: np.arange(4.0).reshape(1, 4),
-            "sample_blocks": lambda problem, length: ("blocks", length),
-            "clocks": lambda channels, rig: [unknown(f"clock.{n}") for n in channels],
-            "clock_rates": lambda channels: [unknown(f"clock_rate.{n}") for n in channels],
-            "is_inverse": lambda rig: self.inverse,
-            "_score": self.score,
-            "_remainder": self.left_over,
-            "_cost": lambda fit, columns, free: {u.name: c for u, c in zip(free, columns[0], strict=True)},
-        }.items():
-            monkeypatch.setattr(clocks, name, stand_in)
-
-    def score(self, fit, columns, which, left, blocks):
-        assert blocks == ("blocks", 1.0), "blocks of a second"
-        *before, last = [left[i].name for i in which]
-        return self.z.get((last, *sorted(before)), 0.0)
-
-    def left_over(self, fit, columns, taken):
-        self.taken = [u.name for u in taken]
-        assert columns.tolist() == [[float([u.name for u in LEFT].index(n)) for n in self.taken]]
-        return self.left
-
-    def asked(self):
-        return required_clocks(solution((0, 0)))
-
-
-@pytest.fixture
-def world(monkeypatch):
-    return World(monkeypatch)
-
-
-@pytest.mark.parametrize(
-    ("z", "taken"),
-    [
-        ({}, []),
-        ({("clock.ft",): 3.49}, []),
-        ({("clock.ft",): 3.5}, ["clock.ft"]),
-        ({("clock.ft",): 4.0, ("clock_rate.position",): 5.0}, ["clock_rate.position"]),
-        (
-            {("clock.ft",): 4.0, ("clock.position",): 5.0, ("clock.ft", "clock.position"): 3.6},
-            ["clock.position", "clock.ft"],
-        ),
-        ({("clock.ft",): 9.0, ("clock.ft", "clock.ft"): 9.0}, ["clock.ft"]),  # each once
-    ],
-)
-def test_clocks_are_asked_for_one_after_the_other(world, z, taken):
-    world.z = z
-    asked = world.asked()
-    assert [u.name for u in asked.clocks] == taken == world.taken
-
-
-@pytest.mark.parametrize(
-    ("left", "taken"), [(1.3, ["clock_rate.ft", "clock.position"]), (1.31, ["clock.position"])]
-)
-def test_a_clock_rate_that_imitates_a_misfit_is_not_accepted(world, left, taken):
-    world.z = {("clock_rate.ft",): 9.0, ("clock.position", "clock_rate.ft"): 4.0}
-    world.left = left
-    assert [u.name for u in world.asked().clocks] == taken
-
-
-@pytest.mark.parametrize(
-    ("z", "cost"),
-    [
-        ({}, {"clock.ft": 0.0, "clock.position": 1.0}),
-        ({("clock.ft",): 9.0}, {"clock.position": 1.0}),
-        ({("clock_rate.ft",): 9.0}, {"clock.ft": 0.0, "clock.position": 1.0}),
-    ],
-)
-def test_the_cost_is_that_of_the_offsets_that_are_taken_as_right(world, z, cost):
-    world.z = z
-    assert world.asked().cost == cost
-
-
-def test_a_rig_that_is_judged_by_torque_has_no_clocks_to_ask_for(world):
-    world.z, world.inverse = {("clock.ft",): 9.0}, True
-    assert world.asked() == RequiredClocks((), None)
 
 
 def test_requested_clocks_start_at_zero_offset():

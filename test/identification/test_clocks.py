@@ -72,14 +72,19 @@ def test_a_clock_rate_is_part_of_the_rig():
     assert np.abs(late - simulate(true, record)["ft"]).max() > 0.02
 
 
+def sweep(seconds):
+    """Return 8 N m from 0.2 to 60 Hz."""
+    t = np.arange(0.0, seconds, 1.0 / 280.0)
+    turns = 0.2 * seconds / np.log(300.0) * (300.0 ** (t / seconds) - 1.0)
+    return Channel(t, 8.0 * np.sin(2.0 * np.pi * turns))
+
+
 @pytest.mark.parametrize(("channels", "ppm"), [(("ft",), 200.0), (("position", "velocity"), -450.0)])
 def test_a_drift_that_turns_the_phases_is_fitted(channels, ppm):
     """6 ms by the end of a chirp left 6 times the noise and the damping 28.4 for 25.4 N m s/rad."""
     nominal = load_rig("paper_high_impedance")
     true = nominal.with_values({"rotor.reflected_damping": 25.4, "spring.stiffness": 1480.0})
-    t = np.arange(0.0, 30.0, 1.0 / 280.0)
-    u = 8.0 * np.sin(2.0 * np.pi * 6.0 / np.log(300.0) * (300.0 ** (t / 30.0) - 1.0))  # 0.2 to 60 Hz
-    record = synthesize(true, Channel(t, u), seed=1)
+    record = synthesize(true, sweep(30.0), seed=1)
     for n in channels:
         record = with_clock(record, n, 0.0, ppm)
     result = identify([record], nominal)
@@ -88,3 +93,12 @@ def test_a_drift_that_turns_the_phases_is_fitted(channels, ppm):
         assert clocks(result)[f"clock_rate.{n}"].value == pytest.approx(ppm, abs=2.0)
     damping = next(p for p in result.parameters if p.name == "rotor.reflected_damping")
     assert damping.value == pytest.approx(25.4, abs=0.1)
+
+
+def test_a_damping_that_drifts_is_taken_for_no_clock_that_does():
+    """Its lag grows along a line, but a clock's rate explains too little of the misfit."""
+    rig = load_rig("paper_high_impedance")
+    record = synthesize(rig.with_effect("damping_drift", relative_change=-0.3), sweep(20.0), seed=1)
+    result = identify([record], rig)
+    assert result.verdict == "misfit"
+    assert not [name for name in clocks(result) if name.startswith("clock_rate")]

@@ -110,7 +110,6 @@ def test_limit_names_value_unit_limit_and_time():
     ("call", "message"),
     [
         (lambda: excitation("sweep", PAPER), "expected one of chirp"),
-        (lambda: ExcitationSettings(rate=0.0), "rate = 0 Hz"),
         (lambda: ExcitationSettings(duration=float("nan")), "duration = nan s"),
         (lambda: ExcitationSettings(low=133.0), "low = 133 Hz"),
         (
@@ -118,7 +117,6 @@ def test_limit_names_value_unit_limit_and_time():
             "ramp = 0.6 s, expected 0 to 0.5 s",
         ),
         (lambda: multisine(ExcitationSettings(period=0.0101)), "whole number of samples"),
-        (lambda: multisine(ExcitationSettings(duration=5.0)), "at most the duration of 5 s"),
         (
             lambda: multisine(ExcitationSettings(period=1.0, low=1.1, high=1.9)),
             "expected one with odd lines in 1.1 to 1.9 Hz",

@@ -14,7 +14,7 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.remark_words import remark_sentences
 
-SEEDS = range(16)
+SEEDS = range(8)
 
 
 def standard_errors(result: Identification, true: dict[str, float]) -> dict[str, float]:

@@ -51,12 +51,11 @@ def test_stamps_count_and_not_positions_in_the_record(case):
     assert identify([later], nominal).residual_rms["ft"] < 1.1 * result.noise_rms["ft"]
 
 
-@pytest.mark.parametrize("deviation", [5e-5, 3e-4])
-def test_jittered_stamps_leave_no_bias(case, deviation):
+def test_jittered_stamps_leave_no_bias(case):
     nominal, true, record = case
     rng = np.random.default_rng(9)
     names = ("ft", "position", "velocity")
-    stamps = {n: record[n].t + deviation * rng.standard_normal(len(record[n])) for n in names}
+    stamps = {n: record[n].t + 3e-4 * rng.standard_normal(len(record[n])) for n in names}
     result = identify([resample(true, record, stamps, 10)], nominal)
     agree(result, true, sigmas=6.0)
     assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=2e-4)

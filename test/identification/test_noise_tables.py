@@ -11,12 +11,10 @@ from benches import bench, record_bench
 from scipy.signal import lfilter
 
 from rsea_ros import simulate
-from rsea_ros.identification import noise
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.noise import least_noise, noise_floor, step_of, top_of_band
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import case_from, simulate_cases
-from rsea_ros.identification.settings import NOISE
 from rsea_ros.identification.unknowns import Clocks
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig
@@ -63,12 +61,10 @@ SECOND = 4.0 / math.sqrt(6.0)
         (alternate(3), sensor(), 1e-9 * math.sqrt(8.0) / 3.0),
         (alternate(3), sensor(0.25), 0.25),
         (alternate(4), sensor(), SECOND),
-        (alternate(62), sensor(), SECOND),
         (alternate(62), sensor(0.25), SECOND),
         (alternate(62), sensor(2.0), 2.0),  # so few do not contradict the rig
         (alternate(62), sensor(0.0, 12.0), 6.0),  # half a step of the rig's
         (np.linspace(0.0, 9.0, 62), sensor(0.25), 0.25),  # a line has no noise
-        (np.linspace(0.0, 9.0, 62) ** 2, sensor(0.25), 0.25),
     ],
 )
 def test_a_short_channel_has_the_noise_of_its_second_differences(y, stated, floor):
@@ -87,7 +83,6 @@ def test_from_64_samples_on_a_channel_has_a_spectrum(size, short):
         (sensor(), 1e-9),
         (sensor(2.0), 0.2),  # a tenth: what looks better was filtered
         (sensor(0.0, 3.0), 1.5),  # half a step
-        (sensor(2.0, 3.0), 1.5),
         (sensor(40.0, 3.0), 4.0),
     ],
 )
@@ -134,43 +129,6 @@ def test_the_noise_is_read_off_the_top_of_the_band(levels, level, flat):
     assert level is None or rms == pytest.approx(math.sqrt(level), rel=0.06)
 
 
-def lines(count, **powers):
-    """Powers of some lines, 1 where nothing is said: halves of the top of the band, and the rest."""
-    power = np.full(count, powers.get("rest", 1.0))
-    top = noise._top(power, NOISE)
-    half = (top.stop - top.start + 1) // 2
-    power[top.start : top.start + half] = powers.get("lower", 1.0)
-    power[top.start + half : top.stop] = powers.get("upper", 1.0)
-    return power
-
-
-@pytest.mark.parametrize(
-    ("count", "first", "last"), [(100, 62, 97), (257, 160, 250), (8, 5, 6), (5, 4, 4), (7, 5, 5)]
-)
-def test_the_top_of_the_band_is_62_to_98_percent_and_a_line_at_least(count, first, last):
-    assert list(range(count))[noise._top(np.ones(count), NOISE)] == list(range(first, last + 1))
-
-
-@pytest.mark.parametrize(
-    ("power", "flat"),
-    [
-        (lines(100), True),
-        (lines(100, rest=1e6), True),
-        (lines(100, lower=2.0), True),
-        (lines(100, upper=2.0), True),
-        (lines(100, lower=2.001), False),
-        (lines(100, upper=2.001), False),
-        (lines(100, lower=0.0, upper=0.0), True),
-        (lines(100, lower=0.0), False),
-        (lines(8), True),
-        (lines(8, upper=3.0), False),
-        (lines(5), False),  # one line does not say whether it is flat
-    ],
-)
-def test_flat_is_up_to_twice_the_power_in_one_half(power, flat):
-    assert noise._is_flat(power, NOISE) is flat
-
-
 LOG = lfilter([0.25, 0.5, 0.25], [1.0], white(2**14))
 """As of a smoothed log: at 0.8 of the Nyquist frequency 0.095 of its noise is left."""
 
@@ -179,11 +137,9 @@ LOG = lfilter([0.25, 0.5, 0.25], [1.0], white(2**14))
     ("y", "stated", "floor"),
     [
         (white(2**14), sensor(5.0), 1.0),  # flat: what is measured counts, not what is stated
-        (white(2**14), sensor(0.1), 1.0),
         (white(2**14), sensor(20.0), 2.0),  # but no less than a tenth of that
         (LOG, sensor(5.0), 5.0),  # not flat
         (LOG, sensor(0.01), 0.095),
-        (LOG, sensor(100.0), 100.0),
     ],
 )
 def test_the_noise_that_the_rig_states_counts_where_the_spectrum_is_not_flat(y, stated, floor):
@@ -199,7 +155,6 @@ def test_the_noise_that_the_rig_states_counts_where_the_spectrum_is_not_flat(y, 
         (100.0, sensor(), 1.0),  # nothing is stated: what is measured
         (224.0, sensor(0.4), 0.4),  # seven eighths of the command's rate
         (240.0, sensor(0.4), 1.0),  # fifteen sixteenths
-        (256.0, sensor(0.4), 1.0),
         (512.0, sensor(0.4), 1.0),
     ],
 )
@@ -234,7 +189,6 @@ GRID = np.resize(np.arange(-3.0, 4.0), 100)
 @pytest.mark.parametrize(
     ("values", "step"),
     [
-        (0.5 * GRID, 0.5),
         (0.5 * GRID + 0.2, 0.5),
         (np.where(np.arange(100) == 50, np.nan, GRID), 1.0),
         (np.resize([0.0, 1.0, 2.0], 100), 1.0),  # three values are the fewest
@@ -242,34 +196,13 @@ GRID = np.resize(np.arange(-3.0, 4.0), 100)
         (np.resize(np.arange(19.0), 100), 1.0),
         (np.resize(np.arange(20.0), 100), 0.0),  # a fifth of the samples: no steps worth the name
         (np.resize([0.0, 1.0, 2.0, 3.0, 7.0], 100), 1.0),  # some are left out
-        (np.resize([0.0, 1.0, 2.0009], 100), 1.00045),
         (np.resize([0.0, 1.0, 2.0, 3.0009], 100), 1.0),
         (np.resize([0.0, 1.0, 2.0, 3.0012], 100), 0.0),  # off the grid
-        (np.resize([0.0, 1.0, 2.0, 3.4], 100), 0.0),
         (np.full(100, 5.0), 0.0),
     ],
 )
 def test_the_step_of_coarse_values_is_found(values, step):
     assert step_of(values) == pytest.approx(step)
-
-
-# nine segments of 512 samples, each begins 256 after the one before; a seam at its first sample is not inside
-@pytest.mark.parametrize(
-    ("seams", "without"),
-    [
-        ([], []),
-        ([256], [0]),
-        ([257], [0, 1]),
-        ([511], [0, 1]),
-        ([512], [1]),
-        ([768, 1500], [2, 4, 5]),
-        ([2559], [8]),
-        (range(1, 2560, 100), []),
-    ],
-)
-def test_segments_with_a_seam_inside_are_left_out_unless_all_have_one(seams, without):
-    whole = noise._seamless(np.zeros((9, 257), complex), list(seams))
-    assert np.flatnonzero(~whole).tolist() == without
 
 
 def test_a_jump_at_a_seam_is_no_noise():
@@ -293,8 +226,7 @@ def with_coloured_noise(record, memory, channels=("ft", "position"), seed=0):
     return record.with_channels(**added)
 
 
-@pytest.mark.parametrize("memory", [0.9, 0.97])
-@pytest.mark.parametrize("channels", [("ft",), ("position",), ("ft", "position")])
+@pytest.mark.parametrize(("memory", "channels"), [(0.9, ("ft",)), (0.97, ("ft", "position"))])
 def test_coloured_noise_of_a_clean_bench_is_noise(memory, channels):
     nominal, true = bench("paper_high_impedance", 3)
     result = identify([with_coloured_noise(record_bench(true, 3, 20.0), memory, channels)], nominal)
@@ -305,10 +237,10 @@ def test_coloured_noise_of_a_clean_bench_is_noise(memory, channels):
     assert set(result.coloured) == set(channels)
 
 
-@pytest.mark.parametrize("duration", [8.0, 14.0, 20.0])
+@pytest.mark.parametrize("duration", [8.0, 20.0])
 def test_white_noise_of_a_short_record_is_not_called_coloured(duration):
     rig = load_rig("paper_high_impedance")
-    for seed in range(15):
+    for seed in range(10):
         case = case_from(record_bench(rig, seed, duration), rig)
         known = reestimate_noise(case, simulate_cases((case,), rig, Clocks({}, {}))[0][0])
         assert known.coloured == frozenset(), seed

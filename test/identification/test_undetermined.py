@@ -44,14 +44,14 @@ def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_reported(
     assert Remark("not_shown", ("nonlinear_spring.cubic",)) in remarks
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_no_variance_of_indistinguishable_unknowns_is_negative(monkeypatch, solution, seed):
+def test_no_variance_of_indistinguishable_unknowns_is_negative(monkeypatch, solution):
     """Rounding left a variance below zero, and its root was a warning and no interval."""
-    rng = np.random.default_rng(seed)
-    matrix = 1e9 * np.outer(rng.normal(size=len(solution.residual)), rng.normal(size=len(solution.theta)))
-    monkeypatch.setattr(confidence, "central_jacobian", lambda *_: matrix)
-    doubt = confidence.confidence_of(replace(solution, jacobian=matrix))
-    assert np.all(np.diag(doubt.covariance) > 0.0)
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        matrix = 1e9 * np.outer(rng.normal(size=len(solution.residual)), rng.normal(size=len(solution.theta)))
+        monkeypatch.setattr(confidence, "central_jacobian", lambda *_, matrix=matrix: matrix)
+        doubt = confidence.confidence_of(replace(solution, jacobian=matrix))
+        assert np.all(np.diag(doubt.covariance) > 0.0)
 
 
 def test_values_of_which_only_a_combination_is_determined_are_not_and_nothing_is_singular():

@@ -37,7 +37,7 @@ QUIET = dict.fromkeys(
 
 
 def _quiet(bench):
-    return record_run(bench.with_values(**QUIET), 3, duration=4.0)
+    return record_run(bench.with_values(**QUIET), 3, duration=3.0)
 
 
 @functools.cache
@@ -111,7 +111,7 @@ def test_both_implementations_agree(effect):
     parameters = drawn_parameters(effect, "medium", np.random.default_rng(3)) if effect else {}
     bench = hide(Bench(), effect, parameters) if effect else Bench()
     hidden, plain = (
-        record_run(b.with_values(**QUIET, hum_phase=0.0), 5, duration=6.0) for b in (bench, Bench())
+        record_run(b.with_values(**QUIET, hum_phase=0.0), 5, duration=4.0) for b in (bench, Bench())
     )
     rig = load_rig("paper_high_impedance")
     if effect:

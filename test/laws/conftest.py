@@ -12,7 +12,7 @@ from rsea_ros.laws.law import LawResult
 from rsea_ros.laws.learn import learn
 from rsea_ros.model.rig_file import load_rig
 
-SECONDS = 8.0
+SECONDS = 6.0
 
 
 @cache

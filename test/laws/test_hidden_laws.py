@@ -54,7 +54,7 @@ def test_a_stiffness_that_repeats_is_one_law_of_its_period():
     change = Parameter("change", "N m/rad", 0.0, -1e3, 1e3, 300.0)
     claims = Claims("deflection", "neither", None)
     effect = Effect("wavy", Port.SPRING, (change,), claims, wavy_spring, reads=(st.DEFLECTION,))
-    command = chirp_noise(8.0, np.random.default_rng(5))
+    command = chirp_noise(6.0, np.random.default_rng(5))
     rig = load_rig("paper_high_impedance")
     with lend(effect):
         hidden = rig.with_effect("wavy", change=300.0)

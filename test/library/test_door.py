@@ -37,35 +37,25 @@ def fit(record):
     return rsea.identify(record, "paper_high_impedance")
 
 
-def in_a_fresh_interpreter(code: str) -> dict[str, object]:
+def in_a_fresh_interpreter(code: str) -> list[object]:
     bare = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "OPENBLAS", "MKL"))}
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60, env=bare)
     return json.loads(done.stdout)
 
 
-def test_importing_changes_no_variable_and_brings_neither_ros_nor_numerics():
+def test_importing_brings_neither_ros_nor_numerics_and_opening_every_name_changes_no_variable():
     seen = in_a_fresh_interpreter(
         "import json, os, sys\n"
         "before = dict(os.environ)\n"
         "import rsea_ros as rsea\n"
         "heavy = [m for m in ('rclpy', 'numpy', 'scipy', 'numba', 'control', 'plotly') if m in sys.modules]\n"
-        "changed = sorted(k for k in os.environ if before.get(k) != os.environ[k])\n"
-        "print(json.dumps({'heavy': heavy, 'changed': changed, 'names': dir(rsea)}))"
-    )
-    assert seen == {"heavy": [], "changed": [], "names": sorted(DOOR)}
-
-
-def test_every_name_of_the_door_opens_without_ros():
-    seen = in_a_fresh_interpreter(
-        "import json, os, sys\n"
-        "import rsea_ros as rsea\n"
-        "before = dict(os.environ)\n"
-        "opened = [getattr(rsea, name) is not None for name in dir(rsea)]\n"
+        "names = dir(rsea)\n"
+        "opened = all(getattr(rsea, name) is not None for name in names)\n"
         "same = dict(os.environ) == before\n"
-        "print(json.dumps({'all': all(opened), 'ros': 'rclpy' in sys.modules, 'environment': same}))"
+        "print(json.dumps([heavy, names, opened, same, 'rclpy' in sys.modules]))"
     )
-    assert seen == {"all": True, "ros": False, "environment": True}
+    assert seen == [[], sorted(DOOR), True, True, False]
     assert set(rsea.__all__) == set(DOOR)
 
 
@@ -102,19 +92,14 @@ def test_stamps_may_count_from_any_epoch():
         ([0.0, 1.0], {"command": [1.0, 2.0, 3.0]}, "command has 3 values for 2 stamps"),
         ([0.0, 1.0, 1.0], {"command": [1.0, 2.0, 3.0]}, "t[2] = 1 s after 1 s, expected stamps that rise"),
         ([0.0, 1.0], {"command": ["a", "b"]}, "command holds <U1, expected real numbers in N·m"),
-        ([0.0, 1.0], {"command": [1.0, object()]}, "command is not an array of numbers"),
         ([0.0, 1.0], {"command": [1, 2], "u": [1, 2]}, "name a channel twice"),
         ([0.0, 1.0], {}, "no channel, expected one or more of command"),
         ([0.0, np.nan], {"command": [1, 2]}, "t[1] = nan, expected a finite value in s"),
-        ([0.0, np.inf], {"command": [1, 2]}, "t[1] = inf, expected a finite value in s"),
-        ([0.0, 1.0], {"u": [1, np.nan]}, "command[1] = nan, expected a finite value in N·m"),
         ([0.0, 1.0], {"command": [1, -np.inf]}, "command[1] = -inf, expected a finite value in N·m"),
         ([0.0, 1.0], {"command": [1, 2j]}, "command holds complex128, expected real numbers in N·m"),
         (np.array([0, 1j]), {"command": [1, 2]}, "t holds complex128, expected real numbers in s"),
         ([0.0, 1.0], {"position": [True, False]}, "position holds bool, expected real numbers in rad"),
-        ([0.0, 1.0], {"q": ["1", "2"]}, "q holds <U1, expected real numbers in rad"),
         (np.array([0, 1], "m8[ms]"), {"u": [1, 2]}, "t holds timedelta64[ms], expected real numbers in s"),
-        (np.array([0, 1], "M8[s]"), {"u": [1, 2]}, "t holds datetime64[s], expected real numbers in s"),
     ],
 )
 def test_arrays_that_cannot_be_a_record_are_refused(t, channels, says):

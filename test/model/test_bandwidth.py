@@ -25,8 +25,10 @@ HZ = np.arange(0.001, 400.0, 0.001)
 
 
 @pytest.mark.parametrize("rig", [PLATFORM, PROTOTYPE], ids=lambda rig: rig.name)
-@pytest.mark.parametrize("sees", ["element", "spring_and_damper"])
-@pytest.mark.parametrize(("db", "deg"), [(3.0, 90.0), (3.0, 10.0), (1.0, 5.0), (0.2, 89.0)])
+@pytest.mark.parametrize(
+    ("sees", "db", "deg"),
+    [("element", 3.0, 90.0), ("spring_and_damper", 3.0, 10.0), ("spring_and_damper", 0.2, 89.0)],
+)
 def test_band_is_where_a_dense_search_first_leaves_it(rig, sees, db, deg):
     function = end_to_end(rig, sees)
     values = function(2j * np.pi * HZ)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from bench.observer.lacks import actuators, cases, measure, played
+from bench.observer.lacks import actuators, measure, played
 from bench.observer.truth import true_run
 from rsea_ros.errors import RigError
 from rsea_ros.model.observer import Observer, noise_of, observe
@@ -22,7 +22,11 @@ from rsea_ros.paper.rival_models import lumped_rig
 RATE = 280.0
 SETTLE = 100
 RIGS = ("paper_high_impedance", "paper_moving_output", "prototype_knee")
-CASES = tuple(name for name in cases(actuators()["bench"]) if "zero" not in name)
+CASES = (
+    "nothing", "friction", "friction, stated", "play", "K_s 5 % more", "J_m 10 % less", "b_s half of it",
+    "F/T noise 5 times", "free housing, friction", "samples late",
+)  # fmt: skip
+"""What the model lacks; `python -m bench observer lacks` plays more, longer."""
 
 
 def rms(values):
@@ -125,9 +129,9 @@ def test_the_innovation_test_names_the_channel_and_passes_a_right_model(moving):
 
 @pytest.mark.parametrize("case", CASES)
 def test_the_torque_is_never_worse_than_the_sensor_and_lies_within_its_sigma(case):
-    """On plants of another hand; 93 to 97 % in long runs: `python -m bench observer lacks`."""
+    """On plants of another hand; 93 to 97 % in long runs."""
     for actuator in actuators().values():
-        error, sensor, inside = measure(actuator, case, 6.0, (1, 2, 3))
+        error, sensor, inside = measure(actuator, case, 6.0, (1,))
         assert error < 1.05 * sensor and inside > 0.92
         assert error < 0.25 * sensor or case not in ("nothing", "friction, stated", "F/T noise 5 times")
         assert inside < 0.98 or case.startswith(("free", "samples late"))

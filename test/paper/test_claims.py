@@ -69,9 +69,7 @@ def test_both_readings_of_the_lumped_model_miss_the_resonance():
 @pytest.mark.parametrize(
     ("hz", "unlumped", "moving"),
     [
-        (0.5, -21.7, -21.7),
         (6.1, -21.3, 4.9),
-        (10.0, -18.8, -16.3),
         (19.8, -8.8, -25.7),
         (33.0, -24.7, -31.6),
     ],
@@ -93,9 +91,6 @@ def test_the_papers_1e8_is_as_good_as_a_clamp():
     assert clamp_error() < 1e-6
 
 
-LIMITS = limits(load_rig("paper_moving_output"))
-
-
 @pytest.mark.parametrize("held", ["T-RSEA", "RT-RSEA"])
 @pytest.mark.parametrize("index", range(len(TRAINS)), ids=TRAINS)
 def test_the_table_has_the_right_transfer_functions(index, held):
@@ -110,14 +105,14 @@ def test_the_table_has_the_right_transfer_functions(index, held):
         np.testing.assert_allclose(frequency_response(rig, torque, HZ), value, rtol=1e-9)
 
 
-@pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: limit.what)
-def test_every_limit_is_reached(limit):
-    if len(limit.values) == 1:
-        assert limit.errors[0] < 1e-12
-        return
-    assert limit.errors[-1] < 3e-3
-    order = np.log10(limit.errors[-2] / limit.errors[-1]) / np.log10(limit.values[-1] / limit.values[-2])
-    assert order == pytest.approx(1.0, abs=0.15)
+def test_every_limit_is_reached():
+    for limit in limits(load_rig("paper_moving_output")):
+        if len(limit.values) == 1:
+            assert limit.errors[0] < 1e-12, limit.what
+            continue
+        assert limit.errors[-1] < 3e-3, limit.what
+        order = np.log10(limit.errors[-2] / limit.errors[-1]) / np.log10(limit.values[-1] / limit.values[-2])
+        assert order == pytest.approx(1.0, abs=0.15), limit.what
 
 
 def test_the_bench_differs_from_what_the_rig_states():

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,30 +25,32 @@ from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.diagnosis.page import write_diagnosis
-from test.watch.browser import chromium
+from test.watch.browser import Browser
 
 DURATION, RATE = 160.0, 280.0
-FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--enable-logging=stderr", "--virtual-time-budget=20000", "--window-size=1200,4000",
-)  # fmt: skip
 
 
 @pytest.fixture(scope="session")
-def opened() -> Callable[[str, Path], tuple[str, str]]:
-    """Return a function that gives a page after its scripts have run, and what the browser logged."""
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Give one browser to all pages: to start one takes longer than to draw a page."""
+    with closing(Browser(tmp_path_factory.mktemp("browser"))) as made:
+        yield made
 
-    def open_page(html: str, folder: Path) -> tuple[str, str]:
-        path = folder / "page.html"
+
+@pytest.fixture(scope="session")
+def shown(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Browser]:
+    """Return a function that shows a page in the browser once all of its figures are drawn."""
+
+    def show(html: str, width: int = 1400) -> Browser:
+        path = tmp_path_factory.mktemp("shown") / "page.html"
         path.write_text(html, encoding="utf-8")
-        done = subprocess.run(
-            [chromium(), *FLAGS, f"--user-data-dir={folder / 'profile'}", "--dump-dom", path.as_uri()],
-            capture_output=True, text=True, timeout=120, check=True,
-        )  # fmt: skip
-        return done.stdout, done.stderr
+        browser.errors.clear()
+        browser.open(path.as_uri(), width)
+        browser.until(f"location.href === '{path.as_uri()}' && document.readyState === 'complete'")
+        browser.until("[...document.querySelectorAll('.figure')].every((f) => f.dataset.drawn)")
+        return browser
 
-    return open_page
+    return show
 
 
 @pytest.fixture(scope="session")

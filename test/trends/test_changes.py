@@ -23,7 +23,7 @@ def day(time_s):
     return (time_s - START) / DAY
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_step_of_three_day_effects_is_found_at_its_date_with_its_size(seed):
     result = trend(seed, course=lambda joint, d: -0.018 * (d >= 120))
     (change,) = result.changes
@@ -110,7 +110,7 @@ def test_intervals_as_wide_as_the_value_show_nothing():
     assert "would show" in result.reason
 
 
-@pytest.mark.parametrize("since", [4, 5, 6, 7, 8])
+@pytest.mark.parametrize("since", [4, 8])
 def test_a_step_of_a_short_series_is_found_wherever_it_lies(since):
     """Of 12 weekly recordings the last six had 60 % more friction: the page called the joint steady."""
     result = trend(7, days=12, each=1, day_sd=0.0, course=lambda joint, d: 0.6 * (d >= since))
@@ -119,7 +119,7 @@ def test_a_step_of_a_short_series_is_found_wherever_it_lies(since):
     assert change.size.low < 0.6 * 1500.0 < change.size.high
 
 
-@pytest.mark.parametrize("days", [8, 12, 20])
+@pytest.mark.parametrize("days", [8, 20])
 def test_noise_of_a_short_series_is_called_a_change_no_oftener_than_stated(days):
     result = fleet_trends(
         history(np.random.default_rng(6), joints=[f"j{k:03d}" for k in range(300)], days=days), NOTHING

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from contextlib import closing
 from itertools import pairwise
 
 import pytest
 
 from rsea_ros.report.fleet.page import write_fleet_report
-from test.watch.browser import Browser
 
 COLOURS = (
     """[...document.querySelectorAll('.rail i:last-child')].map((i) => getComputedStyle(i).backgroundColor)"""
@@ -20,12 +18,10 @@ MONTHS = """[...document.querySelectorAll('.months')].map((m) => [...m.children]
 
 
 @pytest.fixture(scope="module")
-def fleet_in_browser(tables, tmp_path_factory):
-    index = write_fleet_report(*tables, tmp_path_factory.mktemp("shown") / "out")
-    with closing(Browser(tmp_path_factory.mktemp("profile"))) as made:
-        made.open(index.as_uri())
-        made.until("document.querySelector('.heat')")
-        yield made
+def fleet_in_browser(tables, browser, tmp_path_factory):
+    browser.open(write_fleet_report(*tables, tmp_path_factory.mktemp("fleet") / "out").as_uri())
+    browser.until("document.querySelector('.heat')")
+    return browser
 
 
 def test_bars_and_cells_have_their_colours_in_a_browser(fleet_in_browser):

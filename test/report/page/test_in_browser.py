@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ import pytest
 from rsea_ros.report.diagnosis.figures import sketch
 from rsea_ros.report.figures.figure import BEFORE, INK, Figure, axis, label, layout, line
 from rsea_ros.report.page import Html, equation, page, table
-from test.watch.browser import Browser
 
 CAUSE = ["ft_gain_error"]
 CURVE = Figure("Rising", "", [{"type": "scatter", "x": [0, 1], "y": [0, 1], "name": "y"}], layout())
@@ -33,42 +31,31 @@ LIGHT, DARK = ([{"name": "prefers-color-scheme", "value": value}] for value in (
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("page")
-    drawn = Html(sketch(CAUSE) + equation(LAW))
-    (folder / "page.html").write_text(page("t", "k", [drawn, CURVE], []))
-    with closing(Browser(folder)) as made:
-        made.open((folder / "page.html").as_uri())
-        made.until("document.querySelector('[data-drawn]')")
-        yield made
+def culprit(shown):
+    return shown(page("t", "k", [Html(sketch(CAUSE) + equation(LAW)), CURVE], []))
 
 
 @pytest.mark.parametrize("width", [1400, 400, 320])
-def test_the_name_of_the_culprit_is_in_view_and_can_be_read(browser, width):
+def test_the_name_of_the_culprit_is_in_view_and_can_be_read(culprit, width):
     """At 400 px the drawing ended behind the encoder, and the F/T sensor was out of view."""
-    browser.size(width, 900)
-    ((left, right, height),) = browser.value(SHOWN)
+    culprit.size(width, 900)
+    ((left, right, height),) = culprit.value(SHOWN)
     assert 0.0 <= left < right <= width and height > 10.0
 
 
-def test_figures_follow_the_colours_of_the_system(browser):
+def test_figures_follow_the_colours_of_the_system(culprit):
     """Curves drawn in the dark kept their grid on a page that had become white."""
     for look, expected in ((DARK, "#e4e7eb"), (LIGHT, INK)):
-        browser.call("Emulation.setEmulatedMedia", features=look)
-        browser.until(f"({COLOUR}) === {json.dumps(expected)}", seconds=5.0)
-    browser.until("document.querySelectorAll('.tools').length === 1")
-    assert browser.errors == []
+        culprit.call("Emulation.setEmulatedMedia", features=look)
+        culprit.until(f"({COLOUR}) === {json.dumps(expected)}", seconds=5.0)
+    culprit.until("document.querySelectorAll('.tools').length === 1")
+    assert culprit.errors == []
 
 
 @pytest.fixture(scope="module")
-def two_curves(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("two")
+def two_curves(shown):
     rows = table(["trial", "asked", "measured"], [["crossover", "", "13.7 Hz"]])
-    (folder / "page.html").write_text(page("t", "k", [TWO, CURVE, rows], []))
-    with closing(Browser(folder)) as made:
-        made.open((folder / "page.html").as_uri())
-        made.until("document.querySelectorAll('[data-drawn]').length === 2")
-        yield made
+    return shown(page("t", "k", [TWO, CURVE, rows], []))
 
 
 def test_a_figure_has_the_width_of_a_phone(two_curves):
@@ -129,17 +116,14 @@ BOXES = """[...document.querySelectorAll('tbody td')].slice(1).map((cell) => {
 
 
 @pytest.fixture(scope="module")
-def cards(tmp_path_factory):
+def cards(shown):
     """A table on a phone: a short value with a note, and a sentence."""
-    folder = tmp_path_factory.mktemp("cards")
     value = Html("1500 <sub>r</sub><small>noted</small>")
     rows = table(["name", "value", "about"], [["K_s", value, LONG]])
     code = Html("<code style='display: block; width: 10ch'>1234567 --rig</code>")
-    (folder / "page.html").write_text(page("t", "k", [rows, code], []))
-    with closing(Browser(folder)) as made:
-        made.open((folder / "page.html").as_uri(), width=400)
-        made.until("document.querySelector('[data-label]')")
-        yield made
+    made = shown(page("t", "k", [rows, code], []), width=400)
+    made.until("document.querySelector('[data-label]')")
+    return made
 
 
 def test_an_option_is_not_broken_behind_its_hyphens(cards):
