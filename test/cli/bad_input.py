@@ -1,9 +1,11 @@
-"""Shared by the tests of bad input: run a verb as a person does, damage a record."""
+"""Shared by the tests of bad input: run a verb as a person does, or work in a fork; damage a record."""
 
 from __future__ import annotations
 
 import io
+import os
 import subprocess
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -19,6 +21,19 @@ def rsea(*arguments: str | Path):
     with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
         status = main(command)
     return subprocess.CompletedProcess(command, status, out.getvalue(), err.getvalue())
+
+
+def forked(work: Callable[[], object]) -> int:
+    """Do work in a fork of this process, which has imported all; return its status, negative for a signal."""
+    pid = os.fork()
+    if pid == 0:
+        status = 1
+        try:
+            work()
+            status = 0
+        finally:
+            os._exit(status)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
 def change(record: Record, name: str, k: int, *, y: float | None = None, t: float | None = None) -> Record:

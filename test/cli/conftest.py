@@ -1,11 +1,11 @@
-"""Shared by the tests of the command line: a short record, and a place that must stay empty."""
+"""Shared by the tests of the command line: a short record, and what a verb refuses."""
 
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+from rsea_ros.cli.main import main
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -19,8 +19,17 @@ def record() -> Record:
 
 
 @pytest.fixture
-def out(tmp_path: Path) -> Iterator[Path]:
-    """Yield a directory for results that must be empty after the test."""
-    yield tmp_path / "results"
-    left = list((tmp_path / "results").glob("*"))
-    assert not left, left
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Return a function that plays a verb and returns the one line with which it refuses, status 2."""
+
+    def play(*words: object) -> str:
+        capsys.readouterr()
+        try:
+            status = main([str(word) for word in words])
+        except SystemExit as leaving:
+            status = leaving.code
+        printed, line = capsys.readouterr()
+        assert (status, printed, line.count("\n")) == (2, "", 1), line
+        return line
+
+    return play

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
-from pathlib import Path
+import os
 
 import numpy as np
 import pytest
-from bad_input import ROOT, change, rsea
+from bad_input import change, forked, rsea
 
 from msg_adapters import write_record
 from rsea_ros.cli.main import main
@@ -39,30 +37,21 @@ def test_a_stamp_that_goes_back_is_reported_and_the_rest_is_used(record, tmp_pat
 NOBODY = 65534
 
 
-def as_nobody(*arguments: str | Path, once: tuple[str | Path, ...] = ()) -> subprocess.CompletedProcess[str]:
-    """Run a verb without root's rights. once: run it as root before, so that its imports are compiled."""
-    code = (
-        "import contextlib, io, os, sys, msg_adapters, rsea_ros.cli.identify, rsea_ros.model.rig_file\n"
-        "from rsea_ros.cli.main import main\n"
-        f"once = {[str(a) for a in once]}\n"
-        "with contextlib.redirect_stdout(io.StringIO()): assert not once or main(once) == 0\n"
-        f"os.geteuid() or os.seteuid({NOBODY})\n"
-        f"sys.exit(main({[str(a) for a in arguments]}))"
-    )
-    return subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
-
-
-def reachable(folder: Path) -> None:
-    for one in (folder, *folder.parents[:-2]):
-        one.chmod(0o755)
-
-
 def test_a_file_without_read_permission_is_refused(record, tmp_path):
-    for name in ("open.mcap", "locked.mcap"):
-        write_record(record, tmp_path / name)
-    (tmp_path / "locked.mcap").chmod(0)
-    reachable(tmp_path)
-    before = ("identify", tmp_path / "open.mcap", "--out", tmp_path / "results")
-    done = as_nobody("identify", tmp_path / "locked.mcap", once=before)
-    assert (done.returncode, done.stdout) == (2, ""), done.stderr
-    assert done.stderr.count("\n") == 1 and f"{tmp_path}/locked.mcap: no permission to read it" in done.stderr
+    """Played without root's rights."""
+    bag = tmp_path / "locked.mcap"
+    write_record(record, bag)
+    bag.chmod(0)
+    for folder in (tmp_path, *tmp_path.parents[:-2]):
+        folder.chmod(0o755)
+    told, tell = os.pipe()
+
+    def play():
+        os.geteuid() or os.seteuid(NOBODY)
+        done = rsea("identify", bag)
+        os.write(tell, json.dumps([done.returncode, done.stdout, done.stderr]).encode())
+
+    assert forked(play) == 0
+    status, printed, line = json.loads(os.read(told, 10_000))
+    assert (status, printed) == (2, ""), line
+    assert line.count("\n") == 1 and f"{bag}: no permission to read it" in line

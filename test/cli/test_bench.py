@@ -15,7 +15,6 @@ from bench.__main__ import _parser, _print, index, main as run_bench
 from bench.frozen.cases import generated
 from bench.results import read_lines, resumed, write_pages
 from rsea_ros.cli._graph import node_calls
-from rsea_ros.cli.main import main
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig_file import load_rig, rig_folders
@@ -48,36 +47,25 @@ def test_it_prints_its_addresses_and_a_signal_removes_the_port(tmp_path):
 
 def test_with_an_encoder_on_the_spring_there_is_no_ft_sensor(tmp_path):
     with RemoteBench(tmp_path / "tty", "--deflection") as bench:
-        values = bench.parameters()
-    assert (values["encoder_id"], values["encoder_pulses"], values["ft_host"]) == (100, 2.0**20, "")
-    process = start("--port", tmp_path / "second", "--deflection")
-    words = json.loads(process.stdout.readline())["launch"]
-    process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=30)
-    driver, *_ = node_calls("hardware", shlex.split(words)[3:])
-    given = driver.parameters
-    assert (given["encoder_id"], given["encoder_pulses"], given["ft_host"]) == ("100", "1048576.0", "''")
-
-
-def test_an_encoder_needs_a_spring(capsys):
-    assert main(["bench", "--rig", "bare_drive", "--deflection"]) == 2
-    assert "--deflection: the spring of rig bare_drive is rigid" in capsys.readouterr().err
-
-
-def test_an_unknown_request_is_answered_and_changes_nothing(tmp_path):
-    with RemoteBench(tmp_path / "tty") as bench:
+        given, (driver, *_) = bench.parameters(), node_calls("hardware", shlex.split(bench.launch)[3:])
         for name, values in {"explode": {}, "misbehave": {"dropp": 1.0}, "set": {"colour": 3}}.items():
             with pytest.raises(DeviceError, match="expected one of misbehave, set, alert"):
                 bench.ask(name, **values)
-        assert bench.torque() == (0, False)
+        assert bench.torque() == (0, False), "what it does not understand changes nothing"
+    names = "encoder_id", "encoder_pulses", "ft_host"
+    assert [given[name] for name in names] == [100, 2.0**20, ""]
+    assert [driver.parameters[name] for name in names] == ["100", "1048576.0", "''"]
 
 
-def test_a_file_with_the_name_of_the_port_is_not_removed(tmp_path, capsys):
+def test_an_encoder_needs_a_spring(refused):
+    line = refused("bench", "--rig", "bare_drive", "--deflection")
+    assert "--deflection: the spring of rig bare_drive is rigid" in line
+
+
+def test_a_file_with_the_name_of_the_port_is_not_removed(tmp_path, refused):
     (tmp_path / "thesis.tex").write_text("precious")
-    assert main(["bench", "--port", str(tmp_path / "thesis.tex")]) == 2
-    errors = capsys.readouterr().err
-    assert errors.count("\n") == 1
-    assert "thesis.tex: exists already, expected a new name" in errors
+    line = refused("bench", "--port", tmp_path / "thesis.tex")
+    assert "thesis.tex: exists already, expected a new name" in line
     assert (tmp_path / "thesis.tex").read_text() == "precious"
 
 
@@ -88,9 +76,8 @@ def test_a_file_with_the_name_of_the_port_is_not_removed(tmp_path, capsys):
         (("--return-delay", 300), "rsea bench: --return-delay 300, expected 0 to 254 (unit 2 µs)\n"),
     ],
 )
-def test_impossible_options_are_refused(words, message, capsys):
-    assert main(["bench", *map(str, words)]) == 2
-    assert capsys.readouterr() == ("", message)
+def test_impossible_options_are_refused(words, message, refused):
+    assert refused("bench", *words) == message
 
 
 def test_the_tables_of_the_pages_are_the_kept_rows_of_the_benchmarks():

@@ -5,7 +5,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,14 +13,15 @@ import numpy as np
 import pytest
 
 from msg_adapters import read_record, write_record
+from rsea_ros import processes
 from rsea_ros.cli import demo
 from rsea_ros.cli._processes import Processes
-from rsea_ros.cli.main import main
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.records.record import Channel, Fault, Record
+from test.nodes.stalls import until
 
 ROOT = Path(__file__).resolve().parents[2]
 DOMAIN = int(os.environ["ROS_DOMAIN_ID"])
@@ -97,10 +97,7 @@ def _assert_that_the_bag_says_what_the_plant_did(recorded, rig):
 def test_a_signal_leaves_no_process_and_no_half_written_bag(tmp_path):
     out = tmp_path / "demo"
     process = _demo(out)
-    deadline = time.monotonic() + 60.0
-    while not (out / "log" / "excite.log").exists():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    until((out / "log" / "excite.log").exists, 60.0)
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 128 + signal.SIGTERM
@@ -109,13 +106,21 @@ def test_a_signal_leaves_no_process_and_no_half_written_bag(tmp_path):
     assert not list(out.glob("*.partial*"))
 
 
-def test_a_node_that_fails_while_another_is_awaited_is_named_too(tmp_path):
+def test_a_node_that_fails_while_another_is_awaited_is_named_too(tmp_path, monkeypatch):
+    fails = "echo '[FATAL] [17.5] [rsea.plant]: parameter rate = 1.0, expected more'; exit 2"
+    programs, begun = {"plant": ["sh", "-c", fails], "record": ["sleep", "60"]}, []
+
+    def start(name, arguments, **options):
+        begun.append(processes.start(programs[name], **options))
+        return begun[-1]
+
+    monkeypatch.setattr("rsea_ros.cli._processes.start", start)
     with Processes(tmp_path, DOMAIN) as nodes:
         nodes.start("plant", {"rate": 1})
         nodes.start("record", {"out": tmp_path / "bag"})
         with pytest.raises(RseaError, match=r"plant ended too early: parameter rate = 1.0, expected"):
             nodes.wait("record", 60.0)
-    assert not _left_running(tmp_path)
+    assert all(each.poll() is not None for each in begun)
 
 
 def test_the_limit_of_a_node_counts_from_its_last_line(tmp_path, monkeypatch):
@@ -140,11 +145,10 @@ def test_the_limit_of_a_node_counts_from_its_last_line(tmp_path, monkeypatch):
         nodes.wait("replay", 10.0)
 
 
-def test_a_used_directory_is_refused(tmp_path, capsys):
+def test_a_used_directory_is_refused(tmp_path, refused):
     (tmp_path / "demo" / "bag").mkdir(parents=True)
-    assert main(["demo", "--out", str(tmp_path / "demo")]) == 2
-    errors = capsys.readouterr().err
-    assert re.fullmatch(r"rsea demo: --out .*/demo: holds a bag already, expected a new directory\n", errors)
+    line = refused("demo", "--out", tmp_path / "demo")
+    assert re.fullmatch(r"rsea demo: --out .*/demo: holds a bag already, expected a new directory\n", line)
 
 
 STARTS_A_NODE = """
@@ -166,10 +170,7 @@ def test_a_demo_that_is_killed_leaves_no_node(tmp_path):
     assert _left_running(tmp_path)
     process.kill()
     process.communicate()
-    deadline = time.monotonic() + 30.0
-    while _left_running(tmp_path):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    until(lambda: not _left_running(tmp_path))
 
 
 @pytest.mark.parametrize(

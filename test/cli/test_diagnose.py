@@ -11,6 +11,7 @@ from writing_verbs import Result, prepare
 import rsea_ros.diagnosis.diagnose as engine
 from msg_adapters import write_record
 from rsea_ros.cli.main import main
+from rsea_ros.design import spring_design
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -48,6 +49,12 @@ def test_the_status_is_1_for_a_verdict_that_fail_on_names(quick, verdicts, statu
     assert main(["diagnose", "run.mcap", "--json", "--out", "out", "--fail-on", *verdicts]) == status
 
 
+@pytest.mark.parametrize(("feasible", "status"), [(False, 1), (True, 0)])
+def test_the_status_of_a_design_is_1_where_it_is_not_met(quick, monkeypatch, feasible, status):
+    monkeypatch.setattr(spring_design, "spring_design", lambda *asked: Result(feasible=feasible))
+    assert main(["design", "--json", "--out", "out", "--fail-on", "unmet"]) == status
+
+
 def test_bags_rig_and_holdout_reach_the_engine(quick, record):
     for path in ("other.mcap", "held_out.mcap"):
         write_record(record, path)
@@ -59,10 +66,9 @@ def test_bags_rig_and_holdout_reach_the_engine(quick, record):
     assert rig.name == "pendulum"
 
 
-def test_a_file_in_place_of_the_directory_is_refused_before_any_work(quick, capsys):
-    assert main(["diagnose", "run.mcap", "--out", "run.mcap"]) == 2
+def test_a_file_in_place_of_the_directory_is_refused_before_any_work(quick, refused):
     line = "rsea diagnose: --out run.mcap: is a file, expected a directory or a new name\n"
-    assert capsys.readouterr().err == line
+    assert refused("diagnose", "run.mcap", "--out", "run.mcap") == line
     assert quick == []
 
 
@@ -92,11 +98,9 @@ def still(record):
         (still, "every measured channel holds one value, expected motion"),
     ],
 )
-def test_a_run_that_cannot_be_diagnosed_is_refused_in_one_line(record, tmp_path, capsys, spoil, line):
-    path, out = str(tmp_path / "run.mcap"), tmp_path / "out"
+def test_a_run_that_cannot_be_diagnosed_is_refused_in_one_line(record, tmp_path, refused, spoil, line):
+    path, out = tmp_path / "run.mcap", tmp_path / "out"
     write_record(spoil(record), path)
-    assert main(["diagnose", path, "--out", str(out)]) == 2
-    printed, errors = capsys.readouterr()
-    assert printed == "" and errors.count("\n") == 1
-    assert errors.startswith(f"rsea diagnose: {path}: ") and line in errors
+    said = refused("diagnose", path, "--out", out)
+    assert said.startswith(f"rsea diagnose: {path}: ") and line in said
     assert not out.exists()

@@ -47,13 +47,8 @@ def test_the_run_keeps_its_limits_and_can_be_played(models, tmp_path, capsys):
         (["--limits", "torque=5", "--rate", "1e9"], "rate = 1e+09 Hz, expected 50 to 1000 Hz"),
     ],
 )
-def test_an_impossible_run_is_refused_in_one_line(models, words, message, capsys):
-    try:
-        status = main(["experiment", *models, *words])
-    except SystemExit as error:
-        status = error.code
-    shown = capsys.readouterr().err
-    assert status == 2 and message in shown and len(shown.splitlines()) == 1
+def test_an_impossible_run_is_refused_in_one_line(models, words, message, refused):
+    assert message in refused("experiment", *models, *words)
 
 
 @pytest.mark.parametrize(
@@ -64,14 +59,12 @@ def test_an_impossible_run_is_refused_in_one_line(models, words, message, capsys
         ("bare_drive", "the spring is compliant in paper_high_impedance and rigid in bare_drive"),
     ],
 )
-def test_models_of_different_machines_are_refused_in_one_line(models, other, message, tmp_path, capsys):
+def test_models_of_different_machines_are_refused_in_one_line(models, other, message, tmp_path, refused):
     strange = tmp_path / "strange.yaml"
     rig = replace(load_rig(other), known=frozenset(), effects=())
     save_rig(rig.with_effect("torque_constant_error", gain=1.1), strange)
-    assert main(["experiment", models[0], str(strange), "--limits", "torque=5"]) == 2
-    shown = capsys.readouterr().err
-    assert f"models of different machines: {message}, expected causes of one bench" in " ".join(shown.split())
-    assert len(shown.splitlines()) == 1
+    line = refused("experiment", models[0], strange, "--limits", "torque=5")
+    assert f"models of different machines: {message}, expected causes of one bench" in line
 
 
 def test_a_diagnosis_file_supplies_the_doubtful_cause_and_its_alternatives():
@@ -111,10 +104,9 @@ def cause(**body):
         (cause(parameters={"gap": {"value": 1e-3, "ci95": 3}}), "gap.ci95 = 3, expected [low, high]"),
     ],
 )
-def test_a_wrong_diagnosis_file_is_refused_in_one_line_that_names_it(content, message, tmp_path, capsys):
+def test_a_wrong_diagnosis_file_is_refused_in_one_line_that_names_it(content, message, tmp_path, refused):
     save_rig(RIG, tmp_path / "model.yaml")
     path = tmp_path / "diagnosis.json"
     path.write_text(content, encoding="utf-8")
-    assert main(["experiment", str(path), "--limits", "torque=5"]) == 2
-    shown = capsys.readouterr().err
-    assert f"{path}: " in shown and message in shown and len(shown.splitlines()) == 1
+    line = refused("experiment", path, "--limits", "torque=5")
+    assert f"{path}: " in line and message in line

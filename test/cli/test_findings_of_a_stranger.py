@@ -27,12 +27,12 @@ def freeze(record):
     return record.with_channels(ft=Channel(record["ft"].t, y))
 
 
-def test_a_bag_given_twice_counts_once(record, tmp_path, capsys):
-    bag = str(tmp_path / "bag.mcap")
+def test_a_bag_given_twice_counts_once(record, tmp_path, refused):
+    bag = tmp_path / "bag.mcap"
     write_record(record, bag)
     for verb in ("identify", "diagnose"):
-        assert main([verb, bag, bag, "--out", str(tmp_path / "out")]) == 2
-        assert f"{bag}: given twice, expected each bag once" in capsys.readouterr().err
+        said = refused(verb, bag, bag, "--out", tmp_path / "out")
+        assert f"{bag}: given twice, expected each bag once" in said
     with pytest.raises(ParameterError, match="given twice"):
         rsea.identify([record, record], RIG)
 

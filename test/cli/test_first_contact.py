@@ -16,18 +16,15 @@ from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report.check import check_lines
 
 
-def test_a_table_given_for_a_bag_is_sent_to_import(tmp_path, capsys):
+def test_a_table_given_for_a_bag_is_sent_to_import(tmp_path, refused):
     (tmp_path / "run.csv").write_text("t,u\n0,1\n")
-    assert cli.main(["diagnose", str(tmp_path / "run.csv")]) == 2
-    assert f"rsea import {tmp_path}/run.csv --map MAP" in capsys.readouterr().err
+    assert f"rsea import {tmp_path}/run.csv --map MAP" in refused("diagnose", tmp_path / "run.csv")
 
 
 @pytest.mark.parametrize("words", ["identify x", "diagnose x", "export --mjcf x", "watch"])
-def test_an_empty_name_is_no_folder(words, capsys):
+def test_an_empty_name_is_no_folder(words, refused):
     """It was the working directory, where the results were written."""
-    with pytest.raises(SystemExit) as end:
-        cli.main([*words.split(), "--out", ""])
-    assert end.value.code == 2 and "'', expected a name" in capsys.readouterr().err
+    assert "'', expected a name" in refused(*words.split(), "--out", "")
 
 
 @pytest.mark.parametrize("name", sorted(cli.verbs()))
@@ -57,9 +54,8 @@ def test_a_new_rig_is_valid_as_written_and_replaces_nothing(tmp_path, monkeypatc
     assert "spring.stiffness" in shown and "N·m/rad" in shown and "identify fits: " in shown
 
 
-def test_an_axis_with_a_minus_sign_is_accepted_as_typed(capsys):
-    assert cli.main(["check", "no_such_bag", "--axis", "-torque.z"]) == 2
-    assert "no such bag" in capsys.readouterr().err
+def test_an_axis_with_a_minus_sign_is_accepted_as_typed(refused):
+    assert "no such bag" in refused("check", "no_such_bag", "--axis", "-torque.z")
 
 
 @pytest.mark.parametrize("target", ["folder", "nowhere"])

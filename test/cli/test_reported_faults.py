@@ -22,7 +22,6 @@ RIG = "paper_high_impedance"
 DAMAGE = {
     "lost messages": (kinds.lost_messages, "missing_messages"),
     "flipped in a chunk": (kinds.flipped_in_chunk, "damaged_chunks"),
-    "ended in the middle": (kinds.ended_in_the_middle, "data_after_end"),
     "flipped number": (kinds.flipped_number, "checksum_mismatch"),
 }
 

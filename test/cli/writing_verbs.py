@@ -53,7 +53,7 @@ WRITERS = {
 
 def prepare(record: Record, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Make a folder the working directory, with inputs, and give the verbs results that cost nothing."""
-    write_record(record, folder / "run.mcap")
+    write_record(record.between(0.0, 1.0), folder / "run.mcap")
     (folder / "map.yaml").write_text(MAP)
     (folder / "run.csv").write_text("t,u\n0,1\n1,2\n2,3\n")
     monkeypatch.chdir(folder)

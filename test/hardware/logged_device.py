@@ -57,3 +57,10 @@ def guard(device):
     made.enable()
     device.log.clear()
     return made
+
+
+def cycles(joint, device, count, **broken):
+    """Cycles with a torque. broken: by method, the errors of the next calls."""
+    device.broken = {method: [*errors] for method, errors in broken.items()}
+    for _ in range(count):
+        joint.cycle(1.0, 0.0)

@@ -16,11 +16,11 @@ from rsea_ros.hardware.guarded import GuardedDevice, cycle
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.peer.peer_motor import IDENTITY
 from rsea_ros.hardware.peer.registers import ENCODER
-from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._devices import dynamixel_netft
 from test.hardware.conftest import LATENCY, PERIOD, STIFFNESS
+from test.nodes.warm import Bench
 
 TURN = 2.0 * math.pi
 DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
@@ -103,7 +103,7 @@ def test_impossible_settings_are_refused(values, told):
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
-    with RemoteBench(tmp_path_factory.mktemp("encoder") / "tty", "--deflection") as made:
+    with Bench(tmp_path_factory.mktemp("encoder") / "tty", "--deflection") as made:
         yield made
 
 
@@ -116,7 +116,7 @@ def test_a_configure_without_the_encoder_is_refused(bench):
 
 
 def test_it_is_read_beside_several_motors_of_a_line(tmp_path):
-    with RemoteBench(tmp_path / "tty", "--model", 1020, 1120, "--deflection") as bench:
+    with Bench(tmp_path / "tty", "--model", 1020, 1120, "--deflection") as bench:
         line = Line(bench.port, 4_000_000, LATENCY)
         small = Limits(3.0, deflection=math.inf)
         settings = EncoderConnection(IDENTITY, pulses=ENCODER.counts_per_turn, latency=LATENCY)

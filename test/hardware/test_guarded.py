@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 
 import pytest
 
@@ -10,10 +11,10 @@ from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Refused
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
-from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.limits import Limits, without
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, PROCESS
 from rsea_ros.hardware.spring_sensor import Spring
-from test.hardware.logged_device import LOST, Device, guard
+from test.hardware.logged_device import LOST, Device, cycles, guard
 
 WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 7.0)
 
@@ -47,23 +48,21 @@ def test_opening_begins_softly_and_without_a_fault(device):
     assert device.log == ["open", "read"] and joint.fault is None
 
 
-@pytest.mark.parametrize("kind", [NONE, BUS_WATCHDOG])
-@pytest.mark.parametrize("unprotected", [False, True])
-def test_a_device_that_nothing_protects_is_closed_again_unless_that_is_allowed(kind, unprotected):
+@pytest.mark.parametrize(
+    ("kind", "how", "refused"),
+    [
+        (BUS_WATCHDOG, {}, False),
+        (BUS_WATCHDOG, {"unprotected": True}, False),
+        (NONE, {"unprotected": True}, False),
+        (NONE, {"unprotected": False}, True),
+        (NONE, {}, True),
+    ],
+)
+def test_a_device_that_nothing_protects_is_closed_again_unless_that_is_allowed(kind, how, refused):
     device = Device(kind)
-    joint = GuardedDevice(device, Limits(64.0), 64.0)
-    if kind == NONE and not unprotected:
-        with pytest.raises(ParameterError, match="expected a bus watchdog or a supervisor"):
-            joint.open(unprotected=unprotected)
-        assert device.log == ["open", "close"]
-    else:
-        joint.open(unprotected=unprotected)
-        assert device.log == ["open", "read"]
-
-
-def test_protection_is_required_by_default():
-    with pytest.raises(ParameterError):
-        GuardedDevice(Device(NONE), Limits(64.0), 64.0).open()
+    with pytest.raises(ParameterError, match="expected a bus watchdog") if refused else nullcontext():
+        GuardedDevice(device, Limits(64.0), 64.0).open(**how)
+    assert device.log == ["open", "close" if refused else "read"]
 
 
 @pytest.mark.parametrize("name", ["temperature", "current", "voltage"])
@@ -75,16 +74,11 @@ def test_a_limit_of_what_is_not_measured_is_refused(device, name):
     with pytest.raises(ParameterError, match=f"{name}_limit = .* measures no {name}, expected 0 for none"):
         GuardedDevice(device, limits, 64.0).open()
     assert device.log == ["open", "read", "close"]
+    GuardedDevice(device, without(limits, [name]), 64.0).open()
     device.reading = every
     joint = GuardedDevice(device, limits, 64.0)
     joint.open()
     assert joint.lifted == [] and joint.guard.limits == limits
-
-
-def test_without_its_limit_a_quantity_need_not_be_measured(device):
-    device.reading = {}
-    GuardedDevice(device, Limits(64.0, temperature=math.inf), 64.0).open()
-    assert device.log == ["open", "read"]
 
 
 def test_a_simulation_says_which_limits_do_not_apply_to_it():
@@ -101,17 +95,14 @@ def test_a_simulation_says_which_limits_do_not_apply_to_it():
     assert joint.cycle(1.0, 0.0) and joint.fault.cause == "voltage"
 
 
-def test_a_device_that_does_not_answer_is_not_opened(device):
-    device.broken = {"read": [LOST] * 30}
-    with pytest.raises(DeviceError):
+@pytest.mark.parametrize(
+    ("lost", "log"), [(2, ["open", "read", "read", "read"]), (30, ["open", *["read"] * 30, "close"])]
+)
+def test_a_device_may_lose_some_answers_before_it_is_not_opened(device, lost, log):
+    device.broken = {"read": [LOST] * lost}
+    with pytest.raises(DeviceError) if lost == 30 else nullcontext():
         GuardedDevice(device, Limits(64.0), 64.0).open()
-    assert device.log[-1] == "close"
-
-
-def test_two_lost_answers_do_not_keep_a_device_from_being_opened(device):
-    device.broken = {"read": [LOST] * 2}
-    GuardedDevice(device, Limits(64.0), 64.0).open()
-    assert device.log == ["open", "read", "read", "read"]
+    assert device.log == log
 
 
 def test_a_cycle_writes_then_reads_and_beats_before_each(joint, device):
@@ -172,44 +163,34 @@ def test_lost_answers_in_a_row_are_a_fault_and_other_errors_at_once(
 @pytest.mark.parametrize(("method", "what"), [("read", "failed_reads"), ("write", "failed_writes")])
 def test_every_second_answer_lost_is_a_fault_though_never_two_in_a_row(joint, device, method, what):
     """Torque went on for ever on a line that lost every second reply."""
-    device.broken = {method: [LOST, None] * 14}
-    for _ in range(28):
-        joint.cycle(1.0, 0.0)
+    cycles(joint, device, 28, **{method: [LOST, None] * 14})
     assert joint.fault is None
-    device.broken = {method: [LOST]}
-    joint.cycle(1.0, 0.0)
+    cycles(joint, device, 1, **{method: [LOST]})
     assert joint.fault == DeviceFault("no_reply", 15, 15, "cycles", "of the last 29: no reply")
     joint.clear()
-    device.broken = {method: [LOST] * 2}
-    joint.cycle(1.0, 0.0)
-    joint.cycle(1.0, 0.0)
+    cycles(joint, device, 2, **{method: [LOST] * 2})
     assert joint.fault is None and joint.cycles == {what: 17}
 
 
 def test_a_write_that_is_acknowledged_during_the_reading_is_not_lost(joint, device):
     """At 1 kHz a driver whose readings all came latched no_reply: its writes were acknowledged too late."""
-    device.broken, device.reading = {"write": [LOST] * 40}, {"acknowledged_late": True}
-    for _ in range(40):
-        joint.cycle(1.0, 0.0)
+    device.reading = {"acknowledged_late": True}
+    cycles(joint, device, 40, write=[LOST] * 40)
     assert joint.fault is None and joint.cycles == {"failed_writes": 40}
-    device.broken, device.reading = {"write": [LOST] * 3}, {}
-    for _ in range(3):
-        joint.cycle(1.0, 0.0)
+    device.reading = {}
+    cycles(joint, device, 3, write=[LOST] * 3)
     assert joint.fault == DeviceFault("no_reply", 3, 3, "cycles", "no reply")
 
 
-def test_a_third_of_the_answers_lost_is_none(joint, device):
-    device.broken = {"read": [LOST, None, None] * 40}
-    for _ in range(120):
-        joint.cycle(1.0, 0.0)
+@pytest.mark.parametrize(
+    ("count", "broken"),
+    [(120, {"read": [LOST, None, None] * 40}), (2, {"read": [LOST] * 2, "write": [LOST] * 2})],
+    ids=["a third of them", "late ones while others are lost"],
+)
+def test_answers_lost_now_and_then_are_no_fault(joint, device, count, broken):
+    cycles(joint, device, count, **broken)
     assert joint.fault is None
-
-
-def test_an_answer_that_is_late_while_another_is_lost_makes_no_fault_of_both(joint, device):
-    device.broken = {"read": [LOST, LOST], "write": [LOST, LOST]}
-    joint.cycle(1.0, 0.0)
-    joint.cycle(1.0, 0.0)
-    assert joint.fault is None and joint.cycles == {"failed_reads": 2, "failed_writes": 2}
+    assert joint.cycles == {f"failed_{method}s": errors.count(LOST) for method, errors in broken.items()}
 
 
 SPRING = Spring(1500.0)

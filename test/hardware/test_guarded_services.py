@@ -11,7 +11,7 @@ from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits
-from test.hardware.logged_device import LOST, Device, guard
+from test.hardware.logged_device import LOST, Device, cycles, guard
 
 
 @pytest.fixture
@@ -95,12 +95,8 @@ def test_a_sensor_that_does_not_tare_does_not_keep_the_torque_off(joint, device)
     assert joint.write(9.0, 0.0) == 4.0
 
 
-def test_without_a_fault_there_is_nothing_to_clear(joint, device):
-    assert joint.clear() is False
-    assert device.log == []
-
-
 def test_a_fault_is_cleared_by_a_reading_without_it(joint, device):
+    assert joint.clear() is False and device.log == [], "without a fault there is nothing to clear"
     joint.write(9.0, 0.0)
     joint.guard.trip(DeviceFault("ft"))
     joint.write(9.0, 0.0)
@@ -132,18 +128,16 @@ def test_a_fault_is_not_cleared_while_a_reading_has_it(joint, device):
     assert "enable" not in device.log and "disable" not in device.log
 
 
-def test_lost_answers_are_counted_anew_after_a_fault_was_cleared(joint, device):
-    for method in ("read", "write"):
-        device.broken = {method: [LOST] * 3}
-        for _ in range(3):
-            joint.cycle(1.0, 0.0)
-        assert joint.fault.cause == "no_reply"
-        joint.clear()
-        device.broken = {method: [LOST] * 2}
-        for _ in range(2):
-            joint.cycle(1.0, 0.0)
-        assert joint.fault is None
-        joint.cycle(1.0, 0.0)
+@pytest.mark.parametrize("method", ["read", "write"])
+@pytest.mark.parametrize("anew", ["clear", "open"])
+def test_lost_answers_are_counted_anew_after_a_fault_was_cleared_and_in_another_life(
+    joint, device, method, anew
+):
+    cycles(joint, device, 3, **{method: [LOST] * 3})
+    assert joint.fault.cause == "no_reply"
+    getattr(joint, anew)()
+    cycles(joint, device, 2, **{method: [LOST] * 2})
+    assert joint.fault is None
 
 
 def test_a_reboot_ends_the_torque_first_and_restores_it_afterwards(joint, device):
@@ -197,13 +191,3 @@ def test_a_reboot_after_which_a_reading_has_a_fault_leaves_it(joint, device, lat
     assert joint.write(9.0, 0.0) == 0.0 and not joint.away
     device.reading = {}
     assert joint.clear() is True and joint.write(9.0, 0.0) == 4.0
-
-
-def test_lost_answers_of_an_earlier_life_are_forgotten(joint, device):
-    device.broken = {"read": [LOST] * 2}
-    for _ in range(2):
-        joint.cycle(1.0, 0.0)
-    joint.open()
-    device.broken = {"read": [LOST]}
-    joint.cycle(1.0, 0.0)
-    assert joint.fault is None

@@ -1,86 +1,264 @@
-"""Limits against plain arithmetic: which torques are cut, which readings trip, and how the torque ends."""
+"""Limits as tables: readings in, faults out, at the edges too; a limit of what is not measured any more."""
+
+from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
-import yaml
 
+from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.interlock import DeviceFault
-from rsea_ros.hardware.limits import Guard, Limits
+from rsea_ros.hardware.limits import (
+    DeviceFault,
+    Guard,
+    Limits,
+    check_limits,
+    complaint,
+    unmeasured_quantities,
+    without,
+)
+from rsea_ros.hardware.spring_sensor import Spring
 
-PERIOD = 0.01
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def guard(**limits):
-    return Guard(Limits(68.0, **limits), PERIOD)
-
-
-def test_torque_is_cut_at_its_limit_either_way_and_counted():
-    limited = guard(slew=1e6)
-    assert [limited.allowed_torque(w, 0.0) for w in (500.0, -500.0, 20.0)] == [68.0, -68.0, 20.0]
-    assert limited.limited == 2
+ALL = Limits(68.0, deflection=0.25, temperature=60.0, current=12.0, voltage=20.0, velocity=2.0, position=0.5,
+             ft=50.0, power=100.0)  # fmt: skip
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_commands_that_cease_end_in_a_ramp_and_a_fault(sign):
-    late = guard(slew=1e6, command_timeout=0.05, ramp=0.04)
-    assert late.allowed_torque(sign * 40.0, 0.05) == sign * 40.0
-    assert [late.allowed_torque(sign * 40.0, 0.06) for _ in range(5)] == [
-        sign * t for t in (30, 20, 10, 0, 0)
-    ]
-    assert str(late.fault) == "command_timeout: 60 ms, limit 50 ms"
-    assert late.allowed_torque(sign * 40.0, 0.0) == 0.0, "it is latched"
-    late.clear()
-    assert late.allowed_torque(sign * 40.0, 0.0) == sign * 40.0
+def reading(position=0.0, velocity=0.0, motor_torque=0.0, **more):
+    return State(0, position, velocity, motor_torque, **more)
 
 
-def test_the_first_command_does_not_act_in_full_after_start_fault_and_pause():
-    soft = guard(slew=1e6, soft_start=300.0)
-    begin = [3.0, 6.0, 9.0, 10.0]
-    assert [soft.allowed_torque(10.0, 0.0) for _ in range(4)] == begin
-    soft.trip(DeviceFault("any"))
-    assert soft.allowed_torque(10.0, 0.0) == 0.0
-    soft.clear()
-    assert [soft.allowed_torque(10.0, 0.0) for _ in range(4)] == begin
-    soft.allowed_torque(0.0, 0.0)
-    soft.allowed_torque(0.0, 9.0)
-    assert [soft.allowed_torque(10.0, 0.0) for _ in range(4)] == begin
+def wrench(axis, value):
+    return tuple(value if k == axis else 0.0 for k in range(6))
 
 
-def test_the_default_slew_limit_is_that_of_the_driver():
-    """A Limits of one's own allowed four times the slew of the driver."""
-    driver = yaml.safe_load((ROOT / "config" / "nodes" / "driver.yaml").read_text(encoding="utf-8"))
-    (parameters,) = (node["ros__parameters"] for node in driver.values())
-    assert Limits(1.0).slew == parameters["slew_limit"]
+EDGES = {
+    "deflection of the drive": (lambda v: reading(position=v), 0.25, "deflection", "rad"),
+    "deflection by an encoder": (lambda v: reading(position=9.0, deflection=v), 0.25, "deflection", "rad"),
+    "temperature": (lambda v: reading(temperature=v), 60.0, "temperature", "°C"),
+    "current": (lambda v: reading(current=v), 12.0, "current", "A"),
+    "velocity": (lambda v: reading(velocity=v), 2.0, "velocity", "rad/s"),
+    "position": (lambda v: reading(position=v, deflection=0.0), 0.5, "position", "rad"),
+    "wrench": (lambda v: reading(wrench=wrench(5, v)), 50.0, "ft_torque", "N m"),
+    "power": (lambda v: reading(velocity=1.0, motor_torque=v), 100.0, "power", "W"),
+}
+WIDE = Limits(68.0, deflection=math.inf, temperature=math.inf)
 
 
-@pytest.mark.parametrize(("wanted", "age"), [(math.nan, 0.0), (math.inf, 0.0), (-1e6, 0.0), (10.0, math.nan)])
-def test_a_command_that_is_none_leads_to_zero_within_the_slew_limit(wanted, age):
-    """NaN was returned, and dropped the slew limit; -1e6 N m was obeyed as -68; an age of NaN was none."""
-    limited = guard(slew=300.0)
-    for _ in range(5):
-        limited.allowed_torque(10.0, 0.0)
-    assert [limited.allowed_torque(wanted, age) for _ in range(4)] == [7.0, 4.0, 1.0, 0.0]
-    assert limited.refused == (4 if age == 0.0 else 0) and limited.allowed_torque(10.0, 0.0) == 3.0
+def only(**limits):
+    """Limits of which only some are set."""
+    return Limits(**{**vars(WIDE), **limits})
 
 
-@pytest.mark.parametrize("nothing", [None, (0.0, 0.0, 0.0, 0.0, 0.0, math.nan), (0.0,) * 5 + (math.inf,)])
-def test_a_wrench_without_the_torque_is_none_for_its_limit(nothing):
+@pytest.mark.parametrize("name", EDGES)
+def test_a_reading_at_its_limit_is_fine_and_one_beyond_it_is_not(name):
+    make, limit, cause, unit = EDGES[name]
+    limits = only(**{{"ft_torque": "ft"}.get(cause, cause): limit})
+    beyond = math.nextafter(limit, math.inf)
+    assert complaint(limits, make(limit)) is None
+    assert complaint(limits, make(beyond)) == DeviceFault(cause, beyond, limit, unit)
+    if cause != "temperature":
+        assert complaint(limits, make(-beyond)) == DeviceFault(cause, beyond, limit, unit), "either way"
+
+
+def test_a_voltage_at_its_limit_is_fine_and_one_below_it_is_not():
+    limits = only(voltage=20.0)
+    assert complaint(limits, reading(voltage=20.0)) is None
+    assert complaint(limits, reading(voltage=19.9)) == DeviceFault("voltage", 19.9, 20.0, "V", "too low")
+
+
+@pytest.mark.parametrize(
+    ("state", "cause"),
+    [
+        (reading(position=math.radians(4.99)), None),
+        (reading(position=math.radians(5.01)), "deflection"),
+        (reading(temperature=69.9), None),
+        (reading(temperature=70.1), "temperature"),
+        (reading(current=1e9), None),
+        (reading(voltage=0.0), None),
+        (reading(velocity=1e9), None),
+        (reading(position=1e9, deflection=0.0), None),
+        (reading(wrench=(1e9,) * 6), None),
+        (reading(velocity=1e9, motor_torque=1e9), None),
+    ],
+)
+def test_spring_and_motor_are_guarded_by_default_and_nothing_else(state, cause):
+    fault = complaint(Limits(68.0), state)
+    assert (fault and fault.cause) == cause
+
+
+MEASURED = {"temperature": 30.0, "current": 1.0, "voltage": 24.0}
+
+
+@pytest.mark.parametrize(
+    ("limits", "measured", "lacking"),
+    [
+        (ALL, MEASURED, []),
+        (ALL, {}, ["temperature", "current", "voltage"]),
+        (ALL, {"temperature": 30.0, "voltage": 24.0}, ["current"]),
+        (Limits(68.0), {}, ["temperature"]),  # current and voltage have no limit by default
+        (WIDE, {}, []),
+    ],
+)
+def test_a_limited_quantity_that_a_reading_lacks_is_listed(limits, measured, lacking):
+    assert unmeasured_quantities(limits, reading(**measured)) == lacking
+
+
+@pytest.mark.parametrize("names", [["temperature"], ["current"], ["voltage"], ["current", "voltage"]])
+def test_a_limit_that_is_lifted_trips_nothing_and_the_others_stay(names):
+    far = {"temperature": 1e9, "current": 1e9, "voltage": 0.0}
+    lifted = without(ALL, names)
+    assert complaint(lifted, reading(**(MEASURED | {name: far[name] for name in names}))) is None
+    assert {name for name, limit in vars(ALL).items() if getattr(lifted, name) != limit} == set(names)
+
+
+@pytest.mark.parametrize("axis", [None, *range(6)])
+def test_the_torque_is_that_about_the_axis_of_the_actuator(axis):
+    limits = only(ft=50.0) if axis is None else only(ft=50.0, ft_axis=axis)
+    felt = [complaint(limits, reading(wrench=wrench(place, 51.0))) is not None for place in range(6)]
+    assert felt == [place == (5 if axis is None else axis) for place in range(6)], "z by default"
+
+
+@pytest.mark.parametrize("name", ["position", "velocity", "motor_torque"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_reading_that_is_no_number_is_a_fault_with_its_values(name, value):
+    fault = complaint(WIDE, reading(**{name: value}))
+    assert fault.cause == "reading"
+    assert f"{value}" in fault.detail and "expected finite values" in fault.detail
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
+def test_a_deflection_that_is_not_measured_makes_no_wrench(nothing):
+    """An infinite one made an infinite wrench."""
+    assert Spring(1500.0).with_wrench(reading(deflection=nothing)).wrench is None
+    assert Spring(1500.0).with_wrench(reading(deflection=0.01)).wrench[5] == pytest.approx(15.0)
+
+
+@pytest.mark.parametrize(
+    ("more", "cause"),
+    [
+        ({"hardware_error": "a", "motor_trouble": "b", "ft_trouble": "c"}, "hardware_error"),
+        ({"motor_trouble": "b", "ft_trouble": "c", "temperature": 99.0}, "motor_state"),
+        ({"ft_trouble": "c", "temperature": 99.0, "voltage": 1.0}, "ft"),
+        ({"position": 1.0, "temperature": 99.0, "voltage": 1.0}, "deflection"),
+        ({"temperature": 99.0, "voltage": 1.0}, "temperature"),
+        ({"voltage": 1.0}, "voltage"),
+    ],
+)
+def test_a_fault_of_the_device_comes_before_a_measured_one(more, cause):
+    assert complaint(ALL, reading(**more)).cause == cause
+
+
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        (DeviceFault("heldup"), "heldup:"),
+        (DeviceFault("ft", detail="saturation"), "ft: saturation"),
+        (DeviceFault("power", 120.0, 100.0, "W"), "power: 120 W, limit 100 W"),
+        (DeviceFault("voltage", 19.0, 20.0, "V", "too low"), "voltage: 19 V, limit 20 V too low"),
+    ],
+)
+def test_a_fault_is_described_with_value_limit_and_unit(fault, text):
+    assert str(fault) == text
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [
+        (Limits(68.0, deflection=0.0454), None),
+        (Limits(68.19), None),  # the motor's limit itself, as its register rounds it
+        (Limits(68.19 * (1.0 + 5e-10)), None),
+        (Limits(68.2), r"torque_limit = 68\.2 N·m, expected at most 68\.19 N·m, the motor's own limit"),
+        (Limits(68.0, deflection=0.0453), r"by 0\.04533 rad, expected at most .* = 0\.0453 rad"),
+    ],
+)
+def test_limits_fit_the_motor_and_the_spring(limits, message):
+    if message is None:
+        return check_limits(limits, 68.19, 1500.0)
+    with pytest.raises(ParameterError, match=message):
+        check_limits(limits, 68.19, 1500.0)
+
+
+def test_a_torque_that_deflects_the_spring_to_its_limit_is_allowed():
+    check_limits(Limits(64.0, deflection=0.25), 64.0, 256.0)
+
+
+SECOND = 100
+"""Cycles of a guard without a measurement that are no fault; one more is."""
+COMPLETE = {**MEASURED, "wrench": (0.0,) * 6}
+LIMITED = {"ft": 60.0, "temperature": 70.0, "current": 12.0, "voltage": 20.0}
+LACKING = {"ft": {"wrench": None}, **{name: {name: math.nan} for name in MEASURED}}
+NONE = {"wrench": None, **dict.fromkeys(MEASURED, math.nan)}
+
+
+def guard(*limited):
+    """A guard with limits of some quantities, 100 cycles a second."""
+    limits = {"temperature": math.inf, **{name: LIMITED[name] for name in limited}}
+    return Guard(Limits(68.0, **limits), 1.0 / SECOND)
+
+
+def causes(limiter, *readings):
+    """Return the cause of the latched fault after each of some readings, None for none."""
+    told = []
+    for each in readings:
+        limiter.look(reading(**{**COMPLETE, **each}))
+        told.append(limiter.fault and limiter.fault.cause)
+    return told
+
+
+@pytest.mark.parametrize("others", [{}, NONE])
+@pytest.mark.parametrize("name", LIMITED)
+def test_a_limited_quantity_must_go_on_being_measured(name, others):
+    """A device whose wrench ceased went on without the limit, and nobody was told."""
+    limiter, lacking = guard(name), {**others, **LACKING[name]}
+    assert causes(limiter, {}, *[lacking] * (SECOND + 1)) == [None] * (SECOND + 1) + [name]
+    quantity = "torque" if name == "ft" else name
+    assert str(limiter.fault) == f"{name}: no {quantity} measured for 1 s, expected one for {name}_limit"
+
+
+@pytest.mark.parametrize(
+    "nothing", [None, wrench(5, math.nan), wrench(5, math.inf)], ids=["none", "nan", "inf"]
+)
+def test_an_ft_limit_needs_a_torque_also_where_there_never_was_one(nothing):
     """None was a fault after a second; NaN switched the limit off in silence."""
-    blind = guard(ft=50.0)
-    for _ in range(102):
-        blind.look(State(0, 0.0, 0.0, 0.0, wrench=nothing))
-    assert str(blind.fault) == "ft: no torque measured for 1 s, expected one for ft_limit"
+    assert causes(guard("ft"), *[{"wrench": nothing}] * (SECOND + 1)) == [None] * SECOND + ["ft"]
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_a_quantity_that_was_never_measured_trips_nothing(name):
+    """`GuardedDevice.open` refuses its limit."""
+    assert causes(guard(name), *[LACKING[name]] * (SECOND + 50))[-1] is None
 
 
 @pytest.mark.parametrize("nothing", [math.nan, math.inf])
 def test_a_deflection_that_ceases_is_a_fault_and_not_the_drives_angle(nothing):
-    felt = guard()
-    felt.look(State(0, 9.0, 0.0, 0.0, deflection=0.01))
-    for k in range(101):
-        assert felt.fault is None, k
-        felt.look(State(0, 9.0, 0.0, 0.0, deflection=nothing))
-    assert "no deflection measured for 1 s" in str(felt.fault)
+    limiter = guard()
+    felt, blind = ({"position": 9.0, "deflection": value} for value in (0.01, nothing))
+    assert causes(limiter, felt, *[blind] * (SECOND + 1)) == [None] * (SECOND + 1) + ["deflection"]
+    assert "no deflection measured for 1 s" in str(limiter.fault)
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_one_measurement_begins_the_second_anew(name):
+    """A sensor that is slower than the cycle is no fault."""
+    limiter = guard(*LIMITED)
+    for _ in range(3):
+        assert causes(limiter, {}, *[LACKING[name]] * SECOND)[-1] is None
+    assert causes(limiter, LACKING[name]) == [name]
+
+
+@pytest.mark.parametrize("name", ["ft", "temperature"])
+def test_a_cleared_fault_comes_back_while_nothing_is_measured(name):
+    limiter = guard("ft", "temperature")
+    causes(limiter, {}, *[LACKING[name]] * (SECOND + 1))
+    limiter.clear()
+    assert causes(limiter, LACKING[name]) == [name]
+    limiter.clear()
+    assert causes(limiter, {}) == [None]
+
+
+def test_a_missing_torque_is_named_before_other_quantities():
+    assert causes(guard(*LIMITED), {}, *[NONE] * (SECOND + 1)) == [None] * (SECOND + 1) + ["ft"]
+
+
+def test_without_its_limit_a_quantity_need_not_be_measured():
+    assert causes(guard(), {}, *[NONE] * (SECOND + 50))[-1] is None

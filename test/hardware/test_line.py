@@ -13,8 +13,9 @@ from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import GuardedDevice, cycle
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.netft.sensor import SensorConnection
-from rsea_ros.hardware.peer.remote import RemoteBench
 from test.hardware.conftest import FT_TIMEOUT, LATENCY, PERIOD, WATCHDOG
+from test.nodes.stalls import until
+from test.nodes.warm import Bench
 
 MODELS = (1020, 1120, 1170)
 SMALL = Limits(3.0, deflection=math.inf, lost_cycles=3)
@@ -70,7 +71,7 @@ def _device(bench, line, identity, sensor=None):
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
     """Three motors on one line."""
-    with RemoteBench(tmp_path_factory.mktemp("line") / "tty", "--model", *MODELS) as made:
+    with Bench(tmp_path_factory.mktemp("line") / "tty", "--model", *MODELS) as made:
         yield made
 
 
@@ -153,15 +154,12 @@ def test_an_unplugged_motor_does_not_silence_the_others(three):
 
 def test_the_death_of_the_host_is_each_motors_own_watchdog(three):
     three.cycles(5, (1.0, 1.0, 1.0))
-    deadline = time.monotonic() + 20.0
-    while any(three.bench.torque(place)[0] for place in range(3)):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    until(lambda: not any(three.bench.torque(place)[0] for place in range(3)))
     assert [str(member.device.protection) for member in three.members] == ["bus watchdog, 0.5 s"] * 3
 
 
 def test_motors_of_two_series_are_refused_on_one_line(tmp_path):
-    with RemoteBench(tmp_path / "tty", "--model", 1020, 2120) as bench:
+    with Bench(tmp_path / "tty", "--model", 1020, 2120) as bench:
         line = Line(bench.port, 4_000_000, LATENCY)
         first, second = _device(bench, line, 1), _device(bench, line, 2)
         first.open()

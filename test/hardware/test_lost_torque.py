@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import termios
-import time
 from pathlib import Path
 
 import pytest
@@ -18,6 +17,7 @@ from rsea_ros.hardware.device import PortLost
 from rsea_ros.hardware.dynamixel.port import SerialPort
 from rsea_ros.hardware.protection import SupervisorLost
 from test.hardware.conftest import Loop, well_behaved
+from test.nodes.stalls import until
 
 SECOND = 280
 """Cycles."""
@@ -59,8 +59,7 @@ def service(tmp_path):
     path = tmp_path / "supervisor"
     words = [sys.executable, supervisor.__file__, "--listen", path]
     process = subprocess.Popen(words, start_new_session=True)
-    while not path.exists():
-        time.sleep(0.01)
+    until(path.exists)
     yield path
     process.kill()
     process.wait()
@@ -86,11 +85,11 @@ def test_a_supervisor_service_zeroes_the_torque_when_a_whole_process_group_is_ki
     words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, service]
     driver = subprocess.Popen(list(map(str, words)), cwd=root, start_new_session=True)
     try:
-        _until(lambda: bench.torque()[0] != 0 and bench.torque()[1])
+        until(lambda: bench.torque()[0] != 0 and bench.torque()[1])
     finally:
         os.killpg(driver.pid, signal.SIGKILL)
         driver.wait()
-    _until(lambda: bench.torque() == (0, False))
+    until(lambda: bench.torque() == (0, False))
 
 
 def test_the_drivers_own_supervisor_outlives_a_login_that_is_killed(benches):
@@ -105,13 +104,13 @@ def test_the_drivers_own_supervisor_outlives_a_login_that_is_killed(benches):
     )  # fmt: skip
     os.close(far)
     try:
-        _until(lambda: bench.torque()[0] != 0 and bench.torque()[1])
+        until(lambda: bench.torque()[0] != 0 and bench.torque()[1])
     finally:
         os.close(near)
         os.killpg(login.pid, signal.SIGKILL)
         login.wait()
-    _until(lambda: bench.torque() == (0, False))
-    _until(lambda: _is_free(bench.port))  # the supervisor has it until it ends
+    until(lambda: bench.torque() == (0, False))
+    until(lambda: _is_free(bench.port))  # the supervisor has it until it ends
 
 
 def test_a_supervisor_service_releases_the_port_and_its_death_is_a_fault(benches, service):
@@ -140,10 +139,3 @@ def _is_free(path):
         return False
     port.close()
     return True
-
-
-def _until(condition):
-    deadline = time.monotonic() + 40.0
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.02)

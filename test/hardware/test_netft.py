@@ -12,6 +12,7 @@ import pytest
 from rsea_ros.hardware.netft.calibration import parse
 from rsea_ros.hardware.netft.rdt import RESYNCHRONISE, RdtRecord, Sequence, decode, request, trouble
 from rsea_ros.hardware.netft.receiver import DatagramReceiver
+from test.nodes.stalls import until
 
 
 def datagram(sequence, ft_sequence=None, status=0, values=(1, -2, 3, -4, 5, -6)):
@@ -125,15 +126,8 @@ def streamed():
         receiver.close()
 
 
-def _until_heard(receiver, sequence):
-    _until(lambda: receiver.newest is not None and receiver.newest.record.sequence == sequence)
-
-
-def _until(condition):
-    deadline = time.monotonic() + 20.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.002)
+def until_heard(receiver, sequence):
+    until(lambda: receiver.newest is not None and receiver.newest.record.sequence == sequence)
 
 
 def test_the_socket_is_drained_and_every_record_has_the_stamp_of_its_arrival(streamed):
@@ -142,7 +136,7 @@ def test_the_socket_is_drained_and_every_record_has_the_stamp_of_its_arrival(str
     for n in range(1, 201):
         sensor.sendto(datagram(n), client)
     after = time.time_ns()
-    _until(lambda: receiver.newest is not None and receiver.newest.record.sequence == 200)
+    until_heard(receiver, 200)
     arrivals = receiver.take()
     assert [a.record.sequence for a in arrivals] == list(range(1, 201))
     stamps = [a.stamp for a in arrivals]
@@ -154,7 +148,7 @@ def test_records_of_a_stranger_are_not_taken(streamed):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         stranger.sendto(datagram(1), client)
     sensor.sendto(datagram(77), client)
-    _until(lambda: receiver.newest is not None)
+    until_heard(receiver, 77)
     assert [a.record.sequence for a in receiver.take()] == [77]
 
 
@@ -162,9 +156,9 @@ def test_a_stream_that_falls_silent_is_requested_again(streamed):
     receiver, sensor, client = streamed
     sensor.sendto(datagram(9, 9), client)
     assert sensor.recvfrom(64)[0] == request(2)
-    _until(lambda: receiver.newest is not None)
+    until(lambda: receiver.newest is not None)
     sensor.sendto(datagram(1, 20), client)
-    _until(lambda: receiver.newest.record.ft_sequence == 20)
+    until(lambda: receiver.newest.record.ft_sequence == 20)
     assert receiver.sequence.counts["lost"] == 0
 
 
@@ -180,8 +174,8 @@ def test_a_tare_collects_while_the_cycle_reads(streamed):
         sensor.sendto(datagram(sent), client)
         taken += len(receiver.take())
         if sent % 50 == 0:  # a socket holds only so many
-            _until_heard(receiver, sent)
-    _until_heard(receiver, sent)
+            until_heard(receiver, sent)
+    until_heard(receiver, sent)
     taken += len(receiver.take())
     assert taken == sent and len(decoded) > 1
 

@@ -4,12 +4,12 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from contextlib import suppress
 
 import pytest
 
 from rsea_ros.hardware import supervisor
+from test.nodes.stalls import until
 
 
 def may_hurry():
@@ -25,10 +25,8 @@ def test_it_runs_before_all_other_processes_where_it_may(listens, tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-I", "-S", supervisor.__file__, *words], stdin=subprocess.PIPE, pass_fds=(writer,)
     )
-    wanted, until = (os.SCHED_FIFO if may_hurry() else os.SCHED_OTHER), time.monotonic() + 30.0
-    while os.sched_getscheduler(process.pid) != wanted and time.monotonic() < until:
-        time.sleep(0.01)
-    assert os.sched_getscheduler(process.pid) == wanted
+    wanted = os.SCHED_FIFO if may_hurry() else os.SCHED_OTHER
+    until(lambda: os.sched_getscheduler(process.pid) == wanted)
     assert process.poll() is None
     process.kill()
     process.communicate()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -73,8 +75,22 @@ def write_foreign(
             kind = message.__msgtype__
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
-            writer.write(connections[topic], log_time, STORE.serialize_cdr(message, kind))
+            writer.write(connections[topic], log_time, raw_of(message))
     return path
+
+
+def raw_of(message: Any) -> bytes:
+    """Return the bytes of a message."""
+    return bytes(STORE.serialize_cdr(message, message.__msgtype__))
+
+
+def spoilt_database(path: Path, *statements: str) -> Path:
+    """Write a run of 60 samples as a database and change it; return the path of the bag."""
+    bag = write_foreign(path, run_rows(60), StoragePlugin.SQLITE3)
+    with closing(sqlite3.connect(bag / f"{path.name}.db3")) as database, database:
+        for statement in statements:
+            database.execute(statement)
+    return bag
 
 
 def write_ros1(path: Path, rows: Sequence[Row], compression: Packing | None = None) -> Path:
@@ -89,7 +105,7 @@ def write_ros1(path: Path, rows: Sequence[Row], compression: Packing | None = No
             kind = message.__msgtype__
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=noetic)
-            raw = STORE.cdr_to_ros1(STORE.serialize_cdr(message, kind), kind)
+            raw = STORE.cdr_to_ros1(raw_of(message), kind)
             writer.write(connections[topic], log_time, raw)
     return path
 

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import struct
+import sys
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from foreign import STORE, Row, run_rows
+import lz4.frame
+from foreign import Row, raw_of, run_rows
 
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
+PACK: dict[str, Callable[[bytes], bytes]] = {
+    "": lambda data: data, "zstd": zstd.compress, "lz4": lz4.frame.compress,
+}  # fmt: skip
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 1, 2, 3, 4, 5, 6
 ATTACHMENT, STATISTICS, DATA_END = 9, 11, 15
@@ -31,7 +41,7 @@ def message(channel: int, log_time: int, raw: bytes) -> bytes:
 
 def chunk(records: bytes, *, checksum: int | None = None, declared: int | None = None, how: str = "",
           packed: bytes | None = None) -> bytes:  # fmt: skip
-    data = records if packed is None else packed
+    data = PACK[how](records) if packed is None else packed
     crc = zlib.crc32(records) if checksum is None else checksum
     head = struct.pack("<QQQI", 0, 0, len(records) if declared is None else declared, crc)
     return record(CHUNK, head + text(how) + struct.pack("<Q", len(data)) + data)
@@ -39,13 +49,15 @@ def chunk(records: bytes, *, checksum: int | None = None, declared: int | None =
 
 @dataclass
 class McapFile:
-    """A file of rows. messages: the MESSAGE records, CHUNK_ROWS of them a chunk (chunked), else bare."""
+    """A file of rows. messages: the MESSAGE records, CHUNK_ROWS of them a chunk (chunked), else bare.
+
+    how: the compression of the chunks.
+    """
 
     rows: Sequence[Row] = field(default_factory=lambda: run_rows(60))
     chunked: bool = True
-    encode: Callable[[int, Row], bytes] = lambda k, row: bytes(
-        STORE.serialize_cdr(row[2], row[2].__msgtype__)
-    )
+    encode: Callable[[int, Row], bytes] = lambda k, row: raw_of(row[2])
+    how: str = ""
 
     def __post_init__(self) -> None:
         topics = dict.fromkeys((row[0], row[2].__msgtype__) for row in self.rows)
@@ -66,7 +78,8 @@ class McapFile:
         if not self.chunked:
             return [self.declared, *self.messages]
         parts = [self.messages[k : k + CHUNK_ROWS] for k in range(0, len(self.messages), CHUNK_ROWS)]
-        return [chunk((b"" if k else self.declared) + b"".join(part)) for k, part in enumerate(parts)]
+        parts[0] = [self.declared, *parts[0]]
+        return [chunk(b"".join(part), how=self.how) for part in parts]
 
     def summary(self) -> bytes:
         counts = b"".join(struct.pack("<HQ", *item) for item in self.counts.items())

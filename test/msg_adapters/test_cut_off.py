@@ -5,74 +5,30 @@ from __future__ import annotations
 import os
 import random
 import signal
-import struct
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign import run_rows, write_foreign
-from rosbags.rosbag2 import CompressionMode, StoragePlugin
+from bad_input import forked
+from foreign import JOINT_STATE, WRENCH, run_rows, write_foreign
+from mcap_bytes import CHUNK_ROWS, McapFile, write
+from rosbags.rosbag2 import StoragePlugin
 
 from msg_adapters import BagWriter, read_record
 from msg_adapters.bags import read_contents
+from msg_adapters.cdr import joint_states, wrenches
 from rsea_ros.errors import BagError
 
-RECORDER = """
-import sys, time
-import numpy as np
-from msg_adapters import BagWriter
-from msg_adapters.cdr import joint_states, wrenches
-with BagWriter(sys.argv[1], sys.argv[2]) as bag:
-    for k in range(1_000_000):
-        stamps = np.array([1_763_000_000_000_000_000 + k * 3_571_428])
-        (command,) = joint_states(stamps, "joint", effort=np.array([k * 0.5]))
-        (ft,) = wrenches(stamps, np.full((1, 6), k * 0.25))
-        bag.write("/rsea/torque_command", "sensor_msgs/msg/JointState", int(stamps[0]), command)
-        bag.write("/rsea/ft", "geometry_msgs/msg/WrenchStamped", int(stamps[0]), ft)
-        if k == 700:
-            bag.flush()
-            print("flushed", flush=True)
-        if k >= 700:
-            time.sleep(0.001)
-"""
 
-
-def _chunk(path: Path, compression: CompressionMode) -> bytes:
-    """Return an MCAP file with many chunks: each run of rosbags' writer holds a chunk."""
-    rows = run_rows(120)
-    data = b""
-    for part in range(6):
-        bag = write_foreign(
-            path / f"{part}", rows[part * 60 : part * 60 + 60], StoragePlugin.MCAP, compression
-        )
-        whole = (bag / f"{part}.mcap").read_bytes()
-        at, end = (0 if not data else 8), whole.index(struct.pack("<BQI", 0x0F, 4, 0))
-        data += whole[at:end]
-    return data
-
-
-def _messages_of_complete_chunks(data: bytes) -> int:
-    """Count the messages of the chunks that lie wholly before the end."""
-    at, count = 8, 0
-    while at + 9 <= len(data):
-        opcode, size = struct.unpack_from("<BQ", data, at)
-        at += 9 + size
-        if at <= len(data) and opcode == 0x06:
-            count += 60
-    return count
-
-
-@pytest.mark.parametrize("compression", [CompressionMode.NONE, CompressionMode.STORAGE])
-def test_every_complete_chunk_before_the_cut_comes_back(tmp_path, compression):
-    data = _chunk(tmp_path, compression)
-    rng = random.Random(20)
-    cuts = [rng.randrange(1, len(data)) for _ in range(150)]
-    recovered = []
-    for cut in [*cuts, len(data)]:
-        file = tmp_path / "cut.mcap"
-        file.write_bytes(data[:cut])
+@pytest.mark.parametrize("how", ["", "zstd"])
+def test_every_complete_chunk_before_the_cut_comes_back(tmp_path, how):
+    whole = McapFile(run_rows(120), how=how)
+    parts = whole.data()
+    data = whole.file(parts)
+    begin = data.index(parts[0])
+    ends = begin + np.cumsum([len(part) for part in parts])
+    rng, recovered = random.Random(20), []
+    for cut in [*(rng.randrange(1, ends[-1]) for _ in range(150)), ends[-1]]:
+        file = write(tmp_path / "cut.mcap", data[:cut])
         try:
             contents = read_contents(file)
         except BagError as error:
@@ -80,8 +36,8 @@ def test_every_complete_chunk_before_the_cut_comes_back(tmp_path, compression):
             assert "no MCAP file" in str(error)
             continue
         got = sum(len(messages.raw) for messages in contents.topics.values())
-        complete = _messages_of_complete_chunks(data[:cut])
-        assert complete <= got <= complete + 60
+        complete = CHUNK_ROWS * np.count_nonzero(ends <= cut)
+        assert complete <= got <= complete + CHUNK_ROWS
         assert "cut off" in contents.notes[0]
         recovered.append(got)
     assert max(recovered) == 360
@@ -89,27 +45,30 @@ def test_every_complete_chunk_before_the_cut_comes_back(tmp_path, compression):
 
 
 def test_a_cut_off_bag_is_a_record_up_to_the_cut(tmp_path):
-    data = _chunk(tmp_path, CompressionMode.NONE)
-    file = tmp_path / "cut.mcap"
-    file.write_bytes(data[: len(data) // 2])
-    record = read_record(file)
-    full = np.arange(120) * 0.5
+    data = McapFile(run_rows(120)).file()
+    record = read_record(write(tmp_path / "cut.mcap", data[: len(data) // 2]))
     got = record["command"].y
     assert 40 <= len(got) <= 62
-    assert np.array_equal(got, full[: len(got)])
+    assert np.array_equal(got, np.arange(len(got)) * 0.5)
     assert "cut off (recorder killed?)" in record.notes[0]
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_a_killed_recorder_leaves_a_bag_that_opens(tmp_path, storage):
-    bag = tmp_path / "run"
-    with subprocess.Popen(
-        [sys.executable, "-c", RECORDER, str(bag), storage], stdout=subprocess.PIPE, cwd=os.getcwd()
-    ) as recorder:
-        assert recorder.stdout is not None
-        assert recorder.stdout.readline() == b"flushed\n"
-        recorder.send_signal(signal.SIGKILL)
-    assert not bag.exists()
+    def record_and_die():
+        with BagWriter(tmp_path / "run", storage) as bag:
+            for k in range(800):
+                stamps = np.array([1_763_000_000_000_000_000 + k * 3_571_428])
+                (command,) = joint_states(stamps, "joint", effort=np.array([k * 0.5]))
+                (ft,) = wrenches(stamps, np.full((1, 6), k * 0.25))
+                bag.write("/rsea/torque_command", JOINT_STATE, int(stamps[0]), command)
+                bag.write("/rsea/ft", WRENCH, int(stamps[0]), ft)
+                if k == 700:
+                    bag.flush()
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    assert forked(record_and_die) == -signal.SIGKILL
+    assert not (tmp_path / "run").exists()
     record = read_record(tmp_path / "run.partial")
     count = len(record["ft"])
     assert count >= 700

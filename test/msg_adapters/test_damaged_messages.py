@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import sqlite3
 import struct
 
 import numpy as np
 import pytest
-from foreign import STORE, run_rows, write_foreign
+from foreign import raw_of, run_rows, spoilt_database, write_foreign
 from mcap_bytes import McapFile, write
-from rosbags.rosbag2 import StoragePlugin
 
 from msg_adapters import read_record
 from rsea_ros.errors import BagError
@@ -17,15 +15,11 @@ from rsea_ros.errors import BagError
 COUNT = 60
 
 
-def _raw(row) -> bytes:
-    return bytes(STORE.serialize_cdr(row[2], row[2].__msgtype__))
-
-
 def _read(tmp_path, spoil, topic, strict):
     """Read a file in which every tenth message of a topic is spoilt; return record and faults by kind."""
 
     def encode(k, row):
-        raw = _raw(row)
+        raw = raw_of(row[2])
         return spoil(raw) if row[0] == topic and k // 3 % 10 == 5 else raw
 
     got = read_record(write(tmp_path / "a.mcap", McapFile(encode=encode).file()), strict=strict)
@@ -77,19 +71,10 @@ def test_fields_empty_in_some_messages_are_reported(tmp_path):
 def test_a_joint_whose_name_is_not_utf_8_can_be_named(tmp_path):
     got, told = _read(tmp_path, lambda raw: raw.replace(b"joint", b"jo\xff\xfet"), "/rsea/ft", True)
     assert told == {} and len(got["ft"]) == COUNT
-    encode = lambda k, row: _raw(row).replace(b"joint", b"jo\xff\nt") if k else _raw(row)  # noqa: E731
+    encode = lambda k, row: raw_of(row[2]).replace(b"joint", b"jo\xff\nt") if k else raw_of(row[2])  # noqa: E731
     with pytest.raises(BagError, match="2 joints") as caught:
         read_record(write(tmp_path / "b.mcap", McapFile(encode=encode).file()))
     assert "\n" not in str(caught.value)
-
-
-def _database(tmp_path, *statements):
-    bag = write_foreign(tmp_path / "bag", run_rows(COUNT), StoragePlugin.SQLITE3)
-    with sqlite3.connect(bag / "bag.db3") as database:
-        for statement in statements:
-            database.execute(statement)
-    database.close()
-    return bag
 
 
 NULLS = (
@@ -110,7 +95,7 @@ NO_TOPIC = ("UPDATE messages SET topic_id = 77 WHERE id IN (4, 5)",)
     ],
 )
 def test_rows_that_are_missing_or_damaged_are_reported(tmp_path, statements, expected):
-    got = read_record(_database(tmp_path, *statements))
+    got = read_record(spoilt_database(tmp_path / "bag", *statements))
     told = {(fault.kind, fault.channel): fault.size for fault in got.faults}
     assert expected.items() <= told.items()
 
@@ -133,7 +118,7 @@ def test_one_unreadable_file_of_several_is_left_out(tmp_path):
 
 
 def test_a_journal_left_behind_is_reported(tmp_path):
-    bag = _database(tmp_path)
+    bag = spoilt_database(tmp_path / "bag")
     (bag / "bag.db3-journal").write_bytes(b"x" * 600)
     got = read_record(bag)
     assert [(f.kind, f.channel) for f in got.faults] == [("cut_off", "bag.db3")]

@@ -15,7 +15,7 @@ from msg_adapters import read_record
 from rsea_ros.errors import RseaError
 from rsea_ros.records.stamps import repair_stamps
 
-MUTATIONS = 40
+MUTATIONS = 25
 NUMBERS = (0, 1, 255, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1)
 KINDS = {
     "mcap": (StoragePlugin.MCAP, CompressionMode.NONE),

@@ -15,7 +15,7 @@ from rclpy.lifecycle import LifecycleNode
 from msg_adapters.ros import Trigger
 from rsea_ros.nodes import driver
 from test.nodes.stalls import every
-from test.nodes.warm import Nodes
+from test.nodes.warm import parent
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 60.0
@@ -27,13 +27,14 @@ AGAIN = 15.0
 class Process:
     """A node of the package, started with parameters."""
 
-    def __init__(self, nodes, name, log, parameters, remaps):
+    def __init__(self, name, log, parameters, remaps):
         words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={as_argument(value)}")]
         words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
         self._log = log
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
         log.touch()
-        self._process = nodes.start(name, words, environment, log)
+        files = os.devnull, log, log
+        self._process = parent().start(f"rsea_ros.nodes.{name}", ["--ros-args", *words], environment, files)
 
     @property
     def output(self):
@@ -74,22 +75,14 @@ def as_argument(value):
     return f"'{value}'" if isinstance(value, (str, Path)) else str(value)
 
 
-@pytest.fixture(scope="session")
-def nodes(tmp_path_factory):
-    """What starts nodes, in processes of their own."""
-    parent = Nodes(tmp_path_factory.mktemp("nodes"))
-    yield parent
-    parent.close()
-
-
 @pytest.fixture(scope="module")
-def start(nodes, tmp_path_factory):
+def start(tmp_path_factory):
     """A function that starts a node; what still runs after the module is killed."""
     started = []
 
     def begin(name, remaps=(), **parameters):
         log = tmp_path_factory.mktemp(name) / "output.log"
-        started.append(Process(nodes, name, log, parameters, dict(remaps)))
+        started.append(Process(name, log, parameters, dict(remaps)))
         return started[-1]
 
     yield begin
@@ -105,7 +98,7 @@ class Listener:
         self.node = rclpy.create_node("listener")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
-        self._subscriptions, self._clients = [], {}
+        self.subscriptions, self._clients = [], {}
 
     def serve(self, node):
         """Spin another node of this process too, until it is dropped."""
@@ -150,14 +143,14 @@ class Listener:
     def hear(self, kind, topic, qos):
         """Return a list that fills with the messages of a topic."""
         heard = []
-        self._subscriptions.append(self.node.create_subscription(kind, topic, heard.append, qos))
+        self.subscriptions.append(self.node.create_subscription(kind, topic, heard.append, qos))
         return heard
 
-    def forget(self):
-        """Hear nothing any more."""
-        for subscription in self._subscriptions:
+    def forget(self, kept=0):
+        """Hear nothing any more but the first topics that it was asked to hear."""
+        for subscription in self.subscriptions[kept:]:
             self.node.destroy_subscription(subscription)
-        self._subscriptions = []
+        del self.subscriptions[kept:]
 
     def close(self):
         """Take the node away."""
@@ -172,6 +165,16 @@ def listener():
     node = Listener()
     yield node
     node.close()
+
+
+@pytest.fixture(autouse=True)
+def what_a_test_hears(request):
+    """Hear what a test asks for only as long as it lasts: each message costs each who hears it 60 us."""
+    listener = request.getfixturevalue("listener") if "listener" in request.fixturenames else None
+    kept = len(listener.subscriptions) if listener else 0
+    yield
+    if listener:
+        listener.forget(kept)
 
 
 @pytest.fixture

@@ -22,38 +22,56 @@ WAIT = 55.0
 
 
 class Driven:
-    """A driver on a bench, in a namespace of its own. parameters: beside those of the bench."""
+    """A driver on a bench, in a namespace of its own. parameters: beside those of the bench.
+
+    health: the messages of /diagnostics. joint, stamp: of its commands; 0 ns: they act on arrival.
+    """
+
+    joint, stamp = "joint", staticmethod(lambda: 0)
 
     def __init__(self, bench, listener, name, begin, parameters=PATIENT):
         self.bench, self.name, self._listener = bench, name, listener
         self._commands = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
         self._clear = listener.node.create_client(Trigger, f"/{name}/driver/clear_fault")
-        self._health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+        self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.cleared = []
         self.process = begin("driver", remaps={"__ns": f"/{name}"}, **bench.parameters(), **parameters)
 
-    def push(self, condition, torque=10.0):
+    def push(self, condition, torque=10.0, mend=lambda: None):
         """Command a torque until the condition holds; clear what a busy machine has latched."""
-        begun, clear_now_and_then = time.monotonic(), every(1.5, self._clear_stall)
+        begun = time.monotonic()
+        mend_now_and_then = every(1.5, lambda: (self._clear_stall(), mend()))
 
         def push_commands():
             assert time.monotonic() < begun + WAIT, self.process.output[-5:]
-            self._commands.publish(torque_command_message(0, torque))
+            self.publish(torque)
             if not (result := condition()):
-                clear_now_and_then()
+                mend_now_and_then()
             return result
 
         self._listener.until(push_commands)
 
+    def publish(self, torque):
+        """Publish a command."""
+        self._commands.publish(torque_command_message(self.stamp(), torque, self.joint))
+
+    def value(self, key):
+        """The newest value that the driver's diagnostics have."""
+        return value_in(newest_status(self.health, f"/{self.name}/driver"), key)
+
     def _clear_stall(self):
-        fault = newest_value(self._health, self.name, "fault")
+        fault = self.value("fault")
         if is_stall(fault):
             self.cleared.append(fault)
             self._clear.call_async(Trigger.Request())
 
     def drive(self):
-        """Wait until the motor has its torque."""
-        self.push(self._driving)
+        """Wait until the motor has its torque; activate what a busy machine has kept from being activated."""
+        self.push(self._driving, mend=self._activate)
+
+    def _activate(self):
+        if self.value("active") == "False":
+            self.change(Transition.TRANSITION_ACTIVATE)
 
     def _driving(self):
         goal, on = self.goal()
@@ -86,9 +104,11 @@ class Driven:
         return self.call(ChangeState, "change_state", request)
 
 
-def newest_value(health, namespace, key):
-    """The newest value that a driver's diagnostics have."""
-    for message in reversed(health):
-        if message.status[0].name == f"/{namespace}/driver":
-            return {pair.key: pair.value for pair in message.status[0].values}.get(key)
-    return None
+def newest_status(health, name):
+    """The newest status of a node in messages of /diagnostics, None without."""
+    return next((s for message in reversed(health) for s in message.status if s.name == name), None)
+
+
+def value_in(status, key):
+    """A value of a status, None without."""
+    return {pair.key: pair.value for pair in status.values}.get(key) if status else None

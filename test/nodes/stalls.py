@@ -2,13 +2,25 @@
 
 import time
 
-STALLS = ("no_reply", "heldup", "ft", "effort", "deflection", "velocity", "power")
+STALLS = (
+    "no_reply", "heldup", "ft", "effort", "deflection", "velocity", "power",
+    "motor_state: bus_watchdog is -1",
+)  # fmt: skip
 """Beginnings of the texts of such faults; no test that clears them provokes one."""
 
 
 def is_stall(fault):
     """Return whether a fault (None for none) comes from a stalled machine."""
     return (fault or "").startswith(STALLS)
+
+
+def until(condition, seconds=40.0):
+    """Wait until a condition holds; return what it returned."""
+    deadline = time.monotonic() + seconds
+    while not (result := condition()):
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.005)
+    return result
 
 
 def every(seconds, act):

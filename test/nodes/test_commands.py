@@ -2,111 +2,98 @@
 
 import math
 
+import pytest
+
 from rsea_ros.nodes._commands import HORIZON, MILLISECOND, WATCHDOG, CommandQueue
 
 NOW = 1_700_000_000_000_000_000
+MS = MILLISECOND
+
+ORDERS = {
+    "a command waits for its stamp": (
+        [("add", 10, 1.0, 0), ("add", 20, 2.0, 0), ("take", 9), ("take", 10), ("take", 30)],
+        [[], [(10, 1.0)], [(20, 2.0)]], {"torque": 2.0},
+    ),
+    "in the order of their stamps": (
+        [("add", 20, 2.0, 0), ("add", 10, 1.0, 0), ("take", 30)], [[(10, 1.0), (20, 2.0)]], {},
+    ),
+    "a late one takes effect at once and is counted": (
+        [("take", 100), ("add", 50, 3.0, 101), ("take", 200)], [[], [(100, 3.0)]], {"late": 1},
+    ),
+    "of several late ones the last stays in force": (
+        [("take", 100), ("add", 50, 9.0, 101), ("add", 60, 3.0, 101), ("take", 200)],
+        [[], [(100, 9.0), (100, 3.0)]], {"torque": 3.0},
+    ),
+    "one that arrives after its stamp but before the cycle is not late": (
+        [("take", 0), ("add", 50, 3.0, 90), ("take", 100)], [[], [(50, 3.0)]], {"late": 0},
+    ),
+    **{
+        f"without a recent stamp it takes effect on arrival, {stamp}": (
+            [("add", stamp, 4.0, 0), ("take", 0)], [[(0, 4.0)]], {"unstamped": 1},
+        )
+        for stamp in (-NOW, -HORIZON - 1, HORIZON + 1)
+    },
+    "the watchdog zeroes the torque once": (
+        [("add", 0, 5.0, 0), *(("take", at) for at in (0, WATCHDOG, WATCHDOG + 1, WATCHDOG + 1 + MS))],
+        [[(0, 5.0)], [], [(WATCHDOG + 1, 0.0)], []], {"torque": 0.0, "expired": 1},
+    ),
+    "zero commands do not trip the watchdog": (
+        [("add", 0, 0.0, 0), ("take", 0), ("take", 2 * WATCHDOG)], [[(0, 0.0)], []], {"expired": 0},
+    ),
+    "after clear the torque is zero and nothing waits": (
+        [("add", 0, 5.0, 0), ("add", 10, 6.0, 0), ("take", 0), ("clear",), ("take", 20)],
+        [[(0, 5.0)], []], {"torque": 0.0},
+    ),
+    "one that acts now overtakes those that came before it and wait": (
+        [("add", 20 * MS, 5.0, 0), ("add", 40 * MS, 6.0, 0), ("add", 0, 0.0, MS), ("take", 100 * MS)],
+        [[(0, 0.0)]], {},
+    ),
+    "one sent before the clear is dropped whenever it arrives": (
+        [("clear", 0), ("add", -MS, 5.0, -MS), ("add", MS, 6.0, MS), ("take", 2 * MS)],
+        [[(MS, 6.0)]], {"dropped": 1},
+    ),
+    "a clock that is anchored anew moves everything that waits": (
+        [("add", 10, 1.0, 0), ("take", 0), ("shift",), ("take", -990)], [[], [(-990, 1.0)]], {},
+    ),
+}  # fmt: skip
+"""What happens: stamp, N m, arrival; cycles. What each cycle takes, and counts in the end. ns from NOW."""
 
 
-def _queue(*commands, now=NOW):
+@pytest.mark.parametrize("case", ORDERS)
+def test_commands_take_effect_in_time(case):
+    steps, expected, counts = ORDERS[case]
+    queue, taken = CommandQueue(), []
+    for what, *values in steps:
+        if what == "add":
+            stamp, torque, arrival = values
+            queue.add(NOW + stamp, torque, NOW + arrival)
+        elif what == "take":
+            taken.append([(at - NOW, torque) for at, torque in queue.take(NOW + values[0])])
+        elif what == "clear":
+            queue.clear(*(NOW + at for at in values))
+        else:
+            queue.shift(-1000)
+    assert taken == expected
+    assert {name: getattr(queue, name) for name in counts} == counts
+
+
+@pytest.mark.parametrize(
+    ("stamp", "arrival", "at", "age"),
+    [
+        (0, 0, WATCHDOG + 1, None),  # after the watchdog there is no command
+        (-100 * MS, MS, 2 * MS, 0.001),  # of a late one it counts from its arrival
+        (0, 0, MS, 0.001),
+    ],
+)
+def test_an_age_is_that_of_the_command_in_force(stamp, arrival, at, age):
     queue = CommandQueue()
-    for stamp, torque in commands:
-        queue.add(stamp, torque, now)
-    return queue
-
-
-def test_a_command_waits_for_its_stamp():
-    queue = _queue((NOW + 10, 1.0), (NOW + 20, 2.0))
-    assert queue.take(NOW + 9) == []
-    assert queue.take(NOW + 10) == [(NOW + 10, 1.0)]
-    assert queue.take(NOW + 30) == [(NOW + 20, 2.0)]
-    assert queue.torque == 2.0
-
-
-def test_a_late_command_takes_effect_at_once_and_is_counted():
-    queue = _queue()
-    queue.take(NOW + 100)
-    queue.add(NOW + 50, 3.0, NOW + 101)
-    assert queue.take(NOW + 200) == [(NOW + 100, 3.0)]
-    assert queue.late == 1
-
-
-def test_of_several_late_commands_the_last_one_stays_in_force():
-    queue = _queue()
-    queue.take(NOW + 100)
-    for stamp, torque in ((NOW + 50, 9.0), (NOW + 60, 3.0)):
-        queue.add(stamp, torque, NOW + 101)
-    assert queue.take(NOW + 200) == [(NOW + 100, 9.0), (NOW + 100, 3.0)]
-    assert queue.torque == 3.0
-
-
-def test_a_command_that_arrives_after_its_stamp_but_before_the_cycle_is_not_late():
-    queue = _queue()
-    queue.take(NOW)
-    queue.add(NOW + 50, 3.0, NOW + 90)
-    assert queue.take(NOW + 100) == [(NOW + 50, 3.0)]
-    assert queue.late == 0
-
-
-def test_a_command_without_a_recent_stamp_takes_effect_on_arrival():
-    for stamp in (0, NOW - HORIZON - 1, NOW + HORIZON + 1):
-        queue = _queue((stamp, 4.0))
-        assert queue.take(NOW) == [(NOW, 4.0)]
-        assert queue.unstamped == 1
-
-
-def test_the_watchdog_zeroes_the_torque_once():
-    queue = _queue((NOW, 5.0))
-    queue.take(NOW)
-    assert queue.take(NOW + WATCHDOG) == []
-    end = NOW + WATCHDOG + 1
-    assert queue.take(end) == [(end, 0.0)]
-    assert queue.take(end + MILLISECOND) == []
-    assert queue.torque == 0.0 and queue.expired == 1
-    assert queue.age(end) is None
-
-
-def test_zero_commands_do_not_trip_the_watchdog():
-    queue = _queue((NOW, 0.0))
-    queue.take(NOW)
-    assert queue.take(NOW + 2 * WATCHDOG) == []
-    assert queue.expired == 0
-
-
-def test_after_clear_the_torque_is_zero_and_nothing_waits():
-    queue = _queue((NOW, 5.0), (NOW + 10, 6.0))
-    queue.take(NOW)
-    queue.clear()
-    assert queue.torque == 0.0
-    assert queue.take(NOW + 20) == []
-
-
-def test_a_command_that_acts_now_overtakes_those_that_came_before_it_and_wait():
-    queue = _queue((NOW + 20 * MILLISECOND, 5.0), (NOW + 40 * MILLISECOND, 6.0))
-    queue.add(NOW, 0.0, NOW + MILLISECOND)
-    assert queue.take(NOW + 100 * MILLISECOND) == [(NOW, 0.0)]
-
-
-def test_a_command_sent_before_the_clear_is_dropped_whenever_it_arrives():
-    queue = _queue()
-    queue.clear(NOW)
-    queue.add(NOW - MILLISECOND, 5.0, NOW - MILLISECOND)
-    queue.add(NOW + MILLISECOND, 6.0, NOW + MILLISECOND)
-    assert queue.take(NOW + 2 * MILLISECOND) == [(NOW + MILLISECOND, 6.0)] and queue.dropped == 1
-
-
-def test_a_clock_that_is_anchored_anew_moves_everything_that_waits():
-    queue = _queue((NOW + 10, 1.0))
-    queue.take(NOW)
+    queue.take(NOW - MS)
+    queue.add(NOW + stamp, 5.0, NOW + arrival)
+    queue.take(NOW + min(at, 2 * MS))
+    queue.take(NOW + at)
+    assert queue.age(NOW + at) == age
     queue.shift(-1000)
-    assert queue.take(NOW - 990) == [(NOW - 990, 1.0)] and queue.age(NOW - 990) == 0.0
-
-
-def test_an_age_counts_from_the_arrival_of_a_late_command():
-    queue = _queue()
-    queue.take(NOW)
-    queue.add(NOW - 100 * MILLISECOND, 1.0, NOW + MILLISECOND)
-    queue.take(NOW + 2 * MILLISECOND)
-    assert queue.age(NOW + 2 * MILLISECOND) == 0.001
+    assert queue.age(NOW + at - 1000) == age
 
 
 def test_a_command_beyond_ten_times_the_limit_is_refused_as_nan_is():
@@ -117,8 +104,3 @@ def test_a_command_beyond_ten_times_the_limit_is_refused_as_nan_is():
     assert queue.refused == 4 and queue.take(10) == []
     queue.add(0, 600.0, 11)
     assert queue.take(20)[-1][1] == 600.0
-
-
-def test_commands_are_taken_in_the_order_of_their_stamps():
-    queue = _queue((NOW + 20, 2.0), (NOW + 10, 1.0))
-    assert queue.take(NOW + 30) == [(NOW + 10, 1.0), (NOW + 20, 2.0)]

@@ -13,9 +13,11 @@ from msg_adapters.ros import (
     torque_command_message,
 )
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
-from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from test.nodes.on_wire import newest_status, value_in
 from test.nodes.stalls import every
+from test.nodes.torque_loop import GAINS
+from test.nodes.warm import Bench
 
 RATE, ERROR_LIMIT, ERROR_TIME, FT_LIMIT = 280.0, 15.0, 0.5, 110.0
 """Of config/nodes/controller.yaml: Hz, N m, s, N m."""
@@ -36,8 +38,7 @@ class Wire:
 
     def status(self, name):
         """The newest status of a node: level, message, values."""
-        mine = [m.status[0] for m in self.health if m.status[0].name == f"/wired/{name}"]
-        return mine[-1] if mine else None
+        return newest_status(self.health, f"/wired/{name}")
 
     def clear(self, name):
         """Call clear_fault of a node."""
@@ -65,7 +66,7 @@ class Wire:
 @pytest.fixture(scope="module")
 def wire(tmp_path_factory, start, listener):
     """The bench, the driver and the controller."""
-    with RemoteBench(tmp_path_factory.mktemp("wired") / "tty") as bench:
+    with Bench(tmp_path_factory.mktemp("wired") / "tty") as bench:
         made = Wire(bench, start, listener)
         listener.until(lambda: made.status("driver") and made.status("controller") and made.wrenches)
         yield made
@@ -99,15 +100,15 @@ def test_the_end_of_the_controller_is_that_of_the_torque_and_another_one_begins_
     assert wire.driver.is_running()
     since = wire.bench.ask("torque")["t"]
     wire.health.clear()
-    wire.controller = start("controller", remaps={"__ns": "/wired"})
+    wire.controller = start("controller", remaps={"__ns": "/wired"}, **GAINS)
     wire.hold(10.0, lambda: abs(wire.wrenches[-1].wrench.torque.z - 10.0) < 0.5)
     heard = len(wire.wrenches)
     wire.hold(10.0, lambda: len(wire.wrenches) > heard + 200)
     log = wire.bench.log(since)["torque"]
     goals = [abs(goal) * TABLES[54024].ampere * 6.826 for _, goal, on in log if on]
     assert max(goals) < 12.0
-    values = {pair.key: pair.value for pair in wire.status("controller").values}
-    assert int(values["late_commands"]) < 0.5 * int(values["commands"])
+    late, commands = (value_in(wire.status("controller"), key) for key in ("late_commands", "commands"))
+    assert int(late) < 0.5 * int(commands)
 
 
 @pytest.mark.parametrize("ft", [False, True])

@@ -30,16 +30,6 @@ def test_a_clock_step_under_torque_is_a_fault_and_ends_the_torque(world, step):
     assert not world.monitor.violations
 
 
-@pytest.mark.parametrize("step", [-HOUR, HOUR])
-def test_after_a_clock_step_only_clear_fault_restores_the_torque(world, step):
-    world.off += step
-    world.cycles(5, 10.0)
-    with world.drive.deaf():
-        world.guarded.clear()
-    assert world.cycles(20, 10.0)[-1] == 10.0
-    assert world.guarded.fault is None and not world.monitor.violations
-
-
 @pytest.mark.parametrize("step", [-SECOND // 5, -SECOND // 20, SECOND // 20])
 @pytest.mark.parametrize("ahead", [0.0, 0.1])
 def test_a_command_from_before_a_clock_step_never_acts(step, ahead):
@@ -62,27 +52,6 @@ def test_several_clock_steps_end_the_torque_as_one_does(world, steps):
     with world.drive.deaf():
         world.guarded.clear()
     assert world.cycles(20, 10.0)[-1] == 10.0 and not world.monitor.violations
-
-
-@pytest.mark.parametrize("ramp", [0.02, 10.0])
-def test_stop_and_clear_fault_leave_nothing_of_a_ramp(ramp):
-    """The service stop answered that the torque was zero: the ramp went on."""
-    world = World(ramp=ramp)
-    world.activate()
-    world.cycles(20, 10.0)
-    while world.guarded.fault is None:
-        world.cycle()
-    assert world.torques[-1] > 0.0
-    world.motor.during = lambda: seen.append((world.motor.goal, world.cycle()))
-    seen = []
-    with world.drive.deaf():
-        world.guarded.clear()
-    assert seen == [(0.0, 0.0)]
-    assert world.cycles(20, 10.0)[-1] == 10.0
-    while world.guarded.fault is None:
-        world.cycle()
-    world.drive.stop()
-    assert world.cycles(3) == [0.0] * 3 and not world.monitor.violations
 
 
 def test_a_trimmed_clock_is_followed_without_a_step(world):
@@ -114,38 +83,6 @@ def test_clear_fault_under_a_stream_lets_nothing_old_act(world):
     assert world.guarded.fault is None and not world.monitor.violations
 
 
-@pytest.mark.parametrize(
-    "still",
-    [
-        {"temperature": 90.0}, {"voltage": -1.0}, {"current": 1e9}, {"position": 1.0},
-        {"ft_trouble": "saturation"},
-    ],
-    ids=lambda value: next(iter(value)),
-)  # fmt: skip
-def test_clear_fault_takes_a_reading_first(still):
-    world = World(current=12.0)
-    world.activate()
-    world.motor.reading = still
-    world.cycles(3, 10.0)
-    cause = world.guarded.fault.cause
-    with pytest.raises(DeviceError, match="is still there"), world.drive.deaf():
-        world.guarded.clear()
-    assert world.guarded.fault.cause == cause and world.cycles(5, 10.0) == [0.0] * 5
-
-
-def test_clear_fault_without_a_fault_does_nothing(world):
-    world.motor.during = lambda: pytest.fail("the device was touched")
-    assert world.guarded.clear() is False
-    assert world.cycle(10.0) == 10.0
-
-
-def test_stop_ends_the_torque_until_it_is_cleared(world):
-    world.send(10.0, ahead=0.05)
-    world.drive.stop()
-    assert world.cycles(30, 10.0) == [0.0] * 30
-    assert world.guarded.fault.cause == "stopped"
-
-
 @pytest.mark.parametrize("first", [10.0, 0.0])
 def test_after_autostart_the_first_command_is_zero_or_a_fault(first):
     """A driver that was killed and started again under a stream of commands went on with the torque."""
@@ -163,11 +100,6 @@ def test_after_autostart_the_first_command_is_zero_or_a_fault(first):
         with world.drive.deaf():
             world.guarded.clear()
         assert world.cycles(30, 10.0)[-1] == 10.0
-
-
-def test_a_halt_ends_the_torque_in_the_next_cycle(world):
-    world.guarded.interlock.halted = True
-    assert world.cycles(3, 10.0) == [0.0] * 3
 
 
 SEEDS = range(3)

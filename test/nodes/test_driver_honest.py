@@ -6,108 +6,78 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from msg_adapters.ros import DiagnosticArray, JointState, Trigger, torque_command_message
-from rsea_ros.hardware.peer.remote import RemoteBench
+from msg_adapters.ros import JointState, torque_command_message
 from rsea_ros.nodes._bench_topics import Obeyed
 from rsea_ros.nodes._drive import SignalListener
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._waiter import Pulse, anything_to_do
 from test.nodes.clock_shim import preload, set_clock
+from test.nodes.conftest import as_argument
+from test.nodes.on_wire import Driven
 from test.nodes.stalls import is_stall
+from test.nodes.warm import Bench
 
 ROOT = Path(__file__).resolve().parents[2]
 TRIES = 10
 DRIVER = "import sys\nfrom rsea_ros.nodes.driver import main\nsys.exit(main())\n"
 
 
-class Shimmed:
-    """A driver process on a bench, and a publisher of commands."""
+class Shimmed(Driven):
+    """A driver in a process of its own whose system clock the test sets, and commands by that clock."""
+
+    joint = "left_knee"
 
     def __init__(self, bench, listener, folder):
-        self.bench, self.listener, self.off, self.step = bench, listener, 0, folder / "step"
+        self.listener, self.off, self.step = listener, 0, folder / "step"
         self.set_clock(0)
-        start = {"autostart": True, "resume": True, "joint": "left_knee"}
-        values = {**bench.parameters(), "baud": 4_000_000, **start}
-        words = [w for k, v in values.items() for w in ("-p", f"{k}:={str(v).lower() if v is True else v}")]
-        self.process = subprocess.Popen(
+        start = {"autostart": True, "resume": True, "joint": self.joint, "baud": 4_000_000}
+        super().__init__(bench, listener, "honest", partial(self._begin, folder), start)
+        listener.until(self._clear.service_is_ready)
+
+    def _begin(self, folder, name, remaps, **parameters):
+        words = [w for k, v in parameters.items() for w in ("-p", f"{k}:={as_argument(v)}")]
+        process = subprocess.Popen(
             [sys.executable, "-c", DRIVER, "--ros-args", *words, "-r", "__ns:=/honest"],
             env={**os.environ, "PYTHONPATH": str(ROOT), **preload(folder, self.step)},
             stdin=subprocess.DEVNULL,
         )  # fmt: skip
-        self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
-        self.commands = listener.node.create_publisher(JointState, "/honest/torque_command", COMMAND)
-        self._clear = listener.node.create_client(Trigger, "/honest/driver/clear_fault")
-        listener.until(self._clear.service_is_ready)
+        process.output = []
+        return process
+
+    def stamp(self):
+        """Now, by the clock of the driver, ns."""
+        return time.time_ns() + self.off
 
     def set_clock(self, by):
         """Set the process's system clock by so many seconds against the true one."""
         self.off = by * 10**9
         set_clock(self.step, self.off)
 
-    def status(self):
-        """The newest status."""
-        mine = [m.status[0] for m in self.health if m.status[0].name == "/honest/driver"]
-        return mine[-1] if mine else None
-
-    def value(self, key):
-        """A value of it."""
-        status = self.status()
-        return {p.key: p.value for p in status.values}.get(key, "") if status else ""
-
-    def fault(self):
-        """The fault that the newest status has, None without."""
-        fault = self.value("fault")
-        return None if fault in ("", "none") else fault
-
     def settled(self, key):
         """A number of a status that is published from now on."""
         self.health.clear()
-        self.listener.until(self.status)
-        return int(self.value(key))
+        return int(self.listener.until(lambda: self.value(key)))
 
     def told(self, text):
         """Whether any status has said so in its summary."""
-        return any(text in m.status[0].message for m in self.health if m.status[0].name == "/honest/driver")
-
-    def push(self, torque, condition, joint="left_knee"):
-        """Command a torque until a condition holds."""
-
-        def push_commands():
-            stamp = time.time_ns() + self.off
-            self.commands.publish(torque_command_message(stamp, torque, joint))
-            return condition()
-
-        self.listener.until(push_commands)
+        return any(text in s.message for m in self.health for s in m.status if s.name == "/honest/driver")
 
     def drive(self, driven=lambda: True):
-        """Command 10 N m until the motor has a torque and `driven` holds; clear what a stall has latched."""
-        looked = time.monotonic() - 1.2
-
-        def driving():
-            nonlocal looked
-            if time.monotonic() - looked > 1.5:
-                looked = time.monotonic()
-                self.clear()
-            return driven() and self.bench.torque()[0] != 0
-
-        self.push(10.0, driving)
-
-    def clear(self):
-        """Call clear_fault."""
-        future = self._clear.call_async(Trigger.Request())
-        self.listener.until(future.done)
-        return future.result()
+        """Command 10 N m until the motor has a torque and `driven` holds; clear what is latched."""
+        self.trigger("clear_fault")
+        self.push(lambda: driven() and self.goal()[0] != 0, mend=partial(self.trigger, "clear_fault"))
 
 
 @pytest.fixture(scope="module")
 def driver(tmp_path_factory, listener):
     """One for the tests of this module, in their order."""
     folder = tmp_path_factory.mktemp("honest")
-    with RemoteBench(folder / "tty") as bench:
+    with Bench(folder / "tty") as bench:
         made = Shimmed(bench, listener, folder)
         yield made
         made.process.kill()
@@ -125,8 +95,8 @@ def test_a_step_of_the_system_clock_ends_the_torque_and_is_reported(driver):
         steps = driver.settled("clock_steps")
         driver.drive()
         driver.set_clock(-3600)
-        driver.listener.until(lambda: driver.bench.torque()[0] == 0)
-        fault = driver.listener.until(driver.fault)
+        driver.listener.until(lambda: driver.goal()[0] == 0)
+        fault = driver.listener.until(lambda: (fault := driver.value("fault")) != "none" and fault)
         assert driver.settled("clock_steps") == steps + 1
         if fault.startswith("clock_step"):
             break
@@ -139,7 +109,7 @@ def test_a_step_of_the_system_clock_ends_the_torque_and_is_reported(driver):
 def test_wrong_stamps_are_reported(driver):
     driver.off = 10 * 10**9
     driver.health.clear()
-    driver.push(30.0, lambda: driver.told("commands with a stamp that is off"))
+    driver.push(lambda: driver.told("commands with a stamp that is off"), torque=30.0)
     driver.off = 0
     assert float(driver.value("furthest_stamp_s")) == pytest.approx(10.0, abs=0.1)
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from lifecycle_msgs.msg import Transition
 
-from msg_adapters.ros import DiagnosticArray, JointState, WrenchStamped
+from msg_adapters.ros import JointState, WrenchStamped
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
-from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
-from test.nodes.on_wire import Driven, newest_value
+from test.nodes.on_wire import Driven
 from test.nodes.stalls import is_stall
+from test.nodes.warm import Bench
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def bench(tmp_path_factory):
 
     def place(model):
         if model not in made:
-            made[model] = RemoteBench(tmp_path_factory.mktemp("wire") / "tty", "--model", model)
+            made[model] = Bench(tmp_path_factory.mktemp("wire") / "tty", "--model", model)
         return made[model]
 
     yield place
@@ -40,6 +40,7 @@ def wire(bench, start, listener):
 def test_the_driver_publishes_what_the_bench_sent_and_follows_commands(wire, listener):
     states = listener.hear(JointState, "/main/joint_states", MEASUREMENT)
     wrenches = listener.hear(WrenchStamped, "/main/ft", MEASUREMENT)
+    wire.drive()
     wire.push(lambda: len(states) > 50 and len(wrenches) > 50 and states[-1].effort[0] > 9.0)
     wire.push(lambda: 8.0 < wrenches[-1].wrench.torque.z < 12.0)  # a busy listener hears them after states
     assert wire.goal() == (wire.counts(10.0), True)
@@ -68,13 +69,24 @@ def test_zero_ft_is_refused_under_torque_and_takes_the_offset_away_without(wire,
     wire.push(lambda: wire.trigger("zero_ft").success, torque=0.0)  # refused while the load still swings
 
 
-def test_a_fault_is_published_on_diagnostics_and_ends_by_service(wire, listener):
-    health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+def _excite(start, **values):
+    """Begin an excitation of the bench, by default for longer than any test."""
+    usual = {"amplitude": 3.0, "noise": 0.0, "duration": 200.0, "rate": 100.0}
+    return start("excite", remaps={"__ns": "/main"}, **(usual | values))
+
+
+def test_a_fault_is_published_keeps_excite_away_and_ends_by_service(wire, listener, start):
+    """It played to the end, and the recording showed a machine that never moved."""
+    told = "temperature: 90 °C, limit 70 °C"
     wire.drive()
     wire.bench.ask("set", temperature=90)
-    wire.push(lambda: wire.goal() == (0, True))
-    told = "temperature: 90 °C, limit 70 °C"
-    wire.push(lambda: newest_value(health, "main", "fault") == told)
+    wire.push(lambda: wire.goal() == (0, True) and wire.value("fault") == told)
+    commands = listener.hear(JointState, "/main/torque_command", COMMAND)
+    excite = _excite(start)
+    listener.until(lambda: not excite.is_running())
+    assert excite.wait() == 2 and told in excite.output[-1]
+    assert excite.output[-1].endswith("rsea call /main/driver clear_fault")
+    assert not any(message.effort[0] for message in commands)
     refused = wire.change(Transition.TRANSITION_DEACTIVATE), wire.change(Transition.TRANSITION_ACTIVATE)
     assert [answer.success for answer in refused] == [True, False]
     wire.bench.ask("set", temperature=30)
@@ -83,32 +95,15 @@ def test_a_fault_is_published_on_diagnostics_and_ends_by_service(wire, listener)
     wire.drive()
 
 
-def _excite(start):
-    """Begin an excitation of the bench for longer than any test."""
-    return start("excite", remaps={"__ns": "/main"}, amplitude=3.0, noise=0.0, duration=200.0, rate=100.0)
-
-
 def test_excite_keeps_the_limit_that_its_driver_derives(wire, start):
     """Its own was 68 N·m whatever the motor."""
-    wire.drive()
-    excite = start("excite", remaps={"__ns": "/main"}, limit=100.0, amplitude=75.0, noise=0.0, duration=9.0)
-    assert excite.wait() == 2
+    for _ in range(4):
+        wire.drive()
+        excite = _excite(start, limit=100.0, amplitude=75.0, duration=9.0)
+        assert excite.wait() == 2
+        if not is_stall(excite.output[-1].split("has latched a fault, ")[-1]):
+            break
     assert "largest command 75 N·m, expected at most torque_limit = 68 N·m" in excite.output[-1]
-
-
-def test_excite_plays_nothing_to_a_driver_that_has_latched_a_fault(wire, listener, start):
-    """It played to the end, and the recording showed a machine that never moved."""
-    wire.drive()
-    wire.bench.ask("set", temperature=90)
-    wire.push(lambda: wire.goal() == (0, True))
-    commands = listener.hear(JointState, "/main/torque_command", COMMAND)
-    excite = _excite(start)
-    listener.until(lambda: not excite.is_running())
-    assert excite.wait() == 2 and "temperature: 90 °C, limit 70 °C" in excite.output[-1]
-    assert excite.output[-1].endswith("rsea call /main/driver clear_fault")
-    assert not any(message.effort[0] for message in commands)
-    wire.bench.ask("set", temperature=30)
-    assert wire.trigger("clear_fault").success
 
 
 def test_excite_waits_for_an_active_driver_and_stops_at_a_fault(wire, listener, start):
@@ -125,24 +120,6 @@ def test_excite_waits_for_an_active_driver_and_stops_at_a_fault(wire, listener, 
     assert excite.wait() == 2 and (told.startswith("stopped") or is_stall(told)), excite.output[-1]
     assert commands[-1].effort[0] == 0.0
     assert wire.trigger("clear_fault").success
-
-
-def test_a_port_that_comes_back_is_opened_again_by_clear_fault(wire):
-    wire.drive()
-    wire.bench.ask("vanish")
-    answers = []
-
-    def is_refused():
-        answers.append(wire.trigger("clear_fault"))
-        return not answers[-1].success and "port" in answers[-1].message
-
-    try:
-        wire.push(is_refused)  # from the next cycle on
-    finally:
-        wire.bench.ask("appear")
-    answer = wire.trigger("clear_fault")
-    assert answer.success, answer.message
-    wire.drive()
 
 
 LISTENER = (

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from msg_adapters import iterate, read_record, write_record
+from msg_adapters import BagWriter, iterate, read_record, write_record
 from msg_adapters.ros import Clock, JointState, WrenchStamped, stamp_of
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
@@ -61,20 +61,34 @@ def test_replay_keeps_stamps_and_gives_identify_everything(bag, start, listener,
         assert abs(identified[name] - load_rig(RIG)[name]) < high - low
 
 
-def test_excite_interrupted_ends_with_zero_and_says_so(start, listener):
+def test_excite_interrupted_ends_with_zero_and_a_recording_by_itself_after_its_duration(
+    start, listener, tmp_path
+):
     commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
     plant = start("plant", rig=RIG)
+    record = start("record", out=tmp_path / "bag", duration=1.0, storage="sqlite3")
     excite = start("excite", duration=100.0, kind="white_noise", amplitude=5.0, ramp=0.0)
     listener.until(lambda: sum(m.effort[0] != 0.0 for m in commands) > 50)
     assert excite.stop(signal.SIGINT) == 130
     listener.until(lambda: len(commands) > 50 and commands[-1].effort[0] == 0.0)
     assert "torque zero" in excite.output[-1]
-    assert plant.stop() == 0
-
-
-def test_record_ends_by_itself_after_its_duration(start, tmp_path):
-    plant = start("plant", rig=RIG)
-    record = start("record", out=tmp_path / "bag", duration=1.0, storage="sqlite3")
     assert record.wait() == 0, record.output
     assert plant.stop() == 0
     assert sum(row[0] == "/rsea/ft" for row in iterate(tmp_path / "bag")) > 10
+
+
+def test_a_signal_completes_the_bag_of_a_recording(start, listener, tmp_path):
+    record = start("record", out=tmp_path / "bag")
+    listener.until(lambda: any("recording into" in line for line in record.output))
+    assert record.stop(signal.SIGHUP) == 0, record.output
+    assert [p.name for p in tmp_path.iterdir()] == ["bag"]
+    assert list(iterate(tmp_path / "bag")) == []
+
+
+def test_a_recording_that_exists_is_refused(start, tmp_path):
+    with BagWriter(tmp_path / "bag.mcap") as bag:
+        bag.write("/a", "std_msgs/msg/Bool", 5, bytes([0, 1, 0, 0, 1]))
+    record = start("record", out=tmp_path / "bag.mcap")
+    assert record.wait() == 2
+    assert len(record.output) == 1 and "exists already, expected a new name" in record.output[0]
+    assert len(list(iterate(tmp_path / "bag.mcap"))) == 1

@@ -21,6 +21,7 @@ from msg_adapters.ros import (
 )
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE
+from test.nodes.on_wire import newest_status
 
 RIG = "paper_moving_output"
 RATE = 280.0
@@ -64,8 +65,7 @@ class Heard:
 
     def status(self):
         """The newest status of the node."""
-        statuses = [s for m in self._health for s in m.status if s.name == "/rsea/model"]
-        return statuses[-1] if statuses else None
+        return newest_status(self._health, "/rsea/model")
 
     def values(self):
         """Its values."""

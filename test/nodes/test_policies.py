@@ -1,14 +1,13 @@
 """SROS 2 policies: they allow what the nodes do, and only the necessary ones may command torque."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 from xml.etree import ElementTree as XML
 
 import pytest
 
 from rsea_ros.nodes import _policies, _run, _run as _sockets
+from test.nodes.warm import parent
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "security" / "policies.xml"
 
@@ -106,8 +105,9 @@ def test_a_node_that_cannot_be_secured_as_requested_does_not_start(tmp_path, mon
     monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
     monkeypatch.setenv("ROS_SECURITY_STRATEGY", "Enforce")
     monkeypatch.setenv("ROS_SECURITY_KEYSTORE", str(tmp_path))
-    command = [sys.executable, "-m", "rsea_ros.nodes.plant", "--ros-args", "--enclave", "/rsea/plant"]
-    done = subprocess.run(command, cwd=FILE.parents[2], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    told = (done.stdout + done.stderr).splitlines()  # rcl says before where it found the keys
+    words, log = ["--ros-args", "--enclave", "/rsea/plant"], tmp_path / "log"
+    log.touch()
+    node = parent().start("rsea_ros.nodes.plant", words, dict(os.environ), [os.devnull, log, log])
+    assert node.wait() == 2
+    told = log.read_text().splitlines()  # rcl says before where it found the keys
     assert "FATAL" in told[-1] and "error creating node" in told[-1] and "Traceback" not in "".join(told)

@@ -5,17 +5,20 @@ import time
 
 import numpy as np
 import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import DiagnosticArray, JointState, Trigger, stamp_of, torque_command_message
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.interlock import event
-from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._joints import joint_table
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from test.nodes.on_wire import newest_status, value_in
 from test.nodes.stalls import every, is_stall
 from test.nodes.test_driver import Spy
+from test.nodes.warm import Bench
 
 JOINTS = ("hip", "knee", "ankle")
 TRIALS = 10
@@ -116,6 +119,9 @@ class Leg:
         """Clear faults that no test here provokes: commands may cease, too, on a machine that stalls."""
         if any(is_stall(fault) or fault.startswith("command_timeout") for fault in self.faults()):
             self.call("clear_fault")
+        if "False" in (self.value(joint, "active") for joint in JOINTS):  # a stall kept one from it
+            request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE))
+            self.listener.call("/leg/driver/change_state", ChangeState, request)
 
     def ready(self):
         """Wait until every motor has a torque and no fault is latched."""
@@ -132,10 +138,7 @@ class Leg:
 
     def value(self, joint, key):
         """The newest value that a joint's diagnostics have."""
-        for message in reversed(self.health):
-            if message.status[0].name == f"/leg/driver/{joint}":
-                return {pair.key: pair.value for pair in message.status[0].values}.get(key)
-        return None
+        return value_in(newest_status(self.health, f"/leg/driver/{joint}"), key)
 
     def faults(self):
         """The newest fault of each joint in words."""
@@ -153,7 +156,7 @@ class Leg:
 
 @pytest.fixture(scope="module")
 def leg(tmp_path_factory, start, listener):
-    with RemoteBench(tmp_path_factory.mktemp("leg") / "tty", "--model", 1020, 1120, 1170) as bench:
+    with Bench(tmp_path_factory.mktemp("leg") / "tty", "--model", 1020, 1120, 1170) as bench:
         bench.hurry()
         made = Leg(bench, start, listener)
         yield made

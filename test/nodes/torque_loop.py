@@ -8,6 +8,7 @@ import numpy as np
 
 from msg_adapters.ros import (
     DiagnosticArray,
+    DiagnosticStatus,
     JointState,
     WrenchStamped,
     stamp_of,
@@ -15,8 +16,12 @@ from msg_adapters.ros import (
 )
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from test.nodes.on_wire import newest_status
+from test.nodes.stalls import every
 
 RATE = 280.0
+GAINS = {"k_p": 0.163, "k_d": 0.003528, "k_i": 1.173, "q_frequency": 8.679, "k_w": 39.9}
+"""Of the synthesis, which takes half a second."""
 PERIOD = SECOND / RATE
 LEAD = 0.2
 """s by which desired torques are sent ahead."""
@@ -27,26 +32,32 @@ SETTLED = 1.0
 
 
 class Loop:
-    """Topics of plant and controller as seen from outside."""
+    """Topics of plant and controller in a namespace as seen from outside. stalls: faults that it clears."""
 
-    def __init__(self, listener):
-        self.listener = listener
-        self.states = listener.hear(JointState, "/rsea/joint_states", MEASUREMENT)
-        self.wrenches = listener.hear(WrenchStamped, "/rsea/ft", MEASUREMENT)
-        self.commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
+    def __init__(self, listener, namespace="/rsea", stalls=("commands more than 1 sample late",)):
+        self.listener, self._namespace, self._stalls = listener, namespace, stalls
+        self.states = listener.hear(JointState, f"{namespace}/joint_states", MEASUREMENT)
+        self.wrenches = listener.hear(WrenchStamped, f"{namespace}/ft", MEASUREMENT)
+        self.commands = listener.hear(JointState, f"{namespace}/torque_command", COMMAND)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
-        self._desired = listener.node.create_publisher(JointState, "/rsea/desired_torque", COMMAND)
+        self._desired = listener.node.create_publisher(JointState, f"{namespace}/desired_torque", COMMAND)
 
     def ready(self):
         """Wait until the controller commands and all is heard: each topic is discovered at its own time."""
         self.listener.until(lambda: self._desired.get_subscription_count() and len(self.commands) > 100)
         self.listener.until(lambda: self.states and self.wrenches)
 
+    def mend(self):
+        """Clear what a machine that stalls has latched."""
+        if any(stall in self.values()[""] for stall in self._stalls):
+            self.listener.call(f"{self._namespace}/controller/clear_fault")
+
     def sine(self, amplitude, hz, seconds, during=lambda t: None):
         """Publish a sine on the grid of the measurements, ahead of time; return the error, by period.
 
         during: called at each sample with the time (s) since its begin that measurements have reached.
         """
+        self.mend()
         start = stamp_of(self.states[-1].header.stamp) + round(0.3 * RATE) * PERIOD
         wanted = lambda t: amplitude * np.minimum(1.0, t / RISE) * np.sin(2 * np.pi * hz * t)  # noqa: E731
         for k in range(round(seconds * RATE)):
@@ -65,14 +76,16 @@ class Loop:
 
     def hold(self, torque, condition):
         """Publish a constant torque until a condition holds."""
+        mend_now_and_then = every(1.5, self.mend)
 
         def done():
             self._desired.publish(torque_command_message(time.time_ns(), torque))
+            mend_now_and_then()
             return condition()
 
         self.listener.until(done)
 
     def values(self):
         """Key and value of the controller's newest status."""
-        mine = [m for m in self.health if m.status[0].name.endswith("controller")]
-        return {pair.key: pair.value for pair in mine[-1].status[0].values} | {"": mine[-1].status[0].message}
+        newest = newest_status(self.health, f"{self._namespace}/controller") or DiagnosticStatus()
+        return {pair.key: pair.value for pair in newest.values} | {"": newest.message}

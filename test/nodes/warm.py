@@ -1,60 +1,94 @@
-"""Start nodes in their own processes, forked from one that has imported the numerics: 0.7 s of CPU less each.
+"""Start nodes and benches in their own processes, forked from one that has imported the numerics.
 
-The parent reads requests as lines of JSON: it forks, and the fork becomes the node. The parent has one thread
-and does not import ROS, which starts threads. It writes the exit status of each node into a file.
+Each takes 0.7 s of CPU less. The parent reads requests as lines of JSON: it forks, and the fork becomes the
+node or the bench. The parent has one thread and does not import ROS, which starts threads. It writes the exit
+status of each child into a file.
 """
 
 from __future__ import annotations
 
 import atexit
+import functools
 import importlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import traceback
+from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
 
+from rsea_ros.hardware.peer.remote import RemoteBench
+
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = (
-    "rsea_ros.nodes", "rsea_ros.hardware.simulated", "rsea_ros.hardware.dynamixel_netft",
+    "rsea_ros.hardware.dynamixel_netft",
     "rsea_ros.hardware.guarded", "rsea_ros.model.observer", "rsea_ros.model.torque_band",
     "rsea_ros.control.controller", "rsea_ros.identification.identify", "rsea_ros.health.monitor",
     "rsea_ros.experiment.campaign", "msg_adapters",
 )  # fmt: skip
 """What most of a node's time to import goes to."""
+FLAGS = os.O_RDONLY, os.O_WRONLY | os.O_APPEND, os.O_WRONLY | os.O_APPEND
+"""How a child opens its standard streams."""
 
 
-class Nodes:
-    """The parent, as a test sees it. folder: where the ends of nodes are written."""
+class Parent:
+    """The parent, as a test sees it. folder: where the ends of its children are written."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self) -> None:
+        self._folder = Path(tempfile.mkdtemp())
         self._parent = subprocess.Popen(
-            [sys.executable, __file__, str(folder)], env={**os.environ, "PYTHONPATH": str(ROOT)},
+            [sys.executable, __file__, str(self._folder)], env={**os.environ, "PYTHONPATH": str(ROOT)},
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
 
-    def start(self, name: str, words: list[str], environment: dict[str, str], log: Path) -> Node:
-        """Start a node with words on its command line, whose output goes into a file."""
-        wish = {"name": name, "words": words, "environment": environment, "log": str(log)}
+    def start(
+        self, module: str, words: list[str], environment: dict[str, str], files: Sequence[Path]
+    ) -> Child:
+        """Start a module's main, with words on its command line. files: its first standard streams."""
+        wish = {"module": module, "words": words, "environment": environment, "files": [*map(str, files)]}
         print(json.dumps(wish), file=self._parent.stdin, flush=True)
         pid = int(self._parent.stdout.readline())
-        return Node(pid, self._folder / str(pid))
+        return Child(pid, self._folder / str(pid))
 
     def close(self) -> None:
-        """End the parent, which kills the nodes that still run."""
+        """End the parent, which kills the children that still run."""
         self._parent.communicate()
 
 
-class Node:
-    """A node that was started. end: the file into which its status is written."""
+@functools.cache
+def parent() -> Parent:
+    """Return the parent of this process, started on first use and ended with it."""
+    made = Parent()
+    atexit.register(made.close)
+    return made
+
+
+class Bench(RemoteBench):
+    """A bench that is forked."""
+
+    def _begin(self, words: list[str]) -> Child:
+        folder = Path(tempfile.mkdtemp())
+        pipes = folder / "in", folder / "out"
+        for pipe in pipes:
+            os.mkfifo(pipe)
+        child = parent().start("rsea_ros.cli.main", words, dict(os.environ), pipes)
+        child.stdin, child.stdout = pipes[0].open("wb"), pipes[1].open("rb")
+        shutil.rmtree(folder)
+        return child
+
+
+class Child:
+    """What was started, as a subprocess.Popen. end: the file into which its status is written."""
 
     def __init__(self, pid: int, end: Path) -> None:
         self.pid, self._end = pid, end
+        self.stdin = self.stdout = None
 
     def poll(self) -> int | None:
         """Return its status, negative for a signal, or None while it runs."""
@@ -65,7 +99,7 @@ class Node:
         deadline = time.monotonic() + seconds
         while (status := self.poll()) is None:
             if time.monotonic() > deadline:
-                raise subprocess.TimeoutExpired(f"node {self.pid}", seconds)
+                raise subprocess.TimeoutExpired(f"process {self.pid}", seconds)
             time.sleep(0.01)
         return status
 
@@ -80,8 +114,8 @@ class Node:
 
 
 def serve(folder: Path) -> None:
-    """Be the parent until nobody asks any more."""
-    prepare()
+    """Be the parent until nobody asks any more. What only nodes need is loaded for the first of them."""
+    load_bench()
     running: set[int] = set()
 
     def reap(number: int, frame: FrameType | None) -> None:
@@ -94,19 +128,37 @@ def serve(folder: Path) -> None:
 
     signal.signal(signal.SIGCHLD, reap)
     for line in sys.stdin:
+        wish = json.loads(line)
+        if wish["module"].startswith("rsea_ros.nodes."):
+            prepare()
         signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGCHLD])
         pid = os.fork()
         if pid == 0:
-            become(**json.loads(line))
+            become(**wish)
         (folder / str(pid)).unlink(missing_ok=True)
         running.add(pid)
         sys.stdout.write(f"{pid}\n")
         sys.stdout.flush()
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     for pid in running:
         os.kill(pid, signal.SIGKILL)
+    shutil.rmtree(folder)
 
 
+def load_bench() -> None:
+    """Import what benches need, and load the compiled code of a plant."""
+    for module in ("rsea_ros.nodes", "rsea_ros.cli.bench", "rsea_ros.cli.main"):
+        importlib.import_module(module)
+    from rsea_ros.hardware.simulated import SimulatedDevice
+    from rsea_ros.model.rig_file import load_rig
+
+    plant = SimulatedDevice(load_rig("paper_high_impedance"), 1000.0)
+    plant.open()
+    plant.read()
+
+
+@functools.cache
 def prepare() -> None:
     """Import what nodes need but ROS, and load the compiled code by the design of a run (0.5 s of CPU)."""
     for module in MODULES:
@@ -128,21 +180,21 @@ def prepare() -> None:
     assert threads == 1, f"{threads} threads, of which a fork has one"
 
 
-def become(name: str, words: list[str], environment: dict[str, str], log: str) -> None:
-    """Be a node, in a fork, as `python -m` would; this does not return."""
+def become(module: str, words: list[str], environment: dict[str, str], files: list[str]) -> None:
+    """Be a program, in a fork, as `python -m` would; this does not return."""
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
-    for path, flags, files in ((os.devnull, os.O_RDONLY, (0,)), (log, os.O_WRONLY | os.O_APPEND, (1, 2))):
+    os.setsid()
+    for stream, (path, flags) in enumerate(zip(files, FLAGS, strict=False)):
         opened = os.open(path, flags)
-        for file in files:
-            os.dup2(opened, file)
+        os.dup2(opened, stream)
         os.close(opened)
     os.environ.clear()
     os.environ.update(environment)
-    sys.argv = [name, "--ros-args", *words]
+    sys.argv = [module.rpartition(".")[2], *words]
     status = 1
     try:
-        status = importlib.import_module(f"rsea_ros.nodes.{name}").main()
+        status = importlib.import_module(module).main()
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else 1
     except BaseException:

@@ -6,6 +6,7 @@ from contextlib import closing
 import pytest
 
 from rsea_ros.watch.command import PATIENCE, RELEASE
+from test.nodes.stalls import until
 from test.watch.browser import Browser
 
 HIDDEN = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true});" \
@@ -36,10 +37,7 @@ def text(page, name):
 
 
 def await_torque(commander):
-    deadline = time.monotonic() + 60.0
-    while (torque := commander.torque(time.monotonic())) is None or torque < 0.5:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    until(lambda: (commander.torque(time.monotonic()) or 0.0) >= 0.5, 60.0)
 
 
 def test_the_page_draws_without_an_error_and_contacts_only_its_server(page, server):

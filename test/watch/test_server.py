@@ -117,6 +117,16 @@ def test_a_page_whose_socket_is_lost_lets_go_at_once(server, commander):
     assert asyncio.run(talk()) < PATIENCE
 
 
+class Page:
+    """A page as the desk sees it. waiting: frames that it has not taken. got: what was sent."""
+
+    def __init__(self, waiting=0):
+        self.waiting, self.got = waiting, []
+
+    def send(self, text):
+        self.got.append(text)
+
+
 @pytest.mark.parametrize(
     ("message", "told"),
     [
@@ -131,33 +141,24 @@ def test_a_page_whose_socket_is_lost_lets_go_at_once(server, commander):
     ],
 )
 def test_a_page_is_informed_of_what_it_may_not_do(tmp_path, commander, message, told):
-    class Page:
-        waiting, got = 0, ""
-
-        def send(self, text):
-            self.got = text
-
     page = Page()
     Desk(commander, Runs(tmp_path)).act(page, message)
-    assert told in json.loads(page.got)["error"]
+    assert told in json.loads(page.got[0])["error"]
     assert not commander.active
 
 
 def test_a_page_may_only_look_unless_the_server_was_started_to_command(tmp_path):
-    desk, got = Desk(None, Runs(tmp_path)), []
-    page = type("Page", (), {"waiting": 0, "send": lambda self, text: got.append(text)})()
-    desk.act(page, json.dumps(HOLD))
-    assert "may only look; rsea watch --command" in got[0]
+    page = Page()
+    Desk(None, Runs(tmp_path)).act(page, json.dumps(HOLD))
+    assert "may only look; rsea watch --command" in page.got[0]
 
 
 def test_a_slow_page_misses_frames_and_nobody_waits(tmp_path):
-    desk, got = Desk(None, Runs(tmp_path)), []
-    page = type("Page", (), {"waiting": MOST_WAITING, "send": lambda self, text: got.append(text)})()
+    desk, page = Desk(None, Runs(tmp_path)), Page(MOST_WAITING)
     assert desk.enter(page)
     desk.send("frame")
-    assert got == []
-    others = [type("Page", (), {"waiting": 0, "send": got.append})() for _ in range(MOST_PAGES)]
-    assert [desk.enter(each) for each in others] == [True] * (MOST_PAGES - 1) + [False]
+    assert page.got == []
+    assert [desk.enter(Page()) for _ in range(MOST_PAGES)] == [True] * (MOST_PAGES - 1) + [False]
 
 
 def test_a_token_is_new_at_every_start_and_long():

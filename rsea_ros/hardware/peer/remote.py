@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from rsea_ros.errors import DeviceError
@@ -18,26 +17,28 @@ ROOT = Path(__file__).resolve().parents[3]
 class RemoteBench:
     """Start `rsea bench`; leave the block, and it is gone.
 
-    port, ft_port, page_port: where the motor, the RDT stream and the calibration are.
+    port, ft_port, page_port: where motor, RDT stream and calibration are. launch: what starts the driver.
     """
 
     def __init__(self, path: Path, *options: object) -> None:
         path = path.absolute()
         words = [str(o.absolute() if isinstance(o, Path) else o) for o in ("--port", path, *options)]
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "rsea_ros", "bench", "--requests", *words], cwd=ROOT,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
-        )  # fmt: skip
+        self._process = self._begin(["bench", "--requests", *words])
         place = self._receive()
         self.port, self.ft_port, self.page_port = str(path), int(place["ft_port"]), int(place["page_port"])
+        self.launch = str(place["launch"])
         self._encoder = {name: value for name, value in place.items() if name.startswith("encoder")}
+
+    def _begin(self, words: list[str]) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "rsea_ros", *words], cwd=ROOT,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
+        )  # fmt: skip
 
     def __enter__(self) -> RemoteBench:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
     def parameters(self) -> dict[str, object]:
@@ -50,10 +51,7 @@ class RemoteBench:
         }  # fmt: skip
 
     def hurry(self, priority: int = 50) -> bool:
-        """Let it answer at SCHED_FIFO: it represents hardware, which has its own processors.
-
-        Return whether that is permitted.
-        """
+        """Let it answer at SCHED_FIFO, as hardware with its own processors; return whether it may."""
         try:
             os.sched_setscheduler(self._process.pid, os.SCHED_FIFO, os.sched_param(priority))
         except PermissionError:

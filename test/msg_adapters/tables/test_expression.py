@@ -7,9 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from msg_adapters.tables import load_map
 from msg_adapters.tables.expression import parse
-from msg_adapters.tables.importing import import_record
 from rsea_ros.errors import ImportMapError
 
 T = np.linspace(0.0, 1.0, 101)
@@ -87,19 +85,11 @@ channels:
 """
 
 
-@pytest.fixture
-def imported(tmp_path):
-    def run(text):
-        rows = "".join(f"{k // 4},{k % 4 * 250_000_000},{k * k},{k}\n" for k in range(9))
-        (tmp_path / "run.csv").write_text(f"s,ns,phi,i\n{rows}")
-        (tmp_path / "map.yaml").write_text(MAP.format(text))
-        return import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
-
-    return run
+ROWS = "s,ns,phi,i\n" + "".join(f"{k // 4},{k % 4 * 250_000_000},{k * k},{k}\n" for k in range(9))
 
 
-def test_a_map_may_have_expressions(imported):
-    record = imported("derivative(phi)")
+def test_a_map_may_have_expressions(files):
+    record = files(MAP.format("derivative(phi)"), ROWS)
     assert np.allclose(record["command"].t, np.arange(9) * 0.25)
     assert np.allclose(record["velocity"].y[1:-1], np.radians(8.0 * np.arange(1, 8)))
 
@@ -113,6 +103,6 @@ def test_a_map_may_have_expressions(imported):
         ("1 / (i - i)", "run.csv: '1 / .i - i.' is inf at sample 1, expected a finite number"),
     ],
 )
-def test_mistakes_are_named_with_file_and_field(imported, text, message):
+def test_mistakes_are_named_with_file_and_field(files, text, message):
     with pytest.raises(ImportMapError, match=message):
-        imported(text)
+        files(MAP.format(text), ROWS)

@@ -16,30 +16,41 @@ MAPS = Path(__file__).resolve().parents[3] / "config" / "imports"
 BAD_MAPS = {
     "{": "not YAML",
     "time: {rate: 1}\nchannels: {current: {column: i, unit: A}}": "no 'current': map it as `command`",
-    MAP.replace("deg", "degrees"): "unit 'degrees' unknown, expected one of s, ms",
-    MAP.replace("sign: -1", "sign: 2"): r"channels.position.sign is 2.0, expected 1 or -1",
-    MAP.replace(
-        ", scale: 6.8", ""
-    ): r"channels.command\[0\]: unit 'mA' is a current, expected a torque, or a scale",
-    MAP.replace("position", "angle"): "channels: unknown key 'angle', expected command",
-    MAP.replace(
-        "unit: deg", "unit: mm"
-    ): "channels mix 'mm' and 'N m', expected a linear or a rotary machine",
-    MAP.replace("unit: s", "unit: rad"): "time: unit 'rad' is a angle, expected a time",
-    MAP.replace(
-        "time: {column: t, unit: s}", "time: {rate: 0}"
-    ): r"time.rate is 0.0, expected more than 0 Hz",
-    MAP.replace(
-        "time: {column: t, unit: s}", "time: {}"
-    ): "expected either a column with its unit, or a rate",
-    f"where: {{column: t}}\n{MAP}": "where: expected one of from, below, equals",
     "time: {rate: 1}\nchannels: {}": "channels is empty, expected some of command",
+    f"where: {{column: t}}\n{MAP}": "where: expected one of from, below, equals",
+    f"\ndelimiter: ''{MAP}": "line 2: delimiter is '', expected one of ','",
+    f'\ndelimiter: "\\n"{MAP}': "line 2: delimiter is '.*', expected one of ','",
+    f"\nwhere: {{column: yes, from: 1}}{MAP}": "line 2: where.column is True, expected a name",
+    f"\nwhere: {{column: load, from: .nan}}{MAP}": "line 2: where.from is nan, expected a number",
+    f"\nwhere: {{column: load, from: 1:30}}{MAP}": "line 2: where.from: '1:30' is sexagesimal",
+    f"\nabout: x\nabout: y{MAP}": "line 3: key 'about' stands twice, first in line 2",
 }
+CLOCK = "time: {column: t, unit: s}"
+BAD_TERMS = [
+    ("deg", "degrees", "unit 'degrees' unknown, expected one of s, ms"),
+    ("sign: -1", "sign: 2", "channels.position.sign is 2.0, expected 1 or -1"),
+    (", scale: 6.8", "", r"channels.command\[0\]: unit 'mA' is a current, expected a torque, or a scale"),
+    ("position", "angle", "channels: unknown key 'angle', expected command"),
+    ("unit: deg", "unit: mm", "channels mix 'mm' and 'N m', expected a linear or a rotary machine"),
+    ("unit: s", "unit: rad", "time: unit 'rad' is a angle, expected a time"),
+    (CLOCK, "time: {rate: 0}", "time.rate is 0.0, expected more than 0 Hz"),
+    (CLOCK, "time: {rate: 1e-300}", "line 2: time.rate is 1e-300, expected more than 0 Hz: 0.001 to"),
+    (CLOCK, "time: {}", "expected either a column with its unit, or a rate"),
+    ("scale: 6.8", "scale: .nan", r"line 5: channels.command\[0\].scale is nan, expected a number"),
+    ("scale: 6.8", "scale: 0", r"line 5: channels.command\[0\].scale is 0, expected another number"),
+    ("column: phi", "column: [phi]", r"line 4: channels.position.column is \['phi'\], expected a name"),
+    ("position: {", "position: [] #{", "line 4: channels.position is an empty list, expected a column"),
+    ("unit: deg", "unit: N m", "line 4: channels.position: unit 'N m' is a torque, expected a angle"),
+]
+"""Of MAP: what stands there, what is put in its place."""
 
 
-@pytest.mark.parametrize("text", BAD_MAPS)
-def test_senseless_maps_are_refused(files, tmp_path, text):
-    with pytest.raises(ImportMapError, match=BAD_MAPS[text]) as caught:
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [*BAD_MAPS.items(), *((MAP.replace(old, new), message) for old, new, message in BAD_TERMS)],
+)
+def test_senseless_maps_are_refused(files, tmp_path, text, message):
+    with pytest.raises(ImportMapError, match=message) as caught:
         files(text)
     assert str(caught.value).startswith(str(tmp_path / "map.yaml"))
     assert "\n" not in str(caught.value)
@@ -72,44 +83,6 @@ def test_files_that_do_not_fit_the_map_are_refused(files, tmp_path, text):
 def test_a_value_too_large_for_its_unit_is_refused(files):
     with pytest.raises(ImportMapError, match=r"command: i [+] load is too large for its unit"):
         files(MAP.replace("6.8", "1e250"), CSV.replace("1500", "1e200"))
-
-
-BAD_VALUES = {
-    "delimiter: ''": r"line 2: delimiter is '', expected one of ','",
-    'delimiter: "\\n"': r"line 2: delimiter is '.*', expected one of ','",
-    "where: {column: yes, from: 1}": r"line 2: where.column is True, expected a name",
-    "where: {column: load, from: .nan}": None,
-    "where: {column: load, from: 1:30}": r"line 2: where.from: '1:30' is sexagesimal",
-    "about: x\nabout: y": r"line 3: key 'about' stands twice, first in line 2",
-}
-
-
-@pytest.mark.parametrize("line", BAD_VALUES)
-def test_values_of_a_map_are_refused_with_their_line(files, line):
-    message = BAD_VALUES[line] or r"line 2: where.from is nan, expected a number"
-    with pytest.raises(ImportMapError, match=message):
-        files(f"\n{line}{MAP}")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("scale: 6.8", "scale: .nan", r"line 5: channels.command\[0\].scale is nan, expected a number"),
-        ("scale: 6.8", "scale: 0", r"line 5: channels.command\[0\].scale is 0, expected another number"),
-        (
-            "column: t, unit: s",
-            "rate: 1e-300",
-            r"line 2: time.rate is 1e-300, expected more than 0 Hz: 0.001 to",
-        ),
-        ("column: phi", "column: [phi]", r"line 4: channels.position.column is \['phi'\], expected a name"),
-        ("position: {", "position: [] #{", r"line 4: channels.position is an empty list, expected a column"),
-        ("unit: deg", "unit: N m", r"line 4: channels.position: unit 'N m' is a torque, expected a angle"),
-    ],
-)
-def test_terms_of_a_map_are_refused_with_their_line(files, old, new, message):
-    assert old in MAP
-    with pytest.raises(ImportMapError, match=message):
-        files(MAP.replace(old, new))
 
 
 def test_a_folder_and_a_pipe_are_refused(files, tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -76,8 +78,9 @@ def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, program, message
         read_columns(tmp_path / "run.mat", ["x"])
 
 
-def test_a_file_that_declares_more_than_memory_is_refused(tmp_path):
+def test_a_file_that_declares_more_than_memory_is_refused(tmp_path, monkeypatch):
     """A vector of a hundred million numbers that the file does not hold, declared in its header."""
+    monkeypatch.setattr(child, "subprocess", subprocess)  # which has limits
     savemat(tmp_path / "run.mat", {"x": np.arange(5.0)})
     data = (tmp_path / "run.mat").read_bytes()
     shape = np.array([1, 5], "<i4").tobytes()

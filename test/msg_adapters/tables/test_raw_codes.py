@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from msg_adapters.tables import import_record, load_map
 from msg_adapters.tables.raw_codes import raw_code
 from rsea_ros.errors import ImportMapError
 
+MAP = "time: {{column: t, unit: s}}\nchannels: {{{}}}\n"
 N = 3000
 T = np.arange(N) / 500
 
@@ -75,30 +75,25 @@ def test_codes_are_recognised_with_the_expression_that_reads_them(name, code, si
 
 
 @pytest.mark.parametrize(("bits", "gear"), [(10, 1.0), (16, 0.01)])
-def test_an_encoder_that_goes_round_is_unwrapped(bits, gear, tmp_path):
+def test_an_encoder_that_goes_round_is_unwrapped(bits, gear, files):
     turns = np.cumsum(0.01 * np.sin(2 * np.pi * 0.3 * T)) + 0.2
     counts = np.mod(np.rint(turns * 2**bits), 2**bits)
     what, remedy = raw_code("x", counts, gear * 2 * np.pi / 2**bits)
     assert what == f"encoder counts that begin anew at {2**bits}"
     rows = "".join(f"{t:.3f},{c:.0f}\n" for t, c in zip(T, counts, strict=True))
     expression, unit = remedy.replace("`", "").split(", unit")
-    record = imported(tmp_path, f"t,x\n{rows}", f"position: {{{expression}, unit{unit}}}")
+    record = files(MAP.format(f"position: {{{expression}, unit{unit}}}"), f"t,x\n{rows}")
     expected = gear * 2 * np.pi * turns
     np.testing.assert_allclose(np.ptp(record["position"].y), np.ptp(expected), rtol=2e-2)
     assert np.abs(np.diff(record["position"].y)).max() < 0.1 * gear
 
 
-def imported(folder, text, channels):
-    (folder / "run.csv").write_text(text)
-    (folder / "map.yaml").write_text(f"time: {{column: t, unit: s}}\nchannels: {{{channels}}}\n")
-    return import_record(folder / "run.csv", load_map(folder / "map.yaml"))
-
-
 ROWS = "t,i,u\n" + "".join(f"{k / 10},{(k % 21 - 10) % 65536},{k % 7}.5\n" for k in range(100))
 
 
-def test_a_channel_of_codes_is_left_out_and_reported(tmp_path):
-    record = imported(tmp_path, ROWS, "motor_torque: {column: i, unit: N m}, command: {column: u, unit: N m}")
+def test_a_channel_of_codes_is_left_out_and_reported(files):
+    both = "motor_torque: {column: i, unit: N m}, command: {column: u, unit: N m}"
+    record = files(MAP.format(both), ROWS)
     assert list(record.channels) == ["command"]
     (fault,) = record.faults
     assert (fault.kind, fault.channel) == ("raw_codes", "motor_torque")
@@ -109,8 +104,8 @@ def test_a_channel_of_codes_is_left_out_and_reported(tmp_path):
 
 
 @pytest.mark.parametrize("expression", ["int16(i)", "uint16(i)"])
-def test_an_expression_that_reads_the_codes_is_taken_at_its_word(expression, tmp_path):
-    record = imported(tmp_path, ROWS, f"motor_torque: {{expression: {expression}, unit: N m}}")
+def test_an_expression_that_reads_the_codes_is_taken_at_its_word(expression, files):
+    record = files(MAP.format(f"motor_torque: {{expression: {expression}, unit: N m}}"), ROWS)
     assert record["motor_torque"].y.min() == (-10 if expression == "int16(i)" else 0)
 
 
@@ -122,7 +117,7 @@ def test_an_expression_that_reads_the_codes_is_taken_at_its_word(expression, tmp
         ("position: {column: k, unit: rev, sign: -1}", "whole turns alone: counts of an encoder"),
     ],
 )
-def test_an_import_of_codes_alone_is_refused(channel, message, tmp_path):
+def test_an_import_of_codes_alone_is_refused(channel, message, files):
     text = "t,k,i\n" + "".join(f"{k / 10},{3 * k},{(k % 21 - 10) % 65536}\n" for k in range(200))
     with pytest.raises(ImportMapError, match=message):
-        imported(tmp_path, text, channel)
+        files(MAP.format(channel), text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from msg_adapters.tables import import_record, load_map, summary
+from msg_adapters.tables import load_map, summary
 from rsea_ros.errors import ImportMapError
 
 ANGLES = np.r_[np.arange(-20, 21), np.arange(20, -21, -1)] / 1000
@@ -23,21 +23,14 @@ channels:
 """
 
 
-def imported(folder, content, mapping):
-    (folder / "run.csv").write_text(content)
-    (folder / "map.yaml").write_text(mapping)
-    mapping = load_map(folder / "map.yaml")
-    return import_record(folder / "run.csv", mapping), mapping
-
-
 def calibration():
     rng = np.random.default_rng(0)
     rows = (f"{q},{200 * q / 6.8},{198 * q + rng.normal(0, 0.02)}" for q in ANGLES)
     return "q,u,f\n" + "\n".join(rows) + "\n"
 
 
-def test_a_static_calibration_gives_the_stiffness_with_its_interval(tmp_path):
-    record, _ = imported(tmp_path, calibration(), STATIC)
+def test_a_static_calibration_gives_the_stiffness_with_its_interval(files):
+    record = files(STATIC, calibration())
     line = next(note for note in record.notes if note.startswith("ft over deflection"))
     slope, half = line.split(": ")[1].split(" N·m/rad")[0].split(" ± ")
     assert abs(float(slope) - 198) < float(half) < 0.5
@@ -45,13 +38,15 @@ def test_a_static_calibration_gives_the_stiffness_with_its_interval(tmp_path):
     assert set(record.channels) == {"deflection", "ft"}  # no verb may take a second a reading for a run
 
 
-def test_what_can_be_done_without_a_run_is_told(tmp_path):
-    record, mapping = imported(tmp_path, calibration(), STATIC)
-    assert "need the record of a motion" in " ".join(summary(record, mapping))
-    record, mapping = imported(tmp_path, RUN, MEASURED)
-    assert "no command: `check` compares the channels" in summary(record, mapping)[-1]
+def test_what_can_be_done_without_a_run_is_told(files, tmp_path):
+    for text, rows, said in (
+        (STATIC, calibration(), "need the record of a motion"),
+        (MEASURED, RUN, "no command: `check` compares the channels"),
+    ):
+        record = files(text, rows)
+        assert said in " ".join(summary(record, load_map(tmp_path / "map.yaml")))
 
 
-def test_a_map_without_a_time_is_told_what_there_is(tmp_path):
+def test_a_map_without_a_time_is_told_what_there_is(files):
     with pytest.raises(ImportMapError, match=r"expected .* or `set_points` for readings"):
-        imported(tmp_path, calibration(), STATIC.partition("\n")[2])
+        files(STATIC.partition("\n")[2], calibration())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from msg_adapters.tables import import_record, load_map
 from rsea_ros.errors import ImportMapError
 
 MAP = """time: {column: t, unit: s}
@@ -40,59 +39,47 @@ TEXTS = {
 }
 
 
-def import_file(folder, text, more=""):
-    (folder / "run.csv").write_text(text)
-    (folder / "map.yaml").write_text(MAP + more)
-    return import_record(folder / "run.csv", load_map(folder / "map.yaml"))
-
-
 @pytest.mark.parametrize("name", TEXTS)
-def test_it_is_read(name, tmp_path):
-    command = import_file(tmp_path, *TEXTS[name])["command"]
+def test_it_is_read(name, files):
+    text, more = TEXTS[name]
+    command = files(MAP + more, text)["command"]
     np.testing.assert_allclose(command.t, STAMPS, atol=1e-12 if "date" not in name else 3e-7)
     np.testing.assert_allclose(command.y, VALUES)
 
 
 @pytest.mark.parametrize("decimal", ["", 'decimal: ","\n'])
 @pytest.mark.parametrize("sign", [".", ","])
-def test_a_table_without_names_is_read_or_refused_with_the_line_that_reads_it(decimal, sign, tmp_path):
+def test_a_table_without_names_is_read_or_refused_with_the_line_that_reads_it(decimal, sign, files):
     numbered = MAP.replace("column: t", "column: 1").replace("column: u", "column: 2")
-    (tmp_path / "run.csv").write_text("0.0;1.5\n0.1;-2.5\n0.2;1500\n".replace(".", sign))
-    (tmp_path / "map.yaml").write_text(numbered + decimal)
+    text = "0.0;1.5\n0.1;-2.5\n0.2;1500\n".replace(".", sign)
     if sign == "," and not decimal:
         with pytest.raises(ImportMapError, match='`decimal: ","` in the map'):
-            import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
+            files(numbered, text)
         return
-    record = import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
-    np.testing.assert_allclose(record["command"].y, VALUES)
+    np.testing.assert_allclose(files(numbered + decimal, text)["command"].y, VALUES)
 
 
-def test_what_is_left_out_is_noted(tmp_path):
-    notes = " ".join(import_file(tmp_path, *TEXTS["preamble and units"]).notes)
+def test_what_is_left_out_is_noted(files):
+    notes = " ".join(files(MAP, TEXTS["preamble and units"][0]).notes)
     assert "lines 1 to 2 above the names of the columns are left out" in notes
     assert "line 4 is taken for the units: s;Nm" in notes
 
 
-@pytest.mark.parametrize("row", ["0x10,1.5", "12:30,s", "1.2.3,N m"])
-def test_a_first_row_with_a_number_that_is_none_is_refused_as_before(row, tmp_path):
-    with pytest.raises(ImportMapError, match="line 2, column 't' is"):
-        import_file(tmp_path, f"t,u\n{row}\n0,1.5\n0.1,-2.5\n")
+DATES = "t,u\n2025-{}-12T10:03:29Z,1.5\n2025-{}-12T10:03:30Z,2\n"
 
 
 @pytest.mark.parametrize(
-    ("text", "more", "message"),
+    ("text", "unit", "message"),
     [
-        ("t,u\n2025-13-12T10:03:29Z,1.5\n2025-13-12T10:03:30Z,2\n", "", "line 2, column 't' .*month must be"),
-        ("t,u\n0,1.5,7\n0.1,-2.5,8\n", "", "has 3 fields, expected 2.*if a column has no name, number"),
+        # a first row with a number that is none is no row of units
+        ("t,u\n0x10,1.5\n0,1.5\n0.1,-2.5\n", "s", "line 2, column 't' is"),
+        ("t,u\n12:30,s\n0,1.5\n0.1,-2.5\n", "s", "line 2, column 't' is"),
+        ("t,u\n1.2.3,N m\n0,1.5\n0.1,-2.5\n", "s", "line 2, column 't' is"),
+        (DATES.format(13, 13), "s", "line 2, column 't' .*month must be"),
+        (DATES.format(11, 11), "ms", "time.unit is 'ms', and t holds date-times, expected s"),
+        ("t,u\n0,1.5,7\n0.1,-2.5,8\n", "s", "has 3 fields, expected 2.*if a column has no name, number"),
     ],
 )
-def test_what_cannot_be_read_is_one_line(text, more, message, tmp_path):
+def test_what_cannot_be_read_is_one_line(text, unit, message, files):
     with pytest.raises(ImportMapError, match=message):
-        import_file(tmp_path, text, more)
-
-
-def test_date_times_have_no_other_unit_than_seconds(tmp_path):
-    (tmp_path / "run.csv").write_text("t,u\n2025-11-12T10:03:29Z,1.5\n2025-11-12T10:03:30Z,-2.5\n")
-    (tmp_path / "map.yaml").write_text(MAP.replace("unit: s", "unit: ms"))
-    with pytest.raises(ImportMapError, match=r"time.unit is 'ms', and t holds date-times, expected s"):
-        import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
+        files(MAP.replace("unit: s", f"unit: {unit}"), text)
