@@ -148,7 +148,7 @@ def _piece(
     spring: SpringStart | None,
 ) -> Case:  # fmt: skip
     """Return the part of a case from a step with a state and a spring to a time since its start, s."""
-    last, start = math.ceil(end / drive.step), drive.start + first * drive.step
+    last, start = math.ceil(end / drive.step) + 1, drive.start + first * drive.step  # with what follows
     compared = start + run_up
     inside = {n: (t >= start) & (t < drive.start + end) for n, t in case.t.items()}
     cut = replace(
