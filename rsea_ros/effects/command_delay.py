@@ -48,6 +48,10 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     x[0] = (now + 1) % LENGTH
     new, old = (now - whole) % LENGTH, (now - whole - 1) % LENGTH
     last, middle, first = x[ENDS + new], x[ENDS + old], x[ENDS + (old - 1) % LENGTH]
+    if first == middle == last and not targeted:
+        s[COMMAND] = s[HELD] = middle
+        put_beside(s, middle, middle)
+        return
     late = max(_until(first, middle, x[MEANS + old]) - (1.0 - part), 0.0)  # of the step: first still acts
     early = max(1.0 - part - _until(middle, last, x[MEANS + new]), 0.0)  # last acts already
     mean = late * first + (1.0 - late - early) * middle + early * last

@@ -95,7 +95,8 @@ class Injector:
         size = _SHARE * (1.0 if self.rig.loop else float(np.max(np.abs(drive.command), initial=1e-9)))
         out = (self._run(torque * (size / largest), place) - self.base) * (largest / size)
         at = {n: (t - drive.start) / drive.step for n, t in self.sampled.items()}
-        return {n: sample(n, out[:, OUTPUTS.index(n)], at[n]) for n in at}
+        smooth = np.zeros(len(drive.command))
+        return {n: sample(n, out[:, OUTPUTS.index(n)], at[n], smooth) for n in at}
 
     def raw(self, torque: FloatArray, place: Place) -> FloatArray:
         """Return the response of all OUTPUTS to a torque (N m) at the ends of the steps, the start first."""

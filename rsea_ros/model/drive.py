@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -256,6 +256,12 @@ class Drive:
     def simulated(self) -> tuple[tuple[int, int], ...]:
         """First step and end of each part that is simulated."""
         return self.spans or ((0, len(self.command)),)
+
+    @cached_property
+    def mixes(self) -> bool:
+        """Whether a command changes within a step."""
+        change = np.diff(self.command)
+        return self.jumps and bool((change[:-1] * change[1:] > 0.0).any())
 
     @property
     def drift_time(self) -> float:

@@ -101,17 +101,18 @@ NOTHING_WITHIN = np.empty((0, 4))
 
 
 def sample(
-    name: str, values: FloatArray, at: FloatArray, within: FloatArray = NOTHING_WITHIN, *, late: bool = False
-) -> FloatArray:
+    name: str, values: FloatArray, at: FloatArray, held: FloatArray, within: FloatArray = NOTHING_WITHIN, *,
+    late: bool = False,
+) -> FloatArray:  # fmt: skip
     """Return a simulated channel at instants in steps since the start.
 
-    values: at the ends of the steps, the initial one first, shape (steps + 1,). within: what is held in each
-    step and jumps, shape (steps, 4), or nothing. late: the command acts at a time of its own; otherwise a
-    current read up to half a step after a command is still that of the command before.
+    values: at the ends of the steps, the initial one first, shape (steps + 1,). held: what is held in each
+    step and jumps, 0 where nothing does. within: see _beside_mean, or nothing. late: the command acts at a
+    time of its own; otherwise a current read up to half a step after a command is still that of the one before.
     """
     if name == "motor_torque":
         return np.asarray(_sample_held(values, at, within, ON_GRID if late else 0.5))
-    return np.asarray(_sample_smooth(values, at, within[:, 0] if len(within) else np.zeros(len(values) - 1)))
+    return np.asarray(_sample_smooth(values, at, held))
 
 
 SLOW = 0.1
@@ -213,17 +214,21 @@ def _drive_outputs(
     spans = drive.simulated
     edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
     for part, (first, end) in enumerate(spans):
-        out, within = _over_span(machine, rig, drive, ridden, first, end)
+        held = drive.command[first:end] if drive.jumps else np.zeros(end - first)
+        within = np.zeros((end - first, 4)) if late or drive.mixes else NOTHING_WITHIN
+        if len(within):
+            within[:, 0] = held
+            held = within[:, 0]
+        out = _over_span(machine, rig, drive, ridden, within, first, end)
         if on_angle:
             steady = _without_noise(drive, out[1:, 0], first, end) * rig["gear.ratio"]
-            out, within = _over_span(machine, rig, drive, steady, first, end)
-        jumps = within[:, 1].any()
+            out = _over_span(machine, rig, drive, steady, within, first, end)
         for at, sampled in zip(wanted, results, strict=True):
             for n, k in channels.items():
                 inside = np.searchsorted(edges, at[n]) == part if edges else slice(None)
                 since = at[n][inside] - first
-                sampled[n][inside] = sample(n, out[:, k], since, within, late=late)
-                if jumps and (kick := _kick(machine, n)) != 0.0:
+                sampled[n][inside] = sample(n, out[:, k], since, held, within, late=late)
+                if len(within) and (kick := _kick(machine, n)) != 0.0:
                     sampled[n][inside] += kick * drive.step * _beside_mean(within, since)
     return results
 
@@ -239,10 +244,10 @@ def _without_noise(drive: Drive, simulated: FloatArray, first: int, end: int) ->
 
 
 def _over_span(
-    machine: Machine, rig: Rig, drive: Drive, ridden: FloatArray, first: int, end: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return OUTPUTS at the ends of the steps of a span, those at its beginning first, and `within`."""
-    out, within = np.empty((end - first + 1, len(OUTPUTS))), np.empty((end - first, 4))
+    machine: Machine, rig: Rig, drive: Drive, ridden: FloatArray, within: FloatArray, first: int, end: int
+) -> FloatArray:
+    """Return OUTPUTS at the ends of the steps of a span, those at its beginning first. within: StepInputs."""
+    out = np.empty((end - first + 1, len(OUTPUTS)))
     torque, reference = drive.command, drive.reference
     if rig.loop is not None:
         torque, reference = np.zeros(len(drive.command)), drive.command
@@ -260,7 +265,7 @@ def _over_span(
         )  # fmt: skip
         advance(machine.linear, machine.calls, inputs, state, out[start + 1 : stop - first + 1])
         out[start, 2] = out[start + 1, 2]
-    return out, within
+    return out
 
 
 def _instants(rig: Rig, drive: Drive, channel: str, at: FloatArray) -> FloatArray:

@@ -86,8 +86,8 @@ class StepInputs(NamedTuple):
 
     command: N m, held over each step. reference: rad, target of a position loop; ridden: rad, measured rotor
     angle at the middle of each step; both may be empty. start: time of the first step, s. jumps: the command
-    is held between its stamps. within: gets HELD, BEFORE and AFTER of each step behind the effects, and
-    CURRENT_BEFORE, shape (steps, 4); or (0, 4).
+    is held between its stamps. within: HELD of each step and zeros, shape (steps, 4), or (0, 4); where
+    an effect changes it, or the command changes within the step, it gets HELD, BEFORE, AFTER, CURRENT_BEFORE.
     """
 
     command: FloatArray
@@ -192,18 +192,21 @@ def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
     s, effect_x = state.table, state.effect_x
     h, x = s[st.STEP], _state(state.x, linear.rest)
     s_at, p_at, effect_x_at = s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data
-    last = len(command) - 1
+    last, is_kept = len(command) - 1, len(within) > 0
     for k in range(last + 1):
         s[st.TIME], s[st.COMMAND], s[st.CURRENT] = start + k * h, command[k], command[k]
-        s[st.HELD] = 0.0
-        if jumps:
-            s[st.HELD] = reference[k] if s[st.TARGETED] != 0.0 else command[k]
-            put_beside(s, command[max(k - 1, 0)], command[min(k + 1, last)])
+        earlier, later = command[max(k - 1, 0)], command[min(k + 1, last)]
+        if jumps and (earlier - command[k]) * (later - command[k]) < 0.0:
+            put_beside(s, earlier, later)
+        elif s[st.BEFORE] != 0.0:
+            s[st.BEFORE] = s[st.AFTER] = 0.0
         if len(reference) > 0:
             s[st.REFERENCE] = reference[k]
+        if is_kept:
+            s[st.HELD] = within[k, 0]
         call_port(_COMMAND, calls, s_at, p_at, effect_x_at)
         call_port(_MOTOR, calls, s_at, p_at, effect_x_at)
-        if len(within) > 0:
+        if is_kept and (s[st.BEFORE] != s[st.AFTER] or s[st.HELD] != within[k, 0]):
             within[k, 0], within[k, 1] = s[st.HELD], s[st.BEFORE]
             within[k, 2], within[k, 3] = s[st.AFTER], s[st.CURRENT_BEFORE]
         free = end = _free(linear, s[st.COMMAND], x)
