@@ -169,7 +169,7 @@ def blocks(
 ) -> Iterator[Block]:
     """Sort the messages of a topic by layout.
 
-    damaged: called with index and reason of each damaged message; they are left out.
+    damaged: takes index and reason of each damaged message; they are left out.
     Raises BagError where no message is left; `where` (file and topic) is for its text.
     """
     damaged = {} if damaged is None else damaged

@@ -89,10 +89,6 @@ def _mark_overlong(blocks_of_topic: list[Block], damaged: dict[int, str]) -> Non
             damaged.update(dict.fromkeys(block.rows.tolist(), reason))
 
 
-STAMP_SIZE = 8
-"""Bytes of a header before its frame_id."""
-
-
 def is_inferred(contents: Contents, topics: TopicMap) -> bool:
     """Return whether `ft` is a rig's stiffness times `deflection`: it has that one's frame_id, no sensor's.
 
@@ -109,7 +105,7 @@ def _frame(contents: Contents, topic: str) -> str:
         return ""
     try:
         walk = Walk(messages.raw[0])
-        walk.skip(STAMP_SIZE)
+        walk.skip(8)  # the stamp of the header, before its frame_id
         return walk.read_text()
     except ValueError:  # damaged; the decoder reports it
         return ""

@@ -67,7 +67,7 @@ class _Scanner:
             self.declared.channels[key] = channel
             self.sinks[key] = contents.sink(*channel)
         self.read: Counter[str] = Counter()
-        self.ended = self.closed = False
+        self.ended = False
 
     def add(self, kind: str, detail: str, count: int = 1) -> None:
         """Count damage; the first detail of a kind is kept."""
@@ -130,10 +130,6 @@ class _Scanner:
         elif opcode in (mcap.DATA_END, mcap.FOOTER):
             self.ended = True
             self._check_data(buffer, opcode, first, stop)
-        elif opcode == mcap.METADATA:
-            self._metadata(buffer, first, stop)
-        elif opcode == mcap.STATISTICS and self.summary.total is None:
-            self._statistics(buffer, first, stop)
         elif opcode == mcap.ATTACHMENT:
             checksum = mcap.number(buffer, stop - 4, 4, stop) if stop - first > 4 else 0
             if checksum and zlib.crc32(buffer[first : stop - 4]) != checksum:
@@ -143,44 +139,39 @@ class _Scanner:
             self._small(buffer, opcode, first, stop, 0)
 
     def _metadata(self, buffer: mcap.Buffer, first: int, stop: int) -> None:
-        try:
-            name, at = mcap.text(buffer, first, stop)
-            if name != REMARKS:
-                return
-            at, texts = at + 4, {}
-            while at < stop:
-                key, at = mcap.text(buffer, at, stop)
-                texts[key], at = mcap.text(buffer, at, stop)
-        except ValueError as error:
-            self.add("damaged_records", f"at byte {first}: {error}", stop - first)
+        name, at = mcap.text(buffer, first, stop)
+        if name != REMARKS:
             return
+        at, texts = at + 4, {}
+        while at < stop:
+            key, at = mcap.text(buffer, at, stop)
+            texts[key], at = mcap.text(buffer, at, stop)
         remarks = remarks_of(texts)
         self.contents.notes.extend(remarks.notes)
         self.contents.faults.extend(remarks.faults)
 
-    def _statistics(self, buffer: mcap.Buffer, first: int, stop: int) -> None:
-        """Read the statistics of a file whose footer does not lead to them."""
-        try:
-            mcap.take_statistics(buffer, first, stop, self.summary)
-        except ValueError as error:
-            self.add("damaged_records", f"at byte {first}: {error}", stop - first)
-
     def _small(self, buffer: mcap.Buffer, opcode: int, first: int, stop: int, base: int) -> None:
-        """Process a record that may also lie in a chunk, whose records begin at byte `base` of the file."""
-        if opcode == mcap.MESSAGE:
-            self._message(buffer, first, stop, base)
-        elif opcode in (mcap.SCHEMA, mcap.CHANNEL):
-            try:
-                if opcode == mcap.SCHEMA:
-                    self.declared.schema(buffer, first, stop)
-                else:
-                    key = self.declared.channel(buffer, first, stop)
-                    self.sinks[key] = self.contents.sink(*self.declared.channels[key])
-            except ValueError as error:
-                self.add("damaged_records", f"at byte {base + first}: {error}", stop - first)
-        elif opcode not in mcap.KNOWN or (base and opcode != mcap.MESSAGE):
-            where = f"at byte {base or first}" if not base else f"in the chunk at byte {base}"
-            self.add("unknown_records", f"opcode {opcode:#04x} {where}")
+        """Process a record of a file or of a chunk, whose records begin at byte `base` of the file.
+
+        Statistics count where the footer does not lead to them.
+        """
+        try:
+            if opcode == mcap.MESSAGE:
+                self._message(buffer, first, stop, base)
+            elif opcode == mcap.SCHEMA:
+                self.declared.schema(buffer, first, stop)
+            elif opcode == mcap.CHANNEL:
+                key = self.declared.channel(buffer, first, stop)
+                self.sinks[key] = self.contents.sink(*self.declared.channels[key])
+            elif base or opcode not in mcap.KNOWN:
+                where = f"in the chunk at byte {base}" if base else f"at byte {first}"
+                self.add("unknown_records", f"opcode {opcode:#04x} {where}")
+            elif opcode == mcap.METADATA:
+                self._metadata(buffer, first, stop)
+            elif opcode == mcap.STATISTICS and self.summary.total is None:
+                mcap.take_statistics(buffer, first, stop, self.summary)
+        except ValueError as error:
+            self.add("damaged_records", f"at byte {base + first}: {error}", stop - first)
 
     def _message(self, buffer: mcap.Buffer, first: int, stop: int, base: int) -> None:
         if stop - first < mcap.MESSAGE_HEAD.size:

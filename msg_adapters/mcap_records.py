@@ -91,29 +91,26 @@ def read_summary(buffer: Buffer) -> McapSummary:
     end = footer + RECORD.size + FOOTER_CONTENT.size - 4
     if checksum and zlib.crc32(buffer[start:end]) != checksum:
         return McapSummary(damage="the checksum of the summary does not fit its content")
+    at = start
     try:
-        _records(buffer, start, footer, summary)
+        while at < footer:
+            opcode, size = RECORD.unpack_from(buffer, at)
+            first = at + RECORD.size
+            at = first + size
+            if at > footer:
+                raise ValueError(f"a record ends at byte {at}, behind the footer at {footer}")
+            if opcode == SCHEMA:
+                summary.declared.schema(buffer, first, at)
+            elif opcode == CHANNEL:
+                summary.declared.channel(buffer, first, at)
+            elif opcode == CHUNK_INDEX:
+                summary.chunks.append(number(buffer, first + 16, 8, at))
+            elif opcode == STATISTICS:
+                take_statistics(buffer, first, at, summary)
     except (ValueError, struct.error) as error:
         return McapSummary(damage=f"the summary is damaged: {error}")
-    return summary
-
-
-def _records(buffer: Buffer, at: int, stop: int, summary: McapSummary) -> None:
-    while at < stop:
-        opcode, size = RECORD.unpack_from(buffer, at)
-        first = at + RECORD.size
-        at = first + size
-        if at > stop:
-            raise ValueError(f"a record ends at byte {at}, behind the footer at {stop}")
-        if opcode == SCHEMA:
-            summary.declared.schema(buffer, first, at)
-        elif opcode == CHANNEL:
-            summary.declared.channel(buffer, first, at)
-        elif opcode == CHUNK_INDEX:
-            summary.chunks.append(number(buffer, first + 16, 8, at))
-        elif opcode == STATISTICS:
-            take_statistics(buffer, first, at, summary)
     summary.chunks.sort()
+    return summary
 
 
 def take_statistics(buffer: Buffer, first: int, stop: int, summary: McapSummary) -> None:

@@ -94,7 +94,7 @@ def metadata_of(bag: Path, contents: Contents) -> Known:
         contents.notes.append(f"{path}: not understood, read from the files beside it")
         contents.tell("damaged_metadata", NAME, f"not understood ({_why(error)}), read without it")
         return Known()
-    for missing in (file for file in known_content.files if not file.exists()):
+    if missing := next((file for file in known_content.files if not file.exists()), None):
         raise BagError(f"{path}: names {brief(missing.name)}, which is not there")
     return known_content
 
@@ -157,7 +157,19 @@ def text(
         "version": VERSION,
         "storage_identifier": storage,
         **_amount(topics, span),
-        "topics_with_message_count": [_topic(topic) for topic in topics],
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic.name,
+                    "type": topic.msgtype,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": [],
+                    "type_description_hash": topic.digest,
+                },
+                "message_count": topic.count,
+            }
+            for topic in topics
+        ],
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file.name],
@@ -173,17 +185,4 @@ def _amount(topics: Sequence[Topic], span: tuple[int, int]) -> dict[str, Any]:
         "duration": {"nanoseconds": span[1] - span[0]},
         "starting_time": {"nanoseconds_since_epoch": span[0]},
         "message_count": sum(topic.count for topic in topics),
-    }
-
-
-def _topic(topic: Topic) -> Mapping[str, Any]:
-    return {
-        "topic_metadata": {
-            "name": topic.name,
-            "type": topic.msgtype,
-            "serialization_format": "cdr",
-            "offered_qos_profiles": [],
-            "type_description_hash": topic.digest,
-        },
-        "message_count": topic.count,
     }

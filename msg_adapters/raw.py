@@ -8,7 +8,7 @@ import math
 import struct
 from collections.abc import Sequence
 
-from msg_adapters.cdr import STAMP, MessageLayout, layout_of
+from msg_adapters.cdr import STAMP, layout_of
 from msg_adapters.topic_map import JOINT_STATE
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import ParameterError
@@ -59,7 +59,8 @@ class RawReader:
         for name in {name for name, _ in self._fields if self._msgtype == JOINT_STATE}:
             if (count := layout.fields[name][1]) > max(len(layout.names), self._most):
                 raise ParameterError(f"{count} numbers of {name}, expected at most one for each joint")
-        self._at = [_position(layout, name, place + index) for name, index in self._fields]
+        places = [(*layout.fields[name], place + index) for name, index in self._fields]
+        self._at = [first + 8 * at if at < count else 0 for first, count, at in places]  # 0: not in it
         self._fixed = [(a, b, raw[a:b]) for a, b in _join_runs(layout.structure)]
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))
         self._length = len(raw)
@@ -94,12 +95,6 @@ class RawWriter:
         for at, value in zip(self._at, values, strict=False):
             pack(self._bytes, at, value)
         return bytes(self._bytes)
-
-
-def _position(layout: MessageLayout, name: str, index: int) -> int:
-    """Return the first byte of a number, 0 where the message does not have it."""
-    first, count = layout.fields[name]
-    return first + 8 * index if index < count else 0
 
 
 def _join_runs(runs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:

@@ -67,7 +67,9 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
         for name, one in series.items():
             if name in ("command", "reference"):
                 bags.check_finite(one)
-            bags.note_repeats(one, report.notes)
+            if repeats := len(one.stamps) - len(np.unique(one.stamps)):
+                repeated = f"{repeats} of {len(one.stamps)} stamps repeat"
+                report.notes.append(f"{one.where}: {repeated}, the first of each kept")
     series = bags.on_the_clock_of_the_command(series, report)
     _require_values(source, series, strict, report)
     tell_health(contents, report, topics.namespace)
@@ -78,7 +80,8 @@ def _record(series: Mapping[str, bags.FieldSamples], source: str, report: Conten
     epoch = min(int(one.stamps.min()) for one in series.values())
     channels: dict[str, Channel] = {}
     for name, one in series.items():
-        ordered, faults = in_order(Channel(_seconds(one.stamps - epoch), one.values), name)
+        t = np.asarray((one.stamps - epoch) * 1e-9, np.float64)
+        ordered, faults = in_order(Channel(t, one.values), name)
         channels[name] = ordered
         report.faults += faults
     record = Record(channels, source, epoch, tuple(dict.fromkeys(report.notes)), tuple(report.faults))
@@ -86,10 +89,6 @@ def _record(series: Mapping[str, bags.FieldSamples], source: str, report: Conten
         return record
     repaired, faults = repair_stamps(record)
     return replace(repaired, faults=(*record.faults, *faults))
-
-
-def _seconds(nanoseconds: IntArray) -> FloatArray:
-    return np.asarray(nanoseconds * 1e-9, np.float64)
 
 
 def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) -> None:

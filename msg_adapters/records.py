@@ -68,7 +68,12 @@ class _Series:
     def messages(self, part: slice) -> list[bytes]:
         """Return some messages, serialised."""
         values = {field: column[part] for field, column in self.values.items()}
-        return _encode(self.stamps[part], values, self.topics)
+        if "wrench" not in values:
+            return cdr.joint_states(self.stamps[part], self.topics.joint or JOINT, **values)
+        wrench = np.zeros((len(values["wrench"]), len(AXES)))
+        sign, index = sign_and_index(self.topics.axis)
+        wrench[:, index] = sign * values["wrench"]
+        return cdr.wrenches(self.stamps[part], wrench)
 
 
 def _check_apart(series: Sequence[_Series]) -> None:
@@ -124,15 +129,6 @@ def _stamps(record: Record, name: str, t: FloatArray) -> IntArray:
         stamp = f"{record.source or 'record'}: {name}: stamp {k} is {since[k]:.6g} s since 1970"
         raise BagError(f"{stamp}, expected 0 to {LATEST:.0f}")
     return record.epoch_ns + np.rint(t * 1e9).astype(np.int64)
-
-
-def _encode(stamps: IntArray, values: Mapping[str, FloatArray], topics: TopicMap) -> list[bytes]:
-    if "wrench" not in values:
-        return cdr.joint_states(stamps, topics.joint or JOINT, **values)
-    wrench = np.zeros((len(stamps), len(AXES)))
-    sign, index = sign_and_index(topics.axis)
-    wrench[:, index] = sign * values["wrench"]
-    return cdr.wrenches(stamps, wrench)
 
 
 def write_overlay(records: Mapping[str, Record], path: str | Path) -> None:

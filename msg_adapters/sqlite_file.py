@@ -6,7 +6,7 @@ they stand, without their journals, and no more than the file can hold.
 
 import os
 import sqlite3
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -27,7 +27,7 @@ JOURNALS = ("-wal", "-journal")
 
 _STEPS = 10_000
 _STEPS_PER_BYTE = 20
-"""Steps of sqlite's machine: a row takes some 12 of them and not less than 5 bytes."""
+"""Steps of sqlite's machine until a query is stopped: a row takes some 12 and not less than 5 bytes."""
 _STEPS_AT_LEAST = 10_000_000
 _ROW = 4
 """Bytes that a row takes at the least."""
@@ -52,24 +52,19 @@ def scan(path: Path, contents: Contents, allowance: Allowance) -> None:
     if cut_off:
         contents.notes.append("cut off, read as far as it goes")
         contents.tell("cut_off", path.name, f"{size} bytes of {pages} pages, read as far as it goes")
-    _look_for_journals(path, contents)
+    for journal in (path.with_name(path.name + suffix) for suffix in JOURNALS):
+        if journal.exists() and journal.stat().st_size:  # with changes that are not in the file, or to undo
+            detail = f"{journal.name} was left aside (recorder killed?): the last rows may be missing"
+            contents.tell("cut_off", path.name, detail)
+    budget = iter(range(max(_STEPS_AT_LEAST, _STEPS_PER_BYTE * size) // _STEPS))
     try:
         with closing(_connect(path, cut_off)) as database:
-            database.set_progress_handler(_allowance(size), _STEPS)
+            database.set_progress_handler(lambda: next(budget, None) is None, _STEPS)
             _check_tables(database)
             _messages(database, _topics(database, path, contents), contents, path, size)
             _remarks(database, path, contents)
     except (sqlite3.Error, sqlite3.Warning) as error:
         raise ValueError(f"no rosbag2 database: {error}") from None
-
-
-def _look_for_journals(path: Path, contents: Contents) -> None:
-    """Report a journal with changes that are not in the file yet, or must be undone."""
-    for suffix in JOURNALS:
-        journal = path.with_name(path.name + suffix)
-        if journal.exists() and journal.stat().st_size:
-            detail = f"{journal.name} was left aside (recorder killed?): the last rows may be missing"
-            contents.tell("cut_off", path.name, detail)
 
 
 def _connect(path: Path, cut_off: bool) -> sqlite3.Connection:
@@ -82,18 +77,6 @@ def _connect(path: Path, cut_off: bool) -> sqlite3.Connection:
     for pragma in (*PRAGMAS, *(("writable_schema=ON",) if cut_off else ())):
         database.execute(f"PRAGMA {pragma}")
     return database
-
-
-def _allowance(size: int) -> Callable[[], bool]:
-    """Return a handler that stops a query that takes too long for the size of the file."""
-    left = max(_STEPS_AT_LEAST, _STEPS_PER_BYTE * size)
-
-    def over() -> bool:
-        nonlocal left
-        left -= _STEPS
-        return left < 0
-
-    return over
 
 
 def _check_tables(database: sqlite3.Connection) -> None:

@@ -163,7 +163,10 @@ class BagWriter:
                 raise self._error(failure) from None
             finally:
                 if not complete:
-                    self._abandon()
+                    with suppress(OSError):
+                        self._storage.abort()
+                    if not self._recording:
+                        self._clear()
                 self._release()
 
     def _check_name(self) -> None:
@@ -213,12 +216,6 @@ class BagWriter:
         files.remove(self.partial / metadata.NAME)
         files.write_new(self.partial / metadata.NAME, known)
         files.give_names([(self.partial, self.path)], force=self._force)
-
-    def _abandon(self) -> None:
-        with suppress(OSError):
-            self._storage.abort()
-        if not self._recording:
-            self._clear()
 
     def _clear(self) -> None:
         """Remove the new files, and the folders above them where they are empty."""

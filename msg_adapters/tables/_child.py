@@ -30,7 +30,7 @@ def main(reader: dict[str, Any], path: str, limit: int, places: list[dict[str, A
         answer({"column": error.args[0], "names": error.args[-1]})
     except MemoryError:
         answer({"error": f"asks for more than {memory >> 30} GB of memory"})
-    except reader["REFUSED"] as error:
+    except reader["Refused"] as error:
         answer({"error": str(error)})
     except Exception:  # a damaged file may raise anything in the reader
         answer({"error": reader["DAMAGED"]})

@@ -15,18 +15,14 @@ DAMAGED = "no MAT file that can be read, expected one up to version 7; a damaged
 _PART = re.compile(r"(?P<name>[^()]+)(?:\((?P<number>[0-9]{1,6})\))?")
 
 
-class VariableRefused(ValueError):
-    """The kind of a variable, and the expected one."""
-
-
-REFUSED = VariableRefused
-"""What `read` raises for a column that holds no numbers; `_child.py` passes its words on."""
+class Refused(ValueError):
+    """The kind of a variable that holds no numbers, and the expected one; `_child.py` passes its words on."""
 
 
 def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int], list[Any]]:
     """Return the sizes of the vectors, and the vectors.
 
-    Raises VariableRefused for anything but vectors of numbers.
+    Raises Refused for anything but vectors of numbers.
     """
     from scipy.io import loadmat, whosmat
 
@@ -58,7 +54,7 @@ def check(place: dict[str, Any], shapes: dict[str, Any], most: int) -> None:
         expected = kind not in ("cell", "struct", "object", "opaque", "char")
         _check_shape(place, shape, kind, is_number=expected)
     if size > most:
-        raise VariableRefused(
+        raise Refused(
             f"variable {place['column']!r} has {size:.0f} values, expected fewer than {most}"
         )
 
@@ -81,11 +77,11 @@ def _descend(place: dict[str, Any], variables: dict[str, Any]) -> Any:
     for at, part in enumerate(place["base"].split(".")):
         match = _PART.fullmatch(part)
         if match is None:
-            raise VariableRefused(f"column {place['column']!r}: {part!r} is no name, expected log.motor(2).t")
+            raise Refused(f"column {place['column']!r}: {part!r} is no name, expected log.motor(2).t")
         if at:
             names = getattr(getattr(value, "dtype", None), "names", None)
             if names is None:
-                raise VariableRefused(
+                raise Refused(
                     f"column {place['column']!r}: {way} is not a struct, expected one with {part}"
                 )
             if match["name"] not in names:
@@ -96,15 +92,15 @@ def _descend(place: dict[str, Any], variables: dict[str, Any]) -> Any:
         way = f"{way}.{part}" if at else part
         if match["number"] is not None:
             if not 1 <= int(match["number"]) <= value.size:
-                raise VariableRefused(f"{way} of {value.size}, expected a number from 1")
+                raise Refused(f"{way} of {value.size}, expected a number from 1")
             value = value.ravel(order="F")[int(match["number"]) - 1 : int(match["number"])]
     return value
 
 
 def _single(value: Any, way: str) -> Any:
-    """Return the one struct of an array of them. Raises VariableRefused for several."""
+    """Return the one struct of an array of them. Raises Refused for several."""
     if value.size != 1:
-        raise VariableRefused(
+        raise Refused(
             f"{way} is an array of {value.size} structs, expected which: {way}(1), {way}(2), …"
         )
     return value.ravel()[0]
@@ -124,4 +120,4 @@ def _check_shape(place: dict[str, Any], shape: Any, kind: object, *, is_number: 
     if is_number and len(shape) == 2 and not is_vector:
         first, last = (f"{place['base'].split('[')[0]}(:,{n})" for n in (1, shape[1]))
         wanted += f" or a column of the matrix, {first} to {last}"
-    raise VariableRefused(f"variable {place['column']!r} is {kind} {tuple(shape)}, expected {wanted}")
+    raise Refused(f"variable {place['column']!r} is {kind} {tuple(shape)}, expected {wanted}")

@@ -13,18 +13,14 @@ MEMORY, SECONDS = 4 << 30, 60
 DAMAGED = "no Parquet file that can be read; a damaged file?"
 
 
-class ColumnRefused(ValueError):
-    """The kind of a column, and the expected one."""
-
-
-REFUSED = ColumnRefused
-"""What `read` raises for a column that holds no numbers; `_child.py` passes its words on."""
+class Refused(ValueError):
+    """The kind of a column that holds no numbers, and the expected one; `_child.py` passes its words on."""
 
 
 def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int], Iterator[Any]]:
     """Return the sizes of the columns, and their parts one by one.
 
-    Raises ColumnRefused for other than numbers.
+    Raises Refused for other than numbers.
     """
     import pyarrow as pa
     from pyarrow.parquet import ParquetFile
@@ -33,9 +29,9 @@ def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int]
     file = ParquetFile(path)
     rows = file.metadata.num_rows
     if rows * len(places) > limit:
-        raise ColumnRefused(f"{rows} rows of {len(places)} columns, expected fewer than {limit} numbers")
+        raise Refused(f"{rows} rows of {len(places)} columns, expected fewer than {limit} numbers")
     if rows < 2:
-        raise ColumnRefused(f"{rows} rows, expected a record")
+        raise Refused(f"{rows} rows, expected a record")
     fields = [_field(place, file.schema_arrow) for place in places]
     ways = zip(places, fields, strict=True)
     parts = (part for place, (name, way) in ways for part in _vectors(file, name, way, place))
@@ -43,7 +39,7 @@ def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int]
 
 
 def _field(place: dict[str, Any], schema: Any) -> tuple[str, list[str]]:
-    """Return the column of the file, and the way through its fields. Raises KeyError and ColumnRefused."""
+    """Return the column of the file, and the way through its fields. Raises KeyError and Refused."""
     import pyarrow as pa
 
     base = place["base"]
@@ -53,7 +49,7 @@ def _field(place: dict[str, Any], schema: Any) -> tuple[str, list[str]]:
     way, kind = base[len(name) + 1 :].split(".") if base != name else [], schema.field(name).type
     for part in way:
         if not pa.types.is_struct(kind) or part not in [field.name for field in kind]:
-            raise ColumnRefused(
+            raise Refused(
                 f"column {place['column']!r}: {name} is {kind}, expected a struct with {part}"
             )
         kind = kind.field(part).type
@@ -68,19 +64,12 @@ def _check_kind(place: dict[str, Any], kind: Any) -> None:
     element = kind.value_type if is_list else kind
     column = place["column"]
     if is_list and (place["index"] is None or place["is_row"]):
-        raise ColumnRefused(f"column {column!r} is {kind}, expected one number of it: {place['base']}[0]")
+        raise Refused(f"column {column!r} is {kind}, expected one number of it: {place['base']}[0]")
     if not is_list and place["index"] is not None:
-        raise ColumnRefused(f"column {column!r} is {kind}, expected lists of numbers")
-    if not (_is_number(element) or _is_time(element) or types.is_null(element)):
-        raise ColumnRefused(f"column {column!r} is {kind}, expected numbers")
-
-
-def _is_number(kind: Any) -> bool:
-    from pyarrow import types
-
-    return any(
-        f(kind) for f in (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean)
-    )
+        raise Refused(f"column {column!r} is {kind}, expected lists of numbers")
+    plain = (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_null)
+    if not (_is_time(element) or any(is_so(element) for is_so in plain)):
+        raise Refused(f"column {column!r} is {kind}, expected numbers")
 
 
 def _is_time(kind: Any) -> bool:
@@ -104,7 +93,7 @@ def _vectors(file: Any, name: str, way: list[str], place: dict[str, Any]) -> Ite
                     chunk = pc.list_element(chunk, place["index"])
                 except (pa.ArrowInvalid, pa.ArrowIndexError):
                     least = pc.min(pc.list_value_length(chunk)).as_py()
-                    raise ColumnRefused(
+                    raise Refused(
                         f"column {place['column']!r} has a list of {least} numbers, expected more than "
                         f"{place['index']}"
                     ) from None

@@ -1,7 +1,7 @@
 """A reader in a process of its own, and the elements that it returns.
 
 A reader is a file `_NAME_reader.py` with its ceilings MEMORY and SECONDS, what it raises for other than
-numbers (REFUSED), what it says of a DAMAGED file, and `read`. `_child.py` runs it with FILE, the largest
+numbers (Refused), what it says of a DAMAGED file, and `read`. `_child.py` runs it with FILE, the largest
 number of values and the places of the columns in JSON, and answers with a line of JSON, {"sizes": …} in the
 order of the columns, {"column": …, "names": …} for one that the file has not, or {"error": …}; then the
 numbers, as doubles.

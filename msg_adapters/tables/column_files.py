@@ -33,10 +33,12 @@ def read_npz(path: Path, wanted: Wanted) -> Table:
     try:
         with zipfile.ZipFile(path) as archive:
             sizes = {n.removesuffix(".npy"): archive.getinfo(n).file_size for n in archive.namelist()}
-            places = {column: _check_address(place_of(column), list(sizes)) for column in wanted.columns}
+            places = {column: place_of(column) for column in wanted.columns}
             arrays: dict[str, Any] = {}
             for place in places.values():
                 name = _root(place.base, sizes)
+                if name not in sizes:
+                    index_of(place.base, list(sizes))
                 if name not in arrays:
                     with archive.open(f"{name}.npy") as file:
                         arrays[name] = _array(file, name, sizes[name])
@@ -58,13 +60,6 @@ def read_npy(path: Path, wanted: Wanted) -> Table:
         values = array[names[at]] if array.dtype.names else array if array.ndim == 1 else array[:, at]
         vectors[column] = _vector(column, values)
     return finite_table(vectors)
-
-
-def _check_address(place: ElementAddress, names: Sequence[str]) -> ElementAddress:
-    """Return a place whose array is in the file. Raises ValueError for another."""
-    if _root(place.base, names) not in names:
-        index_of(place.base, names)
-    return place
 
 
 def _root(base: str, names: Any) -> str:

@@ -192,7 +192,11 @@ def _codes(name: str, table: Table, terms: Sequence[ChannelTerm], keep: BoolArra
 def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Record:
     start, stop = min(float(p.t[0]) for p in parts), max(float(p.t[-1]) for p in parts)
     epoch = round(start * 1e9) if start > UNDATED else START_NS
-    _check_range(start, stop, epoch)
+    if not epoch * 1e-9 + stop - start < LATEST:
+        raise ImportMapError(
+            f"stamps from {start:g} s to {stop:g} s, expected less than {LATEST:g} s:"
+            " is it another unit of time?"
+        )
     channels, faults = {}, [fault for part in parts for fault in part.faults]
     columns = [(name, part.t - start, y) for part in parts for name, y in part.values.items()]
     for name, t, y in columns:
@@ -215,10 +219,11 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
 def summary(record: Record, mapping: ImportMap) -> list[str]:
     """Return a summary of the import, for a person to compare with the machine."""
     lines = list(record.notes)
+    linear = any(unit(term.unit)[0] in LINEAR for terms in mapping.channels.values() for term in terms)
     for name, channel in record.channels.items():
         columns = " + ".join(_describe(term) for term in mapping.channels[name])
         low, high = channel.y.min(), channel.y.max()
-        si = plain(in_motion(UNITS[name], linear=_is_linear(mapping)))
+        si = plain(in_motion(UNITS[name], linear=linear))
         lines.append(f"{name}: {len(channel)} samples of {columns}, {low:.6g} to {high:.6g} {si}")
     if record.driving is None and not mapping.set_points:
         lines.append(
@@ -231,12 +236,6 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
 def _describe(term: ChannelTerm) -> str:
     """Return `tau [N·m]`, however the map writes the unit."""
     return f"{term.column} [{plain(canonical(term.unit)) or 1}]"
-
-
-def _is_linear(mapping: ImportMap) -> bool:
-    """Return whether a column is in a unit along a line, as those of a linear machine are."""
-    terms = [term for channel in mapping.channels.values() for term in channel]
-    return any(unit(term.unit)[0] in LINEAR for term in terms)
 
 
 def _rows_kept(table: Table, mapping: ImportMap, run: float | str | None) -> tuple[BoolArray, int]:
@@ -356,16 +355,6 @@ def _stamps(
     share = float(np.mean(np.diff(t, prepend=-np.inf) == 0.0))
     faults = [Fault("coarse_stamps", path.name, share, detail)] if detail else []
     return spread[keep[dated]], faults
-
-
-def _check_range(start: float, stop: float, epoch_ns: int) -> None:
-    """Raise ImportMapError for stamps that no message can hold."""
-    last = epoch_ns * 1e-9 + stop - start
-    if not last < LATEST:
-        raise ImportMapError(
-            f"stamps from {start:g} s to {stop:g} s, expected less than {LATEST:g} s:"
-            " is it another unit of time?"
-        )
 
 
 def _values(table: Table, terms: Sequence[ChannelTerm], keep: BoolArray, t: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from msg_adapters.tables.column_table import Wanted, index_of
 from rsea_ros.documents.strict_yaml import is_decimal
 
 _FORTRAN = re.compile(r"([-+]?[0-9.]+)[dD]([-+]?[0-9]+)")
-_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eEdD][-+]?[0-9]+)?")
+DECIMAL_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eEdD][-+]?[0-9]+)?")
 _DATE_TIME = re.compile(
     r"([0-9]{4})[-/]([0-9]{2})[-/]([0-9]{2})[T ]+([0-9]{2}):([0-9]{2}):([0-9]{2})(?:[.,]([0-9]+))?"
     r" ?(?:(?:Z|UTC|GMT)|([+-][0-9]{2}):?([0-9]{2})?)?"
@@ -21,7 +21,7 @@ _DATE_TIME = re.compile(
 
 def numeral(cell: str, decimal: str = ".") -> str:
     """Return a cell as a plain decimal is written; unchanged where it is no number."""
-    if decimal == "," and _COMMA.fullmatch(cell):
+    if decimal == "," and DECIMAL_COMMA.fullmatch(cell):
         cell = cell.replace(",", ".")
     return _FORTRAN.sub(r"\1e\2", cell) if _FORTRAN.fullmatch(cell) else cell
 
@@ -29,16 +29,6 @@ def numeral(cell: str, decimal: str = ".") -> str:
 def is_numeral(cell: str) -> bool:
     """Return whether a cell is a number, with a decimal comma or a D exponent too."""
     return is_decimal(numeral(cell, ","))
-
-
-def is_datum(cell: str) -> bool:
-    """Return whether a cell is a number or a date-time."""
-    return is_numeral(cell) or _DATE_TIME.fullmatch(cell) is not None
-
-
-def has_decimal_comma(cell: str) -> bool:
-    """Return whether a cell is a number with a decimal comma."""
-    return bool(_COMMA.fullmatch(cell))
 
 
 def seconds_of(cell: str) -> float | None:
@@ -160,7 +150,8 @@ def _layout(lines: Sequence[str], delimiter: str, wanted: Wanted) -> TextLayout:
         width = max((_width(split(line, delimiter)) for line in lines[1:]), default=0)
         cells = cells[: max(width, _width(cells), 1)]
         cells += [""] * (width - len(cells)) if is_numbered else []
-    if all(is_datum(cell) for cell in cells if cell) if header is None else not header:
+    is_data = all(is_numeral(cell) or _DATE_TIME.fullmatch(cell) for cell in cells if cell)
+    if is_data if header is None else not header:
         return TextLayout(delimiter, tuple(str(number + 1) for number in range(len(cells))), headed=False)
     return TextLayout(delimiter, tuple(cells), headed=True)
 

@@ -5,7 +5,7 @@ docs/import.md shows them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -87,14 +87,10 @@ def tables() -> str:
     """Return the tables of docs/import.md in Markdown: all keys, all units, the functions of expressions."""
     rows = [f"| {name} | {', '.join(f'`{unit}`' for unit in factors)} |" for name, factors in FACTORS.items()]
     units = "\n".join(["| dimension | units |", "|---|---|", *rows])
-    functions = "\n".join(["| function | is |", "|---|---|", *_functions()])
+    calls = [f"| `{name}({', '.join('xyz'[:n])})` | {says} |" for name, (_, n, says) in FUNCTIONS.items()]
+    functions = "\n".join(["| function | is |", "|---|---|", *calls])
     sections = (table(section, keys) for section, keys in SECTIONS.items())
     return "\n".join([*sections, units, "", functions]) + "\n"
-
-
-def _functions() -> Iterator[str]:
-    for name, (_, count, meaning) in FUNCTIONS.items():
-        yield f"| `{name}({', '.join('xyz'[:count])})` | {meaning} |"
 
 
 PER_JOINT = {"sign": 1, "scale": 1, "constant": 0}

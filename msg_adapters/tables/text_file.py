@@ -88,7 +88,9 @@ def read_text(path: Path, wanted: Wanted) -> Table:
     if not head:
         raise ValueError("empty file, expected a row of column names and rows of numbers")
     at, layout = layouts.layout_of([line for _, line in head], comments, wanted, path)
-    first, notes = head[at][0] + layout.headed, _preamble(head[:at])
+    first, notes = head[at][0] + layout.headed, tuple[str, ...]()
+    if at:
+        notes = (f"lines {head[0][0]} to {head[at - 1][0]} above the names of the columns are left out",)
     places = {column: base_and_index(column, layout.names) for column in wanted.columns}
     indices = {column: layouts.index_in(base, layout.names) for column, (base, _) in places.items()}
     if layout.headed and head[at + 1 :] and is_row_of_texts(layout.cells(head[at + 1][1])):
@@ -96,15 +98,12 @@ def read_text(path: Path, wanted: Wanted) -> Table:
         first, notes = number + 1, (*notes, f"line {number} is taken for the units: {brief(line, _LONGEST)}")
     elements = {column: element for column, (_, element) in places.items()}
     reader = _Reader(layout, indices, elements, wanted)
-    for block in _numbered_blocks(path):
-        reader.add([row for row in block if row[0] >= first])
+    number = 1
+    for lines in blocks_of_lines(path):
+        rows = [row for row in enumerate(lines, number) if row[0] >= first and layouts.counts(row[1])]
+        reader.add(rows)
+        number += len(lines)
     return replace(reader.table(), notes=notes)
-
-
-def _preamble(lines: Sequence[tuple[int, str]]) -> tuple[str, ...]:
-    if not lines:
-        return ()
-    return (f"lines {lines[0][0]} to {lines[-1][0]} above the names of the columns are left out",)
 
 
 def is_row_of_texts(cells: Sequence[str]) -> bool:
@@ -125,13 +124,6 @@ def _head(path: Path) -> tuple[list[str], list[tuple[int, str]]]:
         if len(head) == _PREAMBLE:
             break
     return list(comments), head
-
-
-def _numbered_blocks(path: Path) -> Iterator[list[tuple[int, str]]]:
-    number = 1
-    for lines in blocks_of_lines(path):
-        yield [(number + i, line) for i, line in enumerate(lines) if layouts.counts(line)]
-        number += len(lines)
 
 
 class _Reader:
@@ -178,9 +170,11 @@ class _Reader:
         for column, parts in self._parts.items():
             texts = [cell for part in parts if part.dtype.kind == "U" for cell in part]
             if all(layouts.is_numeral(cell) or not cell for cell in texts):
-                columns[column] = np.concatenate([_as_numbers(part) for part in parts])
+                whole = [np.where(p == "", "nan", p) if p.dtype.kind == "U" else p for p in parts]
+                columns[column] = np.concatenate([np.asarray(part, np.float64) for part in whole])
             else:
-                labels[column] = np.concatenate([_as_texts(part) for part in parts])
+                cells = [c if isinstance(c, str) else f"{c:.15g}" for part in parts for c in part]
+                labels[column] = np.array(cells, np.str_)
             parts.clear()
         dated = frozenset(self._dated)
         return Table(columns, self._rows, self._left_out, self._first, labels=labels, dated=dated)
@@ -239,7 +233,8 @@ def _value(line: int, column: str, cell: str, decimal: str) -> float:
         return float(number)
     if cell.lower() in MISSING:
         return float("nan")
-    hint = ', with a decimal point (or `decimal: ","` in the map)' if layouts.has_decimal_comma(cell) else ""
+    has_comma = layouts.DECIMAL_COMMA.fullmatch(cell)
+    hint = ', with a decimal point (or `decimal: ","` in the map)' if has_comma else ""
     raise ValueError(f"line {line}, column {column!r} is {quote(cell)}, expected a finite number{hint}")
 
 
@@ -248,13 +243,3 @@ def _seconds(line: int, column: str, cell: str) -> float | None:
         return layouts.seconds_of(cell)
     except ValueError as error:
         raise ValueError(f"line {line}, column {column!r} is {quote(cell)}: {error}") from None
-
-
-def _as_numbers(part: FloatArray | Labels) -> FloatArray:
-    if part.dtype.kind == "U":
-        part = np.where(part == "", "nan", part)
-    return np.asarray(part, np.float64)
-
-
-def _as_texts(part: FloatArray | Labels) -> Labels:
-    return np.array([cell if isinstance(cell, str) else f"{cell:.15g}" for cell in part], np.str_)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._graph import need_ros
-from rsea_ros.cli._terminal import positive
+from rsea_ros.cli._terminal import columns, positive
 
 if TYPE_CHECKING:
     from rsea_ros.nodes._visitor import Caller
@@ -35,15 +34,10 @@ def run(args: argparse.Namespace) -> int:
             print(caller.call(args.node, action), flush=True)
         if not args.action:
             name = args.node
-            _list(caller, [caller.full_name(name)] if name else caller.callable_nodes(args.seconds))
+            nodes = [caller.full_name(name)] if name else caller.callable_nodes(args.seconds)
+            rows = [(each, *offer_of(caller, each)) for each in nodes]
+            print(columns([("node", "state", "actions"), *rows]) if rows else "no node that can be called")
     return 0
-
-
-def _list(caller: Caller, nodes: Sequence[str]) -> None:
-    from rsea_ros.cli._terminal import columns
-
-    rows = [(node, *offer_of(caller, node)) for node in nodes]
-    print(columns([("node", "state", "actions"), *rows]) if rows else "no node that can be called")
 
 
 def offer_of(caller: Caller, node: str) -> tuple[str, str]:

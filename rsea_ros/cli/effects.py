@@ -31,14 +31,10 @@ def run(args: argparse.Namespace) -> int:
         say(line, indent=len(line) - len(line.lstrip()) + 2)
     print()
     for paragraph in page.description.split("\n\n"):
-        for line in flow(paragraph):
+        lines = paragraph.strip("\n").splitlines()
+        has_equation = any(line.startswith(" ") for line in lines)
+        for line in lines if has_equation else [" ".join(lines)]:
             say(line)
         print()
     say(f"Bounds and sizes are for {MACHINE}; on others they grow as named, in powers of four.")
     return 0
-
-
-def flow(paragraph: str) -> list[str]:
-    """Return a paragraph as one line that may be broken anew; equations, which are indented, line by line."""
-    lines = paragraph.strip("\n").splitlines()
-    return lines if any(line.startswith(" ") for line in lines) else [" ".join(lines)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -89,12 +90,9 @@ def _exporters(args: argparse.Namespace) -> Mapping[str, Callable[[Rig], Export]
     from rsea_ros.exports.mjcf import export_mjcf
     from rsea_ros.exports.urdf import export_sdf, export_urdf
 
-    def bam(rig: Rig) -> Export:
-        return export_bam(rig, args.actuator)
-
     return {
         "mjcf": export_mjcf, "urdf": export_urdf, "sdf": export_sdf, "fmu": export_fmu, "isaac": export_isaac,
-        "bam": bam,
+        "bam": partial(export_bam, actuator=args.actuator),
     }  # fmt: skip
 
 

@@ -134,7 +134,7 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
     from rsea_ros.fleet import pool
     from rsea_ros.fleet.engine import Engine, EngineLimits
     from rsea_ros.fleet.store import hold_lock, open_store
-    from rsea_ros.fleet.task import is_anything_new, work
+    from rsea_ros.fleet.task import are_new, work
 
     store = open_store(out, create=True)
     with hold_lock(store, None if args.no_wait else _say_waiting):
@@ -146,7 +146,7 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
             workers = args.workers or pool.cores()
             memory = int(args.memory * GIGA) if args.memory else pool.memory_for(workers)
         limits = EngineLimits(memory, time=args.time_limit * MINUTE, pages=args.pages)
-        place = _executor(args, workers, memory) if is_anything_new(store, held) else nullcontext(Serial())
+        place = _executor(args, workers, memory) if any(are_new(store, held)) else nullcontext(Serial())
         with _reporting_what_is_left(store, held), place as places, progress("fleet") as tell:
             return Engine(store, places, work, tell, limits).run(held)
 
@@ -154,13 +154,13 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
 @contextmanager
 def _reporting_what_is_left(store: Store, held: Sequence[Held]) -> Iterator[None]:
     """Let the report of a signal that stops the block say how many recordings are left."""
-    from rsea_ros.fleet.task import count_new
+    from rsea_ros.fleet.task import are_new
 
     try:
         yield
     except Stopped as stop:
         with suppress(RseaError, OSError):
-            number, all_of = count_new(store, held), sum(len(joints) for _, joints in held)
+            number, all_of = sum(are_new(store, held)), sum(len(joints) for _, joints in held)
             stop.note = f"{number} of {all_of} recordings are left, run the same line again"
         raise
 

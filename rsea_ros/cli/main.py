@@ -22,21 +22,14 @@ from rsea_ros.report.words import wrap
 COMPILER = "rsea_ros.compiler"
 
 
-class _LineHandler(logging.Handler):
-    """Writes each message as a line on stderr."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Write a message."""
-        print(f"rsea: {record.getMessage()}", file=sys.stderr, flush=True)
-
-
 @contextmanager
 def compilation_announced() -> Iterator[None]:
     """In this block the compiler says on stderr that it compiles, if stderr is a terminal."""
     if sys.stderr is None or not sys.stderr.isatty():
         yield
         return
-    logger, line = logging.getLogger(COMPILER), _LineHandler()
+    logger, line = logging.getLogger(COMPILER), logging.StreamHandler()
+    line.setFormatter(logging.Formatter("rsea: %(message)s"))
     level = logger.level
     logger.addHandler(line)
     logger.setLevel(logging.INFO)
@@ -126,19 +119,14 @@ def _call(name: str, arguments: Sequence[str]) -> int:
         print(f"rsea_ros {version()}")
         return SUCCESS
     if name not in verbs():
-        raise ParameterError(f"no verb {name!r}, expected one of: {', '.join(verbs())}{_meant(name)}")
+        from rsea_ros.cli.run import node_names
+
+        near = did_you_mean(name, [*verbs(), *_HELP, _VERSION])
+        meant = f", did you mean run {name}?" if name in node_names() else near
+        raise ParameterError(f"no verb {name!r}, expected one of: {', '.join(verbs())}{meant}")
     if effects := os.environ.get("RSEA_EFFECTS"):
         _fail(f"rsea {name}", f"RSEA_EFFECTS={effects}: code from there runs as part of this program")
     return _run(name, arguments)
-
-
-def _meant(name: str) -> str:
-    """Return what may be meant by an unknown verb: the name of a node, a verb, an option."""
-    from rsea_ros.cli.run import node_names
-
-    if name in node_names():
-        return f", did you mean run {name}?"
-    return did_you_mean(name, [*verbs(), *_HELP, _VERSION])
 
 
 def _run(name: str, arguments: Sequence[str]) -> int:

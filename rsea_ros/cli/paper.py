@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
@@ -94,6 +93,7 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
     """Simulate the paper's tests, each through a bag."""
     import numpy as np
 
+    from msg_adapters import read_record, write_record
     from rsea_ros.identification.excitation import ExcitationSettings, excitation
     from rsea_ros.identification.frequency_response import estimate_response
     from rsea_ros.model.rig_file import load_rig
@@ -103,7 +103,9 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
     from rsea_ros.report.paper.page import PaperTests
 
     def bag(name: str, record: Record) -> Record:
-        return through_bag(new.stage(f"{name}.mcap"), record)
+        path = new.stage(f"{name}.mcap")
+        write_record(record, path)
+        return read_record([path])
 
     tell("high impedance", 0.0)
     values = excitation("chirp", ExcitationSettings(rate=RATE, duration=args.duration, seed=args.seed))
@@ -117,11 +119,3 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
             load_rig(name), bag, duration=args.duration, seed=args.seed, channels=channels
         )
     return PaperTests(clamped, moving)
-
-
-def through_bag(path: Path, record: Record) -> Record:
-    """Write a record as a bag and return what is read back."""
-    from msg_adapters import read_record, write_record
-
-    write_record(record, path)
-    return read_record([path])

@@ -32,7 +32,9 @@ def run(args: argparse.Namespace) -> int:
     names = node_names()
     words = [*(["--help"] if args.params else []), *ros_arguments(args.parameters), *args.pass_on]
     if args.node.endswith(".py"):
-        become([_script(args.node), *words])
+        if not Path(args.node).is_file():
+            raise ParameterError(f"{args.node}: no such file, expected a Python program or a node")
+        become([args.node, *words])
     if args.node not in names:
         near = did_you_mean(args.node, names)
         raise ParameterError(f"node {args.node!r}, expected one of {', '.join(names)}{near}")
@@ -43,13 +45,6 @@ def become(words: Sequence[str]) -> NoReturn:
     """Replace this process by Python with these arguments, so that signals reach the node itself."""
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, *words])
-
-
-def _script(name: str) -> str:
-    """Return the path of an existing file. Raises ParameterError if it does not exist."""
-    if not Path(name).is_file():
-        raise ParameterError(f"{name}: no such file, expected a Python program or a node")
-    return name
 
 
 def node_names() -> list[str]:

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
 from rsea_ros.cli._graph import need_ros
-from rsea_ros.cli._terminal import positive, whole_number
-
-if TYPE_CHECKING:
-    from rsea_ros.nodes._visitor import Listener
+from rsea_ros.cli._terminal import columns, positive, whole_number
 
 HELP = "show the published topics: list, rate of a topic, its messages (echo)"
 EXAMPLE = "rsea topics rate /rsea/ft"
@@ -45,12 +41,6 @@ def run(args: argparse.Namespace) -> int:
             for text in listener.messages(args.topic, args.count, args.seconds):
                 print(text, end="---\n", flush=True)
         else:
-            _list(listener, args.seconds)
+            rows = listener.topics(args.seconds)
+            print(columns([("topic", "type", "publishers", "subscribers"), *rows]) if rows else "no topic")
     return 0
-
-
-def _list(listener: Listener, seconds: float) -> None:
-    from rsea_ros.cli._terminal import columns
-
-    rows = listener.topics(seconds)
-    print(columns([("topic", "type", "publishers", "subscribers"), *rows]) if rows else "no topic")

@@ -23,7 +23,7 @@ from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_shape import RunLimits, largest_share, of_command, of_response
 from rsea_ros.experiment.separation import noise_by_channel
 from rsea_ros.identification.excitation import ramp_ends
-from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Map, serial, solve
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import FloatArray
@@ -125,16 +125,12 @@ def _imitate(
 
 
 def _powers(problem: Problem, theta: FloatArray) -> FloatArray:
-    outputs = problem.outputs(theta)
-    return np.array([_power(problem, c, o) for c, o in zip(problem.cases, outputs, strict=True)])
-
-
-def _power(problem: Problem, case: Case, outputs: Mapping[str, FloatArray]) -> float:
-    """Return the squared residual of a case over the noise, summed, per second."""
-    parts: Sequence[float] = [
-        float(np.sum(((outputs[n] - case.measured[n]) / case.noise[n]) ** 2)) for n in problem.present(case)
-    ]
-    return sum(parts) / case.duration
+    """Return the squared residual of each case over the noise, summed, per second."""
+    powers = []
+    for c, made in zip(problem.cases, problem.outputs(theta), strict=True):
+        residuals = [(made[n] - c.measured[n]) / c.noise[n] for n in problem.present(c)]
+        powers.append(sum(float(np.sum(r**2)) for r in residuals) / c.duration)
+    return np.array(powers)
 
 
 ACCURACY = 0.01

@@ -68,20 +68,13 @@ def shared_name(
 
     causes: the likeliest first. asked: of the test that would decide. measured: noise by channel.
     """
-    simple = _contained(causes)
-    if simple is None:
+    contained = (c for c in causes if all(o is c or may_contain(o.name, c.name) for o in causes))
+    simple = next(contained, None)
+    if simple is None or len(causes) < 2:
         return None
     richer = [h.beside(simple.name) for h in causes if h is not simple]
     torque = torque_that_shows([simple, *richer], asked, measured, run)
     return SharedName(tuple(h.name for h in causes), torque)
-
-
-def _contained(causes: Sequence[Hypothesis]) -> Hypothesis | None:
-    """Return the cause that every other of them may contain, None without such or without others."""
-    for cause in causes if len(causes) > 1 else ():
-        if all(may_contain(other.name, cause.name) for other in causes if other is not cause):
-            return cause
-    return None
 
 
 End = Literal[

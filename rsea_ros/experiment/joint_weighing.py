@@ -144,15 +144,11 @@ def repeat_fits(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
         if fit.cost > best.cost + _LITTLE:
             pairs = zip(fit.problem.unknowns, fit.theta, strict=True)
             starts.append(np.array([rig.get(u.name, float(v)) for u, v in pairs]))
-        others = [solve(fit.problem, x, iterations=_ITERATIONS, gain=_GAIN, run=run) for x in starts]
-        again[name] = _likeliest([fit, *others], scale)
+        tried = [solve(fit.problem, x, iterations=_ITERATIONS, gain=_GAIN, run=run) for x in starts]
+        least = min(s.cost for s in (fit, *tried))
+        no_worse = [s for s in (fit, *tried) if s.cost <= least + _LITTLE]
+        again[name] = max(no_worse, key=lambda s: log_evidence(s, scale))
     return again
-
-
-def _likeliest(fits: Sequence[Solution], scale: float) -> Solution:
-    """Return the fit of the largest evidence, of those that are no worse than the best."""
-    least = min(s.cost for s in fits)
-    return max((s for s in fits if s.cost <= least + _LITTLE), key=lambda s: log_evidence(s, scale))
 
 
 def scale_of(fits: Mapping[str, Solution]) -> float:
@@ -235,21 +231,21 @@ class RunWeighing:
 
         By the data alone, without their priors.
         """
-        return [n for n in self._fit_as_well(least) if not self._is_richer(n)]
+        return self._by_data(least, richer=False)
 
     def richer_by_data(self, least: float) -> list[str]:
         """Return the causes of more parameters than the best that fit less than `least` worse, in S.
 
         A cause that contains the best always does: what it adds may be absent, or not shown so far.
         """
-        return [n for n in self._fit_as_well(least) if self._is_richer(n)]
+        return self._by_data(least, richer=True)
 
-    def _fit_as_well(self, least: float) -> list[str]:
-        costs = {n: power(f.solution.residual) / self.scale for n, f in self.fits.items()}
-        return [n for n, c in costs.items() if n != self.best and c - costs[self.best] < least]
-
-    def _is_richer(self, name: str) -> bool:
-        return len(self.fits[name].solution.theta) > len(self.fits[self.best].solution.theta)
+    def _by_data(self, least: float, *, richer: bool) -> list[str]:
+        fits = {n: f.solution for n, f in self.fits.items()}
+        best = fits.pop(self.best)
+        most = power(best.residual) + least * self.scale
+        as_well = [n for n, s in fits.items() if power(s.residual) < most]
+        return [n for n in as_well if (len(fits[n].theta) > len(best.theta)) == richer]
 
     def hypotheses(self, least: float = 0.0) -> list[Hypothesis]:
         """Return the causes with a probability of at least `least`, the likeliest first."""

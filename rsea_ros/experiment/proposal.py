@@ -24,7 +24,6 @@ from rsea_ros.experiment.run_shape import (
     Kind,
     RunLimits,
     Shape,
-    largest_share,
     of_command,
     of_response,
 )
@@ -131,11 +130,6 @@ def at_ends(values: FloatArray) -> float:
         return np.inf
     increases = np.maximum(values[1:].reshape(-1, _POINTS).max(axis=1) - values[0], 0.0)
     return float(values[0] + np.sqrt(np.sum(increases**2)))
-
-
-def share_used(peaks: Peaks, limits: RunLimits) -> float:
-    """Return the largest share of a limit that is used at LEVEL."""
-    return largest_share(peaks.at_level, limits)
 
 
 RATES = (50.0, 1000.0)

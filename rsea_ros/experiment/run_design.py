@@ -20,8 +20,8 @@ from scipy.optimize import minimize
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.hypothesis import Hypothesis
-from rsea_ros.experiment.proposal import DesignRequest, Group, Peaks, Proposal, ends_of, peaks, share_used
-from rsea_ros.experiment.run_shape import Shape
+from rsea_ros.experiment.proposal import DesignRequest, Group, Peaks, Proposal, ends_of, peaks
+from rsea_ros.experiment.run_shape import Shape, largest_share
 from rsea_ros.experiment.separation import (
     INSIDE,
     ShapeRater,
@@ -39,7 +39,6 @@ from rsea_ros.experiment.separation import (
     try_lengths,
 )
 from rsea_ros.identification.solver import Map, serial
-from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import BoolArray, FloatArray
 
@@ -102,15 +101,6 @@ _SETTLED = 5e-3
 _SMALLEST, _BISECTIONS = 0.01, 8
 
 
-def check_commanded_by_torque(rig: Rig) -> None:
-    """Raise ParameterError for a rig that no torque commands."""
-    if rig.loop is not None:
-        raise ParameterError(
-            f"rig {rig.name}: positions command it, expected a rig that torques command: "
-            "limits of the torque do not bound a position loop"
-        )
-
-
 def propose(
     hypotheses: Sequence[Hypothesis],
     asked: DesignRequest,
@@ -123,7 +113,12 @@ def propose(
     measured: noise by channel as records show it. Raises ParameterError where the rig has no torque command.
     """
     say = tell or (lambda step, share: None)
-    check_commanded_by_torque(hypotheses[0].problem.rig)
+    rig = hypotheses[0].problem.rig
+    if rig.loop is not None:
+        raise ParameterError(
+            f"rig {rig.name}: positions command it, expected a rig that torques command: "
+            "limits of the torque do not bound a position loop"
+        )
     rater = ShapeRater(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
     if len(hypotheses) == 1:
         return _sharpest(rater, say)
@@ -219,7 +214,7 @@ def limit_command(
     scale = high
     for _ in range(_BISECTIONS):
         reached = peaks(math.exp(scale) * command, asked.rate, groups)
-        if share_used(reached, asked.limits) <= 1.0:
+        if largest_share(reached.at_level, asked.limits) <= 1.0:
             low, best = scale, (math.exp(scale) * command, reached)
         else:
             high = scale

@@ -222,17 +222,13 @@ def try_lengths(rater: ShapeRater, shapes: Sequence[Shape], apart: BoolArray, sh
     doublings = math.ceil(math.log2(asked.longest / shortest))
     for seconds in np.geomspace(shortest, asked.longest, doublings + 1):
         length = float(np.rint(seconds * asked.rate) / asked.rate)
-        if trials and _is_beyond(best_of(trials, asked), length, asked):
+        best = best_of(trials, asked) if trials else None
+        most = 1.0 / (asked.per_run + length)  # that a run of this length can decide per second
+        if best and best.share >= least_share(asked) and best.per_second(asked.per_run) > most:
             break
         possible = [s for s in shapes if length * asked.rate >= FEWEST[s.kind]]
         trials += [trial_of(rater, s, length, apart) for s in possible]
     return trials
-
-
-def _is_beyond(best: Trial, length: float, asked: DesignRequest) -> bool:
-    """Return whether no run of a length (s) can decide more per second than the best trial so far."""
-    is_enough = best.share >= least_share(asked)
-    return is_enough and best.per_second(asked.per_run) > 1.0 / (asked.per_run + length)
 
 
 def best_of(trials: Sequence[Trial], asked: DesignRequest) -> Trial:

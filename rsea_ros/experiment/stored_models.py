@@ -49,24 +49,19 @@ def hypotheses_from(models: Sequence[ModelFile]) -> list[Hypothesis]:
         if names.count(name) > 1:
             what = "without a cause" if name == NOTHING else f"with {name}"
             raise ParameterError(f"two models {what}, expected each cause once")
-    for model in models[1:]:
-        _check_same_machine(models[0].rig, model.rig)
+    built = [_construction(m.rig) for m in models]
+    for theirs, model in zip(built[1:], models[1:], strict=True):
+        for what, value in built[0].items():
+            if value != theirs[what]:
+                raise ParameterError(
+                    f"models of different machines: {what} is {value} in {models[0].rig.name} and "
+                    f"{theirs[what]} in {model.rig.name}, expected causes of one bench"
+                )
     total = sum(m.probability or 0.0 for m in models)
     unstated = sum(m.probability is None for m in models)
     rest = max(1.0 - total, 0.05) / unstated if unstated else 0.0
     shares = np.array([rest if m.probability is None else m.probability for m in models])
     return [_hypothesis(m, float(p)) for m, p in zip(models, shares / shares.sum(), strict=True)]
-
-
-def _check_same_machine(first: Rig, other: Rig) -> None:
-    """Raise ParameterError for rigs that differ in what no cause changes: gear, ends, sensors, command."""
-    ours, theirs = _construction(first), _construction(other)
-    for what, value in ours.items():
-        if value != theirs[what]:
-            raise ParameterError(
-                f"models of different machines: {what} is {value} in {first.name} and {theirs[what]} in "
-                f"{other.name}, expected causes of one bench"
-            )
 
 
 def _construction(rig: Rig) -> dict[str, str]:
@@ -141,13 +136,7 @@ def models_of(document: Mapping[str, Any], extended: Rig) -> list[ModelFile]:
     asked = next(c for c in causes if c.name == name)
     rest = tuple(e for e in extended.effects if e.name != name)
     group = [asked, *(m for n, m in others if n == name and m.name not in (e.name for e in rest))]
-    return [_model_file(m, extended, rest) for m in group]
-
-
-def _model_file(model: ModelFile, extended: Rig, rest: tuple[EffectSetting, ...]) -> ModelFile:
-    return ModelFile(
-        model.name, extended.with_effects(*rest, model.rig.effects[-1]), model.intervals, model.probability
-    )
+    return [replace(m, rig=extended.with_effects(*rest, m.rig.effects[-1])) for m in group]
 
 
 def _cause(body: Mapping[str, Any], where: str, extended: Rig) -> ModelFile:

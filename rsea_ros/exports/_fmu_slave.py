@@ -65,7 +65,8 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
         self._declare(driven, unit, "held over a communication step", Fmi3Causality.input)
         for at, name in enumerate(OUTPUTS):
             if self._rig.measures(name):
-                self._declare(name, _unit_of_output(name), "", Fmi3Causality.output, at)
+                unit = {"position": "rad", "velocity": "rad/s", "deflection": "rad"}.get(name, "N m")
+                self._declare(name, unit, "", Fmi3Causality.output, at)
         self._declare_parameters()
 
     def _declare(self, name: str, unit: str, about: str, causality: object, at: int = 0) -> None:
@@ -149,10 +150,6 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
             )  # fmt: skip
             self._at = stop
         return Fmi3StepResult(status=Fmi3Status.ok)
-
-
-def _unit_of_output(name: str) -> str:
-    return {"position": "rad", "velocity": "rad/s", "deflection": "rad"}.get(name, "N m")
 
 
 _LONGEST = 60

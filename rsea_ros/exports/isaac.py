@@ -18,6 +18,7 @@ from rsea_ros.exports.others import (
     finite_sizes,
     omitted_effects,
     omitted_parts,
+    omitted_terms,
     without_null_effects,
 )
 from rsea_ros.model.equations import gear_inertia
@@ -31,9 +32,13 @@ def export_isaac(rig: Rig) -> Export:
     """Return the configuration of a rig's actuator."""
     rig = without_null_effects(rig)
     effects = finite_sizes(rig)
-    represented: list[Represented] = []
+    represented = [
+        Represented("rotor.reflected_inertia", "armature"),
+        Represented("rotor.reflected_damping", "viscous_friction"),
+    ]
+    joint = {"armature": gear_inertia(rig), "viscous_friction": rig["rotor.reflected_damping"]}
     delay = effects.get("command_delay", {}).get("delay", 0.0)
-    fields = _joint(rig, represented) | _loop(rig, represented)
+    fields = joint | _loop(rig, represented)
     fields |= _friction(effects, represented) | _limits(rig, effects, represented)
     kind = "DelayedPDActuatorCfg"
     if "voltage_sag" in effects and not delay:
@@ -45,15 +50,10 @@ def export_isaac(rig: Rig) -> Export:
         represented.append(Represented("command_delay", "min_delay = max_delay, in steps of the physics"))
     omitted = [*omitted_parts(rig, "an actuator drives one rigid joint; give it a passive joint beyond")]
     omitted += omitted_effects(rig, represented, f"{kind} has no field for it")
-    omitted += _loop_left_out(rig)
+    terms = ("k_i", "k_f", "k_vi", "sample_time", "velocity_limit")
+    omitted += omitted_terms(rig, dict.fromkeys(terms, "the PD law has no place for it"))
     text = _file(rig, kind, fields, delay, represented, omitted)
     return Export("isaac", ".py", text, tuple(represented), tuple(omitted))
-
-
-def _joint(rig: Rig, represented: list[Represented]) -> dict[str, float]:
-    represented.append(Represented("rotor.reflected_inertia", "armature"))
-    represented.append(Represented("rotor.reflected_damping", "viscous_friction"))
-    return {"armature": gear_inertia(rig), "viscous_friction": rig["rotor.reflected_damping"]}
 
 
 def _loop(rig: Rig, represented: list[Represented]) -> dict[str, float]:
@@ -66,16 +66,6 @@ def _loop(rig: Rig, represented: list[Represented]) -> dict[str, float]:
         return {"stiffness": rig["controller.k_p"], "damping": rig["controller.k_d"]}
     k_v = rig["controller.k_v"]
     return {"stiffness": rig["controller.k_pos"] * k_v, "damping": k_v}
-
-
-def _loop_left_out(rig: Rig) -> list[Omitted]:
-    names = ("k_i", "k_f", "k_vi", "sample_time", "velocity_limit")
-    values = {name: rig.values().get(f"controller.{name}", 0.0) for name in names}
-    return [
-        Omitted(f"controller.{name}", "the PD law has no place for it")
-        for name, value in values.items()
-        if value and math.isfinite(value)
-    ]
 
 
 def _friction(effects: Mapping[str, Mapping[str, float]], represented: list[Represented]) -> dict[str, float]:

@@ -7,7 +7,7 @@ polynomials, springlength, springyield, frictionloss).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from xml.etree import ElementTree as xml
 
 import numpy as np
@@ -22,6 +22,7 @@ from rsea_ros.exports.others import (
     Unrepresentable,
     coverage_comment,
     finite_sizes,
+    omitted_terms,
     without_null_effects,
 )
 from rsea_ros.model.equations import train_ratio, with_structure
@@ -248,7 +249,17 @@ def say_loop(rig: Rig, root: xml.Element) -> tuple[Represented, list[Omitted]]:
     if math.isfinite(limit):
         first.set("forcerange", f"{-limit!r} {limit!r}")
     how = "pid actuator, " + ", ".join(f"{name} {value:g}" for name, value in gains.items())
-    return Represented(f"{rig.loop} loop", how), list(_omitted_terms(rig))
+    omitted = []
+    if rig.encoder_end == "spring_end":
+        why = "an actuator's loop closes over its own tendon, that of the gear output"
+        omitted.append(Omitted("encoder at the spring's end", why))
+    terms = {
+        "sample_time": "the loop runs at the model's step",
+        "velocity_limit": "slewmax limits the target, not what the loop asks",
+        "k_f": "the setpoint has no feed-forward of its rate",
+        "k_vi": "the integral is of the position's error",
+    }
+    return Represented(f"{rig.loop} loop", how), [*omitted, *omitted_terms(rig, terms)]
 
 
 def _gains(rig: Rig) -> dict[str, float]:
@@ -260,21 +271,6 @@ def _gains(rig: Rig) -> dict[str, float]:
     return {name: value for name, value in named.items() if value}
 
 
-def _omitted_terms(rig: Rig) -> Iterator[Omitted]:
-    if rig.encoder_end == "spring_end":
-        why = "an actuator's loop closes over its own tendon, that of the gear output"
-        yield Omitted("encoder at the spring's end", why)
-    for name, why in (
-        ("sample_time", "the loop runs at the model's step"),
-        ("velocity_limit", "slewmax limits the target, not what the loop asks"),
-        ("k_f", "the setpoint has no feed-forward of its rate"),
-        ("k_vi", "the integral is of the position's error"),
-    ):
-        value = rig.values().get(f"controller.{name}", 0.0)
-        if value and math.isfinite(value):
-            yield Omitted(f"controller.{name}", why)
-
-
 def export_mjcf(rig: Rig) -> Export:
     """Return the model of a rig.
 
@@ -283,7 +279,8 @@ def export_mjcf(rig: Rig) -> Export:
     check_rotary(rig)
     rig = without_null_effects(rig)
     finite = finite_sizes(rig)
-    root = model_element(with_structure(rig), play_of(rig))
+    play = next((float(one.parameters["gap"]) for one in rig.effects if one.name == "backlash"), 0.0)
+    root = model_element(with_structure(rig), play)
     loop, omitted = say_loop(rig, root)
     represented = [loop]
     for setting in sorted(rig.effects, key=lambda one: effect_named(one.name).order):
@@ -304,9 +301,3 @@ def export_mjcf(rig: Rig) -> Export:
         omitted.append(Omitted("sensor noise", why))
     root.insert(0, coverage_comment(represented, omitted))
     return Export("mjcf", ".xml", text(root), tuple(represented), tuple(omitted))
-
-
-def play_of(rig: Rig) -> float:
-    """Return the play between gear output and chassis that the model has, rad."""
-    gaps = [one.parameters["gap"] for one in rig.effects if one.name == "backlash"]
-    return float(gaps[0]) if gaps else 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree as xml
@@ -75,6 +75,13 @@ def omitted_effects(rig: Rig, represented: Sequence[Represented], why: str) -> l
     endless = "a parameter of it is infinite"
     effects = (one.name for one in rig.effects if one.name not in names)
     return [Omitted(name, why if name in finite else endless) for name in effects]
+
+
+def omitted_terms(rig: Rig, why: Mapping[str, str]) -> list[Omitted]:
+    """Return the terms of a rig's loop that act and that the target lacks, by the reasons `why`."""
+    values = rig.values()
+    sizes = {name: values.get(f"controller.{name}", 0.0) for name in why}
+    return [Omitted(f"controller.{n}", why[n]) for n, v in sizes.items() if v and math.isfinite(v)]
 
 
 def _spin(rig: Rig) -> Iterator[Omitted]:

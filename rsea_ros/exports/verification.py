@@ -44,12 +44,12 @@ class Difference:
         return self.rms / self.noise
 
 
-def ours(rig: Rig, command: FloatArray, rate: float) -> dict[str, FloatArray]:
+def ours(rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
     """Return the measurements of our simulation of a rig at the beginning of each command's hold.
 
-    command: N m, or target rad of a rig with a position loop. rate: Hz.
+    command: N m, or target rad of a rig with a position loop, at RATE.
     """
-    t = np.arange(len(command)) / rate
+    t = np.arange(len(command)) / RATE
     driven = "command" if rig.loop is None else "reference"
     names = [name for name in CHANNELS if rig.measures(name)]
     asked = {name: Channel(t, np.zeros(len(t))) for name in names}
@@ -57,17 +57,17 @@ def ours(rig: Rig, command: FloatArray, rate: float) -> dict[str, FloatArray]:
 
 
 def losses(
-    rig: Rig, omitted: Iterable[str], mine: Mapping[str, FloatArray], command: FloatArray, rate: float
+    rig: Rig, omitted: Iterable[str], mine: Mapping[str, FloatArray], command: FloatArray
 ) -> dict[str, Difference]:
     """Return what each omitted effect of a rig changes, in the channel where it changes most.
 
-    mine: of the whole rig, as `ours` gives it. command: N m or rad. rate: Hz.
+    mine: of the whole rig, as `ours` gives it. command: N m or rad, at RATE.
     """
     lost = {}
     names = set(omitted)
     for name in (effect.name for effect in rig.effects if effect.name in names):
         without = rig.with_effects(*(effect for effect in rig.effects if effect.name != name))
-        apart = differences(rig, mine, ours(without, command, rate))
+        apart = differences(rig, mine, ours(without, command))
         if apart:
             lost[name] = max(apart, key=lambda one: one.times_noise)
     return lost
@@ -99,7 +99,14 @@ def play_mujoco(model_text: str, rig: Rig, command: FloatArray) -> dict[str, Flo
     command: N m, or target rad of a rig with a position loop, at RATE. Raises ParameterError without MuJoCo,
     and for a model that MuJoCo refuses.
     """
-    mujoco, rollout = _mujoco()
+    try:
+        import mujoco
+        from mujoco import rollout
+    except ImportError:
+        raise ParameterError(
+            "playing the model needs the package mujoco (Python 3.11 or later), which is not installed: "
+            "pip install mujoco, or --no-play"
+        ) from None
     try:
         model = mujoco.MjModel.from_xml_string(model_text)
     except ValueError as error:
@@ -187,18 +194,6 @@ def _slip(x: FloatArray, limit: float) -> FloatArray:
     return slipped
 
 
-def _mujoco() -> tuple[Any, Any]:
-    try:
-        import mujoco
-        from mujoco import rollout
-    except ImportError:
-        raise ParameterError(
-            "playing the model needs the package mujoco (Python 3.11 or later), which is not installed: "
-            "pip install mujoco, or --no-play"
-        ) from None
-    return mujoco, rollout
-
-
 def play_fmu(archive: bytes, rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
     """Return the measurements of the exported rig at the beginning of each command's hold.
 
@@ -255,11 +250,11 @@ def verify(made: Export, rig: Rig, command: FloatArray) -> Verification:
         return Verification((), _losses(rig, names, command), why)
     try:
         theirs = PLAYERS[made.target](made.content, rig, command)
-        mine = ours(rig, command, RATE)
+        mine = ours(rig, command)
     except ParameterError as error:
         return Verification((), _losses(rig, names, command), str(error))
     apart = differences(rig, mine, theirs)
-    return Verification(apart, losses(rig, names, mine, command, RATE), "" if apart else NO_NOISE)
+    return Verification(apart, losses(rig, names, mine, command), "" if apart else NO_NOISE)
 
 
 def _losses(rig: Rig, names: list[str], command: FloatArray) -> Mapping[str, Difference]:
@@ -267,6 +262,6 @@ def _losses(rig: Rig, names: list[str], command: FloatArray) -> Mapping[str, Dif
     if not set(names) & {effect.name for effect in rig.effects}:
         return {}
     try:
-        return losses(rig, names, ours(rig, command, RATE), command, RATE)
+        return losses(rig, names, ours(rig, command), command)
     except RseaError:
         return {}

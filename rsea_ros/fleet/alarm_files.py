@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
@@ -41,19 +40,17 @@ def write_alarms(store: Store) -> list[AlarmFile]:
     """
     folder = store.path / FOLDER
     make_folder(folder)
-    return list(_new(store, folder))
-
-
-def _new(store: Store, folder: Path) -> Iterator[AlarmFile]:
     try:
         present = alarms(history(store.path), recordings(store.path))
     except NoRowsError:
-        return
+        return []
+    written = []
     for alarm in present:
         file = folder / f"{alarm.joint}-{hashlib.sha256(alarm.key.encode()).hexdigest()[:12]}.json"
         with suppress(OutputError):
             write_file(file, json.dumps(webhook(alarm), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
-            yield AlarmFile(file, said(alarm))
+            written.append(AlarmFile(file, said(alarm)))
+    return written
 
 
 def said(alarm: Alarm) -> str:

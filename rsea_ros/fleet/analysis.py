@@ -27,7 +27,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import MappedJoint, date_in
 from rsea_ros.fleet.row import Row
 from rsea_ros.identification.identify import identify
-from rsea_ros.identification.result import Identification, ParameterEstimate
+from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.model.extent import bound_values, check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
@@ -104,7 +104,10 @@ def analyse(row: Row, path: Path, url: str, joint: MappedJoint, *, page: bool = 
     findings = check_record(bound_values(record), rig, joint.topics.axis)
     row["faults"] = faults(findings.faults)
     result = identify([with_faults(_fit_for_fit(run, rig), findings, masks=False)], rig)
-    row |= identification_columns(result)
+    times = result.times_noise
+    main = next((n for n in _MAIN if n in times), next(iter(times), ""))
+    row |= {"verdict": result.verdict, "residual": strict(times.get(main, math.nan))}
+    row["parameters"] = [_parameter(p) for p in result.parameters]
     files = {
         IDENTIFICATION_JSON: json_text(identification_json(result)),
         MODEL: rig_text(result.rig),
@@ -148,17 +151,6 @@ def _diagnose(row: Row, record: Record, rig: Rig, *, page: bool) -> dict[str, st
         "extended.yaml": rig_text(result.extended_rig),
     }
     return files | ({REPORT: diagnosis_report(result)} if page else {})
-
-
-def identification_columns(result: Identification) -> dict[str, Any]:
-    """Return the results of an identification as columns of the row."""
-    times = result.times_noise
-    main = next((n for n in _MAIN if n in times), next(iter(times), ""))
-    return {
-        "verdict": result.verdict,
-        "residual": strict(times.get(main, math.nan)),
-        "parameters": [_parameter(p) for p in result.parameters],
-    }
 
 
 def _interval(name: str, estimate: Any) -> dict[str, Any]:

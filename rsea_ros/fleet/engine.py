@@ -83,14 +83,21 @@ class Engine:
         return self._summary
 
     def _fill(self, unseen: Iterator[Bag]) -> None:
-        """Put jobs in flight while the executor has places: those due again, those ready, then new ones."""
+        """Put jobs in flight while the executor has places: those due again, those ready, then new ones.
+
+        Of a recording that the store does not know, first its fingerprint is requested.
+        """
         while self._in_flight < self._executor.places:
             if self._later and self._later[0][0] <= time.monotonic():
                 job = heapq.heappop(self._later)[2]
             elif self._ready:
                 job = self._ready.popleft()
             elif (bag := next(unseen, None)) is not None:
-                self._look_at(bag)
+                recording = self._recordings.get((bag.url, bag.size, bag.stamp))
+                if recording is None:
+                    self._ready.append(Job(read_fingerprint, bag))
+                else:
+                    self._plan(bag, recording)
                 continue
             else:
                 return
@@ -104,14 +111,6 @@ class Engine:
             return self._executor.next(min(until_due, _TURN))
         time.sleep(min(until_due, _TURN))
         return None
-
-    def _look_at(self, bag: Bag) -> None:
-        """Plan the tasks of a recording that the store knows; request the fingerprint of any other."""
-        recording = self._recordings.get((bag.url, bag.size, bag.stamp))
-        if recording is None:
-            self._ready.append(Job(read_fingerprint, bag))
-        else:
-            self._plan(bag, recording)
 
     def _plan(self, bag: Bag, recording: str) -> None:
         """Make the tasks of a recording that are new; one too large for any worker is a row at once."""

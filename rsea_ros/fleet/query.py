@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -106,7 +106,9 @@ def read_again(read: Callable[[], Result]) -> Result:
 def _answer(store: Store, query: str) -> tuple[list[str], list[tuple[Any, ...]]]:
     with connect(store) as database:
         try:
-            _check_reads(duckdb.extract_statements(query))
+            kinds = [statement.type for statement in duckdb.extract_statements(query)]
+            if kinds not in ([duckdb.StatementType.SELECT], [duckdb.StatementType.EXPLAIN]):
+                raise FleetError("expected one SELECT: only rsea fleet run changes a store")
             table = database.sql(query).to_arrow_table()
         except duckdb.IOException:
             raise
@@ -115,13 +117,6 @@ def _answer(store: Store, query: str) -> tuple[list[str], list[tuple[Any, ...]]]
             raise FleetError(f"{text} (views: {', '.join(VIEWS)})") from None
     columns = [column.to_pylist() for column in table.columns]
     return table.column_names, list(zip(*columns, strict=True))
-
-
-def _check_reads(statements: Sequence[Any]) -> None:
-    """Refuse more than one statement, and one that does more than read."""
-    reading = (duckdb.StatementType.SELECT, duckdb.StatementType.EXPLAIN)
-    if len(statements) != 1 or statements[0].type not in reading:
-        raise FleetError("expected one SELECT: only rsea fleet run changes a store")
 
 
 def _quote(path: str) -> str:

@@ -22,7 +22,7 @@ _BLOCK = 1 << 20
 _DIGITS = 16
 _LIST = "@"
 _MARKS = ("size", "mtime", "ETag", "etag", "LastModified", "updated", "created")
-"""What file systems call the time or the tag of a content."""
+"""What file systems call the size, the time or the tag by which they distinguish contents."""
 
 
 @dataclass(frozen=True)
@@ -133,19 +133,15 @@ def _files(source: str) -> dict[str, Mapping[str, Any]]:
             bags |= files.find(root, detail=True)
     except OSError as error:
         raise FleetError(f"{source}: {error.strerror or error}") from None
+    shown = {path: info for path, info in bags.items() if not PurePosixPath(path).name.startswith(".")}
     if _is_local(files):
-        return {path: info for path, info in bags.items() if not _is_hidden(path)}
-    return {files.unstrip_protocol(path): info for path, info in bags.items() if not _is_hidden(path)}
+        return shown
+    return {files.unstrip_protocol(path): info for path, info in shown.items()}
 
 
 def _parts(url: str) -> dict[str, Mapping[str, Any]]:
     """Return the files of one recording: itself, or those directly in its folder."""
     return {path: info for path, info in _files(url).items() if url in (path, _parent(path))}
-
-
-def _is_hidden(path: str) -> bool:
-    """Return whether a name is that of a temporary file."""
-    return PurePosixPath(path).name.startswith(".")
 
 
 def _bags(files: Mapping[str, Mapping[str, Any]]) -> Iterator[Bag]:
@@ -172,14 +168,10 @@ def _all(files: Mapping[str, Mapping[str, Any]]) -> Iterator[Bag]:
 
 
 def _bag(url: str, files: Mapping[str, Mapping[str, Any]]) -> Bag:
-    stamps = "".join(f"{path}={_stamp(info)};" for path, info in sorted(files.items()))
+    marks = {path: " ".join(str(info.get(name)) for name in _MARKS) for path, info in sorted(files.items())}
+    stamps = "".join(f"{path}={mark};" for path, mark in marks.items())
     stamp = hashlib.sha256(stamps.encode("utf-8", "surrogateescape")).hexdigest()[:_DIGITS]
     return Bag(url, sum(int(info.get("size") or 0) for info in files.values()), stamp)
-
-
-def _stamp(info: Mapping[str, Any]) -> str:
-    """Return size and time or tag, by which the file system distinguishes contents."""
-    return " ".join(str(info.get(name)) for name in _MARKS)
 
 
 def _parent(path: str) -> str:

@@ -192,18 +192,8 @@ def _peak() -> int:
 Held = tuple[Bag, tuple[MappedJoint, ...]]
 
 
-def is_anything_new(store: Store, held: Sequence[Held]) -> bool:
-    """Return whether some recording of a joint has no row, by paths, bytes and stamps."""
-    return any(_new(store, held))
-
-
-def count_new(store: Store, held: Sequence[Held]) -> int:
-    """Return how many rows are to be made, by paths, bytes and stamps."""
-    return sum(_new(store, held))
-
-
-def _new(store: Store, held: Sequence[Held]) -> Iterator[bool]:
-    """Yield for each joint of each recording whether it has no row."""
+def are_new(store: Store, held: Sequence[Held]) -> Iterator[bool]:
+    """Yield for each joint of each recording whether it has no row, by paths, bytes and stamps."""
     keys, recordings = store.known_rows()
     for bag, joints in held:
         recording = recordings.get((bag.url, bag.size, bag.stamp))

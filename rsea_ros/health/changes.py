@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, WatchSettings, unexplained_finding
+from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, WatchSettings
 from rsea_ros.health.hypotheses import (
     CHANNELS,
     FILTER_SETTLING,
@@ -300,7 +300,8 @@ class Changes:
         best, code = causes[0], causes[0].hypothesis.code
         confidence = sum(c.probability for c in causes if c.hypothesis.code == code)
         if best.explained < EXPLAINED:
-            finding = unexplained_finding(self._began, 1.0 - max(best.explained, 0.0))
+            left = 1.0 - max(best.explained, 0.0)
+            finding = HealthFinding(UNEXPLAINED, UNEXPLAINED, self._began, left)
             return self._later(finding if self._patience >= PATIENT else None)
         self.findings.pop(UNEXPLAINED, None)
         finding = self._finding(best, confidence)
@@ -312,7 +313,7 @@ class Changes:
         h, half = cause.hypothesis, 0.5 * (cause.ci95[1] - cause.ci95[0])
         size = h.value + cause.change - self._models[h.name]
         since = self.findings[h.name].since if h.name in self.findings else self._began
-        return HealthFinding(h.code, h.name, h.unit, size, (size - half, size + half), since, confidence)
+        return HealthFinding(h.code, h.name, since, confidence, h.unit, size, (size - half, size + half))
 
     def _later(self, finding: HealthFinding | None) -> HealthFinding | None:
         """Report an unsure cause, and fit again after twice as many looks as before."""
@@ -321,8 +322,7 @@ class Changes:
         if finding is None:
             return None
         known = finding.name in self.findings
-        for name in [n for n, f in self.findings.items() if f.confidence < SURE]:
-            del self.findings[name]
+        self.findings = {n: f for n, f in self.findings.items() if f.confidence >= SURE}
         self.findings[finding.name] = finding
         return None if known else finding
 
@@ -331,8 +331,7 @@ class Changes:
         h = cause.hypothesis
         adopted = replace(h, value=h.value + cause.change)
         hypotheses = tuple(adopted if other.name == h.name else other for other in self._base.hypotheses)
-        for name in [n for n, f in self.findings.items() if f.confidence < SURE]:
-            del self.findings[name]
+        self.findings = {n: f for n, f in self.findings.items() if f.confidence >= SURE}
         changed = _is_change(h, finding.size)
         self._before = replace(self._base, last=h.name) if changed else None
         self._begin(_Base(h.change(self._base.rig, cause.change), hypotheses, self._began - FILTER_SETTLING))

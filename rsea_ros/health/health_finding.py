@@ -132,11 +132,8 @@ class Sensors:
             return beside
         stiffness = 0.0 if self.rig.rigid_spring else self.rig["spring.stiffness"]
         torque = MOVED * stiffness * self._noise.get("position", 0.0)
-        return max(beside, torque if other == "ft" else torque + 3.0 * self._friction())
-
-    def _friction(self) -> float:
-        """Return a torque that may not move the joint at all, N m."""
-        return max((e.parameters.get("torque", 0.0) for e in self.rig.effects), default=0.0)
+        friction = max((e.parameters.get("torque", 0.0) for e in self.rig.effects), default=0.0)
+        return max(beside, torque if other == "ft" else torque + 3.0 * friction)
 
 
 @dataclass(frozen=True)
@@ -147,32 +144,23 @@ class HealthFinding:
 
     code: str
     name: str
-    unit: str
-    size: float
-    ci95: tuple[float, float]
     since: float
-    confidence: float
+    confidence: float = 1.0
+    unit: str = ""
+    size: float = math.nan
+    ci95: tuple[float, float] = (math.nan, math.nan)
 
 
 UNEXPLAINED = "RSEA_UNEXPLAINED"
 
 
-def unexplained_finding(since: float, share: float) -> HealthFinding:
-    """Return the finding of a change without a name. share: of it that the best cause does not explain."""
-    return HealthFinding(UNEXPLAINED, UNEXPLAINED, "", math.nan, (math.nan, math.nan), since, share)
-
-
 def sensor_findings(sensors: Sensors, jumps: int, late: int) -> list[HealthFinding]:
     """Return the findings on the sensors themselves. jumps: of the stamps. late: samples left out."""
-    findings = [_plain("RSEA_SENSOR_FROZEN", name, since) for name, since in sensors.frozen.items()]
-    findings += [_plain("RSEA_SENSOR_MISSING", name, since) for name, since in sensors.missing.items()]
+    findings = [HealthFinding("RSEA_SENSOR_FROZEN", name, since) for name, since in sensors.frozen.items()]
+    findings += [HealthFinding("RSEA_SENSOR_MISSING", name, since) for name, since in sensors.missing.items()]
     counts = {"no numbers": sensors.bad_values, "jumps of the stamps": jumps, "late samples": late}
     counted = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-    return [*findings, _plain("RSEA_BAD_DATA", counted, math.nan)] if counted else findings
-
-
-def _plain(code: str, name: str, since: float) -> HealthFinding:
-    return HealthFinding(code, name, "", math.nan, (math.nan, math.nan), since, 1.0)
+    return [*findings, HealthFinding("RSEA_BAD_DATA", counted, math.nan)] if counted else findings
 
 
 class Code(NamedTuple):

@@ -41,11 +41,6 @@ class Look(NamedTuple):
     values: FloatArray
     counts: np.ndarray[tuple[int], np.dtype[np.bool_]]
 
-    @property
-    def end(self) -> float:
-        """Last stamp, s."""
-        return float(self.t[-1])
-
     def travel(self) -> float:
         """Return how far the joint moved, rad."""
         q = self.values[self.kind == STATE, 0]
@@ -86,7 +81,10 @@ class Cutter:
             self._begin += LENGTH if closer else max(LENGTH, self.every)
             if look is not None:
                 yield look
-        self._drop()
+        first = int(np.searchsorted(self._t, min(self._begin, self._t[-1] if len(self._t) else 0.0)))
+        before = np.flatnonzero(self._kind[:first] == COMMAND)[-1:]  # the command in force stays
+        keep = int(before[0]) if len(before) else first
+        self._t, self._kind, self._values = self._t[keep:], self._kind[keep:], self._values[keep:]
 
     def _cut(self, begin: float, end: float) -> Look | None:
         first, last = np.searchsorted(self._t, [begin, end], side="right")
@@ -95,13 +93,6 @@ class Cutter:
         t, kind = self._t[part], self._kind[part]
         counts = (t > begin + FILTER_SETTLING) & (kind != COMMAND)
         return Look(t, kind, self._values[part], counts) if counts.sum() >= FEWEST else None
-
-    def _drop(self) -> None:
-        """Drop events before the beginning of the next look, except the command in force."""
-        first = int(np.searchsorted(self._t, min(self._begin, self._t[-1] if len(self._t) else 0.0)))
-        before = np.flatnonzero(self._kind[:first] == COMMAND)[-1:]
-        keep = int(before[0]) if len(before) else first
-        self._t, self._kind, self._values = self._t[keep:], self._kind[keep:], self._values[keep:]
 
 
 FACTOR = "friction.factor"
@@ -233,8 +224,7 @@ def _set(rig: Rig, name: str, parameter: str, value: float) -> Rig:
     others = [e for e in rig.effects if e.name != name]
     mine = [e for e in rig.effects if e.name == name] or [EffectSetting(name, {})]
     setting = replace(mine[0], parameters={**mine[0].parameters, parameter: value})
-    order: Sequence[EffectSetting] = [*others, setting]
-    return rig.with_effects(*order)
+    return rig.with_effects(*others, setting)
 
 
 CHANNELS = ("position", "ft", "motor_torque")

@@ -107,41 +107,6 @@ class Learned:
     evidence: Sequence[LookEvidence]
 
 
-class Learning:
-    """Pass looks to `take` until it is no longer `collecting`, and the time to `advance`."""
-
-    def __init__(self, rig: Rig, noise: Noise, settings: WatchSettings) -> None:
-        self._settings = settings
-        self._looks: list[Look] = []
-        self._steps = learn(rig, noise, self._looks, settings.hold)
-        self._examined = -math.inf
-
-    @property
-    def collecting(self) -> bool:
-        """Whether it needs more looks."""
-        return len(self._looks) < self._settings.learn
-
-    def take(self, look: Look) -> None:
-        """Collect a look with motion, unless there are enough."""
-        if self.collecting:
-            self._looks.append(look)
-
-    def advance(self, now: float) -> Learned | None:
-        """Examine the next look, at most one every `every` seconds; return the result after the last.
-
-        now: s.
-        """
-        if self.collecting or 0.0 <= now - self._examined < self._settings.every:
-            return None
-        self._examined = now
-        try:
-            next(self._steps)
-        except StopIteration as end:
-            result: Learned = end.value
-            return result
-        return None
-
-
 def learn(rig: Rig, noise: Noise, looks: Sequence[Look], hold: float) -> Generator[None, None, Learned]:
     """Tune a rig to looks and return their evidence for it; yield after each examined look."""
     t = looks[-1].t[looks[-1].kind == STATE]
@@ -188,7 +153,9 @@ class Monitor:
     def begin(self) -> None:
         """Restart the learning of the joint."""
         self._cutter = Cutter(self._settings.every)
-        self._learning: Learning | None = Learning(self._rig, self._noise, self._settings)
+        self._first: list[Look] = []
+        self._learning = learn(self._rig, self._noise, self._first, self._settings.hold)
+        self._examined = -math.inf
         self.changes: Changes | None = None
         self.now = -math.inf
 
@@ -206,16 +173,21 @@ class Monitor:
             return
         self.now = float(t[-1])
         self.sensors.take(t, kind, values)
-        closer = self._learning.collecting if self._learning else bool(self.changes and self.changes.suspects)
+        closer = self._collecting or bool(self.changes and self.changes.suspects)
         for look in self._cutter.take(t, kind, values, closer=closer):
             self._weigh(look)
-        if self._learning is not None:
-            self._start(self._learning.advance(self.now))
+        if self.learning and not self._collecting:
+            self._learn()
 
     @property
     def learning(self) -> bool:
         """Whether it does not know yet how the innovations scatter when all is right."""
-        return self._learning is not None
+        return self.changes is None
+
+    @property
+    def _collecting(self) -> bool:
+        """Whether it needs more looks to learn that."""
+        return len(self._first) < self._settings.learn
 
     @property
     def job(self) -> Callable[[], CandidateCauses] | None:
@@ -244,14 +216,21 @@ class Monitor:
                 self.changes.estimates.hold()
         elif self.changes is not None:
             self.changes.take(look, self.changes.bank.evidence(look))
-        elif self._learning is not None:
-            self._learning.take(look)
+        elif self._collecting:
+            self._first.append(look)
 
-    def _start(self, learned: Learned | None) -> None:
-        """Watch for changes from what was learned, if learning is over, and from the first looks on."""
-        if learned is None:
+    def _learn(self) -> None:
+        """Examine the next look, at most one every `every` seconds.
+
+        After the last watch for changes from what was learned, and from the first looks on.
+        """
+        if 0.0 <= self.now - self._examined < self._settings.every:
             return
-        self._learning = None
+        self._examined = self.now
+        try:
+            return next(self._learning)
+        except StopIteration as end:
+            learned: Learned = end.value
         self.changes = Changes(
             learned.rig, self._noise, learned.hypotheses, learned.models, scatter_of(learned.evidence),
             self._settings,

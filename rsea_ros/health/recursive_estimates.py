@@ -152,16 +152,8 @@ class Cusum:
     """The sums of changes, both signs. inner, outer: shape (p,), in the unit of each. h: threshold."""
 
     def __init__(self, inner: FloatArray, outer: FloatArray, h: float) -> None:
-        self._inner, self._outer, self.h = inner, outer, h
+        self.h = h
         self._linear, self._square = outer - inner, 0.5 * (outer**2 - inner**2)
-        self.clear()
-
-    def like(self, h: float) -> Cusum:
-        """Return the same sums with another threshold."""
-        return Cusum(self._inner, self._outer, h)
-
-    def clear(self) -> None:
-        """Restart."""
         self.sums = np.zeros((2, len(self._linear)))
         self.looks = np.zeros((2, len(self._linear)), dtype=np.int64)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -132,12 +132,6 @@ SPLINES = (
 )
 
 
-def spline_parts(variables: Variables, spline: Spline, knots: FloatArray) -> FloatArray:
-    """Return the parts of a spline along a record, shape (parts, n)."""
-    basis = basis_of(variables.letters[spline.over], knots)
-    return basis * factor_of(variables, spline.place, spline.over, spline.factor)
-
-
 def factor_of(variables: Variables, place: Place, over: str, factor: str) -> FloatArray | float:
     """Return the factor of a spline: loads act on friction by their size, speeds by their sign."""
     if not factor:
@@ -149,13 +143,9 @@ def factor_of(variables: Variables, place: Place, over: str, factor: str) -> Flo
 
 
 def spline_knots(cases: Sequence[CaseModel], spline: Spline) -> FloatArray:
-    """Return the knots of a spline over the range of its variable in all records."""
-    return knots_of(np.concatenate([c.variables.letters[spline.over] for c in cases]), spline.parts)
-
-
-def knots_of(x: FloatArray, parts: int) -> FloatArray:
-    """Return the knots of a spline with a number of parts, most where the data are, none beyond them."""
-    inner = parts - _DEGREE + 1
+    """Return the knots of a spline, most where the data of all records are, none beyond them."""
+    x = np.concatenate([c.variables.letters[spline.over] for c in cases])
+    inner = spline.parts - _DEGREE + 1
     low, high = np.quantile(x, [0.001, 0.999])
     even, dense = np.linspace(low, high, inner), np.quantile(x, np.linspace(0.001, 0.999, inner))
     knots = 0.5 * (even + dense)
@@ -186,7 +176,8 @@ def terms_for(cases: Sequence[CaseModel]) -> tuple[Term, ...]:
         made += stiffness_waves(cycles)
     if "ft" in model.places:
         made += [t for f in sensor_lines(model) for t in hum_terms(f)]
-        made += mode_terms(sensor_modes(model))
+        keep = model.case.mask["ft"]
+        made += mode_terms(modes(model.case.t["ft"][keep], model.residual["ft"][keep]))
     rigid = model.injector is None
     return tuple(
         t for t in made if t.place in model.places and not (rigid and "d" in (t.over, t.expression[:1]))
@@ -201,12 +192,6 @@ def wave_numbers(model: CaseModel, factor: str = "") -> list[float]:
     return periods(theta, missing.torque, size if factor else None)
 
 
-def sensor_modes(model: CaseModel) -> list[float]:
-    """Return the frequencies of the highest broad peaks of the F/T sensor's residual, Hz."""
-    keep = model.case.mask["ft"]
-    return modes(model.case.t["ft"][keep], model.residual["ft"][keep])
-
-
 def sensor_lines(model: CaseModel) -> list[float]:
     """Return the frequency of the sharpest line in the F/T signal that the mechanics do not explain, Hz."""
     case = model.case
@@ -218,26 +203,24 @@ def sensor_lines(model: CaseModel) -> list[float]:
 
 def candidates_of(cases: Sequence[CaseModel]) -> list[tuple[TermCandidate, list[FloatArray]]]:
     """Return all candidates with their course along the steps of every case."""
-    return [*_of_terms(cases), *_of_splines(cases)]
-
-
-def _of_terms(cases: Sequence[CaseModel]) -> Iterator[tuple[TermCandidate, list[FloatArray]]]:
+    found = []
     for term in terms_for(cases):
         for shape in cases[0].variables.shapes(term):
             values = [c.variables.values(term, shape) for c in cases]
             if any(np.ptp(v) > 0.0 or v[0] != 0.0 for v in values):
-                yield TermCandidate(term.place, term.regressor, term, shape), values
-
-
-def _of_splines(cases: Sequence[CaseModel]) -> Iterator[tuple[TermCandidate, list[FloatArray]]]:
+                found.append((TermCandidate(term.place, term.regressor, term, shape), values))
     for spline in SPLINES:
         if spline.place not in cases[0].places or np.ptp(cases[0].variables.letters[spline.over]) == 0.0:
             continue
         knots = spline_knots(cases, spline)
-        parts = [spline_parts(c.variables, spline, knots) for c in cases]
+        parts = [
+            basis_of(v.letters[spline.over], knots) * factor_of(v, spline.place, spline.over, spline.factor)
+            for v in (c.variables for c in cases)
+        ]
         for k in range(spline.parts):
             part = (spline.over, spline.factor, k)
-            yield TermCandidate(spline.place, spline.regressor, part=part), [p[k] for p in parts]
+            found.append((TermCandidate(spline.place, spline.regressor, part=part), [p[k] for p in parts]))
+    return found
 
 
 def columns_of(

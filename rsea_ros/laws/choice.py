@@ -168,7 +168,8 @@ def surely_helps(
     gain = (before - after)[SELECTION] @ weight
     if not _is_sure(gain, _SURE, _WORSE):
         return False
-    held = [gram.squares_left(np.array(c, np.int64)) @ weight for c in ([*given], [*given, *columns])]
+    both = (np.array(c, np.int64) for c in ([*given], [*given, *columns]))
+    held = [gram.loss(c, gram.fit(c, SELECTION)) @ weight for c in both]
     fall = (held[0] - held[1])[HELD_BACK]
     rms = 1.0 - float(np.sqrt(held[1][HELD_BACK].sum() / max(held[0][HELD_BACK].sum(), 1e-300)))
     return rms > MATTERS and _is_sure(fall, _SURE_ON_TEST, _WORSE_ON_TEST)

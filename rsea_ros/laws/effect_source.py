@@ -42,14 +42,10 @@ _ADDS = {
 
 
 def body_of(law: Law) -> str:
-    lines, state, at = _variables(law), 0, 0
+    lines, state, at = _variables(law), int(law.is_friction), 0
     sizes: list[str] = []
     smooth: list[str] = []
-    index: dict[str, int] = {}
-    for k, name in enumerate(law.parameters):
-        index[name] = k
-    if law.is_friction:
-        state = 1
+    index = {name: k for k, name in enumerate(law.parameters)}
     for part, (c, s) in zip(law.parts, law.names, strict=True):
         expression = part.term.expression
         if s:
@@ -80,12 +76,6 @@ def curve_body(law: Law) -> str:
     return "\n".join(
         f"    {line}" for line in [*lines, f"torque = p[0] * value{factor}", *_addition_lines(law, 0)]
     )
-
-
-def states_of(law: Law) -> int:
-    """Return how many states the file's function keeps."""
-    sizes = {"": 0, "lag": 1, "heat": 1, "delay": RING + 1, "dahl": 2, "play": 2, "ring": 2}
-    return int(law.is_friction) + sum(sizes[p.term.memory] for p in law.parts) + 2 * (law.place == "encoder")
 
 
 def _read(law: Law, letter: str) -> str:
@@ -155,12 +145,9 @@ def _memory(part: FittedTerm, name: str, shape: str, state: int) -> tuple[list[s
         if kind == "dahl"
         else f"played(x[{state}], {of}, {shape})"
     )
-    keep = [f"{name} = {made}"]
-    commit = "if s[COMMIT] == 1.0:" if part.term.place == "spring" else "if True:"
-    keep += [commit, f"    x[{state}], x[{state + 1}] = {name}, {of}"]
-    if commit == "if True:":
-        keep = [keep[0], keep[2].strip()]
-    return keep, state + 2
+    keep = f"x[{state}], x[{state + 1}] = {name}, {of}"
+    kept = ["if s[COMMIT] == 1.0:", f"    {keep}"] if part.term.place == "spring" else [keep]
+    return [f"{name} = {made}", *kept], state + 2
 
 
 _WIDE = 10.0
@@ -239,7 +226,8 @@ def _effect(law: Law, claims: Claims) -> str:
     reads = [READS[n] for n in READS if n in letters] + ["DISTAL_ANGLE"] * ("h" in letters)
     reading = f"    reads=({', '.join(reads)},),\n" if reads else ""
     exponent = claims.amplitude_exponent
-    states = states_of(law)
+    kept = {"": 0, "lag": 1, "heat": 1, "delay": RING + 1, "dahl": 2, "play": 2, "ring": 2}
+    states = int(law.is_friction) + sum(kept[p.term.memory] for p in law.parts) + 2 * (law.place == "encoder")
     return (
         f'EFFECT = Effect(\n    name="{law.name}",\n    port=Port.{port},\n    parameters=(\n{rows}    ),\n'
         f'    claims=Claims("{claims.channel}", "{claims.parity}", amplitude_exponent={exponent}, '

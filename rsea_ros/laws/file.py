@@ -44,7 +44,10 @@ def claims_of(law: Law, effect: Effect, rig: Rig, case: Case) -> Claims:
     drive = case.drive
     if not isinstance(drive, Drive) or rig.loop is not None:
         return Claims("motor_torque", "neither", None, passive)
-    drive = _beginning(drive)
+    steps = min(len(drive.command), int(_LONGEST / drive.step))
+    kept = {n: at[at <= steps] for n, at in drive.at.items()}
+    still = replace(drive, initial=(0.0, 0.0), restarts=())
+    drive = replace(still, command=drive.command[:steps], at=kept)
     forward, backward = (_change(law, effect, rig, drive, a) for a in (1.0, -1.0))
     shown = {n: _rms(v) / case.noise[n] for n, v in forward.items() if n in case.noise}
     channel = max(shown, key=lambda n: shown[n])
@@ -56,13 +59,6 @@ def claims_of(law: Law, effect: Effect, rig: Rig, case: Case) -> Claims:
     whole = float(np.rint(exponents.mean()))
     power = whole if np.abs(exponents - whole).max() < _WHOLE else None
     return Claims(channel, parity, power, passive)
-
-
-def _beginning(drive: Drive) -> Drive:
-    steps = min(len(drive.command), int(_LONGEST / drive.step))
-    kept = {n: at[at <= steps] for n, at in drive.at.items()}
-    still = replace(drive, initial=(0.0, 0.0), restarts=())
-    return replace(still, command=drive.command[:steps], at=kept)
 
 
 def _change(law: Law, effect: Effect, rig: Rig, drive: Drive, factor: float) -> Mapping[str, FloatArray]:

@@ -13,7 +13,6 @@ from rsea_ros.diagnosis.score import Score, gain_of as gain_of_blocks, score_on
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import lend
-from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.solver import one_blas_thread
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws.candidates import SPLINES, TermCandidate, basis_of, spline_knots
@@ -44,7 +43,8 @@ _NEEDED = 0.03
 
 def refined_laws(base: Base, drafts: Sequence[Draft]) -> Refined:
     """Fit the laws in the simulation, in units of their residual, and drop needless terms."""
-    refined = refine(base.solution, base.cases, base.score(FITTED), _starts(drafts, None))
+    starts = [(d.effect, d.law.parameters) for d in drafts]
+    refined = refine(base.solution, base.cases, base.score(FITTED), starts)
     weights = _score(base, refined, FITTED)
     refined = _again(base, drafts, refined, weights, frozenset())
     held: frozenset[str] = frozenset()
@@ -56,20 +56,14 @@ def refined_laws(base: Base, drafts: Sequence[Draft]) -> Refined:
     return refined
 
 
-def _starts(drafts: Sequence[Draft], refined: Refined | None) -> list[tuple[Effect, dict[str, float]]]:
-    if refined is None:
-        return [(d.effect, d.law.parameters) for d in drafts]
-    return [(d.effect, refined.parameters(d.effect.name)) for d in drafts]
-
-
 def _again(
     base: Base, drafts: Sequence[Draft], refined: Refined, weights: Score, held: frozenset[str]
 ) -> Refined:
     """Fit from a fit on, with some parameters held: coefficients at zero, shapes where they are."""
     nearer = replace(base.solution, theta=refined.solution.theta[: len(base.solution.theta)])
     starts = [
-        (e, values | {n: 0.0 for n, _ in d.law.names if f"{e.name}.{n}" in held})
-        for d, (e, values) in zip(drafts, _starts(drafts, refined), strict=True)
+        (e, refined.parameters(e.name) | {n: 0.0 for n, _ in law.names if f"{e.name}.{n}" in held})
+        for e, law in ((d.effect, d.law) for d in drafts)
     ]
     return refine(nearer, base.cases, weights, starts, held)
 
@@ -236,10 +230,10 @@ def _result(
     drafts = [draft_of(law) for law in laws]
     with lend(*(d.effect for d in drafts)):
         refined = refined_laws(base, drafts) if drafts else None
-        if refined is None or not is_better(*gain_on_tests(base, refined)):
+        gain, ci95 = gain_on_tests(base, refined) if refined else (0.0, (0.0, 0.0))
+        if refined is None or not is_better(gain, ci95):
             return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,
                            tried=summarize_models(search, choice, ()))  # fmt: skip
-        gain, ci95 = gain_on_tests(base, refined)
         before, noise = levels_of(base.problem, base.outputs, base.cases)
         problem = replace(refined.solution.problem, cases=base.cases)
         after = levels_of(problem, problem.outputs(refined.solution.theta), base.cases)[0]

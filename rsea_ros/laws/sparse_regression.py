@@ -34,7 +34,7 @@ _GRAM_RIDGE = 1e-6
 _REWEIGHTINGS = 3
 _LEAST = 1e-30
 """RMS of a column, over the noise, below which the data do not show it: it is not scaled."""
-FOLDS = ((0,), (1,), (2,))
+FOLDS = (0, 1, 2)
 """Sets of blocks that are held out in turn; the test blocks take part in nothing."""
 
 
@@ -108,14 +108,9 @@ class Gram:
         """Return the squares that are left of each group by fits without its set, (groups, channels)."""
         out = np.zeros_like(self.rr)
         for fold in FOLDS:
-            inside = groups_of([s for f in FOLDS if f != fold for s in f])
-            at = groups_of(fold)
+            inside, at = groups_of([f for f in FOLDS if f != fold]), groups_of([fold])
             out[at] = self.loss(columns, self.fit(columns, inside, ridge))[at]
         return out
-
-    def squares_left(self, columns: IntArray) -> FloatArray:
-        """Return the squares left by a fit on all but the test blocks, (groups, channels)."""
-        return self.loss(columns, self.fit(columns, SELECTION))
 
 
 def groups_of(sets: Sequence[int]) -> IntArray:
@@ -123,7 +118,7 @@ def groups_of(sets: Sequence[int]) -> IntArray:
     return np.concatenate([np.arange(s * GROUPS, (s + 1) * GROUPS) for s in sets])
 
 
-SELECTION, HELD_BACK = groups_of([s for f in FOLDS for s in f]), groups_of(TEST)
+SELECTION, HELD_BACK = groups_of(FOLDS), groups_of(TEST)
 
 
 def gram_of(rows: ResidualRows, columns: Sequence[FloatArray]) -> Gram:
@@ -188,12 +183,11 @@ class Folded:
 def fold_sums(gram: Gram, weight: FloatArray) -> Folded:
     """Return the sums of each fold. weight: of each channel."""
     products, rights, squares = gram.by_set
-    sets = [k for fold in FOLDS for k in fold]
-    a = {k: np.tensordot(weight, products[k], 1) for k in sets}
-    b = {k: weight @ rights[k] for k in sets}
-    whole_a, whole_b = np.sum([a[k] for k in sets], axis=0), np.sum([b[k] for k in sets], axis=0)
-    inside = [(np.asarray(whole_a - a[k]), np.asarray(whole_b - b[k])) for k in sets]
-    outside = [(a[k], b[k], float(squares[k] @ weight)) for k in sets]
+    a = [np.tensordot(weight, products[k], 1) for k in FOLDS]
+    b = [weight @ rights[k] for k in FOLDS]
+    whole_a, whole_b = np.sum(a, axis=0), np.sum(b, axis=0)
+    inside = [(np.asarray(whole_a - a_k), np.asarray(whole_b - b_k)) for a_k, b_k in zip(a, b, strict=True)]
+    outside = [(a[i], b[i], float(squares[k] @ weight)) for i, k in enumerate(FOLDS)]
     penalty = np.zeros(gram.b.shape[2])
     penalty[: len(gram.prior)] = gram.penalty
     return Folded(tuple(inside), tuple(outside), penalty)

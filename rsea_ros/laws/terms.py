@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from types import CodeType
 from typing import Literal, cast
 
 import numpy as np
@@ -61,7 +60,7 @@ class Term:
     def values(self, variables: Mapping[str, FloatArray], shape: float) -> FloatArray:
         """Return the term over arrays, for a coefficient of 1. variables: by their letters, m included."""
         namespace = {**_ARRAYS, **variables, "a": shape}
-        values = eval(_code(self.expression), {"__builtins__": {}}, namespace)
+        values = eval(_compiled(self.expression, "<term>", "eval"), {"__builtins__": {}}, namespace)
         values = values * np.tanh(variables["w"] / CREEP) * -1.0 if self.friction else values
         return np.broadcast_to(np.asarray(values, np.float64), variables["w"].shape)
 
@@ -70,9 +69,7 @@ CREEP = 2e-3
 """rad/s. Below it a gear with friction creeps (effects/_friction.py)."""
 
 
-@cache
-def _code(expression: str) -> CodeType:
-    return compile(expression, "<term>", "eval")
+_compiled = cache(compile)
 
 
 _WIDE = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)

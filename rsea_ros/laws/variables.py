@@ -147,10 +147,6 @@ class Variables:
     step: float
     letters: Mapping[str, FloatArray]
 
-    def size(self, letter: str) -> float:
-        """Return how large a variable gets, but for its rarest values."""
-        return float(np.quantile(np.abs(self.letters[letter]), 0.995))
-
     def values(self, term: Term, shape: float) -> FloatArray:
         """Return a term along the record, for a coefficient of 1."""
         letters = dict(self.letters)
@@ -159,10 +155,13 @@ class Variables:
         return term.values(letters, shape)
 
     def shapes(self, term: Term) -> tuple[float, ...]:
-        """Return the shapes to be tried of a term, SI; 0 for one that has none."""
+        """Return the shapes to be tried of a term, SI; 0 for one that has none.
+
+        Shares of how large the variable gets, but for its rarest values.
+        """
         if not term.shape:
             return (0.0,)
-        size = self.size(term.over) if term.over else 1.0
+        size = float(np.quantile(np.abs(self.letters[term.over]), 0.995)) if term.over else 1.0
         return tuple(share * size for share in term.shapes)
 
 

@@ -40,7 +40,8 @@ class Bar:
 @contextmanager
 def shown_in_notebook(progress: Progress | None) -> Iterator[Progress | None]:
     """Yield the caller's progress if there is one, else in a notebook a bar that vanishes at the end."""
-    if progress is not None or not _is_notebook():
+    has_kernel = "ipykernel" in sys.modules and hasattr(import_module("IPython").get_ipython(), "kernel")
+    if progress is not None or not has_kernel:  # a terminal of IPython has none
         yield progress
         return
     handle = import_module("IPython.display").display(Bar(), display_id=True)
@@ -48,13 +49,6 @@ def shown_in_notebook(progress: Progress | None) -> Iterator[Progress | None]:
         yield lambda step, share: handle.update(Bar(step, share))
     finally:
         handle.update(Bar())
-
-
-def _is_notebook() -> bool:
-    """Return whether a notebook's kernel runs this code; a terminal of IPython has none."""
-    if "ipykernel" not in sys.modules:
-        return False
-    return hasattr(import_module("IPython").get_ipython(), "kernel")
 
 
 _WIDTH = 140

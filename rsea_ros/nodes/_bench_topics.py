@@ -184,9 +184,7 @@ class Combined:
 
     def __init__(self, node: Node, names: Sequence[str]) -> None:
         self._node = node
-        self._publisher = node.create_publisher(
-            JointState, "joint_states", MEASURED, qos_overriding_options=OVERRIDES
-        )
+        self._publisher = _publisher(node, JointState, "joint_states")
         template = serialize_message(joint_states_message(names))
         self._writer = RawWriter(template, TYPES["joint_states"], "position", "velocity", "effort")
 

@@ -112,11 +112,6 @@ def noise_from(rig: Rig, path: str) -> Noise:
     """
     if not path:
         return noise_of(rig)
-    document = _document(path)
-    return noise_of(rig, _numbers(document, "noise_rms", path), _numbers(document, "residual_rms", path))
-
-
-def _document(path: str) -> Mapping[str, Any]:
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
@@ -124,7 +119,7 @@ def _document(path: str) -> Mapping[str, Any]:
         raise ParameterError(f"parameter identification = {path!r}: {why}, {_EXPECTED}") from None
     if not isinstance(document, dict):
         raise ParameterError(f"parameter identification = {path!r}, {_EXPECTED}")
-    return document
+    return noise_of(rig, _numbers(document, "noise_rms", path), _numbers(document, "residual_rms", path))
 
 
 def _numbers(document: Mapping[str, Any], name: str, path: str) -> dict[str, float]:

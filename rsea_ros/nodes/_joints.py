@@ -79,7 +79,14 @@ class Jobs:
     async def do(self, work: Callable[[], str]) -> str:
         """Return the result of the work or raise its error; the executor goes on meanwhile."""
         future: Future[str] = Future()
-        thread = threading.Thread(target=_fulfil, args=(future, work), daemon=True)
+
+        def fulfil() -> None:
+            try:
+                future.set_result(work())
+            except Exception as error:  # raised in the coroutine of whoever waits for it
+                future.set_exception(error)
+
+        thread = threading.Thread(target=fulfil, daemon=True)
         self._threads.add(thread)
         self._tick.reset()
         thread.start()
@@ -94,10 +101,3 @@ class Jobs:
         """Wait for what is under way, s each."""
         for thread in list(self._threads):
             thread.join(timeout)
-
-
-def _fulfil(future: Future[str], work: Callable[[], str]) -> None:
-    try:
-        future.set_result(work())
-    except Exception as error:  # raised in the coroutine of whoever waits for it
-        future.set_exception(error)

@@ -73,12 +73,18 @@ class ModelHealth:
         stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in sensors.frozen]
         if sensors.unmoved and not stopped:
             stopped = [UNMOVED]
-        doubts = (_inconsistency(name, test) for name, test in tests.items() if test.broken)
+        doubts = (
+            f"model inconsistent with {name}: innovations {t.ratio:.2f} times theirs (limit {t.limit:.2f})"
+            for name, t in tests.items()
+            if t.broken
+        )
         troubles = [*stopped, *self.contradictions, *self._silence(), *doubts]
         summary = "; ".join(troubles) or self._error.verdict
-        return NodeHealth(
-            WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_test_values(tests)}
-        )
+        values = {**self._band(), **self._doubt()}
+        for name, t in tests.items():
+            values |= {f"{name}.innovation": f"{t.ratio:.3f}", f"{name}.innovation_limit": f"{t.limit:.3f}"}
+            values[f"{name}.innovation_mean"] = f"{t.mean:.3g}"
+        return NodeHealth(WARN if troubles else OK, summary, values)
 
     def _contradictions(self, tests: Mapping[str, Consistency]) -> list[str]:
         """Return the channels whose innovations, N m RMS, are more than the tolerated part of the torque.
@@ -147,20 +153,6 @@ class ModelHealth:
             "unstamped_commands": self._inputs.unstamped,
             "restarts": self._observer.restarts,
         }
-
-
-def _inconsistency(name: str, test: Consistency) -> str:
-    return (
-        f"model inconsistent with {name}: innovations {test.ratio:.2f} times theirs (limit {test.limit:.2f})"
-    )
-
-
-def _test_values(tests: Mapping[str, Consistency]) -> dict[str, object]:
-    values: dict[str, object] = {}
-    for name, test in tests.items():
-        values |= {f"{name}.innovation": f"{test.ratio:.3f}", f"{name}.innovation_limit": f"{test.limit:.3f}"}
-        values[f"{name}.innovation_mean"] = f"{test.mean:.3g}"
-    return values
 
 
 NAME = "pure_torque"

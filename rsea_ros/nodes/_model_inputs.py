@@ -42,7 +42,10 @@ class Frozen:
 
     def take(self, stamp: int, values: Sequence[float]) -> bool:
         """Process a sample (stamp in ns); return whether the sensor has stopped."""
-        if not self._stands(values) or stamp < self._since:
+        stands = values == self._last
+        if self._band:
+            stands = bool(self._last) and abs(values[0] - self._last[0]) <= self._band
+        if not stands or stamp < self._since:
             self._last, self._since, self._count = values, stamp, 0
             self._low, self._high, self.doubted, self.frozen = math.inf, -math.inf, False, False
         self._count += 1
@@ -50,11 +53,6 @@ class Frozen:
         if self._count >= SAMPLES and stamp - self._since >= self._time:
             self.frozen = self.doubted
         return self.frozen
-
-    def _stands(self, values: Sequence[float]) -> bool:
-        if self._band == 0.0:
-            return values == self._last
-        return bool(self._last) and abs(values[0] - self._last[0]) <= self._band
 
     def beside(self, value: float) -> None:
         """Process a sample of another sensor."""
@@ -184,7 +182,9 @@ class ModelInputs:
         for stamp, a, b, kind in samples:
             estimate = self._measure(stamp, a, b, kind)
             if estimate is not None and (kind == _FT or self.ft_silent or self.stopped.ft_frozen):
-                self._note_period(stamp)
+                if 0 < stamp - self._estimate_stamp < SECOND:
+                    self._periods.append((stamp - self._estimate_stamp) / SECOND)
+                self._estimate_stamp = stamp
                 yield stamp, estimate
 
     def seconds(self, stamp: int) -> float:
@@ -225,11 +225,6 @@ class ModelInputs:
         if doubted or "joint_states" in self.stopped.frozen:
             return None
         return self._observer.state(self.seconds(stamp), a, b)
-
-    def _note_period(self, stamp: int) -> None:
-        if 0 < stamp - self._estimate_stamp < SECOND:
-            self._periods.append((stamp - self._estimate_stamp) / SECOND)
-        self._estimate_stamp = stamp
 
     def _command(self, stamp: int, torque: float) -> None:
         newest = max(self._state_stamp, self._ft_stamp)

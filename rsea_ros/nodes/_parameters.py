@@ -128,11 +128,8 @@ def _descriptor(parameter: NodeParameter) -> Any:
     low, high, bounds = parameter.low, parameter.high, None
     if low is not None and high is not None:
         bounds = (int(low), int(high)) if isinstance(parameter.default, int) else (float(low), float(high))
-    return parameter_descriptor(_describe(parameter), f"expected {parameter.requirement()}", bounds)
-
-
-def _describe(parameter: NodeParameter) -> str:
-    return f"{parameter.description}, {plain(parameter.unit)}" if parameter.unit else parameter.description
+    about = ", ".join(filter(None, (parameter.description, plain(parameter.unit))))
+    return parameter_descriptor(about, f"expected {parameter.requirement()}", bounds)
 
 
 def usage(name: str, table: Sequence[NodeParameter]) -> str:

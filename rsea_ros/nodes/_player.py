@@ -117,8 +117,7 @@ class Player:
         """Return when the first command takes effect, ns."""
         earliest = time.time_ns() + self._lead + DISCOVERY_TIME
         periods = math.ceil((earliest - measured) * self.rate / SECOND)
-        first: int = measured + round(periods * SECOND / self.rate)
-        return first
+        return measured + round(periods * SECOND / self.rate)
 
     def _step(self, now: int) -> None:
         """Publish the next command, or leave it out when this thread was held up for too long."""

@@ -67,7 +67,8 @@ def policies(joints: Sequence[str] = ()) -> str:
             with BagWriter("every topic") as bag:
                 for name, kind in TOPICS.items():
                     bag.write(name if name.startswith("/") else f"/{NAMESPACE}/{name}", kind, 1, bytes(8))
-            _with_encoder("paper_high_impedance", ENCODERS)
+            rig = load_rig("paper_high_impedance")
+            save_rig(replace(rig, sensors={**rig.sensors, "deflection": Sensor(noise=1e-6)}), ENCODERS)
             nodes = _joints(joints) if joints else {(NAMESPACE, name): interfaces(name) for name in NODES}
         finally:
             os.chdir(before)
@@ -75,11 +76,6 @@ def policies(joints: Sequence[str] = ()) -> str:
     served = {name for each in nodes.values() for name in each["services", "reply"]}
     person: Interfaces = {("topics", "subscribe"): heard, ("services", "request"): served}
     return document({**nodes, (NAMESPACE, OPERATOR): person})
-
-
-def _with_encoder(name: str, path: str) -> None:
-    rig = load_rig(name)
-    save_rig(replace(rig, sensors={**rig.sensors, "deflection": Sensor(noise=1e-6)}), path)
 
 
 def _joints(joints: Sequence[str]) -> Profiles:
@@ -130,7 +126,10 @@ def document(profiles: Profiles) -> str:
             XML.SubElement(enclave, "profiles"), "profile", ns=f"/{namespace}", node=name
         )
         for (plural, verb), names in each.items():
-            _list(profile, plural, verb, names)
+            if names:
+                parent = XML.SubElement(profile, plural, {verb: "ALLOW"})
+            for listed in sorted(names):
+                XML.SubElement(parent, plural.removesuffix("s")).text = listed
     XML.indent(policy)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{XML.tostring(policy, encoding="unicode")}\n'
 
@@ -145,13 +144,6 @@ def _ask(node: Any, name: str) -> Interfaces:
         ("services", "reply"): names(node.get_service_names_and_types_by_node),
         ("services", "request"): names(node.get_client_names_and_types_by_node),
     }
-
-
-def _list(profile: XML.Element, plural: str, verb: str, names: Iterable[str]) -> None:
-    parent = XML.SubElement(profile, plural, {verb: "ALLOW"}) if names else None
-    for name in sorted(names):
-        assert parent is not None
-        XML.SubElement(parent, plural.removesuffix("s")).text = name
 
 
 if __name__ == "__main__":

@@ -46,21 +46,16 @@ class Worker(Protocol):
 
 def keep_time(node: Node, worker: Worker, values: Mapping[str, Any]) -> None:
     """Start a worker with a timed thread, as the parameters REALTIME of its node say."""
-    _let_in_at_once()
+    sys.setswitchinterval(SWITCH_INTERVAL)  # Python's own, 5 ms, is longer than a cycle, and so is
+    gc.collect()  # a garbage collection over everything that a node has loaded
+    gc.freeze()
     worker.start()
     _settle(node, values["cpu_affinity"])
-    _hurry(node, worker.thread, values["realtime_priority"])
-
-
-def _let_in_at_once() -> None:
-    """Shorten the waits of timed threads for other threads and for garbage collection.
-
-    Python's switch interval of 5 ms is longer than a cycle, and so is a garbage collection over everything
-    that a node has loaded.
-    """
-    sys.setswitchinterval(SWITCH_INTERVAL)
-    gc.collect()
-    gc.freeze()
+    if priority := values["realtime_priority"]:
+        try:
+            raise_priority(worker.thread, priority)
+        except ParameterError as error:
+            node.get_logger().warning(f"{error}; runs without")
 
 
 def _settle(node: Node, processor: int) -> None:
@@ -72,15 +67,6 @@ def _settle(node: Node, processor: int) -> None:
         node.get_logger().warning(
             f"parameter cpu_affinity = {processor}, expected one of {allowed}; runs on any"
         )
-
-
-def _hurry(node: Node, first: threading.Thread, priority: int) -> None:
-    """Give a timed thread the requested priority; warn where it is not permitted."""
-    if priority:
-        try:
-            raise_priority(first, priority)
-        except ParameterError as error:
-            node.get_logger().warning(f"{error}; runs without")
 
 
 def raise_priority(first: threading.Thread, priority: int) -> None:

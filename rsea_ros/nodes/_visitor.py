@@ -78,9 +78,10 @@ class Listener:
         return topics
 
     def _seen(self) -> list[tuple[str, str, str, str]]:
+        node = self._node
         return [
-            (name, ", ".join(types), *self._counts(name))
-            for name, types in self._node.get_topic_names_and_types()
+            (name, ", ".join(types), str(node.count_publishers(name)), str(node.count_subscribers(name)))
+            for name, types in node.get_topic_names_and_types()
             if name not in _ROS_TOPICS
         ]
 
@@ -133,9 +134,6 @@ class Listener:
             time.sleep(POLL)
         near = did_you_mean(name, known)
         raise ParameterError(f"topic {name}: nobody publishes it{near} (rsea topics lists what there is)")
-
-    def _counts(self, name: str) -> tuple[str, str]:
-        return str(self._node.count_publishers(name)), str(self._node.count_subscribers(name))
 
 
 _TRIGGER, _CHANGE_STATE = "std_srvs/srv/Trigger", "lifecycle_msgs/srv/ChangeState"
@@ -221,7 +219,7 @@ class Caller:
     def full_name(self, name: str) -> str:
         """Return the full name of a node. Raises ParameterError when it does not run or offers nothing."""
         name = absolute(name)
-        if not _await(lambda: name in self._nodes() and bool(self.actions(name)), _SEARCH):
+        if not any(name in self._nodes() and self.actions(name) for _ in _looks(_SEARCH)):
             visitor = absolute(self._node.get_name())
             near = did_you_mean(name, [other for other in self._nodes() if other != visitor])
             raise ParameterError(f"node {name}: it does not run{near} (rsea call lists what does)")
@@ -269,11 +267,6 @@ class Caller:
             return future.result()
         finally:
             self._node.destroy_client(client)
-
-
-def _await(is_true: Callable[[], bool], patience: float) -> bool:
-    """Return whether something becomes true while a graph is being discovered. patience: s."""
-    return any(is_true() for _ in _looks(patience))
 
 
 def _looks(patience: float) -> Iterator[None]:

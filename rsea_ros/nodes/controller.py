@@ -91,19 +91,15 @@ class ControllerNode:
         together: how many came at once, for the newest of them; 0 for the others, which it replaces.
         """
         self._heard = time.monotonic_ns()
-        if self._grid.jumps(stamp):
-            self._begin_again(stamp)
+        if self._grid.jumps(stamp):  # the clock of the bench was set
+            self._desired.shift(stamp - self._last)
+            self._grid.forget()
+            self._last, self._restarts = 0, self._restarts + 1
         periods = self._grid.place(stamp)
         if periods and (missed := periods - 1) > self._values["stale"] * self._values["rate"]:
             self._last = 0  # the model would be led through a pause that nobody has seen
         if periods:
             self._command(stamp, reading, missed if self._last else 0, together)
-
-    def _begin_again(self, stamp: int) -> None:
-        """Follow stamps that have jumped: the clock of the bench was set."""
-        self._desired.shift(stamp - self._last)
-        self._grid.forget()
-        self._last, self._restarts = 0, self._restarts + 1
 
     def _command(self, stamp: int, reading: Measurement, missed: int, together: int) -> None:
         self._inputs.hear_desired(self._anchor)
@@ -241,27 +237,23 @@ class ControllerNode:
             "desired_watchdog_trips": self._desired.expired,
             "refused_desired": self._desired.refused,
         }
-        warnings = [*self._late_words(), *self._loss_words()]
+        warnings = [*self._loss_words()]
+        new, self._late_reported = self._late - self._late_reported, self._late
+        if new:
+            warnings.insert(0, f"{new} commands more than a sample late, with less feedback")
         if self._fault:
             level, words = ERROR, self._fault
         elif not self._last:
             level, words = WARN, "waiting for joint_states and ft"
         elif not self._polarity.proven:
-            level, words = self._unproven()
+            level, words = OK, "waiting for desired_torque"
+            if self._wished:
+                level, words = WARN, (
+                    "pulses of torque without feedback: signs of ft, joint_states and motor torque are open"
+                )
         else:
             return NodeHealth(*((WARN, "; ".join(warnings)) if warnings else (OK, "running")), values)
         return NodeHealth(max(level, WARN) if warnings else level, "; ".join((words, *warnings)), values)
-
-    def _unproven(self) -> tuple[bytes, str]:
-        """Return level and words of a controller whose signs are not proven."""
-        if not self._wished:
-            return OK, "waiting for desired_torque"
-        return WARN, "pulses of torque without feedback: signs of ft, joint_states and motor torque are open"
-
-    def _late_words(self) -> Iterator[str]:
-        new, self._late_reported = self._late - self._late_reported, self._late
-        if new:
-            yield f"{new} commands more than a sample late, with less feedback"
 
     def _loss_words(self) -> Iterator[str]:
         """Yield that the encoder on the link has ceased to count, as long as a trouble of it lasts."""

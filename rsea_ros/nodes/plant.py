@@ -58,19 +58,16 @@ class PlantNode(Program):
         if not self._now:
             self._now = stamp
             self._device.open()
-        self._let_commands_in(self._cycle.anchor.now() - stamp)
+        behind = self._cycle.anchor.now() - stamp
+        if behind > STALL >= self._behind:  # once after a stall: commands sent meanwhile are on their way
+            time.sleep(PAUSE)
+        self._behind = behind
         self._topics.poll(self._cycle.anchor)
         for instant, torque in self._topics.commands.take(stamp):
             self._now = instant
             self._device.write(torque)
         self._now = stamp
         self._topics.publish(self._device.read())
-
-    def _let_commands_in(self, behind: int) -> None:
-        """Pause once after a stall (ns): commands sent meanwhile are still on their way."""
-        if behind > STALL >= self._behind:
-            time.sleep(PAUSE)
-        self._behind = behind
 
     def is_finished(self) -> bool:
         """Run until stopped."""

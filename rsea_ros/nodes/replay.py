@@ -74,16 +74,9 @@ class ReplayNode:
                 self._node.get_logger().warning(f"{topic} is left out: {error}")
         return publishers
 
-    def _awaits_subscribers(self) -> bool:
-        """Return whether subscribers are still missing."""
-        return any(
-            publisher.get_subscription_count() < self._wanted
-            for topic, publisher in self._publishers.items()
-            if topic.rpartition("/")[2] in WAIT_FOR
-        )
-
     def _run(self) -> None:
-        while self._awaits_subscribers():
+        heard = [each for topic, each in self._publishers.items() if topic.rpartition("/")[2] in WAIT_FOR]
+        while any(publisher.get_subscription_count() < self._wanted for publisher in heard):
             if self._stop.wait(0.05):
                 return
         begin, first, ticked = time.monotonic_ns() + DISCOVERY_TIME, self._rows[0][2], 0

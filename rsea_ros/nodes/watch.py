@@ -54,14 +54,13 @@ class WatchSource:
         self._angle_is_deflection = rig.clamped == set(END_NAMES)
         self.flag: bool | None = None
         self.newest, self._epoch = 0, 0
-        self._refused = 0
         self._health: dict[str, tuple[float, Mapping[str, Any]]] = {}
         self._counted = time.monotonic()
         self.bench = f"{self._namespace.strip('/')} · {rig.name}"
         effort = ("effort", 0)
         self._boxes = {
             topic: Mailbox(
-                node, topic, MessageFields(kind, tuple(fields), name, most), MEASUREMENT, self._refuse
+                node, topic, MessageFields(kind, tuple(fields), name, most), MEASUREMENT, lambda: None
             )
             for topic, kind, name, most, *fields in (
                 ("joint_states", JOINT_STATE, joint, 1, ("position", 0), effort),
@@ -71,7 +70,7 @@ class WatchSource:
             )
         }
         self._counts = dict.fromkeys(self._boxes, 0)
-        node.create_subscription(Bool, "pure_torque", self._on_flag, LATCHED)
+        node.create_subscription(Bool, "pure_torque", lambda m: setattr(self, "flag", bool(m.data)), LATCHED)
         node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, MEASUREMENT)
 
     def take(self) -> Mapping[str, Sequence[tuple[float, float]]]:
@@ -111,12 +110,6 @@ class WatchSource:
     def _seconds(self, stamp: int) -> float:
         self._epoch = self._epoch or stamp
         return (stamp - self._epoch) / SECOND
-
-    def _refuse(self) -> None:
-        self._refused += 1
-
-    def _on_flag(self, message: Bool) -> None:
-        self.flag = bool(message.data)
 
     def _on_health(self, message: DiagnosticArray) -> None:
         for status in message.status:

@@ -62,8 +62,7 @@ def verdict(study: Study) -> str:
 
 def _keys(study: Study) -> list[tuple[str, str]]:
     at, locked = study.rates[0], study.rates[0].design.margins["locked"]
-    value = {trial.what: trial for trial in at.trials}
-    errors = [(f"{t.value:.1f} %", f"error, {name}") for name, t in value.items() if t.unit == "%"][:1]
+    errors = [(f"{t.value:.1f} %", f"error, {t.what}") for t in at.trials if t.unit == "%"][:1]
     return [
         (f"{study.resonance:.1f} Hz", "open-loop resonance"),
         (f"{locked.crossover:.1f} Hz", f"crossover at {at.design.rate:g} Hz"),

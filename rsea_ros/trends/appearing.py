@@ -44,11 +44,6 @@ def scan_threshold(rate: float, share: float, freedom: int) -> float:
     return float(brentq(lambda z: np.log(scan_p(z, share, freedom) / rate), 1.6, 200.0))
 
 
-def two_sided_p(z: float, freedom: float = np.inf) -> float:
-    """Return how often noise alone makes a score so large on either side."""
-    return float(2.0 * t.sf(abs(z), freedom))
-
-
 def adjust(p: FloatArray) -> FloatArray:
     """Return for each p value the false discovery rate at which it counts (Benjamini and Hochberg 1995).
 

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import t as student
 
 from rsea_ros.records.statistics import MAD_TO_SD, Z95
-from rsea_ros.trends.appearing import adjust, appearances, scan_threshold, two_sided_p, with_course
+from rsea_ros.trends.appearing import adjust, appearances, scan_threshold, with_course
 from rsea_ros.trends.cause_series import namings, size_series, temperatures
 from rsea_ros.trends.course import (
     Course,
@@ -151,7 +152,8 @@ def outliers(trends: Iterable[Trend], settings: TrendSettings) -> tuple[Outlier,
     scored = [s for group in groups.values() if len(group) >= settings.fewest_joints for s in _score(group)]
     if not scored:
         return ()
-    q = adjust(np.array([two_sided_p(score, len_ - 1.0) for _, _, score, len_ in scored]))
+    scores, counts = np.array([(score, count) for _, _, score, count in scored]).T
+    q = adjust(2.0 * student.sf(np.abs(scores), counts - 1.0))  # on either side
     return tuple(
         Outlier(t.series.joint, t.series.parameter, t.series.unit, t.now, median, score, float(rate))
         for (t, median, score, _), rate in zip(scored, q, strict=True)
@@ -211,7 +213,10 @@ def _trends(
     for series in all_of:
         days = day_means(series, settings)
         if len(days.t) < settings.fewest_days:
-            out[series.joint, series.parameter] = _undetermined_trend(series, len(days.t), settings)
+            determined = f"{int(np.sum(series.identifiable))} of {len(series.identifiable)} recordings"
+            on = "1 day" if len(days.t) == 1 else f"{len(days.t)} days"
+            reason = f"{determined} determine it, on {on}; {settings.fewest_days} days are needed"
+            out[series.joint, series.parameter] = Trend(series, "undetermined", reason=reason)
             continue
         ready.append((series, days, day_effect(days, settings)))
         effects.setdefault(series.parameter, []).append(ready[-1][2])
@@ -223,11 +228,3 @@ def _trends(
         out[s.joint, s.parameter] = trend_of(s, test, course, float(q), settings)
     warm = {s.parameter for s, days, _ in ready if days.warmth is not None}
     return out, {n: p for n, p in priors.items() if n in warm}
-
-
-def _undetermined_trend(series: Series, days: int, settings: TrendSettings) -> Trend:
-    many = len(series.identifiable)
-    on = "1 day" if days == 1 else f"{days} days"
-    determined = f"{int(np.sum(series.identifiable))} of {many} recordings determine it, on {on}"
-    reason = f"{determined}; {settings.fewest_days} days are needed"
-    return Trend(series, "undetermined", reason=reason)

@@ -69,7 +69,8 @@ def check_wish(wish: Wish, bounds: Bounds) -> Wish:
 class Commander:
     """Who holds the command, and the torque now. Times are s of a monotonic clock; any thread may call.
 
-    bounds: None until they are known; then nothing may be held. holder: who holds it, None: nobody.
+    bounds: None until they are known; then nothing may be held. holder: who holds it, None: nobody. active:
+    whether commands are to be published.
     """
 
     def __init__(self, bounds: Bounds | None = None) -> None:
@@ -79,12 +80,7 @@ class Commander:
         self._wish, self._running = Wish(), Wish()
         self._heard = self._began = self._last = self._zero_since = 0.0
         self._envelope = self._fall = 0.0
-        self._active = False
-
-    @property
-    def active(self) -> bool:
-        """Whether commands are to be published."""
-        return self._active
+        self.active = False
 
     def hold(self, who: object, wish: Wish, now: float) -> bool:
         """Hold the command or continue to; return whether the page has it.
@@ -98,8 +94,8 @@ class Commander:
         with self._lock:
             if self._holds(now) and self.holder != who:
                 return False
-            if not self._active:
-                self._active, self._last, self._running, self._envelope = True, now, wish, 0.0
+            if not self.active:
+                self.active, self._last, self._running, self._envelope = True, now, wish, 0.0
                 self._began = now
             self.holder, self._wish, self._heard = who, wish, now
             return True
@@ -113,14 +109,14 @@ class Commander:
     def torque(self, now: float) -> float | None:
         """Return the torque to command now, N m; None: publish nothing (any more)."""
         with self._lock:
-            if not self._active or self.bounds is None:
+            if not self.active or self.bounds is None:
                 return None
             step, self._last = max(0.0, now - self._last), now
             if self.holder is not None and not self._holds(now):
                 self._let_go()
             self._move(step, now)
             if self.holder is None and self._envelope == 0.0 and now - self._zero_since > CLOSING:
-                self._active = False
+                self.active = False
                 return None
             value = self._envelope * _shape(self._running, now - self._began)
             return min(max(value, -self.bounds.torque), self.bounds.torque)

@@ -90,11 +90,11 @@ def routes(access: Access, desk: Desk, runs: Runs) -> Sequence[Any]:
 class TokenHandler(RequestHandler):
     """Answers only who has the token, by cookie."""
 
-    def initialize(self, access: Access, **more: Any) -> None:
+    access: Access
+
+    def initialize(self, **given: Any) -> None:
         """Keep the arguments from routes()."""
-        self.access = access
-        for name, value in more.items():
-            setattr(self, name, value)
+        vars(self).update(given)
 
     def prepare(self) -> None:
         """Refuse who has no token. Raises HTTPError 403."""

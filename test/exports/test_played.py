@@ -34,7 +34,7 @@ def command(seconds):
 def share_lost(nominal, rig):
     """Return the largest difference of MuJoCo in a channel, as a share of the effects' size."""
     given = command(0.25)
-    mine, without = ours(rig, given, RATE), ours(nominal, given, RATE)
+    mine, without = ours(rig, given), ours(nominal, given)
     size = {one.channel: one.times_noise for one in differences(rig, mine, without)}
     assert min(size.values()) > 3.0
     left = apart(rig)
@@ -45,7 +45,7 @@ def apart(rig):
     """Return the difference of each channel in times the noise."""
     given = command(0.25)
     theirs = play_mujoco(export_mjcf(rig).content, rig, given)
-    return {one.channel: one.times_noise for one in differences(rig, ours(rig, given, RATE), theirs)}
+    return {one.channel: one.times_noise for one in differences(rig, ours(rig, given), theirs)}
 
 
 @MUJOCO
@@ -111,7 +111,7 @@ def test_an_effect_that_conflicts_with_another_is_left_out_entirely(other):
     said = both.with_effects(*(one for one in both.effects if one.name not in left))
     given = command(0.25)
     theirs = play_mujoco(made.content, both, given)
-    assert max(one.times_noise for one in differences(said, ours(said, given, RATE), theirs)) < 1.0
+    assert max(one.times_noise for one in differences(said, ours(said, given), theirs)) < 1.0
 
 
 @MUJOCO
@@ -206,12 +206,12 @@ def test_an_fmu_plays_our_simulation_and_accepts_other_parameters(tmp_path):
             start_values=values, output=["ft", "position", "velocity"],
         )  # fmt: skip
         theirs = {name: result[name] for name in ("ft", "position", "velocity")}
-        differing = differences(expected, ours(expected, given, RATE), theirs)
+        differing = differences(expected, ours(expected, given), theirs)
         assert max(one.times_noise for one in differing) < 0.5
 
 
 def test_drifts_of_an_fmu_come_to_their_size_over_its_duration():
     rig, given = load_rig("paper_high_impedance").with_effect("ft_drift", drift=3.0), command(0.25)
     theirs = play_fmu(export_fmu(rig).content, rig, given)
-    (ft,) = (one for one in differences(rig, ours(rig, given, RATE), theirs) if one.channel == "ft")
+    (ft,) = (one for one in differences(rig, ours(rig, given), theirs) if one.channel == "ft")
     assert ft.times_noise < 1.0

@@ -19,7 +19,7 @@ from rsea_ros.fleet.pool import Done, Serial, WorkerLost
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import Bag, bags_of
 from rsea_ros.fleet.store import TaskOutcome, hold_lock, open_store
-from rsea_ros.fleet.task import Changed, Task, is_anything_new
+from rsea_ros.fleet.task import Changed, Task, are_new
 
 
 def run_engine(store, folder, joints=(KNEE,), executor=None, work=stub_work, limits=None):
@@ -52,7 +52,7 @@ class Unlucky(Serial):
 
 def test_a_second_run_finds_nothing_new(store, folder):
     assert run_engine(store, folder).outcomes == {"done": 5}
-    assert not is_anything_new(store, bags_of([str(folder)], [KNEE]))
+    assert not any(are_new(store, bags_of([str(folder)], [KNEE])))
     again = run_engine(store, folder, work=lambda task: pytest.fail("worked on a known recording"))
     assert (again.rows, again.before) == (0, 5)
     assert count(store) == 5
@@ -61,7 +61,7 @@ def test_a_second_run_finds_nothing_new(store, folder):
 def test_a_bag_that_moved_is_known_by_its_content(store, folder, tmp_path):
     run_engine(store, folder)
     moved = folder.rename(tmp_path / "elsewhere")
-    assert is_anything_new(store, bags_of([str(moved)], [KNEE]))
+    assert any(are_new(store, bags_of([str(moved)], [KNEE])))
     summary = run_engine(store, moved)
     assert (summary.rows, summary.before) == (0, 5)
 

@@ -89,7 +89,7 @@ def rate_of_alarms(h, change, looks, seed):
         score = information * change + np.sqrt(information) * rng.standard_normal(2)
         if cusum.take(score, information, NONE):
             alarms += 1
-            cusum.clear()
+            cusum = Cusum(INNER, OUTER, h)
     return alarms / (looks * EVERY / 3600.0)
 
 
@@ -107,7 +107,7 @@ def test_a_change_is_found_within_a_few_looks_and_only_with_excitation():
     while not cusum.take(np.array([40.0, 0.0]), np.array([20.0, 0.0]), NONE):
         looks += 1
     assert looks == 2 and cusum.since == 3
-    cusum.clear()
+    cusum = Cusum(INNER, OUTER, threshold(1e-3, 4, EVERY))
     assert not any(cusum.take(np.zeros(2), np.zeros(2), NONE) for _ in range(1000)) and not cusum.suspects
 
 

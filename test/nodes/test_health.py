@@ -99,10 +99,9 @@ def test_memory_is_bounded_in_time_and_size():
 
 
 def test_every_code_has_a_status_of_its_own(listener):
-    nan = math.nan
     node_statuses = [
-        HealthFinding("RSEA_BACKLASH", "backlash.gap", "rad", 4e-3, (3.9e-3, 4.1e-3), 2.0, 0.99),
-        HealthFinding("RSEA_SENSOR_FROZEN", "ft", "", nan, (nan, nan), 1.0, 1.0),
+        HealthFinding("RSEA_BACKLASH", "backlash.gap", 2.0, 0.99, "rad", 4e-3, (3.9e-3, 4.1e-3)),
+        HealthFinding("RSEA_SENSOR_FROZEN", "ft", 1.0),
     ]
     publisher = FindingsPublisher(
         listener.node, "knee", lambda: node_statuses, lambda t: EPOCH + round(t * 1e9)

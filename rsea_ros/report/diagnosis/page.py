@@ -235,7 +235,11 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
                      **pick(d, "residual_rms noise_rms fit_percent")},
         "misfit": _misfits(d.misfit),
         "causes": [_cause_json(c) for c in d.causes],
-        "alternatives": [_alternative(a) for a in d.alternatives],
+        "alternatives": [
+            {**pick(a, "name instead_of probability channel"), "parameters": _sizes(a),
+             "gain": pick(a, "holdout=gain_holdout holdout_ci95=gain_holdout_ci95")}
+            for a in d.alternatives
+        ],
         "rejected": [
             {**pick(r, "name gain_holdout"), "why": say.rejection(r), "reason": r.reason,
              "rival": r.rival or None, **pick(r, "fitted=is_fitted probability")}
@@ -265,11 +269,6 @@ def _cause_json(cause: Cause) -> dict[str, Any]:
         "evidence": say.evidence(cause),
         **pick(cause, "equation confusable_with"),
     }
-
-
-def _alternative(a: Alternative) -> dict[str, Any]:
-    gain = pick(a, "holdout=gain_holdout holdout_ci95=gain_holdout_ci95")
-    return {**pick(a, "name instead_of probability channel"), "parameters": _sizes(a), "gain": gain}
 
 
 def _sizes(cause: Cause | Alternative) -> dict[str, Any]:

@@ -69,11 +69,9 @@ def _curves(
         fig.band(hz, low, high, fig.faint(fig.MEASURED, 0.28), yaxis=y),
         fig.line(hz, middle, "measured", fig.faint(fig.MEASURED, 0.55), 5.0, yaxis=y, hovertemplate=hover),
     ]
-    return (
-        [*traces, fig.line(hz, model, "model", fig.AFTER, 1.6, yaxis=y, hovertemplate=hover)]
-        if has_model
-        else traces
-    )
+    if has_model:
+        traces.append(fig.line(hz, model, "model", fig.AFTER, 1.6, yaxis=y, hovertemplate=hover))
+    return traces
 
 
 def _decibel(ratio: FloatArray) -> FloatArray:
