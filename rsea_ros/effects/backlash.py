@@ -15,23 +15,10 @@ Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft w
 
 from collections.abc import Sequence
 
+from rsea_ros.effects import signal_table as st
 from rsea_ros.effects._chassis import GearPath, SprungChassis, along, over_step
 from rsea_ros.effects.effect import Claims, Effect, Gap, Parameter, compiled
 from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
-from rsea_ros.effects.signal_table import (
-    B_S,
-    COMMIT,
-    DEFLECTION,
-    DEFLECTION_RATE,
-    DEFLECTION_SPAN,
-    DISTAL_TORQUE,
-    J_SC,
-    K_S,
-    PLAY,
-    SPRING_TORQUE,
-    STEP,
-    Port,
-)
 
 Y, V, SIDE, D, W, GIVEN, OWED, STARTED = range(8)
 FASTEST = 0.1
@@ -41,31 +28,31 @@ FASTEST = 0.1
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Add the mean torque of the step or, when it is done, the torque at the sensor at its end."""
-    half, h, k, b = 0.5 * p[0], s[STEP], s[K_S], s[B_S]
+    half, h, k, b = 0.5 * p[0], s[st.STEP], s[st.K_S], s[st.B_S]
     if half == 0.0 or k == 0.0:
         return
     least = FASTEST * k * h * h
-    j = p[1] * least + (1.0 - p[1]) * max(s[J_SC], least)
-    d, w = s[DEFLECTION] + 0.5 * s[DEFLECTION_SPAN], s[DEFLECTION_RATE]
+    j = p[1] * least + (1.0 - p[1]) * max(s[st.J_SC], least)
+    d, w = s[st.DEFLECTION] + 0.5 * s[st.DEFLECTION_SPAN], s[st.DEFLECTION_RATE]
     if x[STARTED] == 0.0:
-        x[D], x[W], x[STARTED] = s[DEFLECTION] - 0.5 * s[DEFLECTION_SPAN], w, 1.0
+        x[D], x[W], x[STARTED] = s[st.DEFLECTION] - 0.5 * s[st.DEFLECTION_SPAN], w, 1.0
         x[Y] = min(max(0.0, x[D] - half), x[D] + half)
-    if s[COMMIT] == 0.0:
+    if s[st.COMMIT] == 0.0:
         w = 2.0 * w - x[W]
     path, chassis = GearPath(x[D], x[W], d, w, h), SprungChassis(k, b, j)
     y, v, side, area = over_step(x[Y], x[V], x[SIDE], half, path, chassis)
     _, _, whole = along(path, h)
     spring = (k * (area - whole) + b * ((y - x[Y]) - (d - x[D]))) / h
     inertia = j * ((v - x[V]) - (w - x[W])) / h + x[OWED]
-    if s[COMMIT] == 0.0:
+    if s[st.COMMIT] == 0.0:
         x[GIVEN] = spring + inertia
-        s[SPRING_TORQUE] += spring + inertia
-        s[DISTAL_TORQUE] -= inertia
+        s[st.SPRING_TORQUE] += spring + inertia
+        s[st.DISTAL_TORQUE] -= inertia
     else:
         x[OWED] = spring + inertia - x[GIVEN]
         x[Y], x[V], x[SIDE], x[D], x[W] = y, v, side, d, w
-        s[SPRING_TORQUE] += k * (y - d) + b * (v - w)
-        s[PLAY] = y - d
+        s[st.SPRING_TORQUE] += k * (y - d) + b * (v - w)
+        s[st.PLAY] = y - d
 
 
 _SHARES = (0.1, 0.3, 0.6)
@@ -95,7 +82,7 @@ def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
 
 EFFECT = Effect(
     name="backlash",
-    port=Port.SPRING,
+    port=st.Port.SPRING,
     parameters=(
         Parameter(
             "gap", "rad", null=0.0, low=0.0, high=0.1, typical=4e-3, starts=(1e-3, 0.012), is_fixed=True,
@@ -110,7 +97,7 @@ EFFECT = Effect(
     claims=Claims("position", "odd", amplitude_exponent=None, passive=True, confusable_with=("hard_stop",)),
     function=apply,
     states=8,
-    reads=(DEFLECTION, DEFLECTION_RATE),
+    reads=(st.DEFLECTION, st.DEFLECTION_RATE),
     guesses=guesses,
     tags=("play",),
     compensation=Gap(lambda p: p[0]),

@@ -41,6 +41,7 @@ EFFECT = Effect(
     ),
     function=apply,
     states=1,
+    tags=("lag",),
     response=lambda p, s: 1.0 / (p[0] * s + 1.0),
     about="first-order lag of the motor's current",
 )

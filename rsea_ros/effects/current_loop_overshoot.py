@@ -75,6 +75,7 @@ EFFECT = Effect(
     ),
     function=apply,
     states=2,
+    tags=("lag",),
     response=response,
     about="second-order lag of the motor's current, with overshoot",
 )  # fmt: skip

@@ -27,7 +27,7 @@ _SIGNATURE = types.void(_POINTER, _POINTER, _POINTER)
 _ROUNDING = 1e-9
 """Of the wider bound: what a fitted value may lie beyond it through logarithms and decimal digits."""
 Parity = Literal["odd", "even", "neither"]
-Tag = Literal["delay", "play", "mode", "friction", "limit"]
+Tag = Literal["delay", "lag", "play", "mode", "friction", "limit"]
 """What others have to know of an effect's kind.
 
 delay: shifts the command by its main parameter, s, and does nothing else. play: its main parameter is a gap,

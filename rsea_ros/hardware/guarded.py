@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from rsea_ros.errors import DeviceError, ParameterError
-from rsea_ros.hardware.device import Device, NoReply, State
+from rsea_ros.hardware.device import Device, NoReply, Spring, State
 from rsea_ros.hardware.interlock import DeviceFault, event
 from rsea_ros.hardware.limits import (
     UNRATED,
@@ -23,7 +23,6 @@ from rsea_ros.hardware.limits import (
     without,
 )
 from rsea_ros.hardware.protection import NONE, PROCESS
-from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.records.record import is_measured
 
 

@@ -65,19 +65,24 @@ def _newton(v, left, right, u):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _sample_held(values, at, within, early):  # type: ignore[no-untyped-def]
+def _sample_current(values, at, within, early, lags):  # type: ignore[no-untyped-def]
     """Return what was held `early` steps before each instant: a hold that just ended counts.
 
-    within: of each step, see _beside_mean; empty where no command changes within one.
+    within: of each step, see _beside_mean; empty where no command changes within one. lags: nothing is held;
+    the current goes straight until the command changes, and straight on.
     """
     out, last = np.empty(len(at)), len(values) - 2
     for i in range(len(at)):
-        back = min(max(at[i] - early, 0.0), last + 0.5)
-        k = int(back)
-        out[i] = values[k + 1]
+        back = min(max(at[i] - (0.0 if lags else early), 0.0), last + 1.0)
+        k = min(int(back), last)
+        begin, end, since, span = values[k], values[k + 1], back - k, 1.0
         if k < len(within) and within[k, 1] != within[k, 2]:
-            share = within[k, 2] / (within[k, 2] - within[k, 1])
-            out[i] = within[k, 3] if back - k < share else values[k + 1]
+            span = within[k, 2] / (within[k, 2] - within[k, 1])
+            if since < span:
+                end = within[k, 3]
+            else:
+                begin, since, span = within[k, 3], since - span, 1.0 - span
+        out[i] = begin + since / span * (end - begin) if lags else end
     return out
 
 
@@ -102,16 +107,16 @@ NOTHING_WITHIN = np.empty((0, 4))
 
 def sample(
     name: str, values: FloatArray, at: FloatArray, held: FloatArray, within: FloatArray = NOTHING_WITHIN, *,
-    late: bool = False,
+    early: float = 0.5, lags: bool = False,
 ) -> FloatArray:  # fmt: skip
     """Return a simulated channel at instants in steps since the start.
 
     values: at the ends of the steps, the initial one first, shape (steps + 1,). held: what is held in each
-    step and jumps, 0 where nothing does. within: see _beside_mean, or nothing. late: the command acts at a
-    time of its own; otherwise a current read up to half a step after a command is still that of the one before.
+    step and jumps, 0 where nothing does. within: see _beside_mean, or nothing. early, lags: of the current,
+    see _sample_current: a row's current is that of the command before, but for one that comes late.
     """
     if name == "motor_torque":
-        return np.asarray(_sample_held(values, at, within, ON_GRID if late else 0.5))
+        return np.asarray(_sample_current(values, at, within, early, lags))
     return np.asarray(_sample_smooth(values, at, held))
 
 
@@ -208,14 +213,15 @@ def _drive_outputs(
     """Return the channels of a drive at the instants of each reading, from its own beginning."""
     ridden = _middles(drive.angle) * rig["gear.ratio"] if on_angle else np.empty(0)
     channels = {n: OUTPUTS.index(n) for n in drive.at if rig.measures(n)}
-    late = any("delay" in effect_named(e.name).tags and any(e.parameters.values()) for e in rig.effects)
+    tags = {tag for e in rig.effects if any(e.parameters.values()) for tag in effect_named(e.name).tags}
+    lags, early = "lag" in tags, ON_GRID if "delay" in tags else 0.5
     wanted = [{n: _instants(rig, drive, n, at[n]) for n in channels} for at in readings]
     results = [{n: np.empty(len(at[n])) for n in channels} for at in wanted]
     spans = drive.simulated
     edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
     for part, (first, end) in enumerate(spans):
         held = drive.command[first:end] if drive.jumps else np.zeros(end - first)
-        within = np.zeros((end - first, 4)) if late or drive.mixes else NOTHING_WITHIN
+        within = np.zeros((end - first, 4)) if lags or early < 0.5 or drive.mixes else NOTHING_WITHIN
         if len(within):
             within[:, 0] = held
             held = within[:, 0]
@@ -227,7 +233,7 @@ def _drive_outputs(
             for n, k in channels.items():
                 inside = np.searchsorted(edges, at[n]) == part if edges else slice(None)
                 since = at[n][inside] - first
-                sampled[n][inside] = sample(n, out[:, k], since, held, within, late=late)
+                sampled[n][inside] = sample(n, out[:, k], since, held, within, early=early, lags=lags)
                 if len(within) and (kick := _kick(machine, n)) != 0.0:
                     sampled[n][inside] += kick * drive.step * _beside_mean(within, since)
     return results

@@ -8,7 +8,7 @@ from typing import Any
 
 from msg_adapters.topic_map import sign_and_index
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.hardware.device import Device
+from rsea_ros.hardware.device import Device, Spring
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.encoder import EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line, LineMotor
@@ -18,7 +18,6 @@ from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.limits import UNRATED, Limits, Rating
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
-from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import derive, felt_through_spring

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.hardware.device import NoReply
+from rsea_ros.hardware.device import NoReply, Spring
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.encoder import LINK, BusEncoder, EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line, LineMotor
@@ -16,7 +16,6 @@ from rsea_ros.hardware.guarded import GuardedDevice, cycle
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.peer.peer_motor import IDENTITY
 from rsea_ros.hardware.peer.registers import ENCODER
-from rsea_ros.hardware.spring_sensor import Spring
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._devices import dynamixel_netft
 from test.hardware.conftest import LATENCY, PERIOD, STIFFNESS

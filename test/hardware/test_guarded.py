@@ -8,12 +8,11 @@ from contextlib import nullcontext
 import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
-from rsea_ros.hardware.device import Refused
+from rsea_ros.hardware.device import Refused, Spring
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits, without
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, PROCESS
-from rsea_ros.hardware.spring_sensor import Spring
 from test.hardware.logged_device import LOST, Device, cycles, guard
 
 WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 7.0)

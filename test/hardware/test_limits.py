@@ -7,7 +7,7 @@ import math
 import pytest
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.hardware.device import State
+from rsea_ros.hardware.device import Spring, State
 from rsea_ros.hardware.limits import (
     DeviceFault,
     Guard,
@@ -17,7 +17,6 @@ from rsea_ros.hardware.limits import (
     unmeasured_quantities,
     without,
 )
-from rsea_ros.hardware.spring_sensor import Spring
 
 ALL = Limits(68.0, deflection=0.25, temperature=60.0, current=12.0, voltage=20.0, velocity=2.0, position=0.5,
              ft=50.0, power=100.0)  # fmt: skip

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.hardware.device import Spring
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.outside import options_of, outside_device
 from rsea_ros.hardware.protection import NONE
-from rsea_ros.hardware.spring_sensor import Spring
 
 TOY = Path(__file__).with_name("toy_device.py")
 

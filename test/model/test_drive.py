@@ -228,7 +228,7 @@ def test_what_becomes_of_a_command_that_changes_within_a_step_is_known_there_too
     for channel in SIGNALS:
         assert np.std(coarse[channel] - fine[channel]) < 0.15 * rig.sensors[channel].noise
     off = np.abs(coarse["motor_torque"] - fine["motor_torque"]) > 0.05
-    assert name == "lag" or np.mean(off) < 0.005  # behind a lag it has a kink there, within a step
+    assert np.mean(off) < 0.005
 
 
 @pytest.mark.parametrize("hold", ["zero", "first"])
