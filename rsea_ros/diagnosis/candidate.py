@@ -230,8 +230,8 @@ def on_fine_steps(model: Candidate, setup: FitSetup) -> Candidate:
     return model if cases is model.cases else refit(rescore(replace(model, outputs=outputs), cases), setup)
 
 
-_HALVINGS, _FALLS = 3, 0.5
-"""Of a step, whose error falls by 64 while the cost grows by 8; share to which one must bring the error."""
+_HALVINGS, _FALLS = 2, 0.5
+"""Of a step, whose error falls by 16 while the cost grows by 4; share to which one must bring the error."""
 
 
 def _change(

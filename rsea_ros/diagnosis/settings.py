@@ -134,8 +134,8 @@ class FitSettings:
         "small falls of a residual far above the noise mean nothing",
     )  # fmt: skip
     step_error: float = number(
-        0.25, "1", "of the noise: change by half a step from which a model is simulated on shorter ones",
-        "adds 3 % to a residual of noise alone; a finished search asks for 4 %",
+        0.05, "1", "of the noise: change by half a step from which a model is simulated on shorter ones",
+        "at 0.25 a delay that moved the steps off the commands paid for itself, and was confirmed",
     )  # fmt: skip
     final_gain: float = number(
         1e-6, "1", "the same for the models that are tested", "far below the doubt of a parameter"
