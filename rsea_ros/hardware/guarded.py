@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
@@ -11,7 +12,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from rsea_ros.errors import DeviceError, ParameterError
-from rsea_ros.hardware.device import Device, NoReply, Spring, State
+from rsea_ros.hardware.device import Device, NoReply, PortLost, Spring, State
 from rsea_ros.hardware.interlock import DeviceFault, event
 from rsea_ros.hardware.limits import (
     UNRATED,
@@ -116,6 +117,8 @@ UNOBEYED = {
 """Causes after which the motor is switched off: a goal of zero stops one in another mode not at all."""
 PATIENCE = 10
 """Times the lost answers of a fault that a reading at configure or in clear_fault may lose."""
+AGAIN = 0.25
+"""s after which a port that was lost is tried again."""
 STEP = 2.0
 """Times the velocity limit: a position that changes faster has jumped, the fault `velocity` comes before."""
 
@@ -142,6 +145,7 @@ class GuardedDevice:
         self.state: State | None = None
         self.lifted: list[str] = []
         self.away = self._inferred = self._off_due = False
+        self._reached = -math.inf
         self._turn, self._tare = threading.Lock(), threading.Lock()
         self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
 
@@ -224,6 +228,7 @@ class GuardedDevice:
             state = self._read()
         except DeviceError as error:
             self._count_failure("read", error)
+            self._reach_again(error)
             return None
         self._losses["read"].take(lost=False)
         if state.acknowledged_late:
@@ -245,6 +250,14 @@ class GuardedDevice:
         time = max(1e-9 * (state.stamp - before.stamp), self._period)
         step, most = abs(state.position - before.position), STEP * self.guard.limits.velocity * time
         return DeviceFault("position_step", step, most, "rad", f"in {time:.3g} s") if step > most else None
+
+    def _reach_again(self, error: DeviceError) -> None:
+        """Switch a motor off as soon as a port that was lost is back: it goes on with its last goal."""
+        now = time.monotonic()
+        if isinstance(error, PortLost) and now - self._reached > AGAIN:
+            self._reached = now
+            with suppress(DeviceError):
+                self.device.recover()
 
     def switch_off_if_due(self) -> None:
         """Switch a motor off that may not obey its goal, after a cycle in which it answered."""

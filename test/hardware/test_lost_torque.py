@@ -38,6 +38,23 @@ def test_registers_that_the_torque_depends_on_are_read_once_a_second(loop, regis
     assert loop.guarded.fault is None and loop.bench.torque()[1]
 
 
+def test_a_motor_behind_an_adapter_that_is_back_is_switched_off_before_anybody_clears(loop):
+    """It went on with its last goal, also after a stop and a deactivation that were answered with success."""
+    loop.cycles(20, 8.0)
+    loop.bench.ask("vanish")
+    loop.until_fault(8.0)
+    assert loop.bench.torque()[0] != 0
+    loop.bench.ask("appear")
+    for _ in range(40):
+        loop.cycles(10, 8.0)
+        if loop.bench.torque() == (0, False):
+            break
+    assert loop.bench.torque() == (0, False)
+    assert loop.guarded.fault.cause == "portlost"
+    loop.guarded.clear()
+    assert loop.cycles(3, 8.0) == [8.0] * 3
+
+
 def test_a_motor_absent_at_one_clear_fault_can_be_cleared_at_the_next(loop):
     """After an emergency stop the port was opened again but the motor not set up: 'not open' for ever."""
     loop.bench.ask("misbehave", silent=True)
