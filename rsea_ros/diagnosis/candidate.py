@@ -53,11 +53,6 @@ def with_doubled_step(problem: Problem) -> Problem:
     )
 
 
-def with_halved_step(cases: Sequence[Case]) -> tuple[Case, ...]:
-    """Return cases on steps half as long."""
-    return tuple(replace(c, drive=finer(c.drive)) if isinstance(c.drive, Drive) else c for c in cases)
-
-
 def without_effect(problem: Problem, theta: FloatArray, name: str) -> tuple[Problem, FloatArray]:
     """Return a problem without one of its effects, and theta without its parameters."""
     keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
@@ -217,7 +212,7 @@ def on_fine_steps(model: Candidate, setup: FitSetup) -> Candidate:
     limit, error = setup.settings.fits.step_error, np.inf
     best = cases, outputs = model.cases, model.outputs
     for _ in range(_HALVINGS + 1):
-        halved = with_halved_step(cases)
+        halved = tuple(replace(c, drive=finer(c.drive)) if isinstance(c.drive, Drive) else c for c in cases)
         finer_outputs = replace(model.problem, cases=halved).outputs(model.solution.theta)
         change = _change(cases, outputs, finer_outputs)
         if change > _FALLS * error:

@@ -361,15 +361,15 @@ def finer(drive: Drive) -> Drive:
     """Return a drive on steps half as long; a command that changes within a step keeps its instant."""
     mean = drive.command
     before, after = np.append(mean[0], mean[:-1]) - mean, np.append(mean[1:], mean[-1]) - mean
-    first = 0.125 * (before - after)  # of a line between stamps: beyond the mean in the first half
+    beyond = 0.125 * (before - after)  # the mean, in the first half: of a line between stamps
     if drive.jumps:
         mixed = before * after < 0.0
         share = after / np.where(mixed, after - before, 1.0)
         early = np.clip(2.0 * share, 0.0, 1.0)
-        first = np.where(mixed, early * before + (1.0 - early) * after, 0.0)
+        beyond = np.where(mixed, early * before + (1.0 - early) * after, 0.0)
     ends, halves = np.arange(len(mean)), 0.5 * np.arange(2 * len(mean))
     return replace(
-        drive, step=0.5 * drive.step, command=np.column_stack([mean + first, mean - first]).ravel(),
+        drive, step=0.5 * drive.step, command=np.column_stack([mean + beyond, mean - beyond]).ravel(),
         at={n: 2.0 * at for n, at in drive.at.items()},
         reference=np.interp(halves, ends, drive.reference) if len(drive.reference) else drive.reference,
         angle=np.interp(halves - 0.5, ends, drive.angle) if len(drive.angle) else drive.angle,

@@ -130,7 +130,7 @@ _SENSORS = 1
 
 @dataclass(frozen=True)
 class Machine:
-    """A rig made ready for the step: propagators, calls of its effects, and state for the step to change."""
+    """A rig made ready for the step, with state for it to change. lags, early: see _sample_current."""
 
     linear: Linear
     calls: Calls
@@ -138,6 +138,8 @@ class Machine:
     table: FloatArray
     effect_x: FloatArray
     mechanics: Mechanics
+    lags: bool
+    early: float
     start_maps: dict[str, FloatArray] = field(default_factory=dict)
 
     def begin(self, initial: tuple[float, float] = (0.0, 0.0), spring: SpringStart | None = None) -> None:
@@ -213,15 +215,14 @@ def _drive_outputs(
     """Return the channels of a drive at the instants of each reading, from its own beginning."""
     ridden = _middles(drive.angle) * rig["gear.ratio"] if on_angle else np.empty(0)
     channels = {n: OUTPUTS.index(n) for n in drive.at if rig.measures(n)}
-    tags = {tag for e in rig.effects if any(e.parameters.values()) for tag in effect_named(e.name).tags}
-    lags, early = "lag" in tags, ON_GRID if "delay" in tags else 0.5
     wanted = [{n: _instants(rig, drive, n, at[n]) for n in channels} for at in readings]
     results = [{n: np.empty(len(at[n])) for n in channels} for at in wanted]
     spans = drive.simulated
     edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
+    is_mixed = machine.lags or machine.early < 0.5 or drive.mixes
     for part, (first, end) in enumerate(spans):
         held = drive.command[first:end] if drive.jumps else np.zeros(end - first)
-        within = np.zeros((end - first, 4)) if lags or early < 0.5 or drive.mixes else NOTHING_WITHIN
+        within = np.zeros((end - first, 4)) if is_mixed else NOTHING_WITHIN
         if len(within):
             within[:, 0] = held
             held = within[:, 0]
@@ -233,9 +234,10 @@ def _drive_outputs(
             for n, k in channels.items():
                 inside = np.searchsorted(edges, at[n]) == part if edges else slice(None)
                 since = at[n][inside] - first
-                sampled[n][inside] = sample(n, out[:, k], since, held, within, early=early, lags=lags)
+                read = sample(n, out[:, k], since, held, within, early=machine.early, lags=machine.lags)
                 if len(within) and (kick := _kick(machine, n)) != 0.0:
-                    sampled[n][inside] += kick * drive.step * _beside_mean(within, since)
+                    read += kick * drive.step * _beside_mean(within, since)
+                sampled[n][inside] = read
     return results
 
 
@@ -320,7 +322,11 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table[st.TARGETED] = float(rig.loop is not None)
     table[[st.MOBILITY, st.TURNS]] = linear.spans[0] @ linear.g[:, 0], train_ratio(rig)
     table[st.SENSED] = 1.0 - rig["spring_end.above_sensor"]
-    return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), hanging)
+    tags = {tag for effect, values in active if any(values.values()) for tag in effect.tags}
+    return Machine(
+        linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), hanging,
+        lags="lag" in tags, early=ON_GRID if "delay" in tags else 0.5,
+    )  # fmt: skip
 
 
 def _check_sensor(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]]) -> None:

@@ -195,11 +195,8 @@ def advance(linear, calls, inputs, state, out):  # type: ignore[no-untyped-def]
     last, is_kept = len(command) - 1, len(within) > 0
     for k in range(last + 1):
         s[st.TIME], s[st.COMMAND], s[st.CURRENT] = start + k * h, command[k], command[k]
-        earlier, later = command[max(k - 1, 0)], command[min(k + 1, last)]
-        if jumps and (earlier - command[k]) * (later - command[k]) < 0.0:
-            put_beside(s, earlier, later)
-        elif s[st.BEFORE] != 0.0:
-            s[st.BEFORE] = s[st.AFTER] = 0.0
+        if jumps:
+            put_beside(s, command[max(k - 1, 0)], command[min(k + 1, last)])
         if len(reference) > 0:
             s[st.REFERENCE] = reference[k]
         if is_kept:
