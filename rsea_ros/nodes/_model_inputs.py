@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -127,7 +128,10 @@ def stopped_sensors(rig: Rig, noise: Noise) -> StoppedSensors:
 
 
 PERIODS = 64
-_STATE, _FT = range(2)
+_COMMAND, _STATE, _FT = range(3)
+PATIENCE = 4.0
+"""s for which a topic that says nothing is waited for where all topics count in the order of their stamps:
+the middleware repairs what a busy machine lost after 3 s."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +139,7 @@ class InputSettings:
     """How the topics are read: parameters of the node, by their names.
 
     ft_timeout: s. axis: of the wrench, with its sign. joint: name that the joint must have; empty for any.
+    reliable: lose nothing, and process the topics in the order of their stamps, whichever is delivered first.
     """
 
     ft_timeout: float
@@ -157,6 +162,9 @@ class ModelInputs:
         self._periods: deque[float] = deque(maxlen=PERIODS)
         self.refused = self.unstamped = 0
         deep = RECORD_RELIABLE if settings.reliable else None
+        self._waits = PATIENCE if settings.reliable else 0.0
+        self._waiting: list[tuple[float, tuple[int, int, float, float]]] = []
+        self._newest = [(0, 0.0)] * 3
         self._commands, self._states, self.ft = (
             Mailbox(
                 node,
@@ -173,19 +181,36 @@ class ModelInputs:
         )
 
     def take(self) -> Iterator[tuple[int, TorqueEstimate]]:
-        """Process new messages; yield the estimate at each wrench, or at each state while ft is silent."""
-        for stamp, (torque,), _ in self._commands.take():
-            self._command(stamp, torque)
-        samples = [(t, q, u, _STATE) for t, (q, u), _ in self._states.take()]
-        samples += [(t, self._sign * y, math.nan, _FT) for t, (y,), _ in self.ft.take()]
-        samples.sort(key=itemgetter(0, 3))
-        for stamp, a, b, kind in samples:
+        """Process messages; yield the estimate at each wrench, or at each state while ft is silent."""
+        for stamp, kind, a, b in self._due():
+            if kind == _COMMAND:
+                self._command(stamp, a)
+                continue
             estimate = self._measure(stamp, a, b, kind)
             if estimate is not None and (kind == _FT or self.ft_silent or self.stopped.ft_frozen):
                 if 0 < stamp - self._estimate_stamp < SECOND:
                     self._periods.append((stamp - self._estimate_stamp) / SECOND)
                 self._estimate_stamp = stamp
                 yield stamp, estimate
+
+    def _due(self) -> list[tuple[int, int, float, float]]:
+        """Return stamp, kind and two numbers of each message whose turn it is, in the order of the stamps.
+
+        Its turn comes when every topic has told what it had before, is silent, or has been waited for.
+        """
+        came = [(t, _COMMAND, u, math.nan) for t, (u,), _ in self._commands.take()]
+        came += [(t, _STATE, q, u) for t, (q, u), _ in self._states.take()]
+        came += [(t, _FT, self._sign * y, math.nan) for t, (y,), _ in self.ft.take()]
+        now = time.monotonic()
+        self._waiting += [(now, message) for message in came]
+        for stamp, kind, *_ in came:
+            self._newest[kind] = stamp, now
+        told = [stamp for stamp, heard in self._newest if stamp and now - heard < self._waits]
+        late = [message[0] for arrival, message in self._waiting if now - arrival >= self._waits]
+        turn = max(min(told, default=0), *late, 0)
+        due = sorted((m for _, m in self._waiting if m[0] <= turn), key=itemgetter(0, 1))
+        self._waiting = [(arrival, m) for arrival, m in self._waiting if m[0] > turn]
+        return due
 
     def seconds(self, stamp: int) -> float:
         """Return a stamp in the observer's time, s."""

@@ -23,7 +23,7 @@ from rsea_ros.nodes._health_inputs import noise_from
 from rsea_ros.nodes._model_health import Flags, ModelHealth
 from rsea_ros.nodes._model_inputs import InputSettings, ModelInputs, stopped_sensors
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
-from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._qos import COMMAND, RECORD_RELIABLE
 from rsea_ros.nodes._realtime import REALTIME, keep_time
 from rsea_ros.nodes._run import Program, run_node
 from rsea_ros.nodes._waiter import Waiter
@@ -42,7 +42,9 @@ TABLE = (
     NodeParameter(
         "ft_timeout", 0.02, "time without ft after which joint_states make the estimates", "s", 1e-3, 1.0
     ),
-    NodeParameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
+    NodeParameter(
+        "reliable", False, "lose nothing, in the order of stamps; needs reliable publishers, as replay's are"
+    ),
     NodeParameter("tolerance", 0.3, "of |T_p - T_d| over |T_d|: up to it the torque is pure", "", 0.01, 1.0),
     NodeParameter("error_window", 0.5, "over which that is measured, RMS", "s", 0.01, 2.0),
     NodeParameter("error_hysteresis", 0.15, "part of that tolerance, either way", "", 0.0, 0.5),
@@ -67,7 +69,8 @@ class ModelNode(Program):
         self._band = TorqueBand(rig, *(values[n] for n in ("tolerance_db", "tolerance_deg", "quiet")))
         asked = (values[n] for n in ("tolerance", "error_window", "error_hysteresis", "quiet"))
         self._error = ErrorFlag(rig, ErrorSettings(*asked))
-        self._estimates = node.create_publisher(JointState, "torque_estimate", COMMAND)
+        qos = RECORD_RELIABLE if values["reliable"] else COMMAND
+        self._estimates = node.create_publisher(JointState, "torque_estimate", qos)
         template = serialize_message(efforts_message(0, dict.fromkeys(NAMES, 0.0)))
         self._writer = RawWriter(template, TYPES["joint_states"], "effort")
         self._flags, self._has_ft = Flags(node), "ft" in rig.sensors

@@ -85,16 +85,16 @@ def test_a_bag_replayed_gives_an_estimate_for_each_wrench_as_good_as_it_says(
     heard, truth, start, listener, tmp_path
 ):
     write_record(replace(truth.record, epoch_ns=EPOCH), tmp_path / "run.mcap")
-    replay = start("replay", bag=tmp_path / "run.mcap", rate=1.5)
-    listener.until(lambda: len(heard.estimates) == len(truth.distal))
+    replay = start("replay", bag=tmp_path / "run.mcap", rate=200.0)
+    asked = EPOCH + np.rint(truth.record["ft"].t * 1e9).astype(np.int64)
+    listener.until(lambda: heard.estimates and stamp_of(heard.estimates[-1].header.stamp) == asked[-1])
     assert replay.wait() == 0, replay.output
     assert list(heard.estimates[0].name) == ["distal", "proximal", "disturbance"]
     stamps = np.array([stamp_of(m.header.stamp) for m in heard.estimates])
-    assert np.array_equal(stamps, EPOCH + np.rint(truth.record["ft"].t * 1e9).astype(np.int64))
+    assert np.setdiff1d(asked, stamps).tolist() == [] and stamps.tolist() == asked.tolist()
     efforts = np.array([m.effort for m in heard.estimates])[100:]
     for k, true in enumerate((truth.distal, truth.proximal)):
-        error = np.abs(efforts[:, k] - true[100:])
-        assert np.median(error) < 0.01  # not the mean: a busy machine delivers some commands late
+        assert np.abs(efforts[:, k] - true[100:]).max() < 0.05
 
 
 def test_the_flag_is_latched_for_late_subscribers(heard, listener):
@@ -122,9 +122,7 @@ def test_the_estimate_survives_a_loss_of_ft_and_its_return_without_a_jump(heard,
 
     def play(samples, with_ft=True):
         for k in samples:
-            command.publish(
-                torque_command_message(int(stamps[k]) - round(1e9 / RATE), record["command"].y[k])
-            )
+            command.publish(torque_command_message(int(stamps[k]), record["command"].y[k + 1]))
             values = (record[n].y[k] for n in ("position", "velocity", "motor_torque"))
             state.publish(joint_state_message(int(stamps[k]), *values))
             if with_ft:
@@ -142,7 +140,7 @@ def test_the_estimate_survives_a_loss_of_ft_and_its_return_without_a_jump(heard,
     play(range(300, 400), with_ft=False)
     assert newest(399) == pytest.approx(truth.distal[399], abs=0.06)
     listener.until(lambda: not heard.flags[-1].data)
-    told = listener.until(lambda: "no ft for" in heard.status().message and heard.values())
+    told = listener.until(lambda: heard.status() and "no ft for" in heard.status().message and heard.values())
     assert heard.status().level == b"\x01" and float(told["sigma_distal"]) > 0.004
     doubt = float(told["sigma_distal"])
     play(range(400, 420))

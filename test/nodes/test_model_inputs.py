@@ -111,6 +111,7 @@ def test_a_torque_that_is_no_number_is_none(listener, inputs_of):
     assert not inputs.ft_silent
     for k, torque in enumerate([math.nan] * 15 + [1e300] * 15, 20):
         stamp = round(EPOCH + k * PERIOD)
+        publishers["torque_command"].publish(torque_command_message(stamp, 0.0))
         publishers["joint_states"].publish(joint_state_message(stamp, 0.0, 0.0, 0.0))
         publishers["ft"].publish(wrench_message(stamp, (0.0,) * 5 + (torque,)))
     listener.until(lambda: [*inputs.take()] and inputs.refused >= 30)
