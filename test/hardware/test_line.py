@@ -37,11 +37,13 @@ class Three:
             member.enable()
 
     def cycles(self, count, torques):
-        """Several; returns the readings of the last."""
+        """Several; returns the newest reading of each: a busy machine loses one now and then."""
+        newest = [None] * len(self.members)
         for _ in range(count):
             time.sleep(PERIOD)
             states = cycle(self.members, [(torque, 0.0) for torque in torques], [self.line])
-        return states
+            newest = [state or old for state, old in zip(states, newest, strict=True)]
+        return newest
 
     def beside(self, work):
         """Run work in a thread while the cycles go on; return their readings. Raises its error."""
