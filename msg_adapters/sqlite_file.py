@@ -143,19 +143,6 @@ def _text(data: bytes | str) -> str:
     return data.decode(errors="replace") if isinstance(data, bytes) else data
 
 
-_TABLES = """
-CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
-CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);
-CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
-    serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL,
-    type_description_hash TEXT NOT NULL);
-CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL,
-    encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);
-CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
-    data BLOB NOT NULL);
-CREATE INDEX timestamp_idx ON messages (timestamp ASC);
-INSERT INTO schema VALUES (4, 'rsea_ros');
-"""
 _INSERT_TOPIC = "INSERT INTO topics VALUES (NULL, ?, ?, 'cdr', '[]', ?)"
 _INSERT_DEFINITION = "INSERT INTO message_definitions VALUES (NULL, ?, 'ros2msg', ?, ?)"
 _INSERT_METADATA = f"INSERT INTO metadata VALUES (NULL, {metadata.VERSION}, ?)"
@@ -170,9 +157,11 @@ class SqliteStorage:
         self._types: set[str] = set()
         self._rows: list[tuple[int, int, bytes]] = []
         os.close(create(path))
+        from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer  # costs a reader 50 ms
+
         self._database = sqlite3.connect(path, check_same_thread=False)
         with _system_errors():
-            self._database.executescript(_TABLES)
+            self._database.executescript(Sqlite3Writer.SQLITE_SCHEMA)
 
     def add(self, topic: str, msgtype: str) -> int:
         """Declare a topic; return its key."""

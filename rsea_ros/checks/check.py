@@ -200,7 +200,7 @@ def _compare(
     related = quotients(compared)
     findings += smoothing_findings(related, {n: 1.0 / record[n].rate for n in related})
     findings += _another(record, rig, related, findings)
-    if late or _is_elsewhere(findings):
+    if late or any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in findings):
         return findings, None
     start = start_of(pairs, rig)
     start = start._replace(delay={}) if rates else start  # the record is not the one that the pairs are of
@@ -228,19 +228,12 @@ def _another(
     if {f.kind for f in known} & {"sign", "scale", "wrong_rig", "clock_offset"} or is_held(rig):
         return []
     far = {n: q.measured / q.predicted for n, q in related.items() if n not in named}
-    return [_other_size(n, r) for n, r in far.items() if max(r, 1.0 / max(r, 1e-300)) > _APART]
-
-
-def _other_size(name: str, times: float) -> Finding:
-    return Finding(
-        "amber", "wrong_rig", name, times, "1", expected="about 1", detail="times what the rig would give",
-        remedy=RIGHT_RIG,
-    )  # fmt: skip
-
-
-def _is_elsewhere(findings: list[Finding]) -> bool:
-    """Return whether clocks and sensitivities mean nothing: another rig, signs or scales."""
-    return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in findings)
+    about, one = "times what the rig would give", "about 1"
+    apart = {n: r for n, r in far.items() if max(r, 1.0 / max(r, 1e-300)) > _APART}
+    return [
+        Finding("amber", "wrong_rig", n, r, "1", expected=one, detail=about, remedy=RIGHT_RIG)
+        for n, r in apart.items()
+    ]
 
 
 def _linearise(

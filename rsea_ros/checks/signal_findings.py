@@ -90,7 +90,8 @@ def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]
         if name not in record or name in but or "command" not in record or len(record[name]) < 64:
             continue
         stated = max(sensor.noise, 0.5 * sensor.quantum)
-        floor, rough = noise_floor(record, name, sensor), _rough(record[name])
+        fourth = np.abs(np.diff(record[name].y, 4))  # differences in which smooth motion hardly appears
+        floor, rough = noise_floor(record, name, sensor), float(np.median(fourth)) / 0.6745 / math.sqrt(70.0)
         loud = stated > 0.0 and min(floor, rough) > _LOUD * stated and name != "motor_torque"
         noise = floor if loud else min(floor, max(rough, stated))
         unit = UNITS[name]
@@ -102,11 +103,6 @@ def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]
             )
         )
     return findings
-
-
-def _rough(channel: Channel) -> float:
-    """Return the RMS of white noise by fourth differences, in which smooth motion hardly appears."""
-    return float(np.median(np.abs(np.diff(channel.y, 4)))) / 0.6745 / math.sqrt(70.0)
 
 
 def _times(noise: float, stated: float) -> str:

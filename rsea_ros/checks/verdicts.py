@@ -315,7 +315,9 @@ def verdict_findings(pairs: Sequence[Pair], rig: Rig, axis: str) -> tuple[list[F
             findings += _of_rig(name, stated[name], float(np.median([v.value for v in of])), rig)
     named = {f.channel for f in findings}
     findings += [f for f in _springs(pairs) if f.channel not in named]
-    findings += [_open_clock(p) for p in pairs if math.isnan(p.lag) and not p.coherence]
+    few, faster = "not determined: its samples are too few to show it", "record it faster"
+    untimed = [p.law.y for p in pairs if math.isnan(p.lag) and not p.coherence]
+    findings += [Finding("green", "clock_offset", y, detail=few, remedy=faster) for y in untimed]
     findings += [_contradiction(p) for p in contradictions if not {p.law.x, p.law.y} & named]
     shown = [p for p in pairs if (_is_off(p) or _is_apart(p)) and p not in contradictions]
     findings += [_contradiction(p) for p in shown if not {p.law.x, p.law.y} & named]
@@ -406,12 +408,6 @@ def _springs(pairs: Sequence[Pair]) -> list[Finding]:
             detail="a spring or pendulum holds the output", remedy=RIGHT_RIG,
         )
     ]  # fmt: skip
-
-
-def _open_clock(p: Pair) -> Finding:
-    """Return that a channel has too few samples to show its clock."""
-    detail = "not determined: its samples are too few to show it"
-    return Finding("green", "clock_offset", p.law.y, detail=detail, remedy="record it faster")
 
 
 _SAYS = {

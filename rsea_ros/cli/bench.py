@@ -22,7 +22,7 @@ from rsea_ros.hardware.peer.registers import ENCODER, MODELS
 from rsea_ros.hardware.peer.requests import LineRequests, Station
 from rsea_ros.hardware.peer.serial_line import EmulatedBus
 from rsea_ros.hardware.simulated import SimulatedDevice
-from rsea_ros.model.rig import Rig, Sensor
+from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import check_free
 
@@ -99,8 +99,14 @@ def _place(args: argparse.Namespace, sensor: ForceSensor) -> dict[str, object]:
 
 
 def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice], list[EmulatedMotor]]:
-    """Return the running plant of each motor, and the motors, with the IDs 1, 2, …"""
-    rig = _with_encoder(load_rig(args.rig)) if args.deflection else load_rig(args.rig)
+    """Return the running plant of each motor, and the motors, with the IDs 1, 2, …
+
+    With --deflection the spring has an encoder: the rig's, or one that only its counts limit.
+    """
+    rig = load_rig(args.rig)
+    if args.deflection and rig.rigid_spring:
+        raise ParameterError(f"--deflection: the spring of rig {rig.name} is rigid, expected one that gives")
+    rig = replace(rig, sensors={"deflection": Sensor(), **rig.sensors}) if args.deflection else rig
     plants: list[SimulatedDevice] = []
     motors: list[EmulatedMotor] = []
     for place, model in enumerate(args.model):
@@ -112,13 +118,3 @@ def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice],
         plants.append(plant)
         motors.append(motor)
     return plants, motors
-
-
-def _with_encoder(rig: Rig) -> Rig:
-    """Return a rig whose spring has an encoder: its own, or one that only its counts limit.
-
-    Raises ParameterError for a rig without a spring.
-    """
-    if rig.rigid_spring:
-        raise ParameterError(f"--deflection: the spring of rig {rig.name} is rigid, expected one that gives")
-    return replace(rig, sensors={"deflection": Sensor(), **rig.sensors})

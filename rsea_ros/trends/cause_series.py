@@ -66,7 +66,9 @@ def _faults(joint: str, rows: np.ndarray, time_s: FloatArray, faults: npt.NDArra
 
 
 def _causes(joint: str, rows: np.ndarray, time_s: FloatArray, causes: npt.NDArray[Any]) -> Iterator[Naming]:
-    stated = [[_stated_cause(c) for c in (causes[i] if causes[i] is not None else ())] for i in rows]
+    bare: Mapping[str, Any] = {"status": "confirmed", "probability": 1.0, "gain": float("nan"), "sizes": ()}
+    of_rows = [causes[i] if causes[i] is not None else () for i in rows]
+    stated = [[c if isinstance(c, Mapping) else {"name": str(c), **bare} for c in row] for row in of_rows]
     of_row = [
         {c["name"]: c for c in row if c["status"] != "one_of" or float(c["probability"]) >= _LIKELY}
         for row in stated
@@ -74,13 +76,6 @@ def _causes(joint: str, rows: np.ndarray, time_s: FloatArray, causes: npt.NDArra
     for name in sorted(set().union(*of_row)):
         of_recording = [row.get(name) for row in of_row]
         yield _cause(joint, str(name), rows, time_s[rows], of_recording)
-
-
-def _stated_cause(cause: Any) -> Mapping[str, Any]:
-    """Return a cause of which perhaps only the name is known."""
-    if isinstance(cause, Mapping):
-        return cause
-    return {"name": str(cause), "status": "confirmed", "probability": 1.0, "gain": float("nan"), "sizes": ()}
 
 
 def _cause(

@@ -36,7 +36,8 @@ def day_means(series: Series, settings: TrendSettings) -> Days:
     """Return the weighted means of the days that determine the parameter, lone outliers left out."""
     s = series.keep(series.identifiable)
     s = s.keep(~outliers(s.time_s, s.value, s.sd, settings.outlier_days))
-    scale = _scale(s.value)
+    size = np.abs(s.value)
+    scale = float(np.median(size) if len(size) else 0.0) or float(np.max(size, initial=0.0)) or 1.0
     day = np.floor(s.time_s / DAY)
     starts = np.flatnonzero(np.diff(day, prepend=-np.inf))
     y, variance = s.value / scale, np.maximum(s.sd / scale, 1e-9) ** 2
@@ -86,11 +87,6 @@ def _on_lines(time_s: FloatArray, value: FloatArray) -> FloatArray:
     rise = np.where(apart > 0.0, (y[:, j] - y[:, i]) / np.where(apart > 0.0, apart, 1.0), 0.0)
     slope = np.median(rise, axis=1)
     return np.asarray(np.median(y - slope[:, None] * t, axis=1))
-
-
-def _scale(value: FloatArray) -> float:
-    size = float(np.median(np.abs(value))) if len(value) else 0.0
-    return size or float(np.max(np.abs(value), initial=0.0)) or 1.0
 
 
 def _within(y: FloatArray, variance: FloatArray, starts: np.ndarray) -> float:
