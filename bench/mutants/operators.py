@@ -3,8 +3,8 @@
 A fault replaces one node: a comparison, `and` or `or`, an operator, a number, a text, a truth value, a
 condition by its opposite, min by max, a returned value by None, a statement by nothing. Left alone are
 annotations, decorators, docstrings, the words of exceptions and f-strings, and what changes nothing that
-anybody could notice: `strict=` of zip, which only asserts; numbers below 1e-9, which are room for rounding;
-how long one waits for what comes anyway; seeds of random numbers.
+anybody could notice: `strict=` of zip, which only asserts; None for False, which mypy sees; numbers below
+1e-9, which are room for rounding; how long one waits for what comes anyway; seeds of random numbers.
 """
 
 from __future__ import annotations
@@ -125,7 +125,9 @@ def replacements(node: ast.expr | ast.stmt) -> Iterator[ast.expr | ast.stmt]:
 
 def _statements(node: ast.expr | ast.stmt) -> Iterator[ast.stmt]:
     match node:
-        case ast.Return(value=ast.expr() as value) if not _is_none(value):
+        case ast.Return(value=ast.Constant(value=None | False)):
+            return
+        case ast.Return(value=ast.expr()):
             yield ast.Return(ast.Constant(None))
         case ast.Expr(value=ast.Call()) | ast.AugAssign() | ast.Raise() | ast.Delete():
             yield ast.Pass()
@@ -217,7 +219,3 @@ def _change(node: ast.AST, **fields: object) -> ast.AST:
     for name, value in fields.items():
         setattr(new, name, value)
     return new
-
-
-def _is_none(value: ast.expr) -> bool:
-    return isinstance(value, ast.Constant) and value.value is None

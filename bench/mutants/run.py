@@ -16,10 +16,11 @@ from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
+from shutil import copytree, ignore_patterns
 
 from bench import ROOT
 from bench.mutants.operators import Mutant, mutate
-from rsea_ros.compiler import SHARED
+from rsea_ros.compiler import SHARED, cache_folder
 
 PACKAGES = ("rsea_ros", "msg_adapters", "bench")
 KILLED, SURVIVED = "killed", "survived"
@@ -95,8 +96,10 @@ def _played(
         text = CUSTOM.format(source=ast.unparse(tree), name=name, path=str(path), folder=folder)
         Path(folder, "sitecustomize.py").write_text(text)
         environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONPATH": f"{folder}:{ROOT}"}
-        if any(fnmatch(f"{target}.py", pattern) for pattern in SHARED):
-            environment["NUMBA_CACHE_DIR"] = folder  # compiled into other files
+        environment["NUMBA_CACHE_DIR"] = folder
+        if not any(fnmatch(f"{target}.py", pattern) for pattern in SHARED):  # those are compiled into others
+            copytree(cache_folder(), folder, copy_function=os.link, dirs_exist_ok=True,
+                     ignore=ignore_patterns(f"{path.stem}.*", "tmp*"))  # fmt: skip
         begun, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
         quiet = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
         try:

@@ -112,7 +112,10 @@ def _sample(count: int, seed: int, place: str) -> list[tuple[str, Mutant]]:
 
 
 def tests_of(target: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return files of tests that notice a module below test/, the nearest first; those that wait apart."""
+    """Return files of tests that notice a module below test/, the nearest first; those that wait apart.
+
+    Effects are loaded by their names: nothing imports them, and all tests of effects play them.
+    """
     name = f"rsea_ros.{target.replace('/', '.')}"
     stem, folder = Path(target).name, str(Path(target).parent)
     nodes = [p.stem for p in (ROOT / "rsea_ros" / "nodes").glob("[!_]*.py")]
@@ -130,9 +133,9 @@ def tests_of(target: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
             continue
         elif name in names:
             direct.append((close, where))
-        elif any(name in reachable(n) for n in names):
+        elif any(name in reachable(n) for n in names) or (folder == "effects" and where.startswith(folder)):
             far.append((close, where))
-    near = (*sorted(direct)[:DIRECT], *sorted(far)[:FAR])
+    near = (*sorted(direct)[:DIRECT], *sorted(far)[: FAR if direct else DIRECT])
     return tuple(where for _, where in near), tuple(where for _, where in sorted(wires)[:WIRES])
 
 

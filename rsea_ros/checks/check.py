@@ -61,6 +61,8 @@ _BRIDGED = 0.01
 """Share of masked samples above which the lines that bridge them are no measure of a sensor's noise."""
 _FOLLOWS = {"angle_jumps": "clock_offset", "coarse_steps": "scale"}
 """What a fault of a channel makes by itself: a lag that changes a jump, another unit coarse steps."""
+_NO_FIT = ("sign", "scale", "clock_offset", "wrong_rig")
+"""Kinds of findings beside which, where red, a fit of the whole record says nothing."""
 FAULTY = (
     "sign", "scale", "offset", "angle_jumps", "standstill", "smoothing", "clock_offset", "clock_drift",
     "wrong_rig",
@@ -200,7 +202,7 @@ def _compare(
     related = quotients(compared)
     findings += smoothing_findings(related, {n: 1.0 / record[n].rate for n in related})
     findings += _another(record, rig, related, findings)
-    if late or any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in findings):
+    if late or any(f.light == "red" and f.kind in _NO_FIT for f in findings):
         return findings, None
     start = start_of(pairs, rig)
     start = start._replace(delay={}) if rates else start  # the record is not the one that the pairs are of

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topic_map import AXES
 from rsea_ros.cli import _terminal
-from rsea_ros.cli._output import FOUND
+from rsea_ros.cli._output import FOUND, add_force, path, provenance, results_place
 from rsea_ros.cli._topics import add_runs, add_topic_options, cut, rig_choice, topic_map
 from rsea_ros.errors import RseaError
 from rsea_ros.records.record import Channel, Record
+from rsea_ros.report.result_files import CHECK
 
 if TYPE_CHECKING:
     from rsea_ros.checks.finding import Findings
@@ -30,6 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_runs(parser)
     add = parser.add_argument
     add("--json", action="store_true", help="print the findings as JSON (docs/check.md) and nothing else")
+    add("--out", type=path, help="directory for report.html and check.json (default: none is written)")
+    add_force(parser)
     about = f"exit status {FOUND} if a light is this one or worse"
     add("--fail-on", choices=("red", "amber"), help=about)
     add_topic_options(parser, window=True)
@@ -40,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.model.rig_file import load_rig
 
     rig, topics = load_rig(args.rig), topic_map(args)
+    place = results_place(args, args.out, CHECK, [*args.bags, args.rig]) if args.out else None
     records = [cut(read_record([bag], topics=topics, strict=False), args) for bag in args.bags]
     from rsea_ros.checks.check import check_record  # after the bags, so that a bad bag is refused at once
     from rsea_ros.checks.finding import LIGHTS, worst
@@ -51,12 +55,18 @@ def run(args: argparse.Namespace) -> int:
         )
         for bag, record in zip(args.bags, records, strict=True)
     ]
+    if place:
+        from rsea_ros.report.check import write_check
+
+        report = write_check(checks, records, place, provenance("check", args.bags, args.rig))
     if args.json:
         from rsea_ros.report.check import check_json
 
         print(json.dumps(check_json(checks), indent=1, allow_nan=False, ensure_ascii=False))
     else:
         _print(checks)
+        if place:
+            print(report)
     light = worst([c.light for c in checks])
     fails = args.fail_on is not None and LIGHTS.index(light) >= LIGHTS.index(args.fail_on)
     return FOUND if fails else 0

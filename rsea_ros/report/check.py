@@ -1,15 +1,29 @@
-"""The findings of a check: on a terminal, one line each, and for programs (docs/check.md)."""
+"""The findings of a check: on a terminal, one line each, as a page, and for programs (docs/check.md)."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.text import Text
 
 from rsea_ros.checks.finding import Finding, Findings, worst
 from rsea_ros.checks.pairs import Pair
-from rsea_ros.report import words
-from rsea_ros.report.result_files import fault_json, pick, strict
+from rsea_ros.documents.wording import list_names
+from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.records.record import UNITS, FloatArray, Record
+from rsea_ros.report import page as html, words
+from rsea_ros.report.figures.figure import BEFORE, MEASURED, QUIET, Figure, axis, label, layout, line
+from rsea_ros.report.result_files import (
+    CHECK_JSON,
+    REPORT,
+    Provenance,
+    fault_json,
+    json_text,
+    pick,
+    strict,
+)
 from rsea_ros.report.rig import rig_in_brackets
 from rsea_ros.report.words import WIDTH, wrap
 
@@ -122,3 +136,95 @@ def _finding(f: Finding) -> dict[str, Any]:
 def _pair(p: Pair) -> dict[str, Any]:
     """Return a pair by the names of the contract: factor of y on x, lag of y behind x, s; from, to in s."""
     return {"channels": [p.law.y, p.law.x], **pick(p, "factor sign lag coherence from=start to=stop")}
+
+
+def write_check(
+    checks: Sequence[Findings], records: Sequence[Record], out: Destination, provenance: Provenance
+) -> Path:
+    """Write check.json and report.html, and return the report's path: both or none."""
+    with NewFiles(out) as new:
+        new.write(CHECK_JSON, json_text(check_json(checks), provenance))
+        return new.write(REPORT, check_report(checks, records, provenance))
+
+
+def check_report(
+    checks: Sequence[Findings], records: Sequence[Record], provenance: Provenance | None = None
+) -> str:
+    """Return the page of a check: what to put right, the channels over time, what they say of each other."""
+    named = {
+        light: list(dict.fromkeys(_subject(f) for c in checks for f in c.findings if f.light == light))
+        for light in ("red", "amber")
+    }
+    title = "Nothing stands against a fit"
+    if worse := named["red"] or named["amber"]:
+        title = f"{'Put right' if named['red'] else 'Look at'} before a fit: {list_names(worse)}"
+    blocks = (block for c, r in zip(checks, records, strict=True) for block in _blocks(c, r))
+    return html.page(title, f"Check of {', '.join(c.source for c in checks)}", blocks,
+                     [f"{summary(checks)}. rsea check. All values in SI."], provenance)  # fmt: skip
+
+
+def _subject(f: Finding) -> str:
+    return " of the ".join(filter(None, (kind(f), _channel(f))))
+
+
+def _blocks(c: Findings, record: Record) -> Iterator[html.Block]:
+    told = list(_each_remedy_once(c.findings))
+    if wrong := [f for light in ("red", "amber") for f in told if f.light == light]:
+        yield html.section(f"{c.source}: {c.light}", html.listed(
+            wrong, ("light", lambda f: f.light), *_COLUMNS, ("expected", lambda f: f.expected),
+            ("what to do", lambda f: f.remedy),
+        ))  # fmt: skip
+    yield _over_time(c, record)
+    if pairs := [p for p in c.pairs if not p.unrelated]:
+        caption = "What two channels say of each other, span by span, before any rig is believed."
+        yield html.section("Channel against channel", html.listed(pairs, *_OF_A_PAIR), caption=caption)
+    if right := [f for f in told if f.light == "green"]:
+        yield html.fold(f"{len(right)} properties are as a fit needs them", html.listed(right, *_COLUMNS))
+
+
+_COLUMNS = (
+    ("property", kind), ("channel", _channel), ("#value", number), ("what and where", lambda f: f.detail),
+)  # fmt: skip
+_OF_A_PAIR = (
+    ("channels", lambda p: f"{words.channel(p.law.y)} against {words.channel(p.law.x)}"),
+    ("#from, s", lambda p: f"{p.start:.1f}"), ("#to, s", lambda p: f"{p.stop:.1f}"),
+    ("#factor", lambda p: words.number(p.factor, 3)),
+    ("#late by, ms", lambda p: words.number(1e3 * p.lag, 3)),
+    ("#in common", lambda p: f"{100.0 * p.coherence:.0f} %"),
+)  # fmt: skip
+_MOST = 800
+"""Blocks of a drawn channel: more than a screen has columns for."""
+
+
+def _over_time(c: Findings, record: Record) -> Figure:
+    """Return every channel over time, one below the other; what must not count in another colour."""
+    parts, data, names, height = {}, [], [], 1.0 / len(record.channels)
+    for k, (name, channel) in enumerate(record.channels.items()):
+        mark = "" if k == 0 else str(k + 1)
+        top = 1.0 - k * height
+        parts[f"yaxis{mark}"] = axis(words.unit(UNITS[name]), domain=[top - 0.8 * height, top])
+        names.append(label(words.channel(name), 0.0, top, QUIET, xref="paper", yref="paper", yanchor="bottom"))
+        masked = c.masked.get(name, np.zeros(len(channel.t), dtype=bool))
+        for values, colour in ((channel.y, MEASURED), (np.where(masked, channel.y, np.nan), BEFORE)):
+            if colour == MEASURED or masked.any():
+                hover = f"%{{y:.4g}} {words.unit(UNITS[name])}"
+                data.append(line(*_envelope(channel.t, values), words.channel(name), colour, 1.0,
+                                 yaxis=f"y{mark}", hovertemplate=hover))  # fmt: skip
+    last = f"y{len(record.channels)}" if len(record.channels) > 1 else "y"
+    drawn = layout(xaxis=axis("time, s", anchor=last), annotations=names, **parts,
+                   margin={"l": 72, "r": 24, "t": 24, "b": 48})  # fmt: skip
+    left_out = any(mask.any() for mask in c.masked.values())
+    caption = "Orange: samples that must not count." if left_out else "Least and largest value each moment."
+    return Figure("Every channel over time", caption, data, drawn, 110 * len(record.channels) + 60)
+
+
+def _envelope(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a channel with the least and the largest value of each of at most _MOST blocks."""
+    size = -(-len(t) // _MOST)
+    if size < 3:
+        return t, y
+    whole = len(t) // size * size
+    blocks = y[:whole].reshape(-1, size)
+    filled = np.where(np.isnan(blocks), np.inf, blocks), np.where(np.isnan(blocks), -np.inf, blocks)
+    ends = np.stack([filled[0].min(axis=1), filled[1].max(axis=1)], axis=1).ravel()
+    return np.repeat(t[:whole:size], 2), np.where(np.isfinite(ends), ends, np.nan)

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from rsea_ros.records.record import Fault
 
 MODEL, REPORT = "model.yaml", "report.html"
-IDENTIFICATION_JSON = "identification.json"
+CHECK_JSON, IDENTIFICATION_JSON = "check.json", "identification.json"
+CHECK = (CHECK_JSON, REPORT)
 IDENTIFICATION = (IDENTIFICATION_JSON, MODEL, REPORT)
 DIAGNOSIS_JSON, OVERLAY = "diagnosis.json", "overlay.mcap"
 DIAGNOSIS = (DIAGNOSIS_JSON, MODEL, REPORT, OVERLAY)

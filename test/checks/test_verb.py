@@ -44,6 +44,18 @@ def test_the_suggested_axis_corrects_the_bag(bag, good, capsys):
     assert main(["check", bag(ft=turn_ft(good)), "--axis=-torque.z", "--fail-on", "red"]) == 0
 
 
+def test_the_page_says_first_what_to_put_right(bag, good, tmp_path, capsys):
+    words = ["check", bag(ft=turn_ft(good)), "--rig", "paper_high_impedance", "--out", str(tmp_path / "out")]
+    assert main([*words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "<h1>Put right before a fit: sign of the F/T torque</h1>" in page
+    assert page.index("<td>red") < page.index("<div class=\"figure\"")
+    written = json.loads((tmp_path / "out" / "check.json").read_text())
+    assert {key: written[key] for key in told} == told
+    assert main(words) == 2 and "exists" in capsys.readouterr().err
+
+
 def test_for_a_dead_axis_the_one_that_follows_the_command_is_suggested(bag, capsys):
     assert main(["check", bag(), "--axis", "torque.x", "--fail-on", "red"]) == 1
     assert "--axis torque.z" in capsys.readouterr().out

@@ -46,6 +46,7 @@ WRITERS = {
     "predict": (["predict", RIG, "run.mcap", "--out", "out/new.csv"], ["new.csv"]),
     "export": (["export", "--mjcf", RIG, "--no-play", "--out", "out/new.xml"], ["new.xml"]),
     "design": (["design", "--json", "--out", "out"], ["design.json", "report.html"]),
+    "check": (["check", "run.mcap", "--json", "--out", "out"], list(result_files.CHECK)),
     "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(result_files.IDENTIFICATION)),
     "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(result_files.DIAGNOSIS)),
 }

@@ -1,6 +1,7 @@
 """Dynamixel X and P beside Pro: their tables against the maker's numbers, and all of them on the wire."""
 
 import math
+from contextlib import closing
 from statistics import fmean
 
 import pytest
@@ -145,13 +146,12 @@ def test_angles_count_from_configure_or_from_the_motors_zero_with_its_homing_off
     well_behaved(bench)
     bench.ask("set", homing_offset=-1024)
     try:
-        relative, absolute = device_on(bench, SMALL), device_on(bench, SMALL, absolute=True)
         angles = []
-        for device in (relative, absolute):
-            device.open()
-            angles.append(device.read().position)
-            offset = device.health()["homing_offset_rad"]
-            device.close()
+        for absolute in (False, True):
+            with closing(device_on(bench, SMALL, absolute=absolute, latency=1.0)) as device:
+                device.open()
+                angles.append(device.read().position)
+                offset = device.health()["homing_offset_rad"]
     finally:
         bench.ask("set", homing_offset=0)
     assert angles[0] == pytest.approx(0.0, abs=0.01)
