@@ -84,6 +84,13 @@ COMPUTING = (
 """Files that compute longest, in this order, so that no worker is left with one of them at the end."""
 
 
+TOGETHER = {
+    "test/report": ("test/report/",),
+    "test/test_house": ("test/test_house", "test/test_imports", "test/test_fault_", "test/test_compiler_"),
+}
+"""Files that one worker takes as one: what the first makes, or reads of every source, the others need."""
+
+
 def _place(nodeid: str) -> int:
     """Return where a test's file stands in the order of the files."""
     fits = lambda name: nodeid.startswith(f"test/{name}")  # noqa: E731
@@ -105,7 +112,8 @@ class OneWorker(LoadFileScheduling):
     """
 
     def _split_scope(self, nodeid: str) -> str:
-        return "test/report" if nodeid.startswith("test/report/") else super()._split_scope(nodeid)
+        whole = next((place for place, files in TOGETHER.items() if nodeid.startswith(files)), None)
+        return whole or super()._split_scope(nodeid)
 
     def _next_of(self, node: WorkerController) -> str | None:
         """Return the file that a worker takes next: the longest computation, or what only the first may take.

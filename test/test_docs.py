@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import re
-import subprocess
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -30,13 +28,6 @@ def site() -> ModuleType:
 def test_the_catalogue_of_the_docs_is_that_of_the_code(site):
     """`.ci/docs` regenerates it."""
     assert (DOCS / "effects.md").read_text(encoding="utf-8").strip() == site.effects_page().strip()
-
-
-def test_the_committed_policies_are_those_of_the_nodes():
-    """In a process of its own: rclpy leaves the services of a lifecycle node up, and they answer nobody."""
-    command, file = [sys.executable, "-m", "rsea_ros.nodes._policies"], ROOT / "config/security/policies.xml"
-    made = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True, timeout=60).stdout
-    assert file.read_bytes() == made, f"python -m rsea_ros.nodes._policies > {file} makes it anew"
 
 
 def test_the_reference_has_every_name_of_the_door(site):

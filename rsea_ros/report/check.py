@@ -203,7 +203,8 @@ def _over_time(c: Findings, record: Record) -> Figure:
         mark = "" if k == 0 else str(k + 1)
         top = 1.0 - k * height
         parts[f"yaxis{mark}"] = axis(words.unit(UNITS[name]), domain=[top - 0.8 * height, top])
-        names.append(label(words.channel(name), 0.0, top, QUIET, xref="paper", yref="paper", yanchor="bottom"))
+        above = {"xref": "paper", "yref": "paper", "yanchor": "bottom"}
+        names.append(label(words.channel(name), 0.0, top, QUIET, **above))
         masked = c.masked.get(name, np.zeros(len(channel.t), dtype=bool))
         for values, colour in ((channel.y, MEASURED), (np.where(masked, channel.y, np.nan), BEFORE)):
             if colour == MEASURED or masked.any():

@@ -9,7 +9,18 @@ import pytest
 from rsea_ros.nodes import _policies, _run, _run as _sockets
 from test.nodes.warm import parent
 
-FILE = Path(__file__).resolve().parents[2] / "config" / "security" / "policies.xml"
+ROOT = Path(__file__).resolve().parents[2]
+FILE = ROOT / "config" / "security" / "policies.xml"
+
+
+def test_the_committed_policies_are_those_of_the_nodes(tmp_path):
+    """In a process of its own: rclpy leaves the services of a lifecycle node up, and they answer nobody."""
+    files = os.devnull, tmp_path / "policies.xml", tmp_path / "said"
+    for file in files[1:]:
+        file.touch()
+    made = parent().start("rsea_ros.nodes._policies", [], {**os.environ, "PYTHONPATH": str(ROOT)}, files)
+    assert made.wait(60.0) == 0, files[2].read_text()
+    assert FILE.read_bytes() == files[1].read_bytes(), "python -m rsea_ros.nodes._policies makes it anew"
 
 
 @pytest.mark.parametrize(
