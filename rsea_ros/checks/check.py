@@ -8,38 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.checks.expected import (
-    Quotient,
-    Side,
-    is_commanded,
-    is_full_of_gaps,
-    quotient,
-    quotients,
-    sides,
-)
+from rsea_ros.checks import expected, rig_findings, signal_findings
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings, in_words_of, missing_command, unused_sentence
 from rsea_ros.checks.linearised_rig import LinearisedFit, Start, linear_of
 from rsea_ros.checks.pairs import is_held
-from rsea_ros.checks.rig_findings import (
-    at_rates,
-    clock_findings,
-    clock_rates,
-    drift_findings,
-    lag_lines,
-    restoring_findings,
-    value_findings,
-    with_rates,
-)
-from rsea_ros.checks.signal_findings import (
-    angle_offset_findings,
-    excitation,
-    jump_findings,
-    noises,
-    offset_findings,
-    smoothing_findings,
-    standstill_findings,
-)
 from rsea_ros.checks.stamp_findings import command_band, fault_finding, order, rates
 from rsea_ros.checks.verdicts import RIGHT_RIG, in_step, start_of, verdict_findings
 from rsea_ros.errors import RseaError
@@ -90,10 +63,10 @@ def check_record(
         top = command_band(checked.record["command"])[1] if moving else math.inf
         every += [*order(record), *rates(record, rig, top)]
         if moving:
-            every += excitation(checked.record, rig)
-            every += jump_findings(checked.record)
-            every += [] if _bridged_channels(checked) else standstill_findings(checked.record)
-            if is_commanded(checked.record) and not is_too_fast(checked.record):
+            every += signal_findings.excitation(checked.record, rig)
+            every += signal_findings.jump_findings(checked.record)
+            every += [] if _bridged_channels(checked) else signal_findings.standstill_findings(checked.record)
+            if expected.is_commanded(checked.record) and not is_too_fast(checked.record):
                 every += _against_rig(checked, rig, axis, values)
         every += _other_axes(checked, rig, axis, wrench)
     every = [in_words_of(record, finding) for finding in every if not _is_consequence(finding, every)]
@@ -144,26 +117,26 @@ def _topics(record: Record, rig: Rig) -> list[Finding]:
 
 def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Finding]:
     """Return the findings from comparing the record with the rig's simulation."""
-    if is_full_of_gaps(checked.record):
+    if expected.is_full_of_gaps(checked.record):
         return [
             Finding(
                 "red", "gaps", "", expected="a record without long gaps", detail="it is mostly gaps",
                 remedy="cut it with --from and --to",
             )
         ]
-    both = checked.compared if checked.compared is not None else sides(checked.record, rig)
+    both = checked.compared if checked.compared is not None else expected.sides(checked.record, rig)
     findings, linear = _compare(checked, both, rig, axis, {}, values)
     if linear is None or not linear.is_clear:
         start = float(checked.record["command"].t[0])
-        lines = lag_lines({n: s for n, s in both.items() if n in _whole(checked)}, start)
-        rates = clock_rates(lines)
+        lines = rig_findings.lag_lines({n: s for n, s in both.items() if n in _whole(checked)}, start)
+        rates = rig_findings.clock_rates(lines)
         if rates:
-            even = replace(checked, record=at_rates(checked.record, rates))
-            again, cleared = _compare(even, sides(even.record, rig), rig, axis, rates, values)
+            even = replace(checked, record=rig_findings.at_rates(checked.record, rates))
+            again, cleared = _compare(even, expected.sides(even.record, rig), rig, axis, rates, values)
             if cleared is not None and cleared.is_clear:
                 return again
         if linear is not None:
-            return _with_drifts(findings, drift_findings(lines))
+            return _with_drifts(findings, rig_findings.drift_findings(lines))
     return findings
 
 
@@ -177,7 +150,7 @@ def _with_drifts(findings: list[Finding], drifts: list[Finding]) -> list[Finding
 
 def _compare(
     checked: Checked,
-    both: Mapping[str, Side],
+    both: Mapping[str, expected.Side],
     rig: Rig,
     axis: str,
     rates: Mapping[str, float],
@@ -193,14 +166,14 @@ def _compare(
     compared = {n: s for n, s in both.items() if n in whole}
     if late:
         record = in_step(record, late)
-        compared = {n: s for n, s in sides(record, rig).items() if n in whole}
-    if elsewhere := angle_offset_findings(rig, compared):
+        compared = {n: s for n, s in expected.sides(record, rig).items() if n in whole}
+    if elsewhere := signal_findings.angle_offset_findings(rig, compared):
         return [*findings, *elsewhere], None
     wrong = {f.channel for f in findings if f.light == "red"}
-    findings += [] if wrong & {"ft", "command"} else offset_findings(record, compared)
-    findings += noises(record, rig, but=_bridged_channels(checked) | wrong)
-    related = quotients(compared)
-    findings += smoothing_findings(related, {n: 1.0 / record[n].rate for n in related})
+    findings += [] if wrong & {"ft", "command"} else signal_findings.offset_findings(record, compared)
+    findings += signal_findings.noises(record, rig, but=_bridged_channels(checked) | wrong)
+    related = expected.quotients(compared)
+    findings += signal_findings.smoothing_findings(related, {n: 1.0 / record[n].rate for n in related})
     findings += _another(record, rig, related, findings)
     if late or any(f.light == "red" and f.kind in _NO_FIT for f in findings):
         return findings, None
@@ -221,12 +194,12 @@ def _bridged_channels(checked: Checked) -> set[str]:
 
 
 def _another(
-    record: Record, rig: Rig, related: Mapping[str, Quotient], known: Sequence[Finding]
+    record: Record, rig: Rig, related: Mapping[str, expected.Quotient], known: Sequence[Finding]
 ) -> list[Finding]:
     """Return the findings by which the machine of a record differs from a rig whose values no pair shows."""
     named = {f.channel for f in known if f.kind != "noise"}
     if is_inverse(rig):
-        return [] if "spring_end.stiffness" in named else restoring_findings(record, rig)
+        return [] if "spring_end.stiffness" in named else rig_findings.restoring_findings(record, rig)
     if {f.kind for f in known} & {"sign", "scale", "wrong_rig", "clock_offset"} or is_held(rig):
         return []
     far = {n: q.measured / q.predicted for n, q in related.items() if n not in named}
@@ -245,11 +218,11 @@ def _linearise(
         return [], None
     try:
         linear = linear_of(checked.record, checked.masked, rig, start)
-        fitted = value_findings(linear, rig) if values else []
+        fitted = rig_findings.value_findings(linear, rig) if values else []
     except (RseaError, ValueError, np.linalg.LinAlgError):
         return [], None
     duration = checked.record.stop - checked.record.start
-    return [*clock_findings(with_rates(linear, rates), duration), *fitted], linear
+    return [*rig_findings.clock_findings(rig_findings.with_rates(linear, rates), duration), *fitted], linear
 
 
 def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) -> list[Finding]:
@@ -277,11 +250,11 @@ def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) ->
     ]
 
 
-def _beside(checked: Checked, rig: Rig, channel: Channel) -> Quotient | None:
+def _beside(checked: Checked, rig: Rig, channel: Channel) -> expected.Quotient | None:
     """Return the quotient of another channel taken for the F/T torque."""
     record, _ = repair_stamps(checked.record.with_channels(ft=channel))
-    side: Side | None = sides(replace(record, faults=()), rig).get("ft")
-    return None if side is None else quotient("ft", side.t, side.y, side.p)
+    side: expected.Side | None = expected.sides(replace(record, faults=()), rig).get("ft")
+    return None if side is None else expected.quotient("ft", side.t, side.y, side.p)
 
 
 def _fault(f: Finding) -> Fault:

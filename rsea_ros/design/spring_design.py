@@ -16,15 +16,9 @@ from rsea_ros.design import mechanism
 from rsea_ros.design.mechanism import Requirement, spring_rate
 from rsea_ros.design.motor_gear_units import MotorGear
 from rsea_ros.errors import ParameterError
+from rsea_ros.model import transfer
 from rsea_ros.model.rig import END_NAMES, Quantity, Rig
 from rsea_ros.model.train import Train
-from rsea_ros.model.transfer import (
-    end_over_end,
-    flat_band,
-    pure_torque_bandwidth,
-    undamped_band,
-    undamped_stiffness,
-)
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z90
 
@@ -82,9 +76,9 @@ def spring_design(requirement: Requirement, unit: MotorGear, stiffness: float) -
     if not (math.isfinite(stiffness) and stiffness > 0.0):
         raise ParameterError(f"stiffness = {stiffness:g} N·m/rad, expected a finite value > 0 N·m/rad")
     inner = requirement.inertia + unit.spin
-    function = end_over_end(rig_of(requirement, unit, stiffness))
-    exact = flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
-    band = pure_torque_bandwidth(stiffness, requirement.inertia)
+    function = transfer.end_over_end(rig_of(requirement, unit, stiffness))
+    exact = transfer.flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
+    band = transfer.pure_torque_bandwidth(stiffness, requirement.inertia)
     theta = float(mechanism.deflection(stiffness, requirement.torque))
     return SpringDesign(
         requirement=requirement,
@@ -118,7 +112,9 @@ def _checks(
 def stiffness_bounds(requirement: Requirement, unit: MotorGear) -> dict[str, float]:
     """Return the least K_s, N m/rad, for each demand."""
     return {
-        "Bandwidth by Eq. (7)": float(undamped_stiffness(requirement.bandwidth, requirement.inertia)),
+        "Bandwidth by Eq. (7)": float(
+            transfer.undamped_stiffness(requirement.bandwidth, requirement.inertia)
+        ),
         "Bandwidth with the rotor's spin": least_for_band(requirement, unit),
         "Torque, K_s/2": 2.0 * requirement.torque,
         "Deflection": mechanism.stiffness_for_deflection(requirement.torque, requirement.deflection),
@@ -129,10 +125,9 @@ def least_for_band(requirement: Requirement, unit: MotorGear) -> float:
     """Return the least K_s, N m/rad, whose exact band reaches the required one; bisection in log K_s."""
 
     def reaches(k_s: float) -> bool:
-        function = end_over_end(rig_of(requirement, unit, k_s))
-        return (
-            flat_band(function, requirement.tolerance_db, requirement.tolerance_deg) >= requirement.bandwidth
-        )
+        function = transfer.end_over_end(rig_of(requirement, unit, k_s))
+        band = transfer.flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
+        return band >= requirement.bandwidth
 
     low, high = 1.0, 2.0
     while not reaches(high):
@@ -218,7 +213,7 @@ def band_range(stiffness: float, chassis: float, spin: float, spread: float) -> 
     without limit where the range holds a J_m whose spin cancels J_sc.
     """
     inner = chassis + spin * np.exp(Z90 * spread * np.linspace(-1.0, 1.0, _STEPS))
-    bands = undamped_band(stiffness, inner)
+    bands = transfer.undamped_band(stiffness, inner)
     cancels = bool(inner.min() < 0.0 < inner.max())
     return float(bands.min()), math.inf if cancels else float(bands.max())
 
@@ -268,8 +263,8 @@ def margins(
     inner = inertia + design.unit.spin * draw["rotor"]
     theta, limit = np.degrees(mechanism.deflection(k_s, r.torque)), float(np.degrees(r.deflection))
     demands = [
-        ("Bandwidth by Eq. (7)", "Hz", undamped_band(k_s, inertia), r.bandwidth, True),
-        ("Bandwidth with the rotor's spin", "Hz", undamped_band(k_s, inner), r.bandwidth, True),
+        ("Bandwidth by Eq. (7)", "Hz", transfer.undamped_band(k_s, inertia), r.bandwidth, True),
+        ("Bandwidth with the rotor's spin", "Hz", transfer.undamped_band(k_s, inner), r.bandwidth, True),
         ("Torque that the mechanism carries", "N m", mechanism.largest_torque(k_s), r.torque, True),
         ("Deflection", "deg", np.where(np.isnan(theta), np.inf, theta), limit, False),
         ("Peak torque of motor and gear", "N m", design.unit.strongest * draw["motor"], r.torque, True),

@@ -18,15 +18,8 @@ import numpy as np
 from scipy.stats import norm
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.experiment import run_shape
 from rsea_ros.experiment.hypothesis import Hypothesis, motion
-from rsea_ros.experiment.run_shape import (
-    FEWEST,
-    Kind,
-    RunLimits,
-    Shape,
-    of_command,
-    of_response,
-)
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
 
@@ -111,10 +104,10 @@ def _corners(hypothesis: Hypothesis, z: float) -> list[Rig]:
 
 def peaks(command: FloatArray, rate: float, groups: Sequence[Group]) -> Peaks:
     """Return the peaks of a command over the groups of ends_of."""
-    by_command = of_command(command, rate)
+    by_command = run_shape.of_command(command, rate)
     expected, at_level = dict(by_command), dict(by_command)
     for group in groups:
-        runs = [of_response(command, motion(rig, command, rate)) for rig in group.rigs]
+        runs = [run_shape.of_response(command, motion(rig, command, rate)) for rig in group.rigs]
         for name in runs[0]:
             values = BETWEEN * np.array([run[name] for run in runs])
             expected[name] = max(expected.get(name, 0.0), float(values[0]))
@@ -148,13 +141,13 @@ class DesignRequest:
     Raises ParameterError for a rate outside RATES and for lengths that no run can have.
     """
 
-    limits: RunLimits
+    limits: run_shape.RunLimits
     rate: float = 280.0
     shortest: float = 0.5
     longest: float = 10.0
     probe: float = 2.0
     refine: int = 24
-    kinds: tuple[Kind, ...] = ("multisine", "chirp", "steps", "holds")
+    kinds: tuple[run_shape.Kind, ...] = ("multisine", "chirp", "steps", "holds")
     per_run: float = 0.5
     test: float = 0.0
 
@@ -168,10 +161,10 @@ class DesignRequest:
             raise ParameterError(
                 f"longest run {self.longest:g} s, expected at least the shortest of {self.shortest:g} s"
             )
-        if self.longest * self.rate < max(FEWEST.values()):
+        if self.longest * self.rate < max(run_shape.FEWEST.values()):
             raise ParameterError(
                 f"longest run {self.longest:g} s at {self.rate:g} Hz, "
-                f"expected at least {max(FEWEST.values())} samples"
+                f"expected at least {max(run_shape.FEWEST.values())} samples"
             )
 
 
@@ -187,7 +180,7 @@ class Proposal:
     every quantity. tried: shapes that were rated. energy: N^2 m^2 s, the integral of the squared command.
     """
 
-    shape: Shape
+    shape: run_shape.Shape
     duration: float
     rate: float
     command: FloatArray

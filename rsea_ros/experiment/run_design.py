@@ -19,25 +19,10 @@ import numpy as np
 from scipy.optimize import minimize
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.experiment import separation
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.proposal import DesignRequest, Group, Peaks, Proposal, ends_of, peaks
 from rsea_ros.experiment.run_shape import Shape, largest_share
-from rsea_ros.experiment.separation import (
-    INSIDE,
-    ShapeRater,
-    best_of,
-    chances_decided,
-    information_gain,
-    least_share,
-    likely_separations,
-    noise_by_channel,
-    refit,
-    separations,
-    shapes_for,
-    share_decided,
-    trial_of,
-    try_lengths,
-)
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import BoolArray, FloatArray
@@ -119,30 +104,35 @@ def propose(
             f"rig {rig.name}: positions command it, expected a rig that torques command: "
             "limits of the torque do not bound a position loop"
         )
-    rater = ShapeRater(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
+    noise = separation.noise_by_channel(hypotheses, measured or {})
+    rater = separation.ShapeRater(hypotheses, asked, noise, run)
     if len(hypotheses) == 1:
         return _sharpest(rater, say)
-    shapes = shapes_for(asked)
+    shapes = separation.shapes_for(asked)
     tables = []
     for k, shape in enumerate(shapes):
         say(f"trying {shape.kind}", 0.5 * k / len(shapes))
-        tables.append(separations(hypotheses, rater.responses(rater.within(shape, asked.probe))))
+        tables.append(separation.separations(hypotheses, rater.responses(rater.within(shape, asked.probe))))
     say("fitting rivals", 0.5)
     apart = _hopeless(rater, shapes, tables)
-    trials = try_lengths(rater, shapes, apart, asked.shortest)
-    best = best_of(trials, asked)
+    trials = separation.try_lengths(rater, shapes, apart, asked.shortest)
+    best = separation.best_of(trials, asked)
     say("refining", 0.6)
-    shape, count = refine(best.shape, lambda s: trial_of(rater, s, best.length, apart).share, asked, say)
+    shape, count = refine(
+        best.shape, lambda s: separation.trial_of(rater, s, best.length, apart).share, asked, say
+    )
     tried = len(shapes) + len(trials) + count
     final = _final(rater, shape, best.length, apart, tried)
-    if final.decided >= least_share(asked) or best.length == asked.longest:
+    if final.decided >= separation.least_share(asked) or best.length == asked.longest:
         return final
-    trial = best_of(try_lengths(rater, shapes, apart, asked.longest), asked)
+    trial = separation.best_of(separation.try_lengths(rater, shapes, apart, asked.longest), asked)
     longest = _final(rater, trial.shape, trial.length, apart, tried + len(shapes))
     return max(longest, final, key=lambda p: p.decided)
 
 
-def _resolved(rater: ShapeRater, chances: FloatArray, rows: Sequence[FloatArray], apart: BoolArray) -> float:
+def _resolved(
+    rater: separation.ShapeRater, chances: FloatArray, rows: Sequence[FloatArray], apart: BoolArray
+) -> float:
     """Return the share that a run decides of the cases that are undecided without it; 1 for a single cause.
 
     Without it: what is likely enough already, and what only a hopeless pair leaves open.
@@ -150,12 +140,14 @@ def _resolved(rater: ShapeRater, chances: FloatArray, rows: Sequence[FloatArray]
     if len(chances) == 1:
         return 1.0
     nothing = [np.where(np.isfinite(r), 0.0, r) for r in rows]
-    already = share_decided(rater, chances_decided(rater.hypotheses, nothing, apart))
-    open_, gained = 1.0 - already, share_decided(rater, chances) - already
+    already = separation.share_decided(rater, separation.chances_decided(rater.hypotheses, nothing, apart))
+    open_, gained = 1.0 - already, separation.share_decided(rater, chances) - already
     return max(gained, 0.0) / open_ if open_ > _SETTLED else 0.0
 
 
-def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
+def _hopeless(
+    rater: separation.ShapeRater, shapes: Sequence[Shape], tables: Sequence[FloatArray]
+) -> BoolArray:
     """Return which pairs no tried shape separates in the longest run, in either direction, shape (k, k)."""
     stack = np.array(tables)
     apart = np.eye(stack.shape[1], dtype=bool)
@@ -166,7 +158,7 @@ def _hopeless(rater: ShapeRater, shapes: Sequence[Shape], tables: Sequence[Float
     return apart
 
 
-def _may_show(rater: ShapeRater, shape: Shape, linear: float, i: int, j: int) -> bool:
+def _may_show(rater: separation.ShapeRater, shape: Shape, linear: float, i: int, j: int) -> bool:
     """Return whether the longest run of a shape may separate a rival j from i. linear: S of a probe of it.
 
     A linear step can also leave too much: a rival that contains the other is fitted in full.
@@ -176,25 +168,29 @@ def _may_show(rater: ShapeRater, shape: Shape, linear: float, i: int, j: int) ->
     if linear >= _FAR or linear * longer < _HOPE:
         return linear >= _FAR
     case = rater.case(rater.within(shape, asked.probe), is_quick=True)
-    return refit(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).data * longer >= _HOPE
+    return separation.refit(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).data * longer >= _HOPE
 
 
-def _final(rater: ShapeRater, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
+def _final(
+    rater: separation.ShapeRater, shape: Shape, length: float, apart: BoolArray, tried: int
+) -> Proposal:
     """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
     asked, hypotheses = rater.asked, rater.hypotheses
-    command, reached = limit_command(rater.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
+    largest = rater.within(shape, length) / separation.INSIDE
+    command, reached = limit_command(largest, asked, ends_of(hypotheses))
     responses = rater.responses(command, is_quick=False)
-    linear = separations(hypotheses, responses)
+    linear = separation.separations(hypotheses, responses)
     table = _with_refits(rater, command, linear)
     names = tuple(h.name for h in hypotheses)
     k = len(names)
     pairs = tuple((names[i], names[j]) for i in range(k) for j in range(i + 1, k) if apart[i, j])
-    narrow = information_gain(hypotheses[0], responses[0])
+    narrow = separation.information_gain(hypotheses[0], responses[0])
     energy = float(np.sum(command**2) / asked.rate)
     nearer = np.divide(table, linear, out=np.ones_like(table), where=np.isfinite(table) & (linear > 0.0))
-    rows = likely_separations(hypotheses, responses)
-    chances = chances_decided(hypotheses, [r * n for r, n in zip(rows, nearer, strict=True)], apart)
-    share = share_decided(rater, chances) if k > 1 else 1.0
+    rows = separation.likely_separations(hypotheses, responses)
+    nearest = [r * n for r, n in zip(rows, nearer, strict=True)]
+    chances = separation.chances_decided(hypotheses, nearest, apart)
+    share = separation.share_decided(rater, chances) if k > 1 else 1.0
     return Proposal(
         shape, length, asked.rate, command, names, table, pairs, share, tuple(chances.tolist()),
         _resolved(rater, chances, rows, apart), narrow,
@@ -232,24 +228,24 @@ def limit_command(
     return best
 
 
-def _with_refits(rater: ShapeRater, command: FloatArray, table: FloatArray) -> FloatArray:
+def _with_refits(rater: separation.ShapeRater, command: FloatArray, table: FloatArray) -> FloatArray:
     """Return S with a full fit of each nearest rival, where one linear step does not settle it."""
     case, table = rater.case(command, is_quick=False), table.copy()
     for i, row in enumerate(table):
         j = int(np.argmin(row))
         if row[j] < _FAR:
-            table[i, j] = refit(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).total
+            table[i, j] = separation.refit(rater.hypotheses[i], rater.hypotheses[j], case, rater.run).total
     return table
 
 
-def _sharpest(rater: ShapeRater, say: Progress) -> Proposal:
+def _sharpest(rater: separation.ShapeRater, say: Progress) -> Proposal:
     """Return the run that narrows the parameters of a single cause most (D-optimality)."""
     asked = rater.asked
-    shapes = shapes_for(asked)
+    shapes = separation.shapes_for(asked)
 
     def value(shape: Shape) -> float:
         command = rater.within(shape, asked.probe)
-        return information_gain(rater.hypotheses[0], rater.responses(command)[0])
+        return separation.information_gain(rater.hypotheses[0], rater.responses(command)[0])
 
     values = [value(shape) for shape in shapes]
     shape, count = refine(shapes[int(np.argmax(values))], value, asked, say)

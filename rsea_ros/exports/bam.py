@@ -13,15 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from rsea_ros.exports.others import (
-    Export,
-    Omitted,
-    Represented,
-    finite_sizes,
-    omitted_effects,
-    omitted_parts,
-    without_null_effects,
-)
+from rsea_ros.exports import others
 from rsea_ros.model.equations import gear_inertia
 from rsea_ros.model.rig import Rig
 
@@ -31,13 +23,13 @@ ANY_SPEED = 1e9
 """rad/s, as Stribeck velocity: M6 fades its quadratic part with speed, ours does not."""
 
 
-def export_bam(rig: Rig, actuator: str = "") -> Export:
+def export_bam(rig: Rig, actuator: str = "") -> others.Export:
     """Return the parameters of a rig. actuator: BAM's name of the servo, which brings its control law."""
-    rig = without_null_effects(rig)
-    effects = finite_sizes(rig)
+    rig = others.without_null_effects(rig)
+    effects = others.finite_sizes(rig)
     represented = [
-        Represented("rotor.reflected_inertia", "armature"),
-        Represented("rotor.reflected_damping", "friction_viscous"),
+        others.Represented("rotor.reflected_inertia", "armature"),
+        others.Represented("rotor.reflected_damping", "friction_viscous"),
     ]
     values: dict[str, object] = {
         "armature": gear_inertia(rig),
@@ -47,17 +39,19 @@ def export_bam(rig: Rig, actuator: str = "") -> Export:
     values |= _dry(effects, represented) | _load(effects, represented)
     model = _model(effects)
     values |= {"model": model, "actuator": actuator}
-    omitted = [Omitted("kt, R", "the rig has no voltage; from the data sheet, or from bam.fit")]
+    omitted = [others.Omitted("kt, R", "the rig has no voltage; from the data sheet, or from bam.fit")]
     if not actuator:
-        omitted.append(Omitted("actuator", "BAM's name of the servo, with its control law (--actuator)"))
-    omitted += omitted_parts(rig, "a BAM joint is rigid")
-    omitted += omitted_effects(rig, represented, f"no parameter of {model.upper()}")
+        lacking = "BAM's name of the servo, with its control law (--actuator)"
+        omitted.append(others.Omitted("actuator", lacking))
+    omitted += others.omitted_parts(rig, "a BAM joint is rigid")
+    omitted += others.omitted_effects(rig, represented, f"no parameter of {model.upper()}")
     values["rsea"] = {
         "rig": rig.name,
         "says": {one.name: one.how for one in represented},
         "leaves_out": {one.name: one.why for one in omitted},
     }
-    return Export("bam", ".json", json.dumps(values, indent=2) + "\n", tuple(represented), tuple(omitted))
+    content = json.dumps(values, indent=2) + "\n"
+    return others.Export("bam", ".json", content, tuple(represented), tuple(omitted))
 
 
 def _model(effects: Mapping[str, Mapping[str, float]]) -> str:
@@ -71,11 +65,13 @@ def _model(effects: Mapping[str, Mapping[str, float]]) -> str:
     return "m2" if has_stribeck else "m1"
 
 
-def _dry(effects: Mapping[str, Mapping[str, float]], represented: list[Represented]) -> dict[str, float]:
+def _dry(
+    effects: Mapping[str, Mapping[str, float]], represented: list[others.Represented]
+) -> dict[str, float]:
     """Return the parameters that do not depend on the load."""
     base = effects.get("coulomb_friction", {}).get("torque", 0.0)
     if base:
-        represented.append(Represented("coulomb_friction", "friction_base"))
+        represented.append(others.Represented("coulomb_friction", "friction_base"))
     stribeck, speed = 0.0, 1.0
     for name in ("stribeck_friction", "lugre_friction"):
         if name in effects:
@@ -83,7 +79,7 @@ def _dry(effects: Mapping[str, Mapping[str, float]], represented: list[Represent
             base, stribeck, speed = base + p["coulomb_torque"], p["stribeck_torque"], p["stribeck_velocity"]
             left = ", its bristles left out" if name == "lugre_friction" else ""
             how = f"friction_base, friction_stribeck, dtheta_stribeck, alpha 2{left}"
-            represented.append(Represented(name, how))
+            represented.append(others.Represented(name, how))
     if _model(effects) in ("m1", "m3"):
         return {"friction_base": base}
     return {
@@ -91,19 +87,21 @@ def _dry(effects: Mapping[str, Mapping[str, float]], represented: list[Represent
     }  # fmt: skip
 
 
-def _load(effects: Mapping[str, Mapping[str, float]], represented: list[Represented]) -> dict[str, float]:
+def _load(
+    effects: Mapping[str, Mapping[str, float]], represented: list[others.Represented]
+) -> dict[str, float]:
     """Return the parameters that depend on the load."""
     model, name = _model(effects), "directional_load_friction"
     if model in ("m3", "m4"):
         how = "load_friction_base, half of the coefficient"
-        represented.append(Represented("load_dependent_friction", how))
+        represented.append(others.Represented("load_dependent_friction", how))
         half = 0.5 * effects["load_dependent_friction"]["coefficient"]
         return {"load_friction_base": half, **({"load_friction_stribeck": 0.0} if model == "m4" else {})}
     if model not in ("m5", "m6"):
         return {}
     p = effects[name]
     quad = ", and their quad" if model == "m6" else ""
-    represented.append(Represented(name, f"load_friction_motor, load_friction_external{quad}"))
+    represented.append(others.Represented(name, f"load_friction_motor, load_friction_external{quad}"))
     values = {
         "load_friction_motor": p["motor_coefficient"],
         "load_friction_external": p["load_coefficient"],

@@ -10,17 +10,7 @@ import math
 from collections.abc import Mapping
 
 from rsea_ros.documents.wording import in_docstring
-from rsea_ros.exports.others import (
-    Export,
-    Omitted,
-    Represented,
-    coverage_lines,
-    finite_sizes,
-    omitted_effects,
-    omitted_parts,
-    omitted_terms,
-    without_null_effects,
-)
+from rsea_ros.exports import others
 from rsea_ros.model.equations import gear_inertia
 from rsea_ros.model.rig import Rig
 
@@ -28,13 +18,13 @@ PHYSICS_STEP = 0.005
 """s, of Isaac Lab's examples; a line of the file that its user changes."""
 
 
-def export_isaac(rig: Rig) -> Export:
+def export_isaac(rig: Rig) -> others.Export:
     """Return the configuration of a rig's actuator."""
-    rig = without_null_effects(rig)
-    effects = finite_sizes(rig)
+    rig = others.without_null_effects(rig)
+    effects = others.finite_sizes(rig)
     represented = [
-        Represented("rotor.reflected_inertia", "armature"),
-        Represented("rotor.reflected_damping", "viscous_friction"),
+        others.Represented("rotor.reflected_inertia", "armature"),
+        others.Represented("rotor.reflected_damping", "viscous_friction"),
     ]
     joint = {"armature": gear_inertia(rig), "viscous_friction": rig["rotor.reflected_damping"]}
     delay = effects.get("command_delay", {}).get("delay", 0.0)
@@ -45,50 +35,55 @@ def export_isaac(rig: Rig) -> Export:
         kind = "DCMotorCfg"
         sag = effects["voltage_sag"]
         fields |= {"saturation_effort": sag["limit"], "velocity_limit": sag["no_load_speed"]}
-        represented.append(Represented("voltage_sag", "DCMotorCfg, saturation_effort and velocity_limit"))
+        limits = "DCMotorCfg, saturation_effort and velocity_limit"
+        represented.append(others.Represented("voltage_sag", limits))
     elif delay:
-        represented.append(Represented("command_delay", "min_delay = max_delay, in steps of the physics"))
-    omitted = [*omitted_parts(rig, "an actuator drives one rigid joint; give it a passive joint beyond")]
-    omitted += omitted_effects(rig, represented, f"{kind} has no field for it")
+        steps = "min_delay = max_delay, in steps of the physics"
+        represented.append(others.Represented("command_delay", steps))
+    rigid = "an actuator drives one rigid joint; give it a passive joint beyond"
+    omitted = [*others.omitted_parts(rig, rigid)]
+    omitted += others.omitted_effects(rig, represented, f"{kind} has no field for it")
     terms = ("k_i", "k_f", "k_vi", "sample_time", "velocity_limit")
-    omitted += omitted_terms(rig, dict.fromkeys(terms, "the PD law has no place for it"))
+    omitted += others.omitted_terms(rig, dict.fromkeys(terms, "the PD law has no place for it"))
     text = _file(rig, kind, fields, delay, represented, omitted)
-    return Export("isaac", ".py", text, tuple(represented), tuple(omitted))
+    return others.Export("isaac", ".py", text, tuple(represented), tuple(omitted))
 
 
-def _loop(rig: Rig, represented: list[Represented]) -> dict[str, float]:
+def _loop(rig: Rig, represented: list[others.Represented]) -> dict[str, float]:
     """Return the gains; a rig that torques command has none, and takes efforts."""
     if rig.loop is None:
-        represented.append(Represented("torque command", "stiffness and damping 0: set joint efforts"))
+        represented.append(others.Represented("torque command", "stiffness and damping 0: set joint efforts"))
         return {"stiffness": 0.0, "damping": 0.0}
-    represented.append(Represented(f"{rig.loop} loop", "stiffness and damping"))
+    represented.append(others.Represented(f"{rig.loop} loop", "stiffness and damping"))
     if rig.loop == "pd":
         return {"stiffness": rig["controller.k_p"], "damping": rig["controller.k_d"]}
     k_v = rig["controller.k_v"]
     return {"stiffness": rig["controller.k_pos"] * k_v, "damping": k_v}
 
 
-def _friction(effects: Mapping[str, Mapping[str, float]], represented: list[Represented]) -> dict[str, float]:
+def _friction(
+    effects: Mapping[str, Mapping[str, float]], represented: list[others.Represented]
+) -> dict[str, float]:
     dynamic = effects.get("coulomb_friction", {}).get("torque", 0.0)
     if dynamic:
-        represented.append(Represented("coulomb_friction", "friction and dynamic_friction"))
+        represented.append(others.Represented("coulomb_friction", "friction and dynamic_friction"))
     static = dynamic
     for name in ("stribeck_friction", "lugre_friction"):
         if name in effects:
             dynamic += effects[name]["coulomb_torque"]
             static += effects[name]["coulomb_torque"] + effects[name]["stribeck_torque"]
             how = "friction at rest, dynamic_friction at speed; not the curve between"
-            represented.append(Represented(name, how))
+            represented.append(others.Represented(name, how))
     return {"friction": static, "dynamic_friction": dynamic}
 
 
 def _limits(
-    rig: Rig, effects: Mapping[str, Mapping[str, float]], represented: list[Represented]
+    rig: Rig, effects: Mapping[str, Mapping[str, float]], represented: list[others.Represented]
 ) -> dict[str, float]:
     limits = [rig["controller.torque_limit"]] if rig.loop else []
     if "torque_saturation" in effects:
         limits.append(effects["torque_saturation"]["limit"])
-        represented.append(Represented("torque_saturation", "effort_limit"))
+        represented.append(others.Represented("torque_saturation", "effort_limit"))
     finite = [limit for limit in limits if math.isfinite(limit)]
     return {"effort_limit": min(finite)} if finite else {}
 
@@ -98,12 +93,12 @@ def _file(
     kind: str,
     fields: Mapping[str, float],
     delay: float,
-    represented: list[Represented],
-    omitted: list[Omitted],
+    represented: list[others.Represented],
+    omitted: list[others.Omitted],
 ) -> str:
     """Return the Python file."""
     lines = [f'"""Actuator of {in_docstring(rig.name)}, written by rsea export --isaac.', ""]
-    lines += [in_docstring(line) for line in coverage_lines(represented, omitted)]
+    lines += [in_docstring(line) for line in others.coverage_lines(represented, omitted)]
     lines += ['"""', "", f"from isaaclab.actuators import {kind}", ""]
     if kind == "DelayedPDActuatorCfg":
         step = f"PHYSICS_STEP = {PHYSICS_STEP!r}  # s, of your SimulationCfg"

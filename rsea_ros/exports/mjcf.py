@@ -14,17 +14,8 @@ import numpy as np
 
 from rsea_ros.design.mujoco_model import SOLIMP, SOLREF, STEP, model_element, text
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.exports import others
 from rsea_ros.exports.chain import check_rotary
-from rsea_ros.exports.others import (
-    Export,
-    Omitted,
-    Represented,
-    Unrepresentable,
-    coverage_comment,
-    finite_sizes,
-    omitted_terms,
-    without_null_effects,
-)
 from rsea_ros.model.equations import train_ratio, with_structure
 from rsea_ros.model.rig import Rig
 
@@ -74,7 +65,8 @@ def passive(root: xml.Element, name: str, **attributes: str) -> xml.Element:
 
 def _command_delay(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if p["delay"] < STEP:
-        raise Unrepresentable(f"a delay of {p['delay']:g} s is shorter than the model's step of {STEP:g} s")
+        step = f"the model's step of {STEP:g} s"
+        raise others.Unrepresentable(f"a delay of {p['delay']:g} s is shorter than {step}")
     samples = math.ceil(p["delay"] / STEP) + 1
     for name, value in (("delay", repr(p["delay"])), ("nsample", str(samples)), ("interp", "zoh")):
         motor(root).set(name, value)
@@ -83,7 +75,7 @@ def _command_delay(root: xml.Element, rig: Rig, p: Parameters) -> str:
 
 def _current_loop_lag(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if motor(root).tag != "general":
-        raise Unrepresentable(f"the actuator is a {motor(root).tag}, which has no filter")
+        raise others.Unrepresentable(f"the actuator is a {motor(root).tag}, which has no filter")
     motor(root).set("dyntype", "filterexact")
     motor(root).set("dynprm", repr(p["time_constant"]))
     return f"actuator dyntype filterexact, {p['time_constant']:g} s"
@@ -98,7 +90,7 @@ def _torque_saturation(root: xml.Element, rig: Rig, p: Parameters) -> str:
 
 def _torque_constant_error(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if motor(root).tag != "general":
-        raise Unrepresentable(f"the actuator is a {motor(root).tag}, whose gain is that of its loop")
+        raise others.Unrepresentable(f"the actuator is a {motor(root).tag}, whose gain is that of its loop")
     motor(root).set("gainprm", repr(p["gain"]))
     return f"actuator gainprm {p['gain']:g}"
 
@@ -130,7 +122,7 @@ def _lugre(root: xml.Element, name: str, stiffness: float, p: Parameters, dampin
 
 def _asymmetric_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if p["viscous_difference"]:
-        raise Unrepresentable("damping is the same in both directions")
+        raise others.Unrepresentable("damping is the same in both directions")
     actuator = root.find("actuator")
     assert actuator is not None
     bias = {"gainprm": "0", "biastype": "affine", "biasprm": f"{-p['offset']!r} 0 0"}
@@ -167,7 +159,7 @@ def _spring_hysteresis(root: xml.Element, rig: Rig, p: Parameters) -> str:
     (Masing's rule, which elasto-plastic springs in parallel obey; u: way over `angle`.)
     """
     if p["gamma"]:
-        raise Unrepresentable(f"springs that yield unload as they load, gamma is {p['gamma']:g}")
+        raise others.Unrepresentable(f"springs that yield unload as they load, gamma is {p['gamma']:g}")
     edges = np.concatenate([[0.0], -0.5 * np.log1p(-np.arange(1, ELEMENTS) / ELEMENTS), [2.5]])
     levels = 1.0 - np.exp(-2.0 * edges)
     slopes = np.append(np.diff(levels) / np.diff(edges), 0.0)
@@ -187,16 +179,16 @@ def _torque_ripple(root: xml.Element, rig: Rig, p: Parameters) -> str:
 
 def _backlash(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if math.isfinite(rig["gear.stiffness"]):
-        raise Unrepresentable("play beside a gear that gives has no place in the model")
+        raise others.Unrepresentable("play beside a gear that gives has no place in the model")
     return f"a hinge each for chassis and gear, the tendon between them limited to {p['gap']:g} rad in all"
 
 
 def _voltage_sag(root: xml.Element, rig: Rig, p: Parameters) -> str:
     first = motor(root)
     if first.tag != "general" or first.get("dyntype"):
-        raise Unrepresentable("a dcmotor has no room for the rig's loop or lag beside it")
+        raise others.Unrepresentable("a dcmotor has no room for the rig's loop or lag beside it")
     if float(first.get("gainprm", "1")) != 1.0:
-        raise Unrepresentable("a dcmotor has no room for a torque constant error beside it")
+        raise others.Unrepresentable("a dcmotor has no room for a torque constant error beside it")
     first.tag = "dcmotor"
     del first.attrib["gainprm"]
     first.set("input", "ff")
@@ -234,10 +226,10 @@ EFFECTS: Mapping[str, Effect] = {
 }
 
 
-def say_loop(rig: Rig, root: xml.Element) -> tuple[Represented, list[Omitted]]:
+def say_loop(rig: Rig, root: xml.Element) -> tuple[others.Represented, list[others.Omitted]]:
     """Turn the motor into the loop's actuator; return exported and omitted parts."""
     if rig.loop is None:
-        return Represented("motor", "motor on the tendon output - housing"), []
+        return others.Represented("motor", "motor on the tendon output - housing"), []
     gains = _gains(rig)
     first = motor(root)
     first.tag = "pid"
@@ -252,14 +244,14 @@ def say_loop(rig: Rig, root: xml.Element) -> tuple[Represented, list[Omitted]]:
     omitted = []
     if rig.encoder_end == "spring_end":
         why = "an actuator's loop closes over its own tendon, that of the gear output"
-        omitted.append(Omitted("encoder at the spring's end", why))
+        omitted.append(others.Omitted("encoder at the spring's end", why))
     terms = {
         "sample_time": "the loop runs at the model's step",
         "velocity_limit": "slewmax limits the target, not what the loop asks",
         "k_f": "the setpoint has no feed-forward of its rate",
         "k_vi": "the integral is of the position's error",
     }
-    return Represented(f"{rig.loop} loop", how), [*omitted, *omitted_terms(rig, terms)]
+    return others.Represented(f"{rig.loop} loop", how), [*omitted, *others.omitted_terms(rig, terms)]
 
 
 def _gains(rig: Rig) -> dict[str, float]:
@@ -271,14 +263,14 @@ def _gains(rig: Rig) -> dict[str, float]:
     return {name: value for name, value in named.items() if value}
 
 
-def export_mjcf(rig: Rig) -> Export:
+def export_mjcf(rig: Rig) -> others.Export:
     """Return the model of a rig.
 
     Raises RigError for a rig that MJCF cannot represent (see design/mujoco_model.py).
     """
     check_rotary(rig)
-    rig = without_null_effects(rig)
-    finite = finite_sizes(rig)
+    rig = others.without_null_effects(rig)
+    finite = others.finite_sizes(rig)
     play = next((float(one.parameters["gap"]) for one in rig.effects if one.name == "backlash"), 0.0)
     root = model_element(with_structure(rig), play)
     loop, omitted = say_loop(rig, root)
@@ -287,17 +279,18 @@ def export_mjcf(rig: Rig) -> Export:
         parameters = effect_named(setting.name).complete(setting.parameters)
         try:
             if setting.name not in finite:
-                raise Unrepresentable("a parameter of it is infinite")
+                raise others.Unrepresentable("a parameter of it is infinite")
             if setting.name in STRUCTURES:
-                represented.append(Represented(setting.name, STRUCTURES[setting.name]))
+                represented.append(others.Represented(setting.name, STRUCTURES[setting.name]))
             elif setting.name in EFFECTS:
-                represented.append(Represented(setting.name, EFFECTS[setting.name](root, rig, parameters)))
+                element = EFFECTS[setting.name](root, rig, parameters)
+                represented.append(others.Represented(setting.name, element))
             else:
-                raise Unrepresentable("MuJoCo has no element for it")
-        except Unrepresentable as reason:
-            omitted.append(Omitted(setting.name, str(reason)))
+                raise others.Unrepresentable("MuJoCo has no element for it")
+        except others.Unrepresentable as reason:
+            omitted.append(others.Omitted(setting.name, str(reason)))
     if rig.sensors:
         why = "sensors of MJCF are those of perfect instruments; the rig's noise and quanta stay with the rig"
-        omitted.append(Omitted("sensor noise", why))
-    root.insert(0, coverage_comment(represented, omitted))
-    return Export("mjcf", ".xml", text(root), tuple(represented), tuple(omitted))
+        omitted.append(others.Omitted("sensor noise", why))
+    root.insert(0, others.coverage_comment(represented, omitted))
+    return others.Export("mjcf", ".xml", text(root), tuple(represented), tuple(omitted))

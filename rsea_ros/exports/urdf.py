@@ -12,15 +12,8 @@ from xml.etree import ElementTree as xml
 
 from rsea_ros.documents.wording import printable
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.exports import others
 from rsea_ros.exports.chain import WORLD, Chain, Joint, Link, chain_of
-from rsea_ros.exports.others import (
-    Export,
-    Omitted,
-    Represented,
-    coverage_comment,
-    finite_sizes,
-    without_null_effects,
-)
 from rsea_ros.model.rig import Rig
 
 Frame = Callable[[str], tuple[xml.Element, xml.Element]]
@@ -42,39 +35,39 @@ class Language:
     block: str
 
 
-def export_chain(rig: Rig, language: Language) -> Export:
+def export_chain(rig: Rig, language: Language) -> others.Export:
     """Return a rig in a language. Raises RigError for one that is no chain of links (see chain.py)."""
-    rig = without_null_effects(rig)
+    rig = others.without_null_effects(rig)
     chain = chain_of(rig)
     represented, omitted = _coverage(rig, chain, has_springs=language.has_springs)
     root, model = language.frame(rig.name)
-    model.insert(0, coverage_comment(represented, omitted))
+    model.insert(0, others.coverage_comment(represented, omitted))
     model.extend(language.link(link) for link in chain.links)
     model.extend(language.joint(joint, rig) for joint in chain.joints)
     model.append(_block(language.block, rig))
-    return Export(language.target, f".{language.target}", _text(root), represented, omitted)
+    return others.Export(language.target, f".{language.target}", _text(root), represented, omitted)
 
 
 def _coverage(
     rig: Rig, chain: Chain, *, has_springs: bool
-) -> tuple[tuple[Represented, ...], tuple[Omitted, ...]]:
+) -> tuple[tuple[others.Represented, ...], tuple[others.Omitted, ...]]:
     """Return the parts in the joints, and those in the block alone."""
     only = "only in the block rsea"
-    represented = [Represented(one.name, _how(one, has_springs)) for one in chain.joints]
-    omitted = [Omitted(name, f"{why}; {only}") for name, why in chain.left_out.items()]
+    represented = [others.Represented(one.name, _how(one, has_springs)) for one in chain.joints]
+    omitted = [others.Omitted(name, f"{why}; {only}") for name, why in chain.left_out.items()]
     if not has_springs and not rig.rigid_spring:
-        omitted.append(Omitted("spring.stiffness", f"URDF joints have no spring; {only}"))
-    finite, has_stop = finite_sizes(rig), any(stop_of(joint, rig) for joint in chain.joints)
+        omitted.append(others.Omitted("spring.stiffness", f"URDF joints have no spring; {only}"))
+    finite, has_stop = others.finite_sizes(rig), any(stop_of(joint, rig) for joint in chain.joints)
     for one in rig.effects:
         how = _EFFECTS.get(one.name)
         if one.name not in finite:
-            omitted.append(Omitted(one.name, f"a parameter of it is infinite; {only}"))
+            omitted.append(others.Omitted(one.name, f"a parameter of it is infinite; {only}"))
         elif how is None or (one.name == "hard_stop" and not has_stop):
-            omitted.append(Omitted(one.name, only))
+            omitted.append(others.Omitted(one.name, only))
         else:
-            represented.append(Represented(one.name, how))
+            represented.append(others.Represented(one.name, how))
     if rig.loop is not None:
-        omitted.append(Omitted(f"{rig.loop} loop", f"a controller's affair; {only}"))
+        omitted.append(others.Omitted(f"{rig.loop} loop", f"a controller's affair; {only}"))
     return tuple(represented), tuple(omitted)
 
 
@@ -94,7 +87,7 @@ def _how(joint: Joint, has_springs: bool) -> str:
 
 
 def _parameters(rig: Rig, name: str) -> dict[str, float]:
-    return finite_sizes(rig).get(name, {})
+    return others.finite_sizes(rig).get(name, {})
 
 
 def inertia(link: Link) -> dict[str, str]:
@@ -138,7 +131,7 @@ def _text(root: xml.Element) -> str:
     return '<?xml version="1.0"?>\n' + printable(xml.tostring(root, encoding="unicode")) + "\n"
 
 
-def export_urdf(rig: Rig) -> Export:
+def export_urdf(rig: Rig) -> others.Export:
     """Return the URDF of a rig. Raises RigError for one that is no chain of links (see chain.py)."""
     return export_chain(rig, Language("urdf", False, _robot, _urdf_link, _urdf_joint, "rsea"))
 
@@ -180,7 +173,7 @@ NAMESPACE = "urn:rsea_ros:rig"
 """Of our block, because SDF wants a prefix for elements that it does not know."""
 
 
-def export_sdf(rig: Rig) -> Export:
+def export_sdf(rig: Rig) -> others.Export:
     """Return the SDF of a rig. Raises RigError for one that is no chain of links (see chain.py)."""
     return export_chain(rig, Language("sdf", True, _model, _sdf_link, _sdf_joint, "rsea:rig"))
 

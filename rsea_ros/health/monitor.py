@@ -17,20 +17,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from rsea_ros.errors import RigError
+from rsea_ros.health import hypotheses as hypo
 from rsea_ros.health.changes import CandidateCauses, Changes
 from rsea_ros.health.health_finding import HealthFinding, Sensors, WatchSettings, sensor_findings
-from rsea_ros.health.hypotheses import (
-    FACTOR,
-    FEWEST,
-    GAINS,
-    Bank,
-    ChangeHypothesis,
-    Cutter,
-    Look,
-    LookEvidence,
-    hypotheses_of,
-    nuisances_of,
-)
 from rsea_ros.health.recursive_estimates import ChangeEstimate, scatter_of
 from rsea_ros.model.observer.log import STATE
 from rsea_ros.model.observer.signal_noise import Noise
@@ -47,12 +36,13 @@ ROUNDS = 2
 
 
 def tune(
-    rig: Rig, noise: Noise, hypotheses: Sequence[ChangeHypothesis], looks: Sequence[Look], hold: float
-) -> Generator[None, None, tuple[Rig, tuple[ChangeHypothesis, ...]]]:
+    rig: Rig, noise: Noise, hypotheses: Sequence[hypo.ChangeHypothesis], looks: Sequence[hypo.Look],
+    hold: float,
+) -> Generator[None, None, tuple[Rig, tuple[hypo.ChangeHypothesis, ...]]]:
     """Return rig and hypotheses with the values that the looks have, within the doubts; yield as examine."""
     total, now, first = np.zeros(len(hypotheses)), tuple(hypotheses), rig
     for _ in range(ROUNDS):
-        evidence = yield from examine(Bank(rig, noise, now, hold), looks)
+        evidence = yield from examine(hypo.Bank(rig, noise, now, hold), looks)
         total, sigma = _change(evidence, hypotheses, total)
         changes = list(zip(hypotheses, total.tolist(), strict=True))
         now = tuple(
@@ -65,7 +55,7 @@ def tune(
     return rig, now
 
 
-def examine(bank: Bank, looks: Sequence[Look]) -> Generator[None, None, list[LookEvidence]]:
+def examine(bank: hypo.Bank, looks: Sequence[hypo.Look]) -> Generator[None, None, list[hypo.LookEvidence]]:
     """Return the evidence of the looks; yield after each."""
     evidence = []
     for look in looks:
@@ -75,7 +65,7 @@ def examine(bank: Bank, looks: Sequence[Look]) -> Generator[None, None, list[Loo
 
 
 def _change(
-    evidence: Sequence[LookEvidence], hypotheses: Sequence[ChangeHypothesis], before: FloatArray
+    evidence: Sequence[hypo.LookEvidence], hypotheses: Sequence[hypo.ChangeHypothesis], before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the change of each parameter in all and its sigma, (p,). before: as the looks were judged."""
     scatter = scatter_of(evidence)
@@ -101,25 +91,25 @@ class Learned:
     """
 
     rig: Rig
-    hypotheses: tuple[ChangeHypothesis, ...]
+    hypotheses: tuple[hypo.ChangeHypothesis, ...]
     models: dict[str, float]
-    looks: Sequence[Look]
-    evidence: Sequence[LookEvidence]
+    looks: Sequence[hypo.Look]
+    evidence: Sequence[hypo.LookEvidence]
 
 
-def learn(rig: Rig, noise: Noise, looks: Sequence[Look], hold: float) -> Generator[None, None, Learned]:
+def learn(rig: Rig, noise: Noise, looks: Sequence[hypo.Look], hold: float) -> Generator[None, None, Learned]:
     """Tune a rig to looks and return their evidence for it; yield after each examined look."""
     t = looks[-1].t[looks[-1].kind == STATE]
-    period = float(np.median(np.diff(t))) if len(t) > FEWEST else USUAL
-    models = hypotheses_of(rig, period)
-    single = (*(h for h in models if h.name not in (FACTOR, *GAINS)), *nuisances_of(rig))
+    period = float(np.median(np.diff(t))) if len(t) > hypo.FEWEST else USUAL
+    models = hypo.hypotheses_of(rig, period)
+    single = (*(h for h in models if h.name not in (hypo.FACTOR, *hypo.GAINS)), *hypo.nuisances_of(rig))
     tuned, now = yield from tune(rig, noise, single, looks, hold)
     known = {h.name: h for h in now}
     hypotheses = tuple(
         replace(h, value=known[h.name].value, common=known[h.name].common) if h.name in known else h
         for h in models
     )
-    evidence = yield from examine(Bank(tuned, noise, hypotheses, hold), looks)
+    evidence = yield from examine(hypo.Bank(tuned, noise, hypotheses, hold), looks)
     return Learned(tuned, hypotheses, {h.name: h.value for h in models}, looks, evidence)
 
 
@@ -128,7 +118,7 @@ JUMP = 1.0
 STILL = 30.0
 """Standard deviations of the position within which a look has too little motion."""
 
-_NOTHING = Look(np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 2)), np.zeros(1, dtype=bool))
+_NOTHING = hypo.Look(np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 2)), np.zeros(1, dtype=bool))
 """A look without measurements that count: with it the filter is compiled before the joint is watched."""
 
 
@@ -144,7 +134,7 @@ class Monitor:
         if rig.loop is not None:
             raise RigError(f"rig {rig.name}: a position loop commands it, expected torques as commands")
         self._rig, self._noise, self._settings = rig, noise, settings or WatchSettings()
-        Bank(rig, noise, hypotheses_of(rig, USUAL), self._settings.hold).evidence(_NOTHING)
+        hypo.Bank(rig, noise, hypo.hypotheses_of(rig, USUAL), self._settings.hold).evidence(_NOTHING)
         self._least = STILL * noise.position if math.isfinite(noise.position) else 0.0
         self.sensors = Sensors(rig)
         self.looks = self.still = self.jumps = self.late = 0
@@ -152,8 +142,8 @@ class Monitor:
 
     def begin(self) -> None:
         """Restart the learning of the joint."""
-        self._cutter = Cutter(self._settings.every)
-        self._first: list[Look] = []
+        self._cutter = hypo.Cutter(self._settings.every)
+        self._first: list[hypo.Look] = []
         self._learning = learn(self._rig, self._noise, self._first, self._settings.hold)
         self._examined = -math.inf
         self.changes: Changes | None = None
@@ -208,7 +198,7 @@ class Monitor:
         """Return all parameters; none while it learns."""
         return [] if self.changes is None else self.changes.estimates.estimates()
 
-    def _weigh(self, look: Look) -> None:
+    def _weigh(self, look: hypo.Look) -> None:
         self.looks += 1
         if self.sensors.frozen or look.travel() < self._least:
             self.still += 1

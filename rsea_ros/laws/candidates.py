@@ -12,21 +12,7 @@ from scipy.interpolate import BSpline
 
 from rsea_ros.diagnosis.initial_guess import interpolate_peak, peaks
 from rsea_ros.identification.missing_torque import Place
-from rsea_ros.laws.terms import (
-    COMMAND_TERMS,
-    CREEP,
-    ENCODER_TERMS,
-    GEAR_TERMS,
-    LOAD_TERMS,
-    MOTOR_TERMS,
-    SENSOR_TERMS,
-    SPRING_TERMS,
-    Term,
-    hum_terms,
-    mode_terms,
-    stiffness_waves,
-    wave_terms,
-)
+from rsea_ros.laws import terms
 from rsea_ros.laws.variables import CaseModel, ResidualRows, Variables
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import stamped_density
@@ -93,7 +79,7 @@ class TermCandidate:
 
     place: Place
     regressor: str
-    term: Term | None = None
+    term: terms.Term | None = None
     shape: float = 0.0
     part: tuple[str, str, int] | None = None
 
@@ -138,7 +124,7 @@ def factor_of(variables: Variables, place: Place, over: str, factor: str) -> Flo
         return 1.0
     values = variables.letters[factor]
     if factor == "w":
-        return values if over == "t" else np.tanh(values / CREEP)
+        return values if over == "t" else np.tanh(values / terms.CREEP)
     return np.abs(values) if place == "gear" else values
 
 
@@ -159,25 +145,25 @@ def basis_of(x: FloatArray, knots: FloatArray) -> FloatArray:
     return np.ascontiguousarray(BSpline.design_matrix(inside, knots, _DEGREE, extrapolate=True).toarray().T)
 
 
-def terms_for(cases: Sequence[CaseModel]) -> tuple[Term, ...]:
+def terms_for(cases: Sequence[CaseModel]) -> tuple[terms.Term, ...]:
     """Return the terms that may act on a machine, the waves at the periods that the first record shows."""
     model = cases[0]
-    made: list[Term] = [
-        *GEAR_TERMS,
-        *COMMAND_TERMS,
-        *MOTOR_TERMS,
-        *SPRING_TERMS, *LOAD_TERMS,
-        *SENSOR_TERMS,
-        *ENCODER_TERMS,
+    made: list[terms.Term] = [
+        *terms.GEAR_TERMS,
+        *terms.COMMAND_TERMS,
+        *terms.MOTOR_TERMS,
+        *terms.SPRING_TERMS, *terms.LOAD_TERMS,
+        *terms.SENSOR_TERMS,
+        *terms.ENCODER_TERMS,
     ]
     for cycles in wave_numbers(model):
-        made += wave_terms(cycles)
+        made += terms.wave_terms(cycles)
     for cycles in wave_numbers(model, "d"):
-        made += stiffness_waves(cycles)
+        made += terms.stiffness_waves(cycles)
     if "ft" in model.places:
-        made += [t for f in sensor_lines(model) for t in hum_terms(f)]
+        made += [t for f in sensor_lines(model) for t in terms.hum_terms(f)]
         keep = model.case.mask["ft"]
-        made += mode_terms(modes(model.case.t["ft"][keep], model.residual["ft"][keep]))
+        made += terms.mode_terms(modes(model.case.t["ft"][keep], model.residual["ft"][keep]))
     rigid = model.injector is None
     return tuple(
         t for t in made if t.place in model.places and not (rigid and "d" in (t.over, t.expression[:1]))

@@ -16,20 +16,9 @@ from rsea_ros.identification.fit import fit, with_even_clocks, with_noise_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.start import joint_start
+from rsea_ros.laws import sparse_regression as sparse
 from rsea_ros.laws.candidates import TermCandidate, candidates_of, columns_of
 from rsea_ros.laws.law import Tried
-from rsea_ros.laws.sparse_regression import (
-    HELD_BACK,
-    MOST_TERMS,
-    SELECTION,
-    Dependence,
-    Gram,
-    SparseLaw,
-    gram_of,
-    paths,
-    simplest,
-    standard_error,
-)
 from rsea_ros.laws.variables import CaseModel, case_model, rows_of
 from rsea_ros.model.extent import bound_values
 from rsea_ros.model.position_loop import with_command
@@ -99,7 +88,7 @@ class Search:
     base: Base
     cases: tuple[CaseModel, ...]
     candidates: tuple[TermCandidate, ...]
-    gram: Gram
+    gram: sparse.Gram
 
 
 def make_search(base: Base) -> Search:
@@ -108,7 +97,7 @@ def make_search(base: Base) -> Search:
     rows = rows_of(problem, theta)
     cases = tuple(case_model(problem, theta, c, o) for c, o in zip(base.cases, base.outputs, strict=True))
     candidates = candidates_of(cases)
-    gram = gram_of(rows, columns_of(rows, cases, candidates))
+    gram = sparse.gram_of(rows, columns_of(rows, cases, candidates))
     return Search(base, cases, tuple(c for c, _ in candidates), gram)
 
 
@@ -116,39 +105,39 @@ def make_search(base: Base) -> Search:
 class Choice:
     """The models that were compared, those that make the law, and the dependence that a curve shall show."""
 
-    compared: tuple[SparseLaw, ...]
-    taken: tuple[SparseLaw, ...] = ()
-    curve: Dependence | None = None
+    compared: tuple[sparse.SparseLaw, ...]
+    taken: tuple[sparse.SparseLaw, ...] = ()
+    curve: sparse.Dependence | None = None
 
 
-def chosen_models(search: Search, depends: Sequence[Dependence]) -> Choice:
+def chosen_models(search: Search, depends: Sequence[sparse.Dependence]) -> Choice:
     """Return the models of the law, if one surely helps, with a second place if that surely adds to it."""
     gram = search.gram
-    models = paths(gram, search.candidates)
+    models = sparse.paths(gram, search.candidates)
     none = gram.held_out(np.array([], np.int64))
     if not models:
         return Choice(())
-    best = simplest(models, gram)
+    best = sparse.simplest(models, gram)
     if not surely_helps(gram, none, best.left, best.columns, ()):
         return Choice(tuple(models))
     more = [
         m
-        for m in paths(gram, search.candidates, best.columns, most=3)
-        if m.place != best.place or len(best.columns) + len(m.columns) <= MOST_TERMS
+        for m in sparse.paths(gram, search.candidates, best.columns, most=3)
+        if m.place != best.place or len(best.columns) + len(m.columns) <= sparse.MOST_TERMS
     ]
-    second = simplest([SparseLaw(best.place, (), best.left), *more], gram)
+    second = sparse.simplest([sparse.SparseLaw(best.place, (), best.left), *more], gram)
     helps = second.columns and surely_helps(gram, best.left, second.left, second.columns, best.columns)
     taken = (best, second) if helps else (best,)
     return Choice((*models, *more), taken, _curve(search, depends, none, taken[-1]))
 
 
 def _curve(
-    search: Search, depends: Sequence[Dependence], none: FloatArray, short: SparseLaw
-) -> Dependence | None:
+    search: Search, depends: Sequence[sparse.Dependence], none: FloatArray, short: sparse.SparseLaw
+) -> sparse.Dependence | None:
     """Return the dependence for a learnt curve, where short laws leave much of it."""
-    weight = search.gram.weights(none, SELECTION)
-    room = float(((none - search.gram.count)[SELECTION] @ weight).sum())
-    share = float(((none - short.left)[SELECTION] @ weight).sum()) / max(room, 1e-9)
+    weight = search.gram.weights(none, sparse.SELECTION)
+    room = float(((none - search.gram.count)[sparse.SELECTION] @ weight).sum())
+    share = float(((none - short.left)[sparse.SELECTION] @ weight).sum()) / max(room, 1e-9)
     curved = [
         d
         for d in depends
@@ -161,17 +150,17 @@ def _curve(
 
 
 def surely_helps(
-    gram: Gram, before: FloatArray, after: FloatArray, columns: Sequence[int], given: Sequence[int]
+    gram: sparse.Gram, before: FloatArray, after: FloatArray, columns: Sequence[int], given: Sequence[int]
 ) -> bool:
     """Return whether columns gain beyond doubt where they were chosen, and on the test blocks too."""
-    weight = gram.weights(before, SELECTION)
-    gain = (before - after)[SELECTION] @ weight
+    weight = gram.weights(before, sparse.SELECTION)
+    gain = (before - after)[sparse.SELECTION] @ weight
     if not _is_sure(gain, _SURE, _WORSE):
         return False
     both = (np.array(c, np.int64) for c in ([*given], [*given, *columns]))
-    held = [gram.loss(c, gram.fit(c, SELECTION)) @ weight for c in both]
-    fall = (held[0] - held[1])[HELD_BACK]
-    rms = 1.0 - float(np.sqrt(held[1][HELD_BACK].sum() / max(held[0][HELD_BACK].sum(), 1e-300)))
+    held = [gram.loss(c, gram.fit(c, sparse.SELECTION)) @ weight for c in both]
+    fall = (held[0] - held[1])[sparse.HELD_BACK]
+    rms = 1.0 - float(np.sqrt(held[1][sparse.HELD_BACK].sum() / max(held[0][sparse.HELD_BACK].sum(), 1e-300)))
     return rms > MATTERS and _is_sure(fall, _SURE_ON_TEST, _WORSE_ON_TEST)
 
 
@@ -186,19 +175,19 @@ def _is_sure(gain: FloatArray, errors: float, worse: float) -> bool:
     A feature that appears once, such as a mode passed by a chirp, gains in a single group.
     """
     lost, won = float(-gain[gain < 0.0].sum()), float(gain[gain > 0.0].sum())
-    return gain.sum() > 0.0 and bool(gain.sum() > errors * standard_error(gain) or lost < worse * won)
+    return gain.sum() > 0.0 and bool(gain.sum() > errors * sparse.standard_error(gain) or lost < worse * won)
 
 
-def summarize_models(search: Search, choice: Choice, taken: Sequence[SparseLaw]) -> tuple[Tried, ...]:
+def summarize_models(search: Search, choice: Choice, taken: Sequence[sparse.SparseLaw]) -> tuple[Tried, ...]:
     """Return the compared models with their held-out residuals over that of the base."""
     gram, first = search.gram, len(search.gram.prior)
     none = gram.held_out(np.array([], np.int64))
-    weight = gram.weights(none, SELECTION)
-    whole = float((none[SELECTION] @ weight).sum())
+    weight = gram.weights(none, sparse.SELECTION)
+    whole = float((none[sparse.SELECTION] @ weight).sum())
     rows = []
     for model in choice.compared:
         terms = [search.candidates[k - first].term for k in model.columns]
-        share = float((model.left[SELECTION] @ weight).sum()) / whole
+        share = float((model.left[sparse.SELECTION] @ weight).sum()) / whole
         rows.append(Tried(model.place, tuple(t.name for t in terms if t), float(np.sqrt(max(share, 0.0))),
                           any(model is t for t in taken)))  # fmt: skip
     return tuple(rows)

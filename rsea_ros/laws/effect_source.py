@@ -13,16 +13,7 @@ from dataclasses import dataclass
 from rsea_ros.documents.wording import in_docstring
 from rsea_ros.effects import signal_table
 from rsea_ros.effects.effect import Claims
-from rsea_ros.laws.law import (
-    READS,
-    FittedTerm,
-    Law,
-    about_of,
-    equation_of,
-    letters_of,
-    time_letters,
-    words_of,
-)
+from rsea_ros.laws import law as laws
 from rsea_ros.laws.variables import RING
 
 FARTHER = 3.0
@@ -41,7 +32,7 @@ _ADDS = {
 }  # fmt: skip
 
 
-def body_of(law: Law) -> str:
+def body_of(law: laws.Law) -> str:
     lines, state, at = _variables(law), int(law.is_friction), 0
     sizes: list[str] = []
     smooth: list[str] = []
@@ -63,7 +54,7 @@ def body_of(law: Law) -> str:
     return "\n".join(f"    {line}" for line in lines)
 
 
-def curve_body(law: Law) -> str:
+def curve_body(law: laws.Law) -> str:
     curve = law.curve
     assert curve is not None
     lines = [*_variables(law), f"at = ({curve.over} - FIRST) / SPACING",
@@ -78,32 +69,32 @@ def curve_body(law: Law) -> str:
     )
 
 
-def _read(law: Law, letter: str) -> str:
+def _read(law: laws.Law, letter: str) -> str:
     if law.place in ("ft", "encoder"):
-        return _AT_SENSOR.get(letter, f"s[{READS.get(letter, '')}]")
+        return _AT_SENSOR.get(letter, f"s[{laws.READS.get(letter, '')}]")
     if letter == "h":  # one end is clamped: it stays at zero, and no torque moves it
         return "s[HOUSING_ANGLE] + s[DISTAL_ANGLE]"
     if law.place in ("command", "motor"):
-        return _AT_COMMAND.get(letter, f"s[{READS.get(letter, '')}]")
-    return f"s[{READS[letter]}]"
+        return _AT_COMMAND.get(letter, f"s[{laws.READS.get(letter, '')}]")
+    return f"s[{laws.READS[letter]}]"
 
 
-def is_limited(law: Law, letter: str) -> bool:
+def is_limited(law: laws.Law, letter: str) -> bool:
     """Return whether a law keeps its value beyond the range of a variable: no wave and no gain does."""
     return letter not in ("theta", "q") and not (
         letter in ("T", "u") and law.place in ("ft", "command", "motor")
     )
 
 
-def _variables(law: Law) -> list[str]:
+def _variables(law: laws.Law) -> list[str]:
     lines = []
-    for letter in READS:
-        if letter in letters_of(law):
+    for letter in laws.READS:
+        if letter in laws.letters_of(law):
             limit = law.ranges[letter] * FARTHER
             value = _read(law, letter)
             within = f"min(max({value}, -{limit:.6g}), {limit:.6g})"
             lines.append(f"{letter} = {within if is_limited(law, letter) else value}")
-    time = time_letters(law)
+    time = laws.time_letters(law)
     if "t" in time:
         lines.append("t = s[TIME]")
     if "share" in time:
@@ -111,7 +102,7 @@ def _variables(law: Law) -> list[str]:
     return lines
 
 
-def _addition_lines(law: Law, state: int) -> list[str]:
+def _addition_lines(law: laws.Law, state: int) -> list[str]:
     if law.place != "encoder":
         return [_ADDS[law.place]]
     rate = f"(torque - x[{state}]) / s[STEP] if x[{state + 1}] == 1.0 else 0.0"
@@ -123,7 +114,7 @@ def _with_letter(expression: str, letter: str, replaced: str) -> str:
     return re.sub(rf"\b{letter}\b", replaced, expression)
 
 
-def _memory(part: FittedTerm, name: str, shape: str, state: int) -> tuple[list[str], int]:
+def _memory(part: laws.FittedTerm, name: str, shape: str, state: int) -> tuple[list[str], int]:
     """Return the lines that keep a memory in the states from `state` on, and the next free one."""
     of, kind = part.term.remembers, part.term.memory
     if kind in ("lag", "heat"):
@@ -168,7 +159,7 @@ class LawProvenance:
     gain: str
 
 
-def source_of(law: Law, claims: Claims, provenance: LawProvenance) -> str:
+def source_of(law: laws.Law, claims: Claims, provenance: LawProvenance) -> str:
     """Return the text of the effect file."""
     header = _docstring(law, provenance)
     body = curve_body(law) if law.curve is not None else body_of(law)
@@ -177,24 +168,25 @@ def source_of(law: Law, claims: Claims, provenance: LawProvenance) -> str:
     return f"{header}\n{_imports(law, body)}\n{_tables(law)}\n{function}\n\n{_effect(law, claims)}"
 
 
-def _docstring(law: Law, provenance: LawProvenance) -> str:
+def _docstring(law: laws.Law, provenance: LawProvenance) -> str:
     kind = "A learnt law, no cause: a curve through data" if law.is_learnt else "A law that was found in data"
-    seen = "; ".join(f"{_LETTERS[n]}: up to {v:.3g}" for n, v in law.ranges.items() if n in letters_of(law))
+    letters = laws.letters_of(law)
+    seen = "; ".join(f"{_LETTERS[n]}: up to {v:.3g}" for n, v in law.ranges.items() if n in letters)
     bags = "\n".join(f"    {in_docstring(name)}  sha256 {digest}" for name, digest in provenance.bags.items())
     kept = "its last value" if law.is_learnt else f"the value at {FARTHER:g} times that range"
-    limited = law.is_learnt or any(is_limited(law, n) for n in letters_of(law))
+    limited = law.is_learnt or any(is_limited(law, n) for n in laws.letters_of(law))
     beyond = f" Beyond it the law keeps {kept}." if limited else ""
     reach = [f"Seen in the data: {seen}.{beyond}"] if seen else []
     lines = [
         f'"""{kind}: {"angle error" if law.place == "encoder" else "torque"} by {law.regressor}.',
-        "", f"    {equation_of(law)}", "",
+        "", f"    {laws.equation_of(law)}", "",
         *reach,
         provenance.gain, f"Source: rsea law {provenance.version} on {provenance.date}, from", bags, '"""',
     ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 
-def _tables(law: Law) -> str:
+def _tables(law: laws.Law) -> str:
     if law.curve is None:
         return ""
     values = ", ".join(f"{v:.6g}" for v in law.curve.y)
@@ -202,8 +194,8 @@ def _tables(law: Law) -> str:
             f"CURVE = np.array([{values}])\n\n")  # fmt: skip
 
 
-def _imports(law: Law, body: str) -> str:
-    words = words_of(body)
+def _imports(law: laws.Law, body: str) -> str:
+    words = laws.words_of(body)
     maths = sorted(words & {"sin", "cos", "tanh", "exp", "pi"})
     table = sorted({n for n in vars(signal_table) if n.isupper()} & words | {"Port"})
     helpers = sorted(words & {"lagged", "bent", "played", "from_ring", "rung"})
@@ -217,13 +209,13 @@ def _imports(law: Law, body: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _effect(law: Law, claims: Claims) -> str:
+def _effect(law: laws.Law, claims: Claims) -> str:
     port = {"gear": "GEAR", "load": "GEAR", "spring": "SPRING", "motor": "MOTOR", "command": "COMMAND"}.get(
         law.place, "SENSOR"
     )
     rows = "".join(f"        {row},\n" for row in _parameter_rows(law))
-    letters = letters_of(law) - {"u"} if law.place in ("gear", "load", "spring") else set()
-    reads = [READS[n] for n in READS if n in letters] + ["DISTAL_ANGLE"] * ("h" in letters)
+    letters = laws.letters_of(law) - {"u"} if law.place in ("gear", "load", "spring") else set()
+    reads = [laws.READS[n] for n in laws.READS if n in letters] + ["DISTAL_ANGLE"] * ("h" in letters)
     reading = f"    reads=({', '.join(reads)},),\n" if reads else ""
     exponent = claims.amplitude_exponent
     kept = {"": 0, "lag": 1, "heat": 1, "delay": RING + 1, "dahl": 2, "play": 2, "ring": 2}
@@ -233,11 +225,11 @@ def _effect(law: Law, claims: Claims) -> str:
         f'    claims=Claims("{claims.channel}", "{claims.parity}", amplitude_exponent={exponent}, '
         f"passive={claims.passive}),\n    function=apply,\n"
         + (f"    states={states},\n" if states else "") + reading
-        + f'    about="{about_of(law)}",\n    equation="{equation_of(law)}",\n)\n'
+        + f'    about="{laws.about_of(law)}",\n    equation="{laws.equation_of(law)}",\n)\n'
     )  # fmt: skip
 
 
-def _parameter_rows(law: Law) -> list[str]:
+def _parameter_rows(law: laws.Law) -> list[str]:
     if law.curve is not None:
         return ['Parameter("size", "1", null=0.0, low=0.0, high=2.0, typical=1.0)']
     rows, seen = [], set()

@@ -14,18 +14,7 @@ from pathlib import Path
 from types import TracebackType
 
 from rsea_ros.errors import OutputError, RseaError
-from rsea_ros.outputs.files import (
-    LockedFolder,
-    check_replaceable,
-    give_names,
-    make_folder,
-    make_stage,
-    name_errors,
-    put_back,
-    siblings,
-    taken_error,
-    write_new,
-)
+from rsea_ros.outputs import files
 from rsea_ros.processes import hold_signals
 
 
@@ -53,14 +42,14 @@ class NewFiles:
         self.folder = self._place.folder
         self._names: list[str] = []
         self._made: list[Path] = []
-        self._stage: LockedFolder | None = None
+        self._stage: files.LockedFolder | None = None
 
     def __enter__(self) -> NewFiles:
         try:
             with hold_signals():
                 self.folder = self._make_folder()
-                with name_errors(self.folder):
-                    self._stage = make_stage(self.folder)
+                with files.name_errors(self.folder):
+                    self._stage = files.make_stage(self.folder)
         except BaseException:
             self._clear(complete=False)
             raise
@@ -74,7 +63,7 @@ class NewFiles:
 
     def write(self, name: str, content: str | bytes) -> Path:
         """Write a file, and return the path that it will have."""
-        write_new(self.stage(name), content)
+        files.write_new(self.stage(name), content)
         return self.folder / name
 
     def __exit__(
@@ -86,7 +75,7 @@ class NewFiles:
             try:
                 if error is None:
                     pairs = [(self._stage.path / name, self.folder / name) for name in self._names]
-                    give_names(pairs, force=self._place.force)
+                    files.give_names(pairs, force=self._place.force)
                     complete = True
             except (OSError, RseaError) as failure:
                 error = failure
@@ -101,8 +90,8 @@ class NewFiles:
         if not fresh and (first.is_symlink() or (first.exists() and not first.is_dir())):
             kind = "symbolic link" if first.is_symlink() else "file"
             raise OutputError(f"{first}: is a {kind}, expected a directory or a new name")
-        self._made = make_folder(first.parent if fresh else first)
-        for folder in siblings(first) if fresh else ():
+        self._made = files.make_folder(first.parent if fresh else first)
+        for folder in files.siblings(first) if fresh else ():
             with suppress(FileExistsError):
                 folder.mkdir()
                 self._made.insert(0, folder)
@@ -121,7 +110,7 @@ class NewFiles:
 
 def write_file(path: str | Path, content: str | bytes, *, force: bool = False) -> Path:
     """Write one file into a folder that exists, and return its path. Raises as NewFiles does."""
-    with name_errors(Path(path)):
+    with files.name_errors(Path(path)):
         Path(path).parent.stat()
     with NewFiles(Destination(Path(path).parent, force)) as new:
         return new.write(Path(path).name, content)
@@ -137,15 +126,15 @@ def check_free(
     """
     paths = list(paths)
     for folder in {path.parent for path in paths}:
-        put_back(folder)
+        files.put_back(folder)
     for path in paths:
         for one in map(Path, inputs):
             if one.exists() and _touches(path, one):
                 raise OutputError(f"{path}: is the input {one} or lies in it, expected another name")
         if os.path.lexists(path):
             if not force:
-                raise OutputError(f"{taken_error(path)}{'' if force is None else ' or --force'}")
-            check_replaceable(path)
+                raise OutputError(f"{files.taken_error(path)}{'' if force is None else ' or --force'}")
+            files.check_replaceable(path)
 
 
 def _touches(path: Path, one: Path) -> bool:

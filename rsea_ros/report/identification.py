@@ -16,31 +16,12 @@ from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import SENSED, UNITS, FloatArray
 from rsea_ros.records.statistics import Z95
-from rsea_ros.report import page as html, words
+from rsea_ros.report import page as html, result_files as outputs, rig as rigs, words
 from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, MEASURED, QUIET, Curve, Figure, faint
 from rsea_ros.report.figures.overlay import overlay_figure
 from rsea_ros.report.figures.spectrum import density, finding, residual_figure
 from rsea_ros.report.remark_words import coloured_noise, fault_lines, remark_sentences
-from rsea_ros.report.result_files import (
-    IDENTIFICATION_JSON,
-    MODEL,
-    REPORT,
-    Provenance,
-    fault_json,
-    json_text,
-    pick,
-    strict,
-)
-from rsea_ros.report.rig import (
-    command,
-    rig_in_brackets,
-    rig_json,
-    rig_named,
-    right_rig_block,
-    split_off_rig,
-    values_off,
-)
 
 STRONG = 0.9
 """Correlation from which two values are hardly distinguishable."""
@@ -48,22 +29,26 @@ _WIDTH, _HEIGHT = 190.0, 26.0
 
 
 def write_results(
-    identification: Identification, out: Destination | str | Path, provenance: Provenance | None = None
+    identification: Identification, out: Destination | str | Path,
+    provenance: outputs.Provenance | None = None,
 ) -> Path:
     """Write identification.json, model.yaml and report.html, and return the report's path: all or none.
 
     Raises OutputError for a name that is taken, OSError where something cannot be written.
     """
     with NewFiles(out) as new:
-        new.write(IDENTIFICATION_JSON, json_text(identification_json(identification), provenance))
-        new.write(MODEL, rig_text(identification.rig))
-        return new.write(REPORT, identification_report(identification, provenance))
+        content = outputs.json_text(identification_json(identification), provenance)
+        new.write(outputs.IDENTIFICATION_JSON, content)
+        new.write(outputs.MODEL, rig_text(identification.rig))
+        return new.write(outputs.REPORT, identification_report(identification, provenance))
 
 
-def identification_report(identification: Identification, provenance: Provenance | None = None) -> str:
+def identification_report(
+    identification: Identification, provenance: outputs.Provenance | None = None
+) -> str:
     """Return the report as HTML that opens offline."""
     i = identification
-    kicker = f"Identification of {rig_named(i.rig.name, i.rig_choice)} · "
+    kicker = f"Identification of {rigs.rig_named(i.rig.name, i.rig_choice)} · "
     damage = [words.sentence(f"{line}.") for line in fault_lines(i.faults)]
     notes = [*i.notes, *remark_sentences(i.clocks), "rsea identify. All values in SI."]
     footer = [f"Data: {', '.join(i.sources)}", *damage, *notes]
@@ -84,7 +69,7 @@ def _blocks(i: Identification) -> Iterator[html.Block]:
         yield html.paragraph(
             html.Html(f'<p class="next">To find the cause and its gain: {html.code(following)}</p>')
         )
-    yield right_rig_block(i.remarks)
+    yield rigs.right_rig_block(i.remarks)
     yield _parameters(i.parameters)
     if i.statics is not None:
         yield html.section(
@@ -96,7 +81,7 @@ def _blocks(i: Identification) -> Iterator[html.Block]:
     for overlay in [by_name[n] for n in SENSED if n in by_name] or i.overlays:
         yield _over_time(i, overlay)
         yield _over_frequency(i, overlay)
-    unclear = (*doubt_sentences(i), *remark_sentences(split_off_rig(i.remarks)[1]))
+    unclear = (*doubt_sentences(i), *remark_sentences(rigs.split_off_rig(i.remarks)[1]))
     yield undetermined_section(unclear)
     physical = [k for k, p in enumerate(i.parameters) if not p.name.startswith("clock.")]
     names = [i.parameters[k].name for k in physical]
@@ -244,13 +229,13 @@ def verdict_sentence(identification: Identification) -> str:
     """
     averaged = [words.channel(f.channel) for f in identification.faults if f.kind == "smoothing"]
     biased = f"{list_names(averaged)} averaged before logging, which biases values beyond their intervals"
-    parts = (_verdict(identification), values_off(identification.remarks), biased if averaged else "")
+    parts = (_verdict(identification), rigs.values_off(identification.remarks), biased if averaged else "")
     return "; ".join(filter(None, parts))
 
 
 def _verdict(identification: Identification) -> str:
     ratios = identification.times_noise
-    rig = rig_in_brackets(identification.rig.name, identification.rig_choice)
+    rig = rigs.rig_in_brackets(identification.rig.name, identification.rig_choice)
     if not ratios:
         return f"No channel to test the model with ({rig})"
     worst = max(ratios, key=lambda n: ratios[n])
@@ -277,7 +262,7 @@ def next_command(identification: Identification) -> str:
     i = identification
     if i.at_noise or explained_by_lost_cycles(i):
         return ""
-    return command("diagnose", i.sources, i.rig.name, i.rig_choice)
+    return rigs.command("diagnose", i.sources, i.rig.name, i.rig_choice)
 
 
 def doubt_sentences(identification: Identification) -> tuple[str, ...]:
@@ -368,21 +353,21 @@ def identification_json(identification: Identification) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "rig": i.rig.name,
-        **rig_json(i.rig_choice, i.remarks),
+        **rigs.rig_json(i.rig_choice, i.remarks),
         "verdict": i.verdict,
         "sentence": verdict_sentence(i),
         "next": next_command(i) or None,
-        "data": {**pick(i, "bags=sources duration_s=duration rate_hz=rate"),
-                 "faults": [fault_json(f) for f in i.faults]},
+        "data": {**outputs.pick(i, "bags=sources duration_s=duration rate_hz=rate"),
+                 "faults": [outputs.fault_json(f) for f in i.faults]},
         "parameters": parameters_json(i.parameters),
-        "correlation": {"names": [p.name for p in i.parameters], "matrix": strict(i.correlation)},
-        **pick(i, "residual_rms noise_rms times_noise fit_percent"),
+        "correlation": {"names": [p.name for p in i.parameters], "matrix": outputs.strict(i.correlation)},
+        **outputs.pick(i, "residual_rms noise_rms times_noise fit_percent"),
         "responses": [
-            {**pick(r, "input output method"), "lines": len(r.frequency),
-             "from_hz": strict(r.frequency[0]), "to_hz": strict(r.frequency[-1])}
+            {**outputs.pick(r, "input output method"), "lines": len(r.frequency),
+             "from_hz": outputs.strict(r.frequency[0]), "to_hz": outputs.strict(r.frequency[-1])}
             for r in i.responses if len(r.frequency)
         ],
-        **(pick(i, "statics") if i.statics else {}),
+        **(outputs.pick(i, "statics") if i.statics else {}),
         "alternatives": list(i.alternatives),
         "statements": [*doubt_sentences(i), *remark_sentences(i.remarks)],
         "notes": [*i.notes, *remark_sentences(i.clocks)],
@@ -391,4 +376,4 @@ def identification_json(identification: Identification) -> dict[str, Any]:
 
 def parameters_json(parameters: tuple[ParameterEstimate, ...]) -> dict[str, Any]:
     """Return parameters by name for the result files."""
-    return {p.name: pick(p, "value unit ci95 start told_by_data") for p in parameters}
+    return {p.name: outputs.pick(p, "value unit ci95 start told_by_data") for p in parameters}

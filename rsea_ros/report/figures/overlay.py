@@ -10,17 +10,7 @@ import numpy.typing as npt
 
 from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.figure import (
-    MEASURED,
-    Curve,
-    Figure,
-    Json,
-    axis,
-    faint,
-    label,
-    layout,
-    names_beside,
-)
+from rsea_ros.report.figures import figure as fig
 
 MOST_SAMPLES = 45_000
 """Of a trace in the page: the paper's 160 s at 280 Hz. A longer one keeps its and the residual's extremes."""
@@ -35,9 +25,9 @@ _PAUSE, _PERIODS = 1.0, 10.0
 
 
 def overlay_figure(
-    title: str, channel: str, t: FloatArray, measured: FloatArray, simulations: Sequence[Curve],
+    title: str, channel: str, t: FloatArray, measured: FloatArray, simulations: Sequence[fig.Curve],
     view: float = 6.0, lively: FloatArray | None = None,
-) -> Figure:  # fmt: skip
+) -> fig.Figure:  # fmt: skip
     """Return the figure of one channel. t: stamps of the measured and the simulated values, s.
 
     It opens with the `view` s in which a signal moves most. lively: that signal, by default the measured one.
@@ -48,7 +38,7 @@ def overlay_figure(
     shown = measured[keep]
     shown[list(pauses)] = np.nan
 
-    def residual(simulated: Curve) -> Json:
+    def residual(simulated: fig.Curve) -> fig.Json:
         values = shown - simulated.values[keep]
         y = pack(values, _fineness(values, _RESIDUAL))
         return {"name": simulated.name, "colour": simulated.colour, "y": y}
@@ -56,14 +46,14 @@ def overlay_figure(
     extra = {
         "t": pack(without(pauses, t[keep] - t[0]), _MICROSECOND),
         "pauses": list(pauses.items()),
-        "measured": {"colour": MEASURED, "y": pack(shown, _fineness(measured, _MEASURED))},
+        "measured": {"colour": fig.MEASURED, "y": pack(shown, _fineness(measured, _MEASURED))},
         "residuals": [residual(s) for s in simulations],
         "unit": unit,
     }
     caption = "Drag to zoom, double-click to see the whole record; every zoom draws all samples."
     opening = _liveliest(t - t[0], measured if lively is None else lively, view)
     drawn = _layout(channel, unit, simulations, opening)
-    return Figure(title, caption, [], drawn, 460, "overlay", extra)
+    return fig.Figure(title, caption, [], drawn, 460, "overlay", extra)
 
 
 def pauses_of(t: FloatArray) -> dict[int, float]:
@@ -109,17 +99,17 @@ def _liveliest(t: FloatArray, signal: FloatArray, view: float) -> tuple[float, f
     return start, start + view
 
 
-def _layout(channel: str, unit: str, simulations: Sequence[Curve], view: tuple[float, float]) -> Json:
-    names = names_beside(
-        [("measured", MEASURED), *((f"<b>{s.name}</b>", s.colour) for s in simulations)], 0.055, 1.01
+def _layout(channel: str, unit: str, simulations: Sequence[fig.Curve], view: tuple[float, float]) -> fig.Json:
+    names = fig.names_beside(
+        [("measured", fig.MEASURED), *((f"<b>{s.name}</b>", s.colour) for s in simulations)], 0.055, 1.01
     )
-    last: Json = {"xref": "paper", "yref": "paper", "yanchor": "top"}
-    names.append(label("residual", 1.01, 0.22, simulations[-1].colour, **last))
-    title, zero = {"text": "%{x} s"}, faint(MEASURED, 0.4)
-    return layout(
-        xaxis=axis("time, s", anchor="y2", range=list(view), hoverformat=".3f", unifiedhovertitle=title),
-        yaxis=axis(f"{words.channel(channel)}, {unit}", domain=[0.3, 1.0]),
-        yaxis2=axis(f"residual, {unit}", domain=[0.0, 0.22], zeroline=True, zerolinecolor=zero),
+    last: fig.Json = {"xref": "paper", "yref": "paper", "yanchor": "top"}
+    names.append(fig.label("residual", 1.01, 0.22, simulations[-1].colour, **last))
+    title, zero = {"text": "%{x} s"}, fig.faint(fig.MEASURED, 0.4)
+    return fig.layout(
+        xaxis=fig.axis("time, s", anchor="y2", range=list(view), hoverformat=".3f", unifiedhovertitle=title),
+        yaxis=fig.axis(f"{words.channel(channel)}, {unit}", domain=[0.3, 1.0]),
+        yaxis2=fig.axis(f"residual, {unit}", domain=[0.0, 0.22], zeroline=True, zerolinecolor=zero),
         annotations=names,
         hoversubplots="axis",
         margin={"l": 72, "r": 110, "t": 12, "b": 48},

@@ -6,22 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 import numpy as np
 
 from rsea_ros.records.statistics import Z95
-from rsea_ros.report import words
+from rsea_ros.report import page as html, words
 from rsea_ros.report.fleet import words as say
 from rsea_ros.report.fleet.figures import determined_by, naming_figure, parameter_figure
 from rsea_ros.report.fleet.words import Links
-from rsea_ros.report.page import (
-    Block,
-    Html,
-    fold,
-    key_numbers,
-    listed,
-    named,
-    page,
-    paragraph,
-    section,
-    table,
-)
 from rsea_ros.report.words import sentence as capital
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Interval, Steps, Trend
@@ -56,34 +44,34 @@ def joint_page(
     else:
         title = "too few dated recordings yet"
 
-    def blocks() -> Iterator[Block]:
+    def blocks() -> Iterator[html.Block]:
         trends = trends_of(joint, fleet)
-        yield Html('<p class="next"><a href="index.html">All joints</a></p>')
+        yield html.Html('<p class="next"><a href="index.html">All joints</a></p>')
         outcome = np.asarray(recordings["outcome"], str)[rows]
         faulty = sum(bool(len(recordings["faults"][i])) for i in rows if recordings["faults"][i] is not None)
-        yield key_numbers([
+        yield html.key_numbers([
             *([(f"{determined} of {len(trends)}", "parameters have a trend")] if dated else []),
             (str(int(np.sum(outcome == "done"))), f"recordings used, of {len(rows)}"),
             (str(faulty), f"{say.plural(faulty, 'recording')} with faults in the data"),
         ])  # fmt: skip
         if alarms:
-            yield section("Findings", alarm_table(alarms, links, with_joint=False))
+            yield html.section("Findings", alarm_table(alarms, links, with_joint=False))
         yield from _pictures(joint, trends, fleet, steps)
         if not dated:
             undated = "No recording has a date, so no trend can be estimated"
-            yield section(undated, _UNDATED, undated_rows(joint, history))
+            yield html.section(undated, _UNDATED, undated_rows(joint, history))
         if trends:
-            yield section("All parameters", parameter_rows(trends))
-        yield fold(
+            yield html.section("All parameters", parameter_rows(trends))
+        yield html.fold(
             "The latest recordings" if dated else "Recordings", recording_table(recordings, rows, links)
         )
 
     footer = ["rsea fleet report. All values in SI, all times UTC."]
     kicker = f"Joint {joint} · {len(rows)} {say.plural(len(rows), 'recording')}"
-    return page(f"{joint}: {title}", kicker, blocks(), footer)
+    return html.page(f"{joint}: {title}", kicker, blocks(), footer)
 
 
-def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: Steps) -> Iterator[Block]:
+def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: Steps) -> Iterator[html.Block]:
     """Yield the figures of changed parameters and new causes, then steady, usual and undetermined ones.
 
     A cause that nearly every recording names is shown as a parameter, or as a cause if its trend is unknown.
@@ -105,14 +93,14 @@ def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: St
     for (state, reason), names in groups.items():
         title = f"{names[0] if len(names) == 1 else f'{len(names)} parameters'}: {state}"
         which = f"{'; '.join(names)}. " if len(names) > 1 else ""
-        yield section(title, f"{which}{capital(reason)}.")
+        yield html.section(title, f"{which}{capital(reason)}.")
     silent = (t for t in undetermined if np.isfinite(t.silent_since_s))
-    yield from (section(say.finding(t), f"{capital(t.reason)}.") for t in silent)
+    yield from (html.section(say.finding(t), f"{capital(t.reason)}.") for t in silent)
 
 
 def _namings(
     joint: str, fleet: FleetTrends, steps: Steps, known: Set[str], appeared: bool
-) -> Iterator[Block]:
+) -> Iterator[html.Block]:
     """Yield the figures of causes and faults. known: causes that are shown as parameters."""
     appearances = {(a.joint, a.about, a.kind): a for a in fleet.appearances}
     for naming in sorted((n for n in fleet.namings if n.joint == joint), key=lambda n: n.kind):
@@ -132,13 +120,13 @@ _NO_PAGE = (
 )
 
 
-def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) -> Html:
+def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) -> html.Html:
     """Return the findings with date, size, how sure, and the recording that shows each first."""
 
     def sure(a: Alarm) -> str:
         return "> 99.99 %" if a.confidence > 0.9999 else f"{100.0 * a.confidence:.2f} %"
 
-    return listed(
+    return html.listed(
         alarms,
         *([("Joint", lambda a: links.joint(a.joint))] if with_joint else []),
         ("Finding", say.sentence),
@@ -152,7 +140,7 @@ def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) 
 def joint_table(
     joints: Sequence[str], fleet: FleetTrends, alarmed: Mapping[str, Sequence[Alarm]],
     latest: Mapping[str, str], recordings: Table, links: Links,
-) -> Html:  # fmt: skip
+) -> html.Html:  # fmt: skip
     """Return a row for each joint. latest: causes that its latest recording names."""
     of, done = np.asarray(recordings["joint"], str), np.asarray(recordings["outcome"], str) == "done"
     dated = np.isfinite(np.asarray(recordings["time_s"], float))
@@ -171,7 +159,7 @@ def joint_table(
             f"{len(determined)} of {len(trends)}", say.percent(moved) if moved == moved else "–",
         ))  # fmt: skip
     numbers = ("#Recordings", "#Refused or broken", "#Parameters with a trend", "#Largest change")
-    return table(["Joint", "State", *numbers], rows)
+    return html.table(["Joint", "State", *numbers], rows)
 
 
 def trends_of(joint: str, fleet: FleetTrends) -> list[Trend]:
@@ -179,7 +167,7 @@ def trends_of(joint: str, fleet: FleetTrends) -> list[Trend]:
     return [t for (j, _), t in fleet.trends.items() if j == joint]
 
 
-def parameter_rows(trends: Sequence[Trend]) -> Html:
+def parameter_rows(trends: Sequence[Trend]) -> html.Html:
     """Return a row for each parameter of a joint: level, slope, scatter, least detectable step."""
 
     def share(t: Trend, of: float) -> float:
@@ -193,9 +181,9 @@ def parameter_rows(trends: Sequence[Trend]) -> Html:
         return "–" if math.isnan(share(t, of)) else say.amount(share(t, of))
 
     states = {"trending": "going on"}
-    return listed(
+    return html.listed(
         trends,
-        ("Parameter", lambda t: named(say.name(t.series.parameter), t.series.parameter)),
+        ("Parameter", lambda t: html.named(say.name(t.series.parameter), t.series.parameter)),
         (
             "State",
             lambda t: (
@@ -219,10 +207,10 @@ def _level(trend: Trend) -> str:
         return "–"
     last = int(np.flatnonzero(s.identifiable)[-1])
     v, half = float(s.value[last]), float(Z95 * s.sd[last])
-    return named(say.value(Interval(v, v - half, v + half), s.unit), "latest recording")
+    return html.named(say.value(Interval(v, v - half, v + half), s.unit), "latest recording")
 
 
-def undated_rows(joint: str, history: Table) -> Html:
+def undated_rows(joint: str, history: Table) -> html.Html:
     """Return the median and the range of each parameter over a joint's recordings, whose order is unknown."""
     of, names = np.asarray(history["joint"], str) == joint, np.asarray(history["parameter"], str)
     rows = []
@@ -235,11 +223,11 @@ def undated_rows(joint: str, history: Table) -> Html:
             figures = [float(of_sure(values[sure])) for of_sure in (np.median, np.min, np.max)]
             factor, unit = (100.0, "%") if unit == "1" else words.unit_factor(figures[0], unit)
             shown = [f"{words.number(v * factor, 4)} {unit}" for v in figures]
-        rows.append((named(say.name(parameter), parameter), *shown, f"{int(np.sum(sure))} of {len(at)}"))
-    return table(["Parameter", "#Median", "#Least", "#Most", "#Determined by"], rows)
+        rows.append((html.named(say.name(parameter), parameter), *shown, f"{int(np.sum(sure))} of {len(at)}"))
+    return html.table(["Parameter", "#Median", "#Least", "#Most", "#Determined by"], rows)
 
 
-def undetermined_table(undetermined: Sequence[Trend], links: Links) -> Html:
+def undetermined_table(undetermined: Sequence[Trend], links: Links) -> html.Html:
     """Return the parameters without a trend, or of which no later recording says anything, with reasons."""
 
     def why(t: Trend) -> str:
@@ -247,7 +235,7 @@ def undetermined_table(undetermined: Sequence[Trend], links: Links) -> Html:
             return f"Determined until {say.day(t.silent_since_s)}, but by no later recording"
         return words.sentence(t.reason)
 
-    return listed(
+    return html.listed(
         undetermined,
         ("Joint", lambda t: links.joint(t.series.joint)),
         ("Parameter", lambda t: say.name(t.series.parameter)),
@@ -256,7 +244,7 @@ def undetermined_table(undetermined: Sequence[Trend], links: Links) -> Html:
     )
 
 
-def recording_table(recordings: Table, rows: np.ndarray, links: Links) -> Html:
+def recording_table(recordings: Table, rows: np.ndarray, links: Links) -> html.Html:
     """Return the latest recordings of a joint. rows: its recordings."""
     time_s = np.asarray(recordings["time_s"], float)
     latest = rows[np.argsort(-np.nan_to_num(time_s[rows]), kind="stable")][:_LATEST]
@@ -270,7 +258,7 @@ def recording_table(recordings: Table, rows: np.ndarray, links: Links) -> Html:
         return ", ".join(str(x[key] if isinstance(x, dict) else x).replace("_", " ") for x in held) or "–"
 
     lacking = any(links.lacks_page(text("artefacts", i)) for i in latest)
-    return Html(paragraph(_NO_PAGE if lacking else "") + listed(
+    return html.Html(html.paragraph(_NO_PAGE if lacking else "") + html.listed(
         latest,
         ("Recording", lambda i: links.recording(text("recording", i), text("artefacts", i))),
         ("Date", lambda i: say.short_day(time_s[i]) if np.isfinite(time_s[i]) else "unknown"),

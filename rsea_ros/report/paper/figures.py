@@ -9,17 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.model import outputs
+from rsea_ros.model import outputs, transfer
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.transfer import (
-    end_to_end,
-    frequency_response,
-    inner_inertia,
-    pure_torque_bandwidth,
-    undamped_band,
-)
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.rival_models import MovingOutput, largest_gap, lumped_rig, readings, resonance_hz
@@ -56,7 +49,7 @@ def figure_9() -> list[Figure]:
         for train in (rig.train,) if planetary else PROTOTYPE_TRAINS:
             turned = replace(rig, train=train)
             sign = "" if planetary else f", n = {words.signed_text(train_ratio(turned), 0)}"
-            inner = inner_inertia(turned)
+            inner = transfer.inner_inertia(turned)
             points.append(Point(f"{name}, with spin{sign}", k_s, inner, BEFORE, "middle left"))
     whole = bandwidth_contours(
         "Fig. 9 (a): bandwidth over stiffness and inertia, Eq. (7)", points,
@@ -71,7 +64,7 @@ def figure_9() -> list[Figure]:
 
 def end_response(rig: Rig, hz: FloatArray) -> ComplexArray:
     """Return the torque at the end of the spring over the motor's."""
-    return frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
+    return transfer.frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
 
 
 def figure_15(measured: FrequencyResponse) -> Figure:
@@ -147,8 +140,8 @@ def end_to_end_curves(
     for train, (colour, dash), anchor in zip(PROTOTYPE_TRAINS, looks, sides, strict=True):
         turned = replace(rig, train=train)
         label = f"{spin}n = {words.signed_text(train_ratio(turned), 0)}"
-        curves.append(ResponseCurve(label, colour, hz, end_to_end(turned)(s), dash=dash))
-        edge = float(undamped_band(k_s, inner_inertia(turned)))
+        curves.append(ResponseCurve(label, colour, hz, transfer.end_to_end(turned)(s), dash=dash))
+        edge = float(transfer.undamped_band(k_s, transfer.inner_inertia(turned)))
         marks.append(Mark(edge, f"{edge:.1f} Hz", anchor))
     return curves, marks
 
@@ -156,7 +149,7 @@ def end_to_end_curves(
 def prototype_band() -> float:
     """Return the bandwidth of the prototype by Eq. (7), Hz."""
     rig = load_rig("prototype_knee")
-    return float(pure_torque_bandwidth(rig["spring.stiffness"], rig["chassis.inertia"]))
+    return float(transfer.pure_torque_bandwidth(rig["spring.stiffness"], rig["chassis.inertia"]))
 
 
 def figure_20() -> Figure:
@@ -199,7 +192,9 @@ def documentation_figures() -> dict[str, str]:
         "T_p/T_m, unlumped": (TRUTH, rig, outputs.proximal(rig)),
     }
     hz: FloatArray = np.geomspace(0.1, 140.0, 240)
-    parts = [ResponseCurve(n, c, hz, frequency_response(of, y, hz)) for n, (c, of, y) in clamped.items()]
+    parts = [
+        ResponseCurve(n, c, hz, transfer.frequency_response(of, y, hz)) for n, (c, of, y) in clamped.items()
+    ]
     models = readings(load_rig("paper_moving_output")).items()
     moving = [
         ResponseCurve(name, colour, hz, end_response(model, hz))

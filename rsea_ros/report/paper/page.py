@@ -12,19 +12,7 @@ from rsea_ros.paper.bands import TOLERANCES, Arrangement, Bands, Limit, arrangem
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS, TABLE_2, PaperClaim, PaperFinding, claims
 from rsea_ros.paper.findings import findings
 from rsea_ros.paper.rival_models import MovingOutput, lumped_rig as lumped_model
-from rsea_ros.report import words
-from rsea_ros.report.page import (
-    Block,
-    Html,
-    equation,
-    key_numbers,
-    listed,
-    named,
-    page,
-    paragraph,
-    section,
-    table,
-)
+from rsea_ros.report import page as html, words
 from rsea_ros.report.paper import figures
 from rsea_ros.report.result_files import pick, strict
 
@@ -53,9 +41,11 @@ def paper_report(tests: PaperTests) -> str:
     """Return the page."""
     first = next(iter(tests.moving.values()))
     rig = load_rig("paper_moving_output")
-    blocks: list[Block] = [
-        key_numbers(_keys()), claims_table(claims()), findings_list(findings()),
-        section("The equations as printed, and where the equations of motion differ", equation(EQUATIONS)),
+    blocks: list[html.Block] = [
+        html.key_numbers(_keys()), claims_table(claims()), findings_list(findings()),
+        html.section(
+            "The equations as printed, and where the equations of motion differ", html.equation(EQUATIONS)
+        ),
         table_1(_drawings()), table_2(_rig_values()),
         *figures.figure_9(), figures.figure_15(tests.high_impedance), figures.figure_18(first),
         figures.figure_18_as_printed(), moving_table(tests.moving), figures.figure_20(),
@@ -66,7 +56,7 @@ def paper_report(tests: PaperTests) -> str:
         f"A moving output separates the models: unlumped {unlumped:.2f} % of a simulated bench's torque, "
         f"lumped {lumped:.0f} %. Eq. (7) leaves out the rotor's spin"
     )
-    return page(title, _KICKER, blocks, _FOOTER)
+    return html.page(title, _KICKER, blocks, _FOOTER)
 
 
 _KICKER = (
@@ -172,11 +162,11 @@ TABLE_1 = (
 )
 
 
-def claims_table(claims: Sequence[PaperClaim]) -> Html:
+def claims_table(claims: Sequence[PaperClaim]) -> html.Html:
     """Return printed beside our numbers; only results of the paper's own numbers are counted."""
     recomputed = [c for c in claims if c.status == "found"]
     agree = sum(c.agrees for c in recomputed)
-    shown = listed(
+    shown = html.listed(
         claims,
         ("Where", lambda c: c.where),
         ("What", lambda c: c.what),
@@ -190,7 +180,7 @@ def claims_table(claims: Sequence[PaperClaim]) -> Html:
         ("", lambda c: c.status),
         ("Ours comes from", lambda c: c.how),
     )
-    return section(
+    return html.section(
         f"{agree} of the {len(recomputed)} numbers that others of the paper make come out to the last digit",
         shown,
         caption="found: the paper's numbers alone make it, and only these count. silent: one that is needed "
@@ -198,27 +188,28 @@ def claims_table(claims: Sequence[PaperClaim]) -> Html:
     )
 
 
-def findings_list(findings: Sequence[PaperFinding]) -> Html:
+def findings_list(findings: Sequence[PaperFinding]) -> html.Html:
     """Return where the paper contradicts itself or is silent."""
     counts = {status: sum(f.status == status for f in findings) for status in ("found", "silent", "unclear")}
     title = (
         f"{counts['found']} contradictions, {counts['unclear']} statements with two readings, "
         f"{counts['silent']} things left unsaid"
     )
-    return section(title, listed(findings, ("", lambda f: named(f.where, f.status)), ("", lambda f: f.text)))
+    columns = ("", lambda f: html.named(f.where, f.status)), ("", lambda f: f.text)
+    return html.section(title, html.listed(findings, *columns))
 
 
-def table_1(drawings: Sequence[tuple[str, str]]) -> Html:
+def table_1(drawings: Sequence[tuple[str, str]]) -> html.Html:
     """Return Table 1 and the drawings, (caption, SVG)."""
-    return section(
+    return html.section(
         "Table 1 and Figs. 6 to 8: the same machine as a circuit",
-        table(["Mechanical", "Impedance", "Electrical", "Impedance"], TABLE_1),
-        *(Html(f"<h3>{escape(caption)}</h3>{svg}") for caption, svg in drawings),
+        html.table(["Mechanical", "Impedance", "Electrical", "Impedance"], TABLE_1),
+        *(html.Html(f"<h3>{escape(caption)}</h3>{svg}") for caption, svg in drawings),
         caption="Torque is voltage, velocity is current.",
     )
 
 
-def table_2(rig_values: Mapping[str, float]) -> Html:
+def table_2(rig_values: Mapping[str, float]) -> html.Html:
     """Return Table 2 beside the rigs' values."""
 
     def used(name: str) -> str:
@@ -226,7 +217,7 @@ def table_2(rig_values: Mapping[str, float]) -> Html:
             return words.number(rig_values[name], 4)
         return "clamped, exact" if TABLE_2[name][0] == "1e8" else "behind the clamp"
 
-    shown = listed(
+    shown = html.listed(
         TABLE_2,
         ("Parameter", str),
         ("#Printed", lambda n: TABLE_2[n][0]),
@@ -234,10 +225,10 @@ def table_2(rig_values: Mapping[str, float]) -> Html:
         ("#In our rigs", used),
     )
     caption = "The paper's proximal end (lp) is the one fixed to the frame; units without the per-radian."
-    return section("Table 2, as printed and as simulated here", shown, caption=caption)
+    return html.section("Table 2, as printed and as simulated here", shown, caption=caption)
 
 
-def bands_table(actuators: Mapping[str, Bands]) -> Html:
+def bands_table(actuators: Mapping[str, Bands]) -> html.Html:
     """Return Eq. (7) and the exact bands of the actuators."""
     tolerances = [f"#±{db:g} dB" + (f", ±{deg:g}°" if deg < 90 else "") for db, deg in TOLERANCES]
     parts, none = [], [""] * (len(tolerances) - 1)
@@ -250,9 +241,9 @@ def bands_table(actuators: Mapping[str, Bands]) -> Html:
         ]
         motor = ", ".join(f"{t:.2g} N·m at {f:.3g} Hz" for f, t in b.motor_limit.items())
         limits = f"Amplitude: {b.spring_limit:.0f} N·m at 5° of the spring; from the motor {motor}."
-        body = table(["|T_d/T_p| within, Hz", *tolerances], rows)
-        parts += [Html(f"<h3>{escape(name)}</h3>"), body, paragraph(limits, "caption under")]
-    return section(
+        body = html.table(["|T_d/T_p| within, Hz", *tolerances], rows)
+        parts += [html.Html(f"<h3>{escape(name)}</h3>"), body, html.paragraph(limits, "caption under")]
+    return html.section(
         "Up to where each is a pure torque source depends on the tolerance, the sensor and the rotor's spin",
         *parts,
         caption="Exact: roots of polynomials in the frequency. Motor: continuous torque, both ends clamped. "
@@ -261,7 +252,7 @@ def bands_table(actuators: Mapping[str, Bands]) -> Html:
     )
 
 
-def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> Html:
+def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> html.Html:
     """Return transfer functions and limits of all arrangements."""
 
     def at(limit: Limit) -> str:
@@ -271,7 +262,7 @@ def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> 
             else ""
         )
 
-    shown = listed(
+    shown = html.listed(
         rows,
         ("Train", lambda r: words.train(r.train)),
         ("#n", lambda r: words.signed_text(r.ratio, 0)),
@@ -280,28 +271,28 @@ def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> 
         ("T-RSEA", lambda r: "T_d/T_m = (b_s s + K_s)/den"),
         ("", lambda r: "T_p/T_m = (J_in s² + b_s s + K_s)/den"),
     )
-    reached = listed(
+    reached = html.listed(
         limits,
         ("Limit", lambda x: x.what),
         ("of", lambda x: x.of.split(",")[0]),
         ("at", at),
         ("#largest difference, 0.5 to 140 Hz", lambda x: " → ".join(f"{e:.1e}" for e in x.errors)),
     )
-    return section(
+    return html.section(
         "T-RSEA and RT-RSEA, every train, lumped and unlumped: one table",
-        equation(
+        html.equation(
             "den = J_out s² + (b_m + b_s) s + K_s\nJ_out = J_sc + n² J_r      J_in = J_sc + n J_r "
             "(lumped: J_out)      J_r = J_m/N²"
         ),
         shown,
-        Html("<h3>Limits</h3>"),
+        html.Html("<h3>Limits</h3>"),
         reached,
         caption="Both ends clamped, the platform's values. An RT-RSEA is the same machine held by the other "
         "end: T_d and T_p change places.",
     )
 
 
-def moving_table(tests: Mapping[str, MovingOutput]) -> Html:
+def moving_table(tests: Mapping[str, MovingOutput]) -> html.Html:
     """Return how much of the held-out torque each model explains, for every test and sensor."""
     rows = []
     for name, model, j in (
@@ -322,10 +313,10 @@ def moving_table(tests: Mapping[str, MovingOutput]) -> Html:
         "#RMS error, N·m",
         "#RMS torque, N·m",
     ]
-    return section(
+    return html.section(
         "With both ends moving a sensor at the distal end alone cannot tell the models apart; one at the "
         "other end can",
-        table(head, rows),
+        html.table(head, rows),
         caption="Fitted to the first half of the spring end's record, tested on the second half, and on "
         "the other sensor, which no fit has seen. The lumped model is fitted with loose priors. The benches "
         "are unlumped by construction.",
