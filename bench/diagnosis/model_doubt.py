@@ -60,9 +60,9 @@ def deviations_of(rig: Rig, seconds: float) -> Iterator[tuple[str, float]]:
 
     Raises ParameterError for an effect that the exported model leaves out.
     """
-    for omitted in export_mjcf(rig).omitted:
-        if omitted.name in {e.name for e in rig.effects}:
-            raise ParameterError(f"left out of the model: {omitted.why}")
+    for name, why in export_mjcf(rig).leaves_out.items():
+        if name in {e.name for e in rig.effects}:
+            raise ParameterError(f"left out of the model: {why}")
     of_effects = {f"{e.name}.{n}": v for e in rig.effects for n, v in e.parameters.items()}
     true = {**rig.values(), **of_effects}
     for p in identify([played_record(rig, seconds)], rig).parameters:

@@ -128,7 +128,7 @@ def _lines(made: Export, rig: Rig, out: Path, verified: Verification) -> list[st
     from rsea_ros.exports.others import coverage_lines
 
     lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]
-    lines += [f"  {line}" for line in coverage_lines(made.represented, made.omitted)]
+    lines += [f"  {line}" for line in coverage_lines(made.says, made.leaves_out)]
     lines += [f"  without {name}: {_apart(one)}" for name, one in verified.losses.items()]
     lines += [f"played in both: {_apart(one)}" for one in verified.differences]
     return [*lines, f"not played: {verified.not_played}"] if verified.not_played else lines
@@ -149,8 +149,8 @@ def _document(made: Export, rig: Rig, out: Path, verified: Verification) -> dict
         "rig": rig.name,
         "target": made.target,
         "file": str(out),
-        "says": {one.name: one.how for one in made.represented},
-        "leaves_out": {one.name: one.why for one in made.omitted},
+        "says": made.says,
+        "leaves_out": made.leaves_out,
         "loss": {name: pick(one, f"channel {_NUMBERS}") for name, one in verified.losses.items()},
         "not_played": verified.not_played or None,
         "difference": {one.channel: pick(one, _NUMBERS) for one in verified.differences},

@@ -27,31 +27,22 @@ def export_bam(rig: Rig, actuator: str = "") -> others.Export:
     """Return the parameters of a rig. actuator: BAM's name of the servo, which brings its control law."""
     rig = others.without_null_effects(rig)
     effects = others.finite_sizes(rig)
-    represented = [
-        others.Represented("rotor.reflected_inertia", "armature"),
-        others.Represented("rotor.reflected_damping", "friction_viscous"),
-    ]
+    says = {"rotor.reflected_inertia": "armature", "rotor.reflected_damping": "friction_viscous"}
     values: dict[str, object] = {
         "armature": gear_inertia(rig),
         "q_offset": 0.0,
         "friction_viscous": rig["rotor.reflected_damping"],
     }
-    values |= _dry(effects, represented) | _load(effects, represented)
+    values |= _dry(effects, says) | _load(effects, says)
     model = _model(effects)
     values |= {"model": model, "actuator": actuator}
-    omitted = [others.Omitted("kt, R", "the rig has no voltage; from the data sheet, or from bam.fit")]
+    left = {"kt, R": "the rig has no voltage; from the data sheet, or from bam.fit"}
     if not actuator:
-        lacking = "BAM's name of the servo, with its control law (--actuator)"
-        omitted.append(others.Omitted("actuator", lacking))
-    omitted += others.omitted_parts(rig, "a BAM joint is rigid")
-    omitted += others.omitted_effects(rig, represented, f"no parameter of {model.upper()}")
-    values["rsea"] = {
-        "rig": rig.name,
-        "says": {one.name: one.how for one in represented},
-        "leaves_out": {one.name: one.why for one in omitted},
-    }
-    content = json.dumps(values, indent=2) + "\n"
-    return others.Export("bam", ".json", content, tuple(represented), tuple(omitted))
+        left["actuator"] = "BAM's name of the servo, with its control law (--actuator)"
+    left |= others.omitted_parts(rig, "a BAM joint is rigid")
+    left |= others.omitted_effects(rig, says, f"no parameter of {model.upper()}")
+    values["rsea"] = {"rig": rig.name, "says": says, "leaves_out": left}
+    return others.Export("bam", ".json", json.dumps(values, indent=2) + "\n", says, left)
 
 
 def _model(effects: Mapping[str, Mapping[str, float]]) -> str:
@@ -65,21 +56,18 @@ def _model(effects: Mapping[str, Mapping[str, float]]) -> str:
     return "m2" if has_stribeck else "m1"
 
 
-def _dry(
-    effects: Mapping[str, Mapping[str, float]], represented: list[others.Represented]
-) -> dict[str, float]:
+def _dry(effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> dict[str, float]:
     """Return the parameters that do not depend on the load."""
     base = effects.get("coulomb_friction", {}).get("torque", 0.0)
     if base:
-        represented.append(others.Represented("coulomb_friction", "friction_base"))
+        says["coulomb_friction"] = "friction_base"
     stribeck, speed = 0.0, 1.0
     for name in ("stribeck_friction", "lugre_friction"):
         if name in effects:
             p = effects[name]
             base, stribeck, speed = base + p["coulomb_torque"], p["stribeck_torque"], p["stribeck_velocity"]
             left = ", its bristles left out" if name == "lugre_friction" else ""
-            how = f"friction_base, friction_stribeck, dtheta_stribeck, alpha 2{left}"
-            represented.append(others.Represented(name, how))
+            says[name] = f"friction_base, friction_stribeck, dtheta_stribeck, alpha 2{left}"
     if _model(effects) in ("m1", "m3"):
         return {"friction_base": base}
     return {
@@ -87,21 +75,18 @@ def _dry(
     }  # fmt: skip
 
 
-def _load(
-    effects: Mapping[str, Mapping[str, float]], represented: list[others.Represented]
-) -> dict[str, float]:
+def _load(effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> dict[str, float]:
     """Return the parameters that depend on the load."""
     model, name = _model(effects), "directional_load_friction"
     if model in ("m3", "m4"):
-        how = "load_friction_base, half of the coefficient"
-        represented.append(others.Represented("load_dependent_friction", how))
+        says["load_dependent_friction"] = "load_friction_base, half of the coefficient"
         half = 0.5 * effects["load_dependent_friction"]["coefficient"]
         return {"load_friction_base": half, **({"load_friction_stribeck": 0.0} if model == "m4" else {})}
     if model not in ("m5", "m6"):
         return {}
     p = effects[name]
     quad = ", and their quad" if model == "m6" else ""
-    represented.append(others.Represented(name, f"load_friction_motor, load_friction_external{quad}"))
+    says[name] = f"load_friction_motor, load_friction_external{quad}"
     values = {
         "load_friction_motor": p["motor_coefficient"],
         "load_friction_external": p["load_coefficient"],

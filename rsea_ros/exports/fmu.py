@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.exports.others import Export, Omitted, Represented, coverage_lines
+from rsea_ros.exports.others import Export, coverage_lines
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.model.simulation import build
@@ -29,15 +29,14 @@ def export_fmu(rig: Rig) -> Export:
         raise ParameterError(
             "--fmu needs the package pythonfmu3, which is not installed: pip install pythonfmu3"
         ) from None
-    how = "our own compiled step, co-simulation; the Python that plays it needs rsea_ros"
-    represented = [Represented("bench", how)]
-    represented += [Represented(one.name, "in the step; its sizes are parameters") for one in rig.effects]
+    says = {"bench": "our own compiled step, co-simulation; the Python that plays it needs rsea_ros"}
+    says |= {one.name: "in the step; its sizes are parameters" for one in rig.effects}
     if rig.linear:
-        represented.append(Represented("linear rig", "m and N stand in the place of rad and N·m"))
-    omitted = [Omitted("sensor noise", "outputs are what perfect instruments read")] if rig.sensors else []
+        says["linear rig"] = "m and N stand in the place of rad and N·m"
+    left = {"sensor noise": "outputs are what perfect instruments read"} if rig.sensors else {}
     with tempfile.TemporaryDirectory() as folder:
-        files = {"rig.yaml": rig_text(rig), "coverage.txt": "\n".join(coverage_lines(represented, omitted))}
+        files = {"rig.yaml": rig_text(rig), "coverage.txt": "\n".join(coverage_lines(says, left))}
         for name, text in files.items():
             write_new(Path(folder, name), text)
         made = FmuBuilder.build_FMU(SLAVE, dest=folder, project_files=[Path(folder, name) for name in files])
-        return Export("fmu", ".fmu", Path(made).read_bytes(), tuple(represented), tuple(omitted))
+        return Export("fmu", ".fmu", Path(made).read_bytes(), says, left)

@@ -22,83 +22,66 @@ def export_isaac(rig: Rig) -> others.Export:
     """Return the configuration of a rig's actuator."""
     rig = others.without_null_effects(rig)
     effects = others.finite_sizes(rig)
-    represented = [
-        others.Represented("rotor.reflected_inertia", "armature"),
-        others.Represented("rotor.reflected_damping", "viscous_friction"),
-    ]
+    says = {"rotor.reflected_inertia": "armature", "rotor.reflected_damping": "viscous_friction"}
     joint = {"armature": gear_inertia(rig), "viscous_friction": rig["rotor.reflected_damping"]}
     delay = effects.get("command_delay", {}).get("delay", 0.0)
-    fields = joint | _loop(rig, represented)
-    fields |= _friction(effects, represented) | _limits(rig, effects, represented)
+    fields = joint | _loop(rig, says) | _friction(effects, says) | _limits(rig, effects, says)
     kind = "DelayedPDActuatorCfg"
     if "voltage_sag" in effects and not delay:
         kind = "DCMotorCfg"
         sag = effects["voltage_sag"]
         fields |= {"saturation_effort": sag["limit"], "velocity_limit": sag["no_load_speed"]}
-        limits = "DCMotorCfg, saturation_effort and velocity_limit"
-        represented.append(others.Represented("voltage_sag", limits))
+        says["voltage_sag"] = "DCMotorCfg, saturation_effort and velocity_limit"
     elif delay:
-        steps = "min_delay = max_delay, in steps of the physics"
-        represented.append(others.Represented("command_delay", steps))
-    rigid = "an actuator drives one rigid joint; give it a passive joint beyond"
-    omitted = [*others.omitted_parts(rig, rigid)]
-    omitted += others.omitted_effects(rig, represented, f"{kind} has no field for it")
+        says["command_delay"] = "min_delay = max_delay, in steps of the physics"
+    left = others.omitted_parts(rig, "an actuator drives one rigid joint; give it a passive joint beyond")
+    left |= others.omitted_effects(rig, says, f"{kind} has no field for it")
     terms = ("k_i", "k_f", "k_vi", "sample_time", "velocity_limit")
-    omitted += others.omitted_terms(rig, dict.fromkeys(terms, "the PD law has no place for it"))
-    text = _file(rig, kind, fields, delay, represented, omitted)
-    return others.Export("isaac", ".py", text, tuple(represented), tuple(omitted))
+    left |= others.omitted_terms(rig, dict.fromkeys(terms, "the PD law has no place for it"))
+    return others.Export("isaac", ".py", _file(rig, kind, fields, delay, says, left), says, left)
 
 
-def _loop(rig: Rig, represented: list[others.Represented]) -> dict[str, float]:
+def _loop(rig: Rig, says: dict[str, str]) -> dict[str, float]:
     """Return the gains; a rig that torques command has none, and takes efforts."""
     if rig.loop is None:
-        represented.append(others.Represented("torque command", "stiffness and damping 0: set joint efforts"))
+        says["torque command"] = "stiffness and damping 0: set joint efforts"
         return {"stiffness": 0.0, "damping": 0.0}
-    represented.append(others.Represented(f"{rig.loop} loop", "stiffness and damping"))
+    says[f"{rig.loop} loop"] = "stiffness and damping"
     if rig.loop == "pd":
         return {"stiffness": rig["controller.k_p"], "damping": rig["controller.k_d"]}
     k_v = rig["controller.k_v"]
     return {"stiffness": rig["controller.k_pos"] * k_v, "damping": k_v}
 
 
-def _friction(
-    effects: Mapping[str, Mapping[str, float]], represented: list[others.Represented]
-) -> dict[str, float]:
+def _friction(effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> dict[str, float]:
     dynamic = effects.get("coulomb_friction", {}).get("torque", 0.0)
     if dynamic:
-        represented.append(others.Represented("coulomb_friction", "friction and dynamic_friction"))
+        says["coulomb_friction"] = "friction and dynamic_friction"
     static = dynamic
     for name in ("stribeck_friction", "lugre_friction"):
         if name in effects:
             dynamic += effects[name]["coulomb_torque"]
             static += effects[name]["coulomb_torque"] + effects[name]["stribeck_torque"]
-            how = "friction at rest, dynamic_friction at speed; not the curve between"
-            represented.append(others.Represented(name, how))
+            says[name] = "friction at rest, dynamic_friction at speed; not the curve between"
     return {"friction": static, "dynamic_friction": dynamic}
 
 
-def _limits(
-    rig: Rig, effects: Mapping[str, Mapping[str, float]], represented: list[others.Represented]
-) -> dict[str, float]:
+def _limits(rig: Rig, effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> dict[str, float]:
     limits = [rig["controller.torque_limit"]] if rig.loop else []
     if "torque_saturation" in effects:
         limits.append(effects["torque_saturation"]["limit"])
-        represented.append(others.Represented("torque_saturation", "effort_limit"))
+        says["torque_saturation"] = "effort_limit"
     finite = [limit for limit in limits if math.isfinite(limit)]
     return {"effort_limit": min(finite)} if finite else {}
 
 
 def _file(
-    rig: Rig,
-    kind: str,
-    fields: Mapping[str, float],
-    delay: float,
-    represented: list[others.Represented],
-    omitted: list[others.Omitted],
-) -> str:
+    rig: Rig, kind: str, fields: Mapping[str, float], delay: float, says: Mapping[str, str],
+    left: Mapping[str, str],
+) -> str:  # fmt: skip
     """Return the Python file."""
     lines = [f'"""Actuator of {in_docstring(rig.name)}, written by rsea export --isaac.', ""]
-    lines += [in_docstring(line) for line in others.coverage_lines(represented, omitted)]
+    lines += [in_docstring(line) for line in others.coverage_lines(says, left)]
     lines += ['"""', "", f"from isaaclab.actuators import {kind}", ""]
     if kind == "DelayedPDActuatorCfg":
         step = f"PHYSICS_STEP = {PHYSICS_STEP!r}  # s, of your SimulationCfg"

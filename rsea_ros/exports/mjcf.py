@@ -34,11 +34,16 @@ def tendon(root: xml.Element, name: str) -> xml.Element:
     return next(one for one in root.iter("fixed") if one.get("name") == name)
 
 
+def section(root: xml.Element, tag: str) -> xml.Element:
+    """Return the actuators, or the tendons, of a model."""
+    found = root.find(tag)
+    assert found is not None
+    return found
+
+
 def motor(root: xml.Element) -> xml.Element:
     """Return the actuator that the command drives, as the element that has every attribute."""
-    actuator = root.find("actuator")
-    assert actuator is not None
-    first = actuator[0]
+    first = section(root, "actuator")[0]
     if first.tag == "motor":
         first.tag = "general"
         first.set("gainprm", "1")
@@ -47,9 +52,7 @@ def motor(root: xml.Element) -> xml.Element:
 
 def beside(root: xml.Element, name: str, like: str) -> xml.Element:
     """Add and return a sum of hinges of another name."""
-    tendons = root.find("tendon")
-    assert tendons is not None
-    copy = xml.SubElement(tendons, "fixed", name=name)
+    copy = xml.SubElement(section(root, "tendon"), "fixed", name=name)
     for joint in tendon(root, like):
         copy.append(xml.fromstring(xml.tostring(joint)))
     return copy
@@ -57,10 +60,8 @@ def beside(root: xml.Element, name: str, like: str) -> xml.Element:
 
 def passive(root: xml.Element, name: str, **attributes: str) -> xml.Element:
     """Add and return a dcmotor without input on the output: its friction or cogging alone."""
-    actuator = root.find("actuator")
-    assert actuator is not None
     fixed = {"name": name, "tendon": "motor", "input": "none", "motorconst": "0", "resistance": "1"}
-    return xml.SubElement(actuator, "dcmotor", {**fixed, **attributes})
+    return xml.SubElement(section(root, "actuator"), "dcmotor", {**fixed, **attributes})
 
 
 def _command_delay(root: xml.Element, rig: Rig, p: Parameters) -> str:
@@ -68,16 +69,14 @@ def _command_delay(root: xml.Element, rig: Rig, p: Parameters) -> str:
         step = f"the model's step of {STEP:g} s"
         raise others.Unrepresentable(f"a delay of {p['delay']:g} s is shorter than {step}")
     samples = math.ceil(p["delay"] / STEP) + 1
-    for name, value in (("delay", repr(p["delay"])), ("nsample", str(samples)), ("interp", "zoh")):
-        motor(root).set(name, value)
+    motor(root).attrib.update(delay=repr(p["delay"]), nsample=str(samples), interp="zoh")
     return f"actuator delay {p['delay']:g} s"
 
 
 def _current_loop_lag(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if motor(root).tag != "general":
         raise others.Unrepresentable(f"the actuator is a {motor(root).tag}, which has no filter")
-    motor(root).set("dyntype", "filterexact")
-    motor(root).set("dynprm", repr(p["time_constant"]))
+    motor(root).attrib.update(dyntype="filterexact", dynprm=repr(p["time_constant"]))
     return f"actuator dyntype filterexact, {p['time_constant']:g} s"
 
 
@@ -96,13 +95,8 @@ def _torque_constant_error(root: xml.Element, rig: Rig, p: Parameters) -> str:
 
 
 def _coulomb_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
-    losses = tendon(root, "motor")
-    for name, value in (
-        ("frictionloss", repr(p["torque"])),
-        ("solreffriction", SOLREF),
-        ("solimpfriction", SOLIMP),
-    ):
-        losses.set(name, value)
+    losses = {"frictionloss": repr(p["torque"]), "solreffriction": SOLREF, "solimpfriction": SOLIMP}
+    tendon(root, "motor").attrib.update(losses)
     return f"tendon frictionloss {p['torque']:g} N·m; it sticks where the rig's creeps"
 
 
@@ -123,10 +117,8 @@ def _lugre(root: xml.Element, name: str, stiffness: float, p: Parameters, dampin
 def _asymmetric_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if p["viscous_difference"]:
         raise others.Unrepresentable("damping is the same in both directions")
-    actuator = root.find("actuator")
-    assert actuator is not None
     bias = {"gainprm": "0", "biastype": "affine", "biasprm": f"{-p['offset']!r} 0 0"}
-    xml.SubElement(actuator, "general", {"name": "offset", "tendon": "motor", **bias})
+    xml.SubElement(section(root, "actuator"), "general", {"name": "offset", "tendon": "motor", **bias})
     return f"a second actuator with the constant bias {-p['offset']:g} N·m"
 
 
@@ -191,10 +183,9 @@ def _voltage_sag(root: xml.Element, rig: Rig, p: Parameters) -> str:
         raise others.Unrepresentable("a dcmotor has no room for a torque constant error beside it")
     first.tag = "dcmotor"
     del first.attrib["gainprm"]
-    first.set("input", "ff")
-    first.set("motorconst", "1")
-    first.set("resistance", repr(p["no_load_speed"] / p["limit"]))
-    first.set("controller", f"0 0 0 0 0 {p['no_load_speed']!r}")
+    limit = f"0 0 0 0 0 {p['no_load_speed']!r}"
+    resistance = repr(p["no_load_speed"] / p["limit"])
+    first.attrib.update(input="ff", motorconst="1", resistance=resistance, controller=limit)
     return f"dcmotor of constant 1, {p['no_load_speed'] / p['limit']:g} Ohm and Vmax {p['no_load_speed']:g} V"
 
 
@@ -226,32 +217,30 @@ EFFECTS: Mapping[str, Effect] = {
 }
 
 
-def say_loop(rig: Rig, root: xml.Element) -> tuple[others.Represented, list[others.Omitted]]:
+def say_loop(rig: Rig, root: xml.Element) -> tuple[dict[str, str], dict[str, str]]:
     """Turn the motor into the loop's actuator; return exported and omitted parts."""
     if rig.loop is None:
-        return others.Represented("motor", "motor on the tendon output - housing"), []
+        return {"motor": "motor on the tendon output - housing"}, {}
     gains = _gains(rig)
     first = motor(root)
     first.tag = "pid"
     del first.attrib["gainprm"]
-    first.set("input", "pos")
-    for name, value in gains.items():
-        first.set(name, repr(value))
+    first.attrib.update({"input": "pos", **{name: repr(value) for name, value in gains.items()}})
     limit = rig["controller.torque_limit"]
     if math.isfinite(limit):
         first.set("forcerange", f"{-limit!r} {limit!r}")
     how = "pid actuator, " + ", ".join(f"{name} {value:g}" for name, value in gains.items())
-    omitted = []
+    left = {}
     if rig.encoder_end == "spring_end":
-        why = "an actuator's loop closes over its own tendon, that of the gear output"
-        omitted.append(others.Omitted("encoder at the spring's end", why))
+        over = "an actuator's loop closes over its own tendon, that of the gear output"
+        left["encoder at the spring's end"] = over
     terms = {
         "sample_time": "the loop runs at the model's step",
         "velocity_limit": "slewmax limits the target, not what the loop asks",
         "k_f": "the setpoint has no feed-forward of its rate",
         "k_vi": "the integral is of the position's error",
     }
-    return others.Represented(f"{rig.loop} loop", how), [*omitted, *others.omitted_terms(rig, terms)]
+    return {f"{rig.loop} loop": how}, left | others.omitted_terms(rig, terms)
 
 
 def _gains(rig: Rig) -> dict[str, float]:
@@ -273,24 +262,22 @@ def export_mjcf(rig: Rig) -> others.Export:
     finite = others.finite_sizes(rig)
     play = next((float(one.parameters["gap"]) for one in rig.effects if one.name == "backlash"), 0.0)
     root = model_element(with_structure(rig), play)
-    loop, omitted = say_loop(rig, root)
-    represented = [loop]
+    says, left = say_loop(rig, root)
     for setting in sorted(rig.effects, key=lambda one: effect_named(one.name).order):
         parameters = effect_named(setting.name).complete(setting.parameters)
         try:
             if setting.name not in finite:
                 raise others.Unrepresentable("a parameter of it is infinite")
             if setting.name in STRUCTURES:
-                represented.append(others.Represented(setting.name, STRUCTURES[setting.name]))
+                says[setting.name] = STRUCTURES[setting.name]
             elif setting.name in EFFECTS:
-                element = EFFECTS[setting.name](root, rig, parameters)
-                represented.append(others.Represented(setting.name, element))
+                says[setting.name] = EFFECTS[setting.name](root, rig, parameters)
             else:
                 raise others.Unrepresentable("MuJoCo has no element for it")
         except others.Unrepresentable as reason:
-            omitted.append(others.Omitted(setting.name, str(reason)))
+            left[setting.name] = str(reason)
     if rig.sensors:
-        why = "sensors of MJCF are those of perfect instruments; the rig's noise and quanta stay with the rig"
-        omitted.append(others.Omitted("sensor noise", why))
-    root.insert(0, others.coverage_comment(represented, omitted))
-    return others.Export("mjcf", ".xml", text(root), tuple(represented), tuple(omitted))
+        perfect = "sensors of MJCF are those of perfect instruments"
+        left["sensor noise"] = f"{perfect}; the rig's noise and quanta stay with the rig"
+    root.insert(0, others.coverage_comment(says, left))
+    return others.Export("mjcf", ".xml", text(root), says, left)

@@ -39,36 +39,34 @@ def export_chain(rig: Rig, language: Language) -> others.Export:
     """Return a rig in a language. Raises RigError for one that is no chain of links (see chain.py)."""
     rig = others.without_null_effects(rig)
     chain = chain_of(rig)
-    represented, omitted = _coverage(rig, chain, has_springs=language.has_springs)
+    says, left = _coverage(rig, chain, has_springs=language.has_springs)
     root, model = language.frame(rig.name)
-    model.insert(0, others.coverage_comment(represented, omitted))
+    model.insert(0, others.coverage_comment(says, left))
     model.extend(language.link(link) for link in chain.links)
     model.extend(language.joint(joint, rig) for joint in chain.joints)
     model.append(_block(language.block, rig))
-    return others.Export(language.target, f".{language.target}", _text(root), represented, omitted)
+    return others.Export(language.target, f".{language.target}", _text(root), says, left)
 
 
-def _coverage(
-    rig: Rig, chain: Chain, *, has_springs: bool
-) -> tuple[tuple[others.Represented, ...], tuple[others.Omitted, ...]]:
+def _coverage(rig: Rig, chain: Chain, *, has_springs: bool) -> tuple[dict[str, str], dict[str, str]]:
     """Return the parts in the joints, and those in the block alone."""
     only = "only in the block rsea"
-    represented = [others.Represented(one.name, _how(one, has_springs)) for one in chain.joints]
-    omitted = [others.Omitted(name, f"{why}; {only}") for name, why in chain.left_out.items()]
+    says = {one.name: _how(one, has_springs) for one in chain.joints}
+    left = {name: f"{why}; {only}" for name, why in chain.left_out.items()}
     if not has_springs and not rig.rigid_spring:
-        omitted.append(others.Omitted("spring.stiffness", f"URDF joints have no spring; {only}"))
+        left["spring.stiffness"] = f"URDF joints have no spring; {only}"
     finite, has_stop = others.finite_sizes(rig), any(stop_of(joint, rig) for joint in chain.joints)
     for one in rig.effects:
         how = _EFFECTS.get(one.name)
         if one.name not in finite:
-            omitted.append(others.Omitted(one.name, f"a parameter of it is infinite; {only}"))
+            left[one.name] = f"a parameter of it is infinite; {only}"
         elif how is None or (one.name == "hard_stop" and not has_stop):
-            omitted.append(others.Omitted(one.name, only))
+            left[one.name] = only
         else:
-            represented.append(others.Represented(one.name, how))
+            says[one.name] = how
     if rig.loop is not None:
-        omitted.append(others.Omitted(f"{rig.loop} loop", f"a controller's affair; {only}"))
-    return tuple(represented), tuple(omitted)
+        left[f"{rig.loop} loop"] = f"a controller's affair; {only}"
+    return says, left
 
 
 _EFFECTS = {

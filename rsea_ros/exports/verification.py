@@ -244,24 +244,23 @@ def verify(made: Export, rig: Rig, command: FloatArray) -> Verification:
 
     command: N m, or target rad of a rig with a position loop, at RATE.
     """
-    names = [one.name for one in made.omitted]
     if made.target not in PLAYERS:
         why = "only --mjcf and --fmu are verified by simulation"
-        return Verification((), _losses(rig, names, command), why)
+        return Verification((), _losses(rig, made.leaves_out, command), why)
     try:
         theirs = PLAYERS[made.target](made.content, rig, command)
         mine = ours(rig, command)
     except ParameterError as error:
-        return Verification((), _losses(rig, names, command), str(error))
+        return Verification((), _losses(rig, made.leaves_out, command), str(error))
     apart = differences(rig, mine, theirs)
-    return Verification(apart, losses(rig, names, mine, command), "" if apart else NO_NOISE)
+    return Verification(apart, losses(rig, made.leaves_out, mine, command), "" if apart else NO_NOISE)
 
 
-def _losses(rig: Rig, names: list[str], command: FloatArray) -> Mapping[str, Difference]:
+def _losses(rig: Rig, omitted: Iterable[str], command: FloatArray) -> Mapping[str, Difference]:
     """Return the losses of an export that is not played; none of a rig that cannot be simulated."""
-    if not set(names) & {effect.name for effect in rig.effects}:
+    if not {effect.name for effect in rig.effects}.intersection(omitted):
         return {}
     try:
-        return losses(rig, names, ours(rig, command), command)
+        return losses(rig, omitted, ours(rig, command), command)
     except RseaError:
         return {}
