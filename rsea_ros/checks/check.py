@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -102,17 +102,16 @@ def _of_targets(f: Finding) -> Finding:
     return replace(f, channel="reference", unit=unit, detail=detail)
 
 
-def _topics(record: Record, rig: Rig) -> list[Finding]:
+def _topics(record: Record, rig: Rig) -> Iterator[Finding]:
     have = ", ".join(record.channels)
     have = "; ".join(filter(None, (have, unused_sentence(record, rig))))
     if "command" in record:
-        return [Finding("green", "topics", "", float(len(record.channels)), "1", detail=have)]
-    return [
-        Finding(
-            "red", "topics", "command", expected="the torques that drove the run", detail=f"only {have}",
-            remedy=missing_command(record),
-        )
-    ]
+        yield Finding("green", "topics", "", float(len(record.channels)), "1", detail=have)
+        return
+    yield Finding(
+        "red", "topics", "command", expected="the torques that drove the run", detail=f"only {have}",
+        remedy=missing_command(record),
+    )  # fmt: skip
 
 
 def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Finding]:
@@ -167,7 +166,7 @@ def _compare(
     if late:
         record = in_step(record, late)
         compared = {n: s for n, s in expected.sides(record, rig).items() if n in whole}
-    if elsewhere := signal_findings.angle_offset_findings(rig, compared):
+    if elsewhere := list(signal_findings.angle_offset_findings(rig, compared)):
         return [*findings, *elsewhere], None
     wrong = {f.channel for f in findings if f.light == "red"}
     findings += [] if wrong & {"ft", "command"} else signal_findings.offset_findings(record, compared)
@@ -195,20 +194,18 @@ def _bridged_channels(checked: Checked) -> set[str]:
 
 def _another(
     record: Record, rig: Rig, related: Mapping[str, expected.Quotient], known: Sequence[Finding]
-) -> list[Finding]:
-    """Return the findings by which the machine of a record differs from a rig whose values no pair shows."""
+) -> Iterator[Finding]:
+    """Yield the findings by which the machine of a record differs from a rig whose values no pair shows."""
     named = {f.channel for f in known if f.kind != "noise"}
     if is_inverse(rig):
-        return [] if "spring_end.stiffness" in named else rig_findings.restoring_findings(record, rig)
+        yield from () if "spring_end.stiffness" in named else rig_findings.restoring_findings(record, rig)
+        return
     if {f.kind for f in known} & {"sign", "scale", "wrong_rig", "clock_offset"} or is_held(rig):
-        return []
-    far = {n: q.measured / q.predicted for n, q in related.items() if n not in named}
+        return
     about, one = "times what the rig would give", "about 1"
-    apart = {n: r for n, r in far.items() if max(r, 1.0 / max(r, 1e-300)) > _APART}
-    return [
-        Finding("amber", "wrong_rig", n, r, "1", expected=one, detail=about, remedy=RIGHT_RIG)
-        for n, r in apart.items()
-    ]
+    for n, r in ((n, q.measured / q.predicted) for n, q in related.items() if n not in named):
+        if max(r, 1.0 / max(r, 1e-300)) > _APART:
+            yield Finding("amber", "wrong_rig", n, r, "1", expected=one, detail=about, remedy=RIGHT_RIG)
 
 
 def _linearise(
@@ -225,29 +222,21 @@ def _linearise(
     return [*rig_findings.clock_findings(rig_findings.with_rates(linear, rates), duration), *fitted], linear
 
 
-def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) -> list[Finding]:
-    """Return which other axis of the wrench follows the command, where this one does not."""
+def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) -> Iterator[Finding]:
+    """Yield which other axis of the wrench follows the command, where this one does not."""
     dead = any(f.kind == "dead_channel" and f.channel == "ft" for f in checked.faults)
     if wrench is None or not dead:
-        return []
-    tried = {
-        n: q
-        for n, c in wrench().items()
-        if n != axis.removeprefix("-")
-        for q in [_beside(checked, rig, c)]
-        if q
-    }
-    alive = {n: q for n, q in tried.items() if not q.is_unrelated}
+        return
+    beside = {n: _beside(checked, rig, c) for n, c in wrench().items() if n != axis.removeprefix("-")}
+    alive = {n: q for n, q in beside.items() if q is not None and not q.is_unrelated}
     if not alive:
-        return []
+        return
     best = max(alive, key=lambda n: alive[n].related)
     turned = "-" if float(np.sum(alive[best].weight * alive[best].value.real)) < 0.0 else ""
-    return [
-        Finding(
-            "amber", "sign", "ft", alive[best].related, "1", expected="the actuator's axis",
-            detail=f"{best} follows the command", remedy=f"--axis {turned}{best}",
-        )
-    ]
+    yield Finding(
+        "amber", "sign", "ft", alive[best].related, "1", expected="the actuator's axis",
+        detail=f"{best} follows the command", remedy=f"--axis {turned}{best}",
+    )  # fmt: skip
 
 
 def _beside(checked: Checked, rig: Rig, channel: Channel) -> expected.Quotient | None:

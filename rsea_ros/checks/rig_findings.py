@@ -16,7 +16,7 @@ measured motion, without and with restoring terms:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -220,25 +220,23 @@ _SHARP = 0.05
 """Of the speed's RMS: the width of its sign's step."""
 
 
-def restoring_findings(record: Record, rig: Rig) -> list[Finding]:
-    """Return the finding of a torque that follows the position, for a rig that has neither K nor gravity."""
+def restoring_findings(record: Record, rig: Rig) -> Iterator[Finding]:
+    """Yield the finding of a torque that follows the position, for a rig that has neither K nor gravity."""
     if rig["spring_end.stiffness"] or rig["spring_end.gravity"]:
-        return []
+        return
     try:
         motion = motion_from(record)
     except (RseaError, ValueError):
-        return []
+        return
     without, held = residual_shares(motion)
     if not held < _FALLS * without:
-        return []
-    return [
-        Finding(
-            "red", "wrong_rig", "spring_end.stiffness", 100.0 * (1.0 - (held / without) ** 2), "%",
-            expected="0",
-            detail="of the torque that the rig leaves open follows the position: a spring or a pendulum",
-            remedy=RIGHT_RIG,
-        )
-    ]
+        return
+    yield Finding(
+        "red", "wrong_rig", "spring_end.stiffness", 100.0 * (1.0 - (held / without) ** 2), "%",
+        expected="0",
+        detail="of the torque that the rig leaves open follows the position: a spring or a pendulum",
+        remedy=RIGHT_RIG,
+    )  # fmt: skip
 
 
 def residual_shares(motion: Motion) -> tuple[float, float]:

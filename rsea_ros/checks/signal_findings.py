@@ -12,7 +12,7 @@ a mode at the other sensor looks alike: it raises that one's response as an aver
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 
@@ -42,40 +42,32 @@ _MORE = 2.0
 _EXCITE = "excite it: `rsea simulate --help` lists the excitations, the node `excite` plays them"
 
 
-def excitation(record: Record, rig: Rig) -> list[Finding]:
-    """Return the findings on the command: its band and size, and the share of the record at rest."""
+def excitation(record: Record, rig: Rig) -> Iterator[Finding]:
+    """Yield the findings on the command: its band and size, and the share of the record at rest."""
     command = record["command"]
     if float(np.ptp(command.y)) == 0.0:
-        return [
-            Finding(
-                "red", "excitation", "command", float(command.y[0]), "N m",
-                expected="a command that changes", detail="the command never changes", remedy=_EXCITE,
-            )
-        ]
+        yield Finding(
+            "red", "excitation", "command", float(command.y[0]), "N m",
+            expected="a command that changes", detail="the command never changes", remedy=_EXCITE,
+        )
+        return
     low, high = command_band(command)
     rms, peak = float(np.std(command.y)), float(np.max(np.abs(command.y)))
     detail = f"{low:.3g} to {high:.3g} Hz, peak {peak:.3g} N·m"
     natural = natural_frequency(rig)
     if natural is not None and high < 0.5 * natural:
-        first = Finding(
+        yield Finding(
             "amber", "excitation", "command", rms, "N m", expected=f"a band beyond {natural:.3g} Hz",
             detail=detail, remedy="excite up to twice the rig's natural frequency",
         )
     else:
-        first = Finding("green", "excitation", "command", rms, "N m", detail=detail)
-    return [first, *_rest(at_rest(record))]
-
-
-def _rest(share: float) -> list[Finding]:
-    if share < _WORTH_TELLING:
-        return []
-    return [
-        Finding(
+        yield Finding("green", "excitation", "command", rms, "N m", detail=detail)
+    if (share := at_rest(record)) >= _WORTH_TELLING:
+        yield Finding(
             "amber" if share > _MOSTLY else "green", "rest", "", 100.0 * share, "%",
             expected=f"less than {100.0 * _MOSTLY:.0f} %", detail="of the record is at rest",
             remedy="cut it with --from and --to" if share > _MOSTLY else "",
         )
-    ]
 
 
 def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]:
@@ -117,44 +109,40 @@ _LARGE, _FAR = 1.0, 3.0
 """Times the largest torque of the run: a zero that was never set; an offset that no zero explains."""
 
 
-def offset_findings(record: Record, compared: Mapping[str, Side]) -> list[Finding]:
-    """Return the finding of an F/T torque that lies far from what the rig would give.
+def offset_findings(record: Record, compared: Mapping[str, Side]) -> Iterator[Finding]:
+    """Yield the finding of an F/T torque that lies far from what the rig would give.
 
     compared: the record beside the rig's simulation, which has the gravity of its loads.
     """
     side = compared.get("ft")
     if side is None or "command" not in record:
-        return []
+        return
     offset = float(np.median(side.y) - np.median(side.p))
     largest = max(float(np.max(np.abs(record["command"].y))), float(np.max(np.abs(side.p))))
     if abs(offset) <= _LARGE * largest:
-        return []
-    return [
-        Finding(
-            "red" if abs(offset) > _FAR * largest else "amber", "offset", "ft", offset, "N m",
-            expected=f"less than {largest:.3g}, the largest torque of the run",
-            detail=f"{abs(offset) / largest:.2g} times that torque at all times",
-            remedy="set the sensor's zero, look at its mount, or give the constant in the import map",
-        )
-    ]
+        return
+    yield Finding(
+        "red" if abs(offset) > _FAR * largest else "amber", "offset", "ft", offset, "N m",
+        expected=f"less than {largest:.3g}, the largest torque of the run",
+        detail=f"{abs(offset) / largest:.2g} times that torque at all times",
+        remedy="set the sensor's zero, look at its mount, or give the constant in the import map",
+    )
 
 
-def angle_offset_findings(rig: Rig, compared: Mapping[str, Side]) -> list[Finding]:
-    """Return the finding of a position whose whole range lies away from where the rig would be."""
+def angle_offset_findings(rig: Rig, compared: Mapping[str, Side]) -> Iterator[Finding]:
+    """Yield the finding of a position whose whole range lies away from where the rig would be."""
     side = compared.get("position")
     if side is None or rig.zero_unknown("position"):
-        return []
+        return
     middle, rest = float(np.median(side.y)), float(np.median(side.p))
     if min(abs(middle), abs(middle - rest)) <= float(np.ptp(side.y)):
-        return []
-    return [
-        Finding(
-            "red", "offset", "position", middle - rest, "rad",
-            expected=f"motion about {rest:.3g}, where the rig rests",
-            detail=f"all of the motion is about {middle:.4g} rad; fits compare its changes alone",
-            remedy="`zero_unknown: true` for position in the rig, or give the constant in the import map",
-        )
-    ]
+        return
+    yield Finding(
+        "red", "offset", "position", middle - rest, "rad",
+        expected=f"motion about {rest:.3g}, where the rig rests",
+        detail=f"all of the motion is about {middle:.4g} rad; fits compare its changes alone",
+        remedy="`zero_unknown: true` for position in the rig, or give the constant in the import map",
+    )
 
 
 _LONGEST, _SHARE = 1.0, 0.1
@@ -167,11 +155,11 @@ _GOES_ON = 0.3
 """Share of that time in which the command changes clearly."""
 
 
-def standstill_findings(record: Record) -> list[Finding]:
-    """Return the finding of the longest standstill under a command. record: finite values, rising stamps."""
+def standstill_findings(record: Record) -> Iterator[Finding]:
+    """Yield the finding of the longest standstill under a command. record: finite values, rising stamps."""
     sensors = [record[n] for n in SENSED if n in record and np.ptp(record[n].y) > 0.0]
     if "command" not in record or not sensors or np.ptp(record["command"].t) < _LONGEST:
-        return []
+        return
     command, t = moves(record["command"]), record["command"].t
     still = np.ones(len(t), bool)
     for channel in sensors:
@@ -183,16 +171,14 @@ def standstill_findings(record: Record) -> list[Finding]:
     first, last = _longest(mostly, t)
     length = float(t[last] - t[first])
     if not all(_rests(channel, float(t[first]), float(t[last])) for channel in sensors):
-        return []
+        return
     if length < max(_LONGEST, _SHARE * float(t[-1] - t[0])) or command[first : last + 1].mean() < _GOES_ON:
-        return []
-    return [
-        Finding(
-            "amber", "standstill", "", length, "s", expected="motion while the command changes",
-            detail=f"from {t[first]:.4g} s to {t[last]:.4g} s nothing moves while the command goes on",
-            remedy="was the motor on, the command above the friction? If not, cut the record there",
-        )
-    ]
+        return
+    yield Finding(
+        "amber", "standstill", "", length, "s", expected="motion while the command changes",
+        detail=f"from {t[first]:.4g} s to {t[last]:.4g} s nothing moves while the command goes on",
+        remedy="was the motor on, the command above the friction? If not, cut the record there",
+    )
 
 
 def _rests(channel: Channel, start: float, stop: float) -> bool:
@@ -228,31 +214,29 @@ def jump_findings(record: Record) -> list[Finding]:
     return [f for n in ("position", "deflection") if n in record for f in _of_angle(record, n)]
 
 
-def _of_angle(record: Record, name: str) -> list[Finding]:
+def _of_angle(record: Record, name: str) -> Iterator[Finding]:
     channel = record[name]
     at = _jumps(channel)
     sizes = np.diff(channel.y)[at]
     turns = np.abs(np.abs(sizes) - _TURN) < _NEAR_TURN * _TURN
     made_up = turns | _is_contradicted(record, at, sizes) if name == "position" else turns
     if not made_up.any():
-        return []
+        return
     first = int(np.argmax(made_up))
     wrapped = bool(turns[first])
     where = f"by {sizes[first]:.3g} rad at {channel.t[at[first] + 1]:.4g} s"
-    return [
-        Finding(
-            "red",
-            "angle_jumps",
-            name,
-            float(np.count_nonzero(made_up)),
-            "1",
-            expected="none",
-            detail=f"{where}: {'a whole turn' if wrapped else 'the velocity did not make it'}",
-            remedy='`expression: "unwrap(…)"` in the import map, or publish the angle unwrapped'
-            if wrapped
-            else "cut the record there with --from or --to: the encoder began to count anew",
-        )
-    ]
+    yield Finding(
+        "red",
+        "angle_jumps",
+        name,
+        float(np.count_nonzero(made_up)),
+        "1",
+        expected="none",
+        detail=f"{where}: {'a whole turn' if wrapped else 'the velocity did not make it'}",
+        remedy='`expression: "unwrap(…)"` in the import map, or publish the angle unwrapped'
+        if wrapped
+        else "cut the record there with --from or --to: the encoder began to count anew",
+    )
 
 
 def _jumps(channel: Channel) -> IntArray:

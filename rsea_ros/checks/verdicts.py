@@ -14,7 +14,7 @@ contradiction itself is the finding. Each span in which the pairs say the same i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from typing import NamedTuple
@@ -380,34 +380,30 @@ def _unit(channel: str, factor: Factor) -> str:
     return f"`unit: {factor.unit}` for {channel} in the import map, or publish SI"
 
 
-def _of_rig(name: str, stated: float, moved: float, rig: Rig) -> list[Finding]:
-    """Return the finding of a rig's value that the record contradicts; a damping is no machine's mark."""
+def _of_rig(name: str, stated: float, moved: float, rig: Rig) -> Iterator[Finding]:
+    """Yield the finding of a rig's value that the record contradicts; a damping is no machine's mark."""
     factor, spread = math.exp(moved), _spread(rig, name)
     soft = name.endswith("damping")
     if max(factor, 1.0 / factor) < (_FAR if soft else _MOVED) or abs(moved) < _ELSEWHERE * spread:
-        return []
+        return
     light: Light = "red" if max(factor, 1.0 / factor) > _FAR and not soft else "amber"
-    return [
-        Finding(
-            light, "wrong_rig", name, factor * stated, rig.unit(name), expected=f"{stated:.4g}",
-            detail=f"{factor:.2g} times the rig's value", remedy=RIGHT_RIG,
-        )
-    ]  # fmt: skip
+    yield Finding(
+        light, "wrong_rig", name, factor * stated, rig.unit(name), expected=f"{stated:.4g}",
+        detail=f"{factor:.2g} times the rig's value", remedy=RIGHT_RIG,
+    )  # fmt: skip
 
 
-def _springs(pairs: Sequence[Pair]) -> list[Finding]:
-    """Return the finding of a spring that holds an output which the rig leaves free."""
+def _springs(pairs: Sequence[Pair]) -> Iterator[Finding]:
+    """Yield the finding of a spring that holds an output which the rig leaves free."""
     name = "spring_end.stiffness"
     free = [p for p in pairs if p.fits and name in p.law.names and not p.law.expected[0]]
     sure = [p.ratios[0] for p in free if p.ratios[0] > 0.0 and p.sds[0] < _SURE_SPRING]
     if len(sure) < 2:
-        return []
-    return [
-        Finding(
-            "red", "wrong_rig", name, float(np.median(sure)), "N m/rad", expected="0",
-            detail="a spring or pendulum holds the output", remedy=RIGHT_RIG,
-        )
-    ]  # fmt: skip
+        return
+    yield Finding(
+        "red", "wrong_rig", name, float(np.median(sure)), "N m/rad", expected="0",
+        detail="a spring or pendulum holds the output", remedy=RIGHT_RIG,
+    )  # fmt: skip
 
 
 _SAYS = {

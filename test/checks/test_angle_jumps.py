@@ -68,11 +68,11 @@ def test_a_motor_that_is_off_for_a_while_is_said(start):
         off[name] = Channel(t, np.where(t > start, noise, run()[name].y))
     (jumps,) = check_record(run().with_channels(**off), RIG).of("standstill")
     assert jumps.value == pytest.approx(8.0 - start, abs=0.25)
-    assert standstill_findings(run()) == []
+    assert list(standstill_findings(run())) == []
 
 
 def test_a_sensor_that_is_not_recorded_then_does_not_stand_still():
     short = Record({"command": run()["command"], "ft": run()["ft"].between(0.0, 2.0)})
-    assert standstill_findings(short) == []
+    assert list(standstill_findings(short)) == []
     slow = {n: Channel(c.t[9::10], c.y[9::10]) for n, c in run().channels.items() if n != "command"}
-    assert standstill_findings(Record({"command": run()["command"], **slow})) == []
+    assert list(standstill_findings(Record({"command": run()["command"], **slow}))) == []

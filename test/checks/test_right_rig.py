@@ -45,7 +45,7 @@ def test_a_rig_without_gravity_is_questioned_on_a_pendulum_that_swings_far():
     torque = 0.15 * np.gradient(v, t) + 0.05 * v + 3.0 * np.sin(q)
     record = Record({"command": Channel(t, torque), "position": Channel(t, q)}, "swing")
     assert [f.light for f in restoring_findings(record, load_rig("bare_drive"))] == ["red"]
-    assert restoring_findings(record, load_rig("pendulum")) == []
+    assert list(restoring_findings(record, load_rig("pendulum"))) == []
 
 
 @pytest.mark.parametrize(("name", "amplitude"), [("bare_drive", 15.0), ("pendulum", 1.0)])
