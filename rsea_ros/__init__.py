@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from rsea_ros.library.checking import check
     from rsea_ros.library.diagnosed import diagnose
     from rsea_ros.library.identified import identify
-    from rsea_ros.library.read_bag import read_bag
-    from rsea_ros.library.simulating import simulate
+    from rsea_ros.library.records import read_bag
+    from rsea_ros.library.records import simulate
     from rsea_ros.model.observer.observer import Observer, observe
     from rsea_ros.model.prediction_errors import predict
     from rsea_ros.model.rig import Rig
@@ -42,8 +42,8 @@ DOOR = {
     "load_rig": "model.rig_file",
     "observe": "model.observer.observer",
     "predict": "model.prediction_errors",
-    "read_bag": "library.read_bag",
-    "simulate": "library.simulating",
+    "read_bag": "library.records",
+    "simulate": "library.records",
 }
 """The names that `import rsea_ros` offers, and the module of each."""
 

@@ -106,6 +106,27 @@ def read_text(path: Path, wanted: Wanted) -> Table:
     return replace(reader.table(), notes=notes)
 
 
+def column_names(path: Path) -> tuple[dict[str, str], str]:
+    """Return what a row of units says of each column, by number where a name is not its own; the delimiter.
+
+    The table begins where the next lines have as many cells. Raises ValueError where it nowhere does.
+    """
+    comments, head = _head(path)
+    lines = [line for _, line in head]
+    wishes = [Wanted((), delimiter=one) for one in dict.fromkeys(layouts.DELIMITERS.values())]
+    for at in range(len(lines) - 1):
+        tried = [layouts.layout_of(lines[at:], comments, wanted, path)[1] for wanted in wishes]
+        for layout in sorted(tried, key=lambda one: -sum(map(bool, one.names))):
+            below = [layout.cells(line) for line in lines[at + 1 : at + 4]]
+            if len(layout.names) < 2 or any(len(cells) != len(layout.names) for cells in below):
+                continue
+            once = [name if layout.names.count(name) == 1 else "" for name in layout.names]
+            names = [name or str(number) for number, name in enumerate(once, 1)]
+            units = below[0] if is_row_of_texts(below[0]) else [""] * len(names)
+            return dict(zip(names, units, strict=True)), layout.delimiter
+    raise ValueError("no rows of the same number of cells, expected a table with two columns or more")
+
+
 def is_row_of_texts(cells: Sequence[str]) -> bool:
     """Return whether a row has texts and neither a number nor a list: the units of its columns."""
     filled = [cell for cell in cells if cell.lower() not in MISSING]
@@ -168,9 +189,11 @@ class _Reader:
         columns: dict[str, FloatArray] = {}
         labels: dict[str, Labels] = {}
         for column, parts in self._parts.items():
-            texts = [cell for part in parts if part.dtype.kind == "U" for cell in part]
-            if all(layouts.is_numeral(cell) or not cell for cell in texts):
-                whole = [np.where(p == "", "nan", p) if p.dtype.kind == "U" else p for p in parts]
+            sign = self._decimal
+            plain = [[layouts.numeral(c, sign) for c in p] if p.dtype.kind == "U" else p for p in parts]
+            texts = [cell for part in plain for cell in part if isinstance(cell, str)]
+            if all(is_decimal(cell) or not cell for cell in texts):
+                whole = [[c or "nan" for c in p] if isinstance(p, list) else p for p in plain]
                 columns[column] = np.concatenate([np.asarray(part, np.float64) for part in whole])
             else:
                 cells = [c if isinstance(c, str) else f"{c:.15g}" for part in parts for c in part]

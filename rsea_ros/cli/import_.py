@@ -3,15 +3,16 @@
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
+from shlex import quote
 
 from msg_adapters import write_record
-from msg_adapters.tables import Imported, ImportMap, import_records, load_map, summary
+from msg_adapters.tables import Imported, ImportMap, guess_map, import_records, load_map, summary
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._terminal import say, whole_numbers
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.cli.maps import map_path
-from rsea_ros.errors import OutputError
-from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
+from rsea_ros.errors import OutputError, ParameterError
+from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_file
 
 HELP = "convert a measurement (CSV, MAT, Parquet, NPZ, JSON) to a bag by a map of its columns"
 EXAMPLE = "rsea import run.csv --map map.yaml --out run"
@@ -24,11 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="measurements: .csv, .tsv or other text (also .gz), .mat (up to version 7), .parquet, .npz, "
         ".npy, .json, .jsonl; a directory for some maps",
     )  # fmt: skip
-    parser.add_argument("--map", required=True, help="map file (YAML), or the name of one in config/imports")
+    kind = parser.add_mutually_exclusive_group(required=True)
+    kind.add_argument("--map", help="map file (YAML), or the name of one in config/imports")
+    kind.add_argument("--guess", metavar="MAP", help="write a first map for FILE, a text, with its questions")
     out = (
         "bag to write: a directory, a file .mcap or .db3; for several files, joints or runs a folder of bags"
     )
-    parser.add_argument("--out", required=True, help=out)
+    parser.add_argument("--out", help=out)
     which = (
         "numbers of the joints in the place of # in the map's columns (q[#], from 0; J# torque): 2, "
         "or 0,1,2, or 0-5"
@@ -41,7 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the bags and print their contents."""
+    """Write the bags and print their contents, or a first map."""
+    if args.guess:
+        return _guess(args.files, Path(args.guess), args.force)
+    if args.out is None:
+        raise ParameterError("rsea import: no --out, expected a name for the bag")
     path = map_path(args.map)
     check_free([Path(args.out)], force=args.force, inputs=[*args.files, path])
     mapping = load_map(path)
@@ -53,6 +60,16 @@ def run(args: argparse.Namespace) -> int:
         lines = _write_several(args, mapping)
     for line in lines:
         say(line, indent=2)
+    return 0
+
+
+def _guess(files: list[str], path: Path, force: bool) -> int:
+    """Write a map for the first file, and say what comes next."""
+    check_free([path], force=force, inputs=files)
+    text = guess_map(files[0])
+    write_file(path, text, force=force)
+    say(f"{path}: a ? where the file says nothing, {text.count('?') - 1} times")
+    print(f"next: rsea import {quote(files[0])} --map {quote(str(path))} --out {quote(Path(files[0]).stem)}")
     return 0
 
 

@@ -129,9 +129,9 @@ def stopped_sensors(rig: Rig, noise: Noise) -> StoppedSensors:
 
 PERIODS = 64
 _COMMAND, _STATE, _FT = range(3)
-PATIENCE = 4.0
+PATIENCE = 6.0
 """s for which a topic that says nothing is waited for where all topics count in the order of their stamps:
-the middleware repairs what a busy machine lost after 3 s."""
+the middleware repairs after 3 s what a busy machine lost."""
 
 
 @dataclass(frozen=True)

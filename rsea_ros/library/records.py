@@ -1,17 +1,39 @@
-"""`rsea.simulate`: the simulated record of a bench, from commands at a fixed rate."""
+"""`rsea.read_bag` and `rsea.simulate`: the record of a run, recorded or simulated, without ROS."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from msg_adapters import TopicMap, read_record
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel, Record
+
+
+def read_bag(
+    path: str | Path | Sequence[str | Path],
+    *,
+    namespace: str = "/rsea",
+    joint: str | None = None,
+    axis: str = "torque.z",
+    strict: bool = True,
+) -> Record:
+    """Return the record of a rosbag2 directory, an .mcap or a .db3 file, or of several files of one run.
+
+    namespace: of the topics. joint: its name, if the messages hold several. axis: axis of the actuator in the
+    wrench; a leading `-` reverses it. strict: refuse commands that are missing or not finite, and correct the
+    stamps; with False all samples are kept as they were recorded.
+    Raises BagError with file, topic, field, value and expected value.
+    Not to be confused with `rsea import`, which converts tables to bags.
+    """
+    return read_record(path, topics=TopicMap(namespace=namespace, joint=joint, axis=axis), strict=strict)
 
 
 def simulate(
