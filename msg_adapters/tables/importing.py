@@ -221,7 +221,8 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
     lines = list(record.notes)
     linear = any(unit(term.unit)[0] in LINEAR for terms in mapping.channels.values() for term in terms)
     for name, channel in record.channels.items():
-        columns = " + ".join(_describe(term) for term in mapping.channels[name])
+        terms = mapping.channels[name]
+        columns = " + ".join(f"{term.column} [{plain(canonical(term.unit)) or 1}]" for term in terms)
         low, high = channel.y.min(), channel.y.max()
         si = plain(in_motion(UNITS[name], linear=linear))
         lines.append(f"{name}: {len(channel)} samples of {columns}, {low:.6g} to {high:.6g} {si}")
@@ -231,11 +232,6 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
             " torque or current as `command`, or the measured one where no other was logged"
         )
     return lines
-
-
-def _describe(term: ChannelTerm) -> str:
-    """Return `tau [N·m]`, however the map writes the unit."""
-    return f"{term.column} [{plain(canonical(term.unit)) or 1}]"
 
 
 def _rows_kept(table: Table, mapping: ImportMap, run: float | str | None) -> tuple[BoolArray, int]:

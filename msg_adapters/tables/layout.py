@@ -2,9 +2,10 @@
 
 import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
+from itertools import product
 from pathlib import Path
 
 from msg_adapters.tables.child import base_and_index
@@ -122,7 +123,8 @@ def layout_of(
         if all(_has(layout, column) for column in columns):
             return 0, layout
     for layout in (one for one in layouts if not one.headed):
-        for named in (TextLayout(layout.delimiter, n, False) for n in _commented(comments, known)):
+        for line, one in product(reversed(comments), known):  # as numpy.savetxt(header=…) writes them
+            named = TextLayout(layout.delimiter, tuple(split(line.lstrip(" \t#%"), one)), False)
             if len(named.names) == len(layout.names) and all(_names(named, column) for column in columns):
                 return 0, named
     for at in range(1, len(lines) if header is not False else 0):
@@ -130,12 +132,6 @@ def layout_of(
             if layout.headed and all(_names(layout, column) for column in columns):
                 return at, layout
     return 0, max(layouts, key=lambda one: (sum(_names(one, column) for column in columns), len(one.names)))
-
-
-def _commented(comments: Sequence[str], delimiters: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """Yield what may be the names of columns in comments, as numpy.savetxt(header=…) writes them."""
-    for line in reversed(comments):
-        yield from (tuple(split(line.lstrip(" \t#%"), one)) for one in delimiters)
 
 
 def _names(layout: TextLayout, column: str) -> bool:

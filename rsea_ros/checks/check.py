@@ -69,7 +69,8 @@ def check_record(
             if expected.is_commanded(checked.record) and not is_too_fast(checked.record):
                 every += _against_rig(checked, rig, axis, values)
         every += _other_axes(checked, rig, axis, wrench)
-    every = [in_words_of(record, finding) for finding in every if not _is_consequence(finding, every)]
+    red = {(f.kind, f.channel) for f in every if f.light == "red"}  # of which others are consequences
+    every = [in_words_of(record, f) for f in every if (_FOLLOWS.get(f.kind), f.channel) not in red]
     idle = (replace(f, kind="no_excitation") for f in every if (f.kind, f.light) == ("excitation", "red"))
     doubts = (*(f for f in every if f.kind in FAULTY and f.light != "green"), *idle)
     kept = {(f.kind, f.channel) for f in every}
@@ -78,12 +79,6 @@ def check_record(
     findings = tuple(_of_targets(f) for f in every) if rig.loop is not None else tuple(every)
     found = tuple(dict.fromkeys(findings))
     return Findings(record.source, rig.name, found, faults, pairs=checked.pairs, masked=checked.masked)
-
-
-def _is_consequence(finding: Finding, every: Sequence[Finding]) -> bool:
-    """Return whether a red finding of the same channel explains a finding."""
-    why = _FOLLOWS.get(finding.kind)
-    return any((f.kind, f.channel, f.light) == (why, finding.channel, "red") for f in every)
 
 
 def _no_targets(record: Record) -> Finding:

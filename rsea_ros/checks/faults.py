@@ -120,7 +120,7 @@ def check(record: Record, rig: Rig) -> Checked:
     """Find and mask the faults of a record; a channel of one sample, or without a good one, is missing."""
     few = {n: 1 if n in ("command", "reference") else 2 for n in record.channels}
     record = _without(record, {n for n, c in record.channels.items() if len(c) < few[n]})
-    faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing_channels(record, rig))]
+    faults = [*record.faults, *(Fault("missing_topic", n, 1.0) for n in rig.sensors if n not in record)]
     repaired, clock_faults = repair_stamps(record)
     faults += [f for n, c in repaired.channels.items() for f in rounded_stamps(c, n)]
     masked, marked = {}, {}
@@ -186,11 +186,6 @@ def _mask(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
 
 def _without(record: Record, names: Collection[str]) -> Record:
     return replace(record, channels={n: c for n, c in record.channels.items() if n not in names})
-
-
-def missing_channels(record: Record, rig: Rig) -> tuple[str, ...]:
-    """Return the channels of the rig's sensors that the record lacks."""
-    return tuple(n for n in rig.sensors if n not in record)
 
 
 def coarse(channel: Channel, name: str, rig: Rig) -> list[Fault]:

@@ -74,14 +74,13 @@ def worst(lights: Sequence[Light]) -> Light:
 
 
 def unused_sentence(record: Record, rig: Rig) -> str:
-    """Return which channels are not used and why, empty where all are."""
-    unused = ", ".join(n for n in record.channels if not _takes(rig, n))
+    """Return which channels a fit does not use and why, empty where it uses all.
+
+    A drive without a spring is judged by its torque.
+    """
+    beside = {"velocity"} if is_inverse(rig) else set()
+    unused = ", ".join(n for n in record.channels if not rig.measures(n) or n in beside)
     return f"a rig without a spring makes no use of {unused}" if unused else ""
-
-
-def _takes(rig: Rig, channel: str) -> bool:
-    """Return whether a fit of the rig uses a channel; a drive without a spring is judged by its torque."""
-    return rig.measures(channel) and not (is_inverse(rig) and channel == "velocity")
 
 
 _IN_A_MAP = (

@@ -128,15 +128,11 @@ def residual_at(setting: LinearSetting, state: LinearState) -> FitResidual:
     wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed, setting.rig))
     problem = Problem((case,), setting.rig, (*setting.values, *wide), setting.timed)
     theta = np.concatenate([state.theta, np.zeros(len(wide))])
-    residual, of = problem.residual(theta), _channel_of(case, setting.timed)
+    of = np.repeat(np.arange(len(setting.timed)), [int(case.mask[n].sum()) for n in setting.timed])
+    residual = problem.residual(theta)
     noise, y = _of_rows(case, case.noise, setting.timed), _of_rows(case, case.measured, setting.timed)
     plain = np.column_stack([1.0 / noise, y / noise + residual])
     return FitResidual(problem, theta, residual, plain, of, _misfits(residual, plain, of, len(setting.timed)))
-
-
-def _channel_of(case: Case, timed: Sequence[str]) -> IntArray:
-    """Return the channel of every row, as its number in `timed`."""
-    return np.repeat(np.arange(len(timed)), [int(case.mask[n].sum()) for n in timed])
 
 
 def _of_rows(case: Case, what: Mapping[str, float | FloatArray], timed: Sequence[str]) -> FloatArray:

@@ -47,15 +47,14 @@ JOINT = ("velocity", "position")
 _RELATIVE = "against the model; a delay of the drive looks the same"
 
 
-def clock_findings(linear: LinearisedFit, duration: float) -> list[Finding]:
-    """Return offset and drift of every sensor's stamps against the command's. duration: of the record, s."""
+def clock_findings(linear: LinearisedFit, duration: float) -> Iterator[Finding]:
+    """Yield offset and drift of every sensor's stamps against the command's. duration: of the record, s."""
     if not linear.settled:
-        return [Finding("green", "clock_offset", "", detail="not determined beside what the rig leaves")]
-    findings = []
+        yield Finding("green", "clock_offset", "", detail="not determined beside what the rig leaves")
+        return
     for name, offset in linear.offset.items():
-        findings.append(_offset(name, offset, linear))
-        findings.append(_drift(name, linear.drift[name], linear, duration))
-    return findings
+        yield _offset(name, offset, linear)
+        yield _drift(name, linear.drift[name], linear, duration)
 
 
 def _offset(name: str, offset: Number, linear: LinearisedFit) -> Finding:
@@ -110,12 +109,9 @@ def _is_clear(linear: LinearisedFit, names: Sequence[str]) -> bool:
 
 
 def _beside(linear: LinearisedFit, name: str) -> str:
-    misfit = linear.misfit[name]
-    return (
-        ""
-        if misfit < BESIDE
-        else f"; beside a misfit of {misfit:.0f} times the noise a cause may stand in for it"
-    )
+    if (misfit := linear.misfit[name]) < BESIDE:
+        return ""
+    return f"; beside a misfit of {misfit:.0f} times the noise a cause may stand in for it"
 
 
 _STEPS = 8

@@ -70,14 +70,13 @@ def excitation(record: Record, rig: Rig) -> Iterator[Finding]:
         )
 
 
-def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]:
-    """Return the noise of every sensor beside the rig's. record: finite values, rising stamps.
+def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> Iterator[Finding]:
+    """Yield the noise of every sensor beside the rig's. record: finite values, rising stamps.
 
     The floor of the spectrum holds what friction and play add; differences from sample to sample do not. Both
     must be loud; else the smaller is the noise, and not less than what the rig states.
     but: channels of which a part was masked and bridged.
     """
-    findings = []
     for name, sensor in rig.sensors.items():
         if name not in record or name in but or "command" not in record or len(record[name]) < 64:
             continue
@@ -86,15 +85,11 @@ def noises(record: Record, rig: Rig, but: Collection[str] = ()) -> list[Finding]
         floor, rough = noise_floor(record, name, sensor), float(np.median(fourth)) / 0.6745 / math.sqrt(70.0)
         loud = stated > 0.0 and min(floor, rough) > _LOUD * stated and name != "motor_torque"
         noise = floor if loud else min(floor, max(rough, stated))
-        unit = UNITS[name]
-        findings.append(
-            Finding(
-                "amber" if loud else "green", "noise", name, noise, unit,
-                expected=f"about {stated:.3g}" if stated else "", detail=_times(noise, stated),
-                remedy="look at cable and filter, or state this noise in the rig" if loud else "",
-            )
+        yield Finding(
+            "amber" if loud else "green", "noise", name, noise, UNITS[name],
+            expected=f"about {stated:.3g}" if stated else "", detail=_times(noise, stated),
+            remedy="look at cable and filter, or state this noise in the rig" if loud else "",
         )
-    return findings
 
 
 def _times(noise: float, stated: float) -> str:

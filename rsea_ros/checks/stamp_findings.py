@@ -6,6 +6,7 @@ Stamps at whole multiples of a step s, of samples whose period is no multiple of
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -145,19 +146,15 @@ def natural_frequency(rig: Rig) -> float | None:
     return float(sizes.min()) / (2.0 * math.pi) if len(sizes) else None
 
 
-def order(record: Record) -> list[Finding]:
-    """Return the channels whose stamps go back."""
-    findings = []
+def order(record: Record) -> Iterator[Finding]:
+    """Yield the channels whose stamps go back."""
     for name, channel in record.channels.items():
         back = int(np.count_nonzero(np.diff(channel.t) < 0.0))
         if back:
-            findings.append(
-                Finding(
-                    "amber", "order", name, float(back), "1", expected="rising stamps",
-                    detail="stamps go back", remedy=_REMEDIES["out_of_order"],
-                )
+            yield Finding(
+                "amber", "order", name, float(back), "1", expected="rising stamps",
+                detail="stamps go back", remedy=_REMEDIES["out_of_order"],
             )
-    return findings
 
 
 _STEPS = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5)

@@ -135,7 +135,8 @@ def judged(pairs: Sequence[Pair], rig: Rig) -> tuple[list[Verdict], list[Pair]]:
     """Return who is wrong, span by span, and the pairs of contradictions that convict nobody."""
     verdicts: list[Verdict] = []
     open_pairs: list[Pair] = []
-    for start, stop in _spans(pairs):
+    edges = sorted({v for p in pairs for v in (p.start, p.stop)})
+    for start, stop in ((a, b) for a, b in pairwise(edges) if b - a > _SHORTEST):
         within = [p for p in pairs if p.start < stop - 1e-6 and p.stop > start + 1e-6 and p.clear]
         for kind, equations in _kinds(within):
             changes, convicted = _explained(equations, kind, rig)
@@ -152,11 +153,6 @@ def _is_open(e: Equation, kept: Mapping[str, float], kind: str) -> bool:
     far = {"sign": 0.5, "scale": ALLOWED, "clock_offset": NEAR}[kind]
     rigless = not any("." in n for n in e.terms) and (e.pair.law.powers[-1] < 2 or e.pair.law.x == "ft")
     return rigless and abs(e.left(kept)) > _HOLDS and abs(e.left(kept) * e.sd) > far
-
-
-def _spans(pairs: Sequence[Pair]) -> list[tuple[float, float]]:
-    edges = sorted({v for p in pairs for v in (p.start, p.stop)})
-    return [(a, b) for a, b in pairwise(edges) if b - a > _SHORTEST]
 
 
 def _kinds(pairs: Sequence[Pair]) -> Iterable[tuple[str, list[Equation]]]:
@@ -188,16 +184,14 @@ def _signs(p: Pair) -> list[Equation]:
     return [Equation({p.law.y: 1.0, p.law.x: 1.0}, float(p.ratios[ks[0]] < 0.0), 0.15, p)]
 
 
-def _factors(p: Pair) -> list[Equation]:
-    found = []
+def _factors(p: Pair) -> Iterator[Equation]:
     for k in _sure(p):
         name = p.law.names[k]
         if name and (p.left > _MEASURED or p.coherence < _OF_ONE):
             continue
         tolerance = _OF_DAMPING if name.endswith("damping") else _TOLERANCE
         terms = {p.law.y: 1.0, p.law.x: -1.0} | ({name: 1.0} if name else {})
-        found.append(Equation(terms, math.log(abs(p.ratios[k])), math.hypot(tolerance, p.sds[k]), p))
-    return found
+        yield Equation(terms, math.log(abs(p.ratios[k])), math.hypot(tolerance, p.sds[k]), p)
 
 
 def _explained(equations: Sequence[Equation], kind: str, rig: Rig) -> tuple[dict[str, float], set[str]]:
@@ -418,11 +412,8 @@ def _contradiction(p: Pair) -> Finding:
     law = _SAYS.get((p.law.y, p.law.x), f"what {p.law.x} makes it by the rig's structure")
     sign = "-" if p.sign < 0 else ""
     size = f"{sign}{p.factor:.3g} times {law}" if p.sign else f"not {law}"
-    late = (
-        f", {1e3 * abs(p.lag):.3g} ms {'behind' if p.lag > 0.0 else 'ahead of'} it"
-        if abs(p.lag) > _IN_TIME
-        else ""
-    )
+    side = "behind" if p.lag > 0.0 else "ahead of"
+    late = f", {1e3 * abs(p.lag):.3g} ms {side} it" if abs(p.lag) > _IN_TIME else ""
     return Finding(
         "amber",
         "contradiction",

@@ -74,7 +74,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         except RseaError as error:
             return _fail(prefix, str(error))
         except OSError as error:
-            return _fail(prefix, _describe(error))
+            place = f"{os.fsdecode(error.filename)}: " if error.filename else ""
+            return _fail(prefix, f"{place}{error.strerror or error}")
         except KeyboardInterrupt as error:
             return _report_stop(prefix, error)
         except Exception as error:
@@ -188,12 +189,6 @@ class _Parser(argparse.ArgumentParser):
         given = [word.partition("=")[0] for word in self.words if word.startswith("--")]
         wrong = [word for word in given if not any(option.startswith(word) for option in self.options)]
         return did_you_mean(wrong[0], self.options) if wrong else ""
-
-
-def _describe(error: OSError) -> str:
-    """Return one line that names the file, if the error has it."""
-    reason = error.strerror or str(error)
-    return f"{os.fsdecode(error.filename)}: {reason}" if error.filename else reason
 
 
 def _fault(error: Exception) -> str:

@@ -77,14 +77,14 @@ def differences(
     rig: Rig, mine: Mapping[str, FloatArray], theirs: Mapping[str, FloatArray]
 ) -> tuple[Difference, ...]:
     """Return the difference of each channel whose noise the rig states, N samples against N."""
-    differences_found = []
+    apart = []
     for name in CHANNELS:
         noise = rig.sensors[name].noise if name in rig.sensors else 0.0
         if noise > 0.0 and name in mine and name in theirs:
-            apart = float(np.sqrt(np.mean((theirs[name] - mine[name]) ** 2)))
-            apart = apart if math.isfinite(apart) else math.inf
-            differences_found.append(Difference(name, UNITS[name], apart, float(np.std(mine[name])), noise))
-    return tuple(differences_found)
+            rms = float(np.sqrt(np.mean((theirs[name] - mine[name]) ** 2)))
+            rms = rms if math.isfinite(rms) else math.inf
+            apart.append(Difference(name, UNITS[name], rms, float(np.std(mine[name])), noise))
+    return tuple(apart)
 
 
 PIECE = 100

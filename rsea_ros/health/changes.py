@@ -21,16 +21,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.health import hypotheses as hypo
 from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, WatchSettings
-from rsea_ros.health.hypotheses import (
-    CHANNELS,
-    FILTER_SETTLING,
-    Bank,
-    ChangeHypothesis,
-    Look,
-    LookEvidence,
-    whiten,
-)
 from rsea_ros.health.recursive_estimates import Cusum, Estimates, Scatter, threshold
 from rsea_ros.model.observer.log import BatchObserver
 from rsea_ros.model.observer.signal_noise import Noise
@@ -58,7 +50,7 @@ class ChangeCause:
     explained: part of the excess of the innovations that it explains. cost: of the fit (see Fitter).
     """
 
-    hypothesis: ChangeHypothesis
+    hypothesis: hypo.ChangeHypothesis
     change: float
     ci95: tuple[float, float]
     probability: float
@@ -72,7 +64,7 @@ _Point = tuple[float, FloatArray, float]
 
 @dataclass(frozen=True)
 class _Fit:
-    hypothesis: ChangeHypothesis
+    hypothesis: hypo.ChangeHypothesis
     change: float
     cost: float
     sigma: float
@@ -81,11 +73,13 @@ class _Fit:
 class Fitter:
     """Fits over some looks. scale: standard deviation of the innovations by channel when all is right."""
 
-    def __init__(self, rig: Rig, noise: Noise, hold: float, looks: Sequence[Look], scale: FloatArray) -> None:
+    def __init__(
+        self, rig: Rig, noise: Noise, hold: float, looks: Sequence[hypo.Look], scale: FloatArray
+    ) -> None:
         self._rig, self._noise, self._hold = rig, noise, hold
         self._looks, self._scale = looks, scale
 
-    def causes(self, hypotheses: Sequence[ChangeHypothesis], starts: FloatArray) -> list[ChangeCause]:
+    def causes(self, hypotheses: Sequence[hypo.ChangeHypothesis], starts: FloatArray) -> list[ChangeCause]:
         """Return the FINALISTS causes, the most probable first. starts: changes to begin with, (p,)."""
         before = self._innovations(self._rig)
         usual = WHITE * float(np.isfinite(before).sum())
@@ -107,7 +101,7 @@ class Fitter:
         """Return the cost of the unchanged rig on the looks; zero without any."""
         return cost(self._innovations(self._rig)) if self._looks else 0.0
 
-    def _finalists(self, hypotheses: Sequence[ChangeHypothesis], starts: FloatArray) -> list[_Fit]:
+    def _finalists(self, hypotheses: Sequence[hypo.ChangeHypothesis], starts: FloatArray) -> list[_Fit]:
         """Return the fits to the clearest look that explain it best, the best first."""
         look = max(self._looks, key=lambda one: self._on(one).now())
         clearest = self._on(look)
@@ -115,11 +109,11 @@ class Fitter:
         fits = clearest._fits(sorted(begun, key=lambda one: one[1][2]))
         return sorted(fits, key=lambda fit: fit.cost)[:FINALISTS]
 
-    def _on(self, look: Look) -> Fitter:
+    def _on(self, look: hypo.Look) -> Fitter:
         """Return the fitter of a single look."""
         return Fitter(self._rig, self._noise, self._hold, [look], self._scale)
 
-    def _fits(self, begun: Iterable[tuple[ChangeHypothesis, _Point]]) -> list[_Fit]:
+    def _fits(self, begun: Iterable[tuple[hypo.ChangeHypothesis, _Point]]) -> list[_Fit]:
         """Return the fits of hypotheses from the points given; a hopeless one ends early."""
         fits: list[_Fit] = []
         for hypothesis, first in begun:
@@ -127,14 +121,14 @@ class Fitter:
             fits.append(self._fit(hypothesis, first, limit))
         return fits
 
-    def _start(self, hypothesis: ChangeHypothesis, start: float) -> _Point:
+    def _start(self, hypothesis: hypo.ChangeHypothesis, start: float) -> _Point:
         """Return the best of some changes to begin with."""
         low, high = hypothesis.low - hypothesis.value, hypothesis.high - hypothesis.value
         starts = (start, *(k * hypothesis.least for k in STARTS))
         tried = [self._at(hypothesis, change) for change in {min(max(s, low), high) for s in starts}]
         return min(tried, key=lambda one: one[2])
 
-    def _fit(self, hypothesis: ChangeHypothesis, first: _Point, limit: float) -> _Fit:
+    def _fit(self, hypothesis: hypo.ChangeHypothesis, first: _Point, limit: float) -> _Fit:
         """Return the best fit of one hypothesis: Gauss-Newton with the weights of the cost."""
         low, high = hypothesis.low - hypothesis.value, hypothesis.high - hypothesis.value
         change, w, size = first
@@ -159,14 +153,14 @@ class Fitter:
                 break
         return _Fit(hypothesis, change, size, max(sigma, 0.5 * hypothesis.grain / Z95))
 
-    def _at(self, hypothesis: ChangeHypothesis, change: float) -> _Point:
+    def _at(self, hypothesis: hypo.ChangeHypothesis, change: float) -> _Point:
         """Return a change, its innovations and their cost."""
         w = self._innovations(hypothesis.change(self._rig, change))
         return change, w, cost(w)
 
     def _innovations(self, rig: Rig) -> FloatArray:
         observer = BatchObserver(rig, self._noise, hold=self._hold)
-        by_look = (zip(whiten(observer, look), self._scale, strict=True) for look in self._looks)
+        by_look = (zip(hypo.whiten(observer, look), self._scale, strict=True) for look in self._looks)
         return np.concatenate([w / s for look in by_look for w, s in look])
 
 
@@ -198,7 +192,7 @@ class _Base:
     """The model that a joint is compared with, and its date (s)."""
 
     rig: Rig
-    hypotheses: tuple[ChangeHypothesis, ...]
+    hypotheses: tuple[hypo.ChangeHypothesis, ...]
     since: float = -math.inf
     last: str = ""
 
@@ -222,13 +216,13 @@ class Changes:
     """Pass looks to `take`; when there is a `job`, run it and pass its result to `conclude`."""
 
     def __init__(
-        self, rig: Rig, noise: Noise, hypotheses: Sequence[ChangeHypothesis], models: Mapping[str, float],
-        scatter: Scatter, settings: WatchSettings,
+        self, rig: Rig, noise: Noise, hypotheses: Sequence[hypo.ChangeHypothesis],
+        models: Mapping[str, float], scatter: Scatter, settings: WatchSettings,
     ) -> None:  # fmt: skip
         """models: values of the last model by name, against which sizes are said."""
         self._noise, self._scatter, self._settings = noise, scatter, settings
         self._models = dict(models)
-        self._looks: deque[Look] = deque(maxlen=REMEMBERED)
+        self._looks: deque[hypo.Look] = deque(maxlen=REMEMBERED)
         self._before: _Base | None = None
         self.findings: dict[str, HealthFinding] = {}
         self.job: Job | None = None
@@ -237,10 +231,10 @@ class Changes:
     def _begin(self, base: _Base) -> None:
         """Begin to look for changes from a base."""
         self._base = base
-        self.bank = Bank(base.rig, self._noise, base.hypotheses, self._settings.hold)
+        self.bank = hypo.Bank(base.rig, self._noise, base.hypotheses, self._settings.hold)
         inner, outer = (np.array([getattr(h, n) for h in base.hypotheses]) for n in ("inner", "outer"))
-        loud = np.full(len(CHANNELS), 1.0)
-        h = threshold(self._settings.rate, 2 * len(inner) + len(CHANNELS), self._settings.every)
+        loud = np.full(len(hypo.CHANNELS), 1.0)
+        h = threshold(self._settings.rate, 2 * len(inner) + len(hypo.CHANNELS), self._settings.every)
         self._cusum = Cusum(np.append(inner, LOUD * loud), np.append(outer, LOUDER * loud), h)
         self.estimates = Estimates(base.hypotheses)
         self._wait = self._patience = 0
@@ -250,7 +244,7 @@ class Changes:
         """Whether more should be looked at now: not for long where no cause is sure."""
         return self._cusum.suspects and self._patience <= PATIENT
 
-    def take(self, look: Look, evidence: LookEvidence) -> None:
+    def take(self, look: hypo.Look, evidence: hypo.LookEvidence) -> None:
         """Process a look with motion."""
         self._looks.append(look)
         score, information = evidence.scale_sums(self._scatter.scale)
@@ -268,7 +262,7 @@ class Changes:
         """Request a fit of each cause: to the newest looks, and to the first ones of this change."""
         since = min(max(self._cusum.since, 1), len(self._looks))
         recent = list(self._looks)[-since:]
-        self._began = recent[0].t[0] + FILTER_SETTLING
+        self._began = recent[0].t[0] + hypo.FILTER_SETTLING
         looks = _spread(recent, self._settings.fitted)
         first = [look for look in self._looks if self._base.since <= look.t[0] < recent[0].t[0]][:2]
         base, before = self._base, self._before
@@ -282,7 +276,7 @@ class Changes:
 
         self.job = fit
 
-    def _fitter(self, base: _Base, looks: Sequence[Look]) -> Fitter:
+    def _fitter(self, base: _Base, looks: Sequence[hypo.Look]) -> Fitter:
         return Fitter(base.rig, self._noise, self._settings.hold, looks, self._scatter.scale)
 
     def conclude(self, answer: CandidateCauses) -> HealthFinding | None:
@@ -334,7 +328,8 @@ class Changes:
         self.findings = {n: f for n, f in self.findings.items() if f.confidence >= SURE}
         changed = _is_change(h, finding.size)
         self._before = replace(self._base, last=h.name) if changed else None
-        self._begin(_Base(h.change(self._base.rig, cause.change), hypotheses, self._began - FILTER_SETTLING))
+        began = self._began - hypo.FILTER_SETTLING
+        self._begin(_Base(h.change(self._base.rig, cause.change), hypotheses, began))
         if not changed:
             self.findings.pop(h.name, None)
             return None
@@ -342,12 +337,12 @@ class Changes:
         return finding
 
 
-def _is_change(hypothesis: ChangeHypothesis, size: float) -> bool:
+def _is_change(hypothesis: hypo.ChangeHypothesis, size: float) -> bool:
     """Return whether a parameter that is so far off the last model is beyond that model's doubt."""
     return abs(size) > hypothesis.inner + 0.5 * hypothesis.least
 
 
-def _spread(looks: Sequence[Look], count: int) -> list[Look]:
+def _spread(looks: Sequence[hypo.Look], count: int) -> list[hypo.Look]:
     """Return some of the looks, evenly spread, the newest among them."""
     at = np.unique(np.linspace(0, len(looks) - 1, min(count, len(looks))).round().astype(int))
     return [looks[k] for k in at]

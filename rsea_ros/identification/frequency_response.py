@@ -41,15 +41,7 @@ from numpy.fft import irfft, rfft
 from numpy.polynomial.polynomial import polyval
 
 from rsea_ros.effects import signal_table as st
-from rsea_ros.identification.local_polynomial import (
-    Aligned,
-    AtRestError,
-    Lines,
-    align,
-    detrend,
-    local_polynomial,
-    widen,
-)
+from rsea_ros.identification import local_polynomial as lpm
 from rsea_ros.identification.problem import FEWEST
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.equations import Mechanics
@@ -70,7 +62,7 @@ _OVERLAP_CORRELATION = 1.0 / 6.0
 _TINY = 1e-300
 
 
-def suits(aligned: Aligned) -> bool:
+def suits(aligned: lpm.Aligned) -> bool:
     """Return whether a record is long enough for this method, and its command alike in all segments.
 
     A sweep has its low frequencies in few segments: (sum |U|^2)^2 / sum |U|^4 counts them.
@@ -84,7 +76,7 @@ def suits(aligned: Aligned) -> bool:
     return float(np.quantile(bearing, 0.05)) > _ALIKE * len(starts)
 
 
-def welch(aligned: Aligned) -> Lines:
+def welch(aligned: lpm.Aligned) -> lpm.Lines:
     """Return the response by averaging over the segments that have no gap."""
     length = _length(aligned)
     starts = _starts(aligned, length)
@@ -98,22 +90,22 @@ def welch(aligned: Aligned) -> Lines:
     spread = np.sqrt(residual * np.maximum(s_uu + 2.0 * _OVERLAP_CORRELATION * overlap, 0.5 * s_uu)) / s_uu
     s_yy = np.sum(np.abs(y) ** 2, axis=0) + _TINY
     keep = slice(_FIRST_LINE, None)
-    return Lines(
+    return lpm.Lines(
         method="Welch", frequency=(np.arange(u.shape[1]) / (length * aligned.period))[keep],
-        response=response[keep], sd=widen(spread, effective - 1.0)[keep],
+        response=response[keep], sd=lpm.widen(spread, effective - 1.0)[keep],
         coherence=np.minimum(np.abs(response) ** 2 * s_uu / s_yy, 1.0)[keep],
         noise=(np.sqrt(2.0 * residual / np.sum(hann(length) ** 2) / length))[keep],
     )
 
 
-def _length(aligned: Aligned) -> int:
+def _length(aligned: lpm.Aligned) -> int:
     """Return the segment length in samples, even."""
     duration = len(aligned.command) * aligned.period
     seconds = min(LONGEST_SEGMENT, duration / (FEWEST_SEGMENTS / 2.0 + 1.0))
     return 2 * int(next_fast_length(int(seconds / aligned.period / 2.0), real=True))
 
 
-def _starts(aligned: Aligned, length: int) -> IntArray:
+def _starts(aligned: lpm.Aligned, length: int) -> IntArray:
     starts = np.arange(0, len(aligned.command) - length + 1, length // 2)
     missing = np.concatenate([[0], np.cumsum(~aligned.measured)])
     whole: IntArray = starts[missing[starts + length] == missing[starts]]
@@ -122,7 +114,7 @@ def _starts(aligned: Aligned, length: int) -> IntArray:
 
 def _segments(values: FloatArray, starts: IntArray, length: int) -> ComplexArray:
     """Return the windowed spectra, shape (segments, lines)."""
-    windows = np.lib.stride_tricks.sliding_window_view(detrend(values), length)[starts]
+    windows = np.lib.stride_tricks.sliding_window_view(lpm.detrend(values), length)[starts]
     spectra: ComplexArray = rfft(windows * hann(length), axis=1)
     return spectra
 
@@ -146,7 +138,7 @@ _NO_DELAY_WITHIN = 1.2
 
 
 def unfold(
-    aligned: Aligned, frequency: FloatArray, measured: ComplexArray, sd: FloatArray
+    aligned: lpm.Aligned, frequency: FloatArray, measured: ComplexArray, sd: FloatArray
 ) -> tuple[ComplexArray, FloatArray]:
     """Return the continuous-time response and its sd. frequency: Hz; measured: output per held command."""
     x = frequency * aligned.period
@@ -295,7 +287,7 @@ class Distortion:
         return np.sqrt(np.sum(known, axis=0)) if known else None
 
 
-def multisine(aligned: Aligned, periods: Periods) -> Lines:
+def multisine(aligned: lpm.Aligned, periods: Periods) -> lpm.Lines:
     """Return the response at the excited lines. The first period is left to settle."""
     u, y = (_periods(x, periods) for x in (aligned.command, aligned.output))
     whole = _periods(aligned.measured.astype(float), periods, spectrum=False).all(axis=1)
@@ -309,10 +301,10 @@ def multisine(aligned: Aligned, periods: Periods) -> Lines:
     spread = np.sqrt(variance[excited] / count + odd) / np.abs(mean_u[excited])
     freedom = (count - 1) * (1.0 + odd / (variance[excited] / count + 1e-300))
     power = np.abs(mean_y[excited]) ** 2
-    return Lines(
+    return lpm.Lines(
         method="multisine", frequency=excited / (periods.length * aligned.period),
         response=mean_y[excited] / mean_u[excited],
-        sd=widen(spread, np.minimum(freedom, count - 1 + _SMOOTHED)),
+        sd=lpm.widen(spread, np.minimum(freedom, count - 1 + _SMOOTHED)),
         coherence=power / (power + variance[excited] + 1e-300), noise=levels.noise * np.sqrt(count),
         distortion=levels.total,
     )
@@ -362,12 +354,12 @@ HIGHEST = 0.45
 """Of the sample rate: above it an image is as large as the response itself."""
 
 
-def sampled_lines(aligned: Aligned) -> Lines:
+def sampled_lines(aligned: lpm.Aligned) -> lpm.Lines:
     """Return the sampled response by the method that the command allows."""
     periods = find_periods(aligned.command)
     if periods is not None:
         return multisine(aligned, periods)
-    return welch(aligned) if suits(aligned) else local_polynomial(aligned)
+    return welch(aligned) if suits(aligned) else lpm.local_polynomial(aligned)
 
 
 def estimate_response(record: Record, output: str) -> FrequencyResponse:
@@ -375,7 +367,7 @@ def estimate_response(record: Record, output: str) -> FrequencyResponse:
 
     Raises ChannelError for a missing channel and IdentificationError for one too short.
     """
-    aligned = align(record, output)
+    aligned = lpm.align(record, output)
     lines = sampled_lines(aligned).up_to(HIGHEST * min(1.0 / aligned.period, aligned.rate))
     response, sd = unfold(aligned, lines.frequency, lines.response, lines.sd)
     return FrequencyResponse(
@@ -395,7 +387,7 @@ def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
         return ()
     responses = []
     for name in (n for n in outputs if len(record[n]) >= FEWEST and not record[n].is_still):
-        with suppress(AtRestError):
+        with suppress(lpm.AtRestError):
             responses.append(estimate_response(record, name))
     return tuple(r for r in responses if len(r.frequency) > 0)
 

@@ -15,19 +15,8 @@ from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.identification.solver import one_blas_thread
 from rsea_ros.identification.unknowns import apply
+from rsea_ros.laws import choice as choices
 from rsea_ros.laws.candidates import SPLINES, TermCandidate, basis_of, spline_knots
-from rsea_ros.laws.choice import (
-    FITTED,
-    Base,
-    Choice,
-    Search,
-    chosen_models,
-    fitted_base,
-    is_better,
-    levels_of,
-    make_search,
-    summarize_models,
-)
 from rsea_ros.laws.effect_source import LawProvenance
 from rsea_ros.laws.file import Draft, Refined, draft_of, finish_laws, refine
 from rsea_ros.laws.law import FittedTerm, Law, LawResult, LearntCurve, WrittenLaw, ranges_of
@@ -41,11 +30,11 @@ _NEEDED = 0.03
 """Of what is left: a term without which the fit leaves no more than that is left out."""
 
 
-def refined_laws(base: Base, drafts: Sequence[Draft]) -> Refined:
+def refined_laws(base: choices.Base, drafts: Sequence[Draft]) -> Refined:
     """Fit the laws in the simulation, in units of their residual, and drop needless terms."""
     starts = [(d.effect, d.law.parameters) for d in drafts]
-    refined = refine(base.solution, base.cases, base.score(FITTED), starts)
-    weights = _score(base, refined, FITTED)
+    refined = refine(base.solution, base.cases, base.score(choices.FITTED), starts)
+    weights = _score(base, refined, choices.FITTED)
     refined = _again(base, drafts, refined, weights, frozenset())
     held: frozenset[str] = frozenset()
     while (names := _least(drafts, refined, held)) is not None:
@@ -57,7 +46,7 @@ def refined_laws(base: Base, drafts: Sequence[Draft]) -> Refined:
 
 
 def _again(
-    base: Base, drafts: Sequence[Draft], refined: Refined, weights: Score, held: frozenset[str]
+    base: choices.Base, drafts: Sequence[Draft], refined: Refined, weights: Score, held: frozenset[str]
 ) -> Refined:
     """Fit from a fit on, with some parameters held: coefficients at zero, shapes where they are."""
     nearer = replace(base.solution, theta=refined.solution.theta[: len(base.solution.theta)])
@@ -86,13 +75,13 @@ def _least(drafts: Sequence[Draft], refined: Refined, held: frozenset[str]) -> f
     return frozenset({f"{effect}.{c}", *([f"{effect}.{s}"] if s and not shared else [])})
 
 
-def _score(base: Base, refined: Refined, sets: tuple[int, ...]) -> Score:
+def _score(base: choices.Base, refined: Refined, sets: tuple[int, ...]) -> Score:
     """Return the score of refined laws on some sets of blocks."""
     problem = replace(refined.solution.problem, cases=base.cases)
     return score_on(problem, base.cases, sets, problem.outputs(refined.solution.theta), DEFAULT.blocks)
 
 
-def gain_on_tests(base: Base, refined: Refined) -> tuple[float, tuple[float, float]]:
+def gain_on_tests(base: choices.Base, refined: Refined) -> tuple[float, tuple[float, float]]:
     """Return the gain on the test blocks with its interval."""
     return gain_of(base.score(TEST), _score(base, refined, TEST))
 
@@ -193,23 +182,23 @@ def learn(
     tell = progress or (lambda step, share: None)
     with one_blas_thread():
         tell("fitting the model", 0.0)
-        base = fitted_base(records, rig)
+        base = choices.fitted_base(records, rig)
         if is_at_floor(base.score(TEST)):
             return nothing_left(base, records)
         tell("looking for what is missing", 0.2)
-        search = make_search(base)
+        search = choices.make_search(base)
         tell("comparing laws", 0.6)
         depends = dependences(search.gram, search.candidates)
-        models = chosen_models(search, depends)
+        models = choices.chosen_models(search, depends)
         taken = [k for m in models.taken for k in m.columns]
         depends = dependences(search.gram, search.candidates, taken) if taken else depends
         tell("fitting the law in the simulation", 0.75)
         return _result(search, depends, models, records, provenance)
 
 
-def nothing_left(base: Base, records: Sequence[Record]) -> LawResult:
+def nothing_left(base: choices.Base, records: Sequence[Record]) -> LawResult:
     """Return the result where the base model is at the noise floor."""
-    before, noise = levels_of(base.problem, base.outputs, base.cases)
+    before, noise = choices.levels_of(base.problem, base.outputs, base.cases)
     rig = apply(base.problem.rig, base.problem.unknowns, base.solution.theta)[0]
     duration = sum(c.duration for c in base.cases)
     return LawResult(rig.name, tuple(r.source for r in records), duration, rig, rig,
@@ -217,7 +206,7 @@ def nothing_left(base: Base, records: Sequence[Record]) -> LawResult:
 
 
 def _result(
-    search: Search, depends: Sequence[Dependence], choice: Choice, records: Sequence[Record],
+    search: choices.Search, depends: Sequence[Dependence], choice: choices.Choice, records: Sequence[Record],
     provenance: LawProvenance | None,
 ) -> LawResult:  # fmt: skip
     base = search.base
@@ -231,12 +220,12 @@ def _result(
     with lend(*(d.effect for d in drafts)):
         refined = refined_laws(base, drafts) if drafts else None
         gain, ci95 = gain_on_tests(base, refined) if refined else (0.0, (0.0, 0.0))
-        if refined is None or not is_better(gain, ci95):
+        if refined is None or not choices.is_better(gain, ci95):
             return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,
-                           tried=summarize_models(search, choice, ()))  # fmt: skip
-        before, noise = levels_of(base.problem, base.outputs, base.cases)
+                           tried=choices.summarize_models(search, choice, ()))  # fmt: skip
+        before, noise = choices.levels_of(base.problem, base.outputs, base.cases)
         problem = replace(refined.solution.problem, cases=base.cases)
-        after = levels_of(problem, problem.outputs(refined.solution.theta), base.cases)[0]
+        after = choices.levels_of(problem, problem.outputs(refined.solution.theta), base.cases)[0]
         share = share_of(before, after, noise)
         written = finish_laws(drafts, refined, base.cases, provenance, gain, ci95)
         rigs = [
@@ -246,8 +235,9 @@ def _result(
         rig_name=rigs[0].name, sources=tuple(r.source for r in records),
         duration=sum(c.duration for c in base.cases), base_rig=rigs[0],
         rig=_with_files(rigs[1], rigs[0], written),
-        dependences=tuple(depends), tried=summarize_models(search, choice, choice.taken), laws=tuple(written),
-        gain=gain, gain_ci95=ci95, share=share, before=before, after=after, noise=noise, at_floor=False,
+        dependences=tuple(depends), tried=choices.summarize_models(search, choice, choice.taken),
+        laws=tuple(written), gain=gain, gain_ci95=ci95, share=share, before=before, after=after, noise=noise,
+        at_floor=False,
     )  # fmt: skip
 
 

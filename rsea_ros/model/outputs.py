@@ -17,17 +17,7 @@ from typing import Literal
 import numpy as np
 
 from rsea_ros.errors import RigError
-from rsea_ros.model.equations import (
-    COORDINATES,
-    END_COORDINATES,
-    PORT_DIRECTIONS,
-    PORTS,
-    C,
-    D,
-    H,
-    actuator_matrices,
-    owners,
-)
+from rsea_ros.model import equations
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
 
@@ -50,17 +40,17 @@ class Output:
 
 def position() -> Output:
     """Return the gear output's angle against the housing, rad, as the encoder reads it."""
-    return _of_coordinates({C: 1.0, H: -1.0})
+    return _of_coordinates({equations.C: 1.0, equations.H: -1.0})
 
 
 def link() -> Output:
     """Return the angle of what hangs on the spring against the housing, rad."""
-    return _of_coordinates({D: 1.0, H: -1.0})
+    return _of_coordinates({equations.D: 1.0, equations.H: -1.0})
 
 
 def deflection() -> Output:
     """Return the spring's angle, rad."""
-    return _of_coordinates({C: 1.0, D: -1.0})
+    return _of_coordinates({equations.C: 1.0, equations.D: -1.0})
 
 
 def distal(rig: Rig, sees: Sees = "spring_and_damper") -> Output:
@@ -80,13 +70,14 @@ def end_torque(rig: Rig, end: str, sees: Sees = "spring_and_damper") -> Output:
     """
     if end == "spring_end" and sees == "element":
         return _spring_element(rig)
-    coordinate = next(c for c, name in END_COORDINATES if name == end)
-    owner = owners(rig)
+    coordinate = next(c for c, name in equations.END_COORDINATES if name == end)
+    owner = equations.owners(rig)
     rows = [c for c in owner if owner[c] == owner[coordinate]]
     sign = 1.0 if end == "housing_end" else -1.0
-    mass, damping, stiffness = (sign * matrix[rows].sum(axis=0) for matrix in actuator_matrices(rig))
-    inside = np.isin(PORTS, ("gear", "spring", "joint"))
-    torques = PORT_DIRECTIONS[:, rows].sum(axis=1) * inside
+    matrices = equations.actuator_matrices(rig)
+    mass, damping, stiffness = (sign * matrix[rows].sum(axis=0) for matrix in matrices)
+    inside = np.isin(equations.PORTS, ("gear", "spring", "joint"))
+    torques = equations.PORT_DIRECTIONS[:, rows].sum(axis=1) * inside
     return Output(np.array([stiffness, damping, mass]), -sign * torques)
 
 
@@ -95,11 +86,11 @@ def _spring_element(rig: Rig) -> Output:
         raise RigError(
             f"rig {rig.name}: spring.rigid = True, expected a spring with a stiffness to read its element"
         )
-    return Output(rig["spring.stiffness"] * deflection().c, np.zeros(len(PORTS)))
+    return Output(rig["spring.stiffness"] * deflection().c, np.zeros(len(equations.PORTS)))
 
 
 def _of_coordinates(factors: Mapping[int, float]) -> Output:
-    c = np.zeros((3, COORDINATES))
+    c = np.zeros((3, equations.COORDINATES))
     for coordinate, factor in factors.items():
         c[0, coordinate] = factor
-    return Output(c, np.zeros(len(PORTS)))
+    return Output(c, np.zeros(len(equations.PORTS)))

@@ -14,23 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.errors import ChannelError
-from rsea_ros.records.holds import (
-    COMMANDS,
-    behind_the_edge,
-    paused_steps,
-    with_held_commands,
-    without_held_samples,
-)
+from rsea_ros.records import holds, stamp_order
 from rsea_ros.records.record import SENSED, BoolArray, Channel, Fault, FloatArray, Record
-from rsea_ros.records.stamp_order import (
-    LONGEST_PAUSE,
-    dropped_samples,
-    far_apart,
-    jumps_back,
-    median_period,
-    sort_by_stamp,
-    stray_fault,
-)
 
 _FEWEST = 10
 """Samples of a channel: fewer say little of when it started."""
@@ -199,17 +184,18 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     channels = {}
     for name, channel in record.channels.items():
         channel, jumps = _without_jumps(channel, name, _expected_span(record, name), _pauses(record, name))
-        channel, disorder = sort_by_stamp(channel, name, record.keeps_rows)
+        channel, disorder = stamp_order.sort_by_stamp(channel, name, record.keeps_rows)
         count = len(channel)
         channel, repeats = _without_repeats(channel, name)
         faults += [*jumps, *disorder, *repeats]
         _check_even(channel, f"{record.source}: {name}")
-        pauses = paused_steps(record.with_channels(**{name: channel}), name) if name in COMMANDS else None
-        faults += dropped_samples(channel, name, count - len(channel), pauses)
+        ordered = record.with_channels(**{name: channel})
+        pauses = holds.paused_steps(ordered, name) if name in holds.COMMANDS else None
+        faults += stamp_order.dropped_samples(channel, name, count - len(channel), pauses)
         channels[name] = channel
-    repaired, held = without_held_samples(record.with_channels(**channels))
-    repaired, _ = with_held_commands(repaired)
-    repaired, early = behind_the_edge(repaired)
+    repaired, held = holds.without_held_samples(record.with_channels(**channels))
+    repaired, _ = holds.with_held_commands(repaired)
+    repaired, early = holds.behind_the_edge(repaired)
     faults += [*held, *early]
     explained = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}
     new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in explained]
@@ -246,11 +232,11 @@ def _check_even(channel: Channel, where: str) -> None:
     """
     if len(channel) < 3:
         return
-    places = float(np.ptp(channel.t)) / median_period(channel.t)
+    places = float(np.ptp(channel.t)) / stamp_order.median_period(channel.t)
     if places > max(_MOST_PLACES, _MOST_PER_SAMPLE * len(channel)):
         raise ChannelError(
-            f"{where}: {len(channel)} stamps, half of them {median_period(channel.t):.3g} s apart, over"
-            f" {np.ptp(channel.t):.3g} s, expected even sampling"
+            f"{where}: {len(channel)} stamps, half of them {stamp_order.median_period(channel.t):.3g} s "
+            f"apart, over {np.ptp(channel.t):.3g} s, expected even sampling"
         )
 
 
@@ -261,8 +247,9 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
     for name, channel in record.channels.items():
         channels[name], stray = _without_stray_parts(channel, name, record.keeps_rows)
         faults += stray
+    periods = {name: _SHORTEST_JUMP * stamp_order.median_period(c.t) for name, c in channels.items()}
     pauses = {
-        name: np.abs(np.diff(c.t)) > max(LONGEST_PAUSE, _SHORTEST_JUMP * median_period(c.t))
+        name: np.abs(np.diff(c.t)) > max(stamp_order.LONGEST_PAUSE, periods[name])
         for name, c in channels.items()
     }
     if all(at.any() for at in pauses.values()):
@@ -274,10 +261,10 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
 
 def _without_stray_parts(channel: Channel, name: str, keep: bool) -> tuple[Channel, list[Fault]]:
     """Leave out the few samples that lie far from the others."""
-    stray = far_apart(channel.t, LONGEST_PAUSE)
+    stray = stamp_order.far_apart(channel.t, stamp_order.LONGEST_PAUSE)
     if keep or not stray.any():
         return channel, []
-    return Channel(channel.t[~stray], channel.y[~stray]), [stray_fault(stray, name)]
+    return Channel(channel.t[~stray], channel.y[~stray]), [stamp_order.stray_fault(stray, name)]
 
 
 def _expected_span(record: Record, name: str) -> float:
@@ -295,7 +282,7 @@ def _pauses(record: Record, name: str) -> FloatArray:
     t = record[beside].t
     if len(t) < 3:
         return np.empty((2, 0))
-    long = np.diff(t) > _SHORTEST_JUMP * median_period(t)
+    long = np.diff(t) > _SHORTEST_JUMP * stamp_order.median_period(t)
     return np.array([t[:-1][long], t[1:][long]])
 
 
@@ -308,9 +295,9 @@ def _without_jumps(
     """
     if len(channel) < 3:
         return channel, []
-    at = jumps_back(channel.t)
+    at = stamp_order.jumps_back(channel.t)
     step = np.diff(channel.t)
-    period = median_period(channel.t)
+    period = stamp_order.median_period(channel.t)
     surplus = float(channel.t[-1] - channel.t[0]) - expected if expected else 0.0
     largest = int(np.argmax(step))
     if (
@@ -332,7 +319,7 @@ def _is_shared(step: FloatArray, beside: FloatArray) -> bool:
 def _shorten_steps(channel: Channel, name: str, at: BoolArray) -> tuple[Channel, list[Fault]]:
     """Return the channel with each step of `at` as long as a period, and the fault."""
     step = np.diff(channel.t)
-    shift = np.concatenate([[0.0], np.cumsum(np.where(at, step - median_period(channel.t), 0.0))])
+    shift = np.concatenate([[0.0], np.cumsum(np.where(at, step - stamp_order.median_period(channel.t), 0.0))])
     first, largest = int(np.argmax(at)), float(np.abs(shift).max())
     detail = f"{largest:.4g} s at {channel.t[first]:.3f} s"
     share = 1.0 - (first + 1) / len(channel.t)

@@ -16,15 +16,7 @@ from dynamixel_sdk import (
     Protocol2PacketHandler,
 )
 
-from rsea_ros.hardware.dynamixel.frames import (
-    LONGEST,
-    OVERHEAD,
-    StatusFrameParser,
-    crc16,
-    frame,
-    stuff,
-    unstuff,
-)
+from rsea_ros.hardware.dynamixel import frames
 from rsea_ros.hardware.dynamixel.port import SerialPort
 
 EMPTY = 11
@@ -41,7 +33,7 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
     """
 
     def __init__(self) -> None:
-        self.receiver = StatusFrameParser()
+        self.receiver = frames.StatusFrameParser()
         self.stale = self.acknowledged = 0
         self.expected: int | None = None
         self.meanwhile: Callable[[], None] | None = None
@@ -49,26 +41,26 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
 
     def updateCRC(self, crc_accum: int, data_blk_ptr: Sequence[int], data_blk_size: int) -> int:
         """Return the CRC of the first bytes of a block."""
-        return crc16(data_blk_ptr[:data_blk_size], crc_accum)
+        return frames.crc16(data_blk_ptr[:data_blk_size], crc_accum)
 
     def addStuffing(self, packet: Sequence[int]) -> list[int]:
         """Return a packet with INST and parameters stuffed and LEN put right; the CRC is not."""
-        return _with_payload(packet, stuff(_payload(packet)))
+        return _with_payload(packet, frames.stuff(_payload(packet)))
 
     def removeStuffing(self, packet: Sequence[int]) -> list[int]:
         """Return a packet with INST and parameters as they were before stuffing.
 
         Raises ValueError for one that no stuffing makes.
         """
-        plain = unstuff(_payload(packet))
+        plain = frames.unstuff(_payload(packet))
         if plain is None:
             raise ValueError(f"packet {bytes(packet).hex(' ')}: FF FF FD inside, expected FF FF FD FD")
         return _with_payload(packet, plain)
 
     def txPacket(self, port: SerialPort, txpacket: Sequence[int]) -> int:
         """Stuff, sign and send a packet; earlier input is discarded. Raises PortLost."""
-        data = frame(txpacket[4], _payload(txpacket))
-        if len(data) > LONGEST:
+        data = frames.frame(txpacket[4], _payload(txpacket))
+        if len(data) > frames.LONGEST:
             return int(COMM_TX_ERROR)
         port.clearPort()
         self.receiver.reset()
@@ -102,7 +94,7 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
 
 def _payload(packet: Sequence[int]) -> bytes:
     """Return INST and parameters of a packet by its LEN."""
-    return bytes(packet[OVERHEAD : OVERHEAD - 2 + packet[5] + (packet[6] << 8)])
+    return bytes(packet[frames.OVERHEAD : frames.OVERHEAD - 2 + packet[5] + (packet[6] << 8)])
 
 
 def _with_payload(packet: Sequence[int], payload: bytes) -> list[int]:
