@@ -261,12 +261,8 @@ def _common(y: FloatArray, extreme: float) -> bool:
     """Return whether values just inside the extreme are as common as the extreme (a coarse quantum)."""
     values, counts = np.unique(y[np.isfinite(y)], return_counts=True)
     k = int(np.argmin(np.abs(values - extreme)))
-    inside = (
-        counts[max(k - 3, 0) : k].max(initial=0)
-        if k > len(values) // 2
-        else counts[k + 1 : k + 4].max(initial=0)
-    )
-    return bool(counts[k] < 4 * max(int(inside), 1))
+    inside = counts[max(k - 3, 0) : k] if k > len(values) // 2 else counts[k + 1 : k + 4]
+    return bool(counts[k] < 4 * max(int(inside.max(initial=0)), 1))
 
 
 _WHILE_MOVING = ("clipping", "frozen_samples")
@@ -284,8 +280,6 @@ def _fill(record: Record, masked: Mapping[str, BoolArray]) -> Record:
     channels = {}
     for name, channel in record.channels.items():
         good = ~masked[name] & np.isfinite(channel.y)
-        bridged = (
-            np.interp(channel.t, channel.t[good], channel.y[good]) if good.any() else np.zeros(len(channel))
-        )
+        bridged = np.interp(channel.t, channel.t[good], channel.y[good]) if good.any() else 0.0
         channels[name] = Channel(channel.t, np.where(good, channel.y, bridged))
     return record.with_channels(**channels)

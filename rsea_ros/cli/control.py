@@ -11,7 +11,7 @@ from rsea_ros.cli._terminal import progress
 from rsea_ros.cli._topics import RIG
 from rsea_ros.errors import ParameterError
 from rsea_ros.outputs.new_files import NewFiles
-from rsea_ros.report.result_files import CONTROL_JSON, REPORT
+from rsea_ros.report.result_files import CONTROL_JSON, REPORT, json_text
 
 if TYPE_CHECKING:
     from rsea_ros.control.study import MotorLimits, Study
@@ -42,7 +42,6 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.control.uncertainty import lightest
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.report.control import control_json, control_report
-    from rsea_ros.report.result_files import json_text
 
     place = results_place(args, "out/control", (CONTROL_JSON, REPORT), [args.rig, args.free])
     for rate in args.rate:

@@ -11,7 +11,7 @@ from rsea_ros.cli._terminal import say
 from rsea_ros.design.mechanism import Requirement, check_magnitude
 from rsea_ros.model.train import TRAINS
 from rsea_ros.outputs.new_files import NewFiles
-from rsea_ros.report.result_files import DESIGN_JSON, REPORT
+from rsea_ros.report.result_files import DESIGN_JSON, REPORT, json_text
 
 HELP = "compute spring stiffness and spring rate from torque, bandwidth and inertia by the paper's method"
 EXAMPLE = "rsea design --torque 200 --bandwidth 50 --inertia 0.01"
@@ -52,7 +52,6 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.design.motor_gear_units import unit_named
     from rsea_ros.design.spring_design import least_stiffness, robust_stiffness, spring_design
     from rsea_ros.report.design import design_json, design_report
-    from rsea_ros.report.result_files import json_text
 
     place = _output.results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
     check_magnitude("stiffness", args.stiffness, "N m/rad")

@@ -13,7 +13,7 @@ from rsea_ros.cli._terminal import positive, progress, say, whole_number
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.outputs.new_files import Destination, NewFiles
-from rsea_ros.report.result_files import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MODEL, REPORT
+from rsea_ros.report.result_files import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MODEL, REPORT, json_text
 
 if TYPE_CHECKING:
     from rsea_ros.experiment.advice import Advice
@@ -120,7 +120,6 @@ def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -
     """Write run.csv, experiment.json and report.html; return the report's path."""
     from rsea_ros.experiment.run_shape import run_text
     from rsea_ros.report.experiment import advice_json, advice_page
-    from rsea_ros.report.result_files import json_text
 
     source = _output.provenance("experiment", args.bag)
     with NewFiles(place) as new:

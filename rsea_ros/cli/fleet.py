@@ -18,10 +18,9 @@ from rsea_ros.cli._output import FOUND, Action, add_actions, add_fail_on, add_fo
 from rsea_ros.cli._terminal import progress
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.fleet import FleetError, need_extra
+from rsea_ros.fleet import FleetError, need_extra, pool
 from rsea_ros.fleet.joints import Diagnose, load_joints
-from rsea_ros.fleet.pool import Executor, Serial
-from rsea_ros.fleet.task import TIME_LIMIT
+from rsea_ros.fleet.task import TIME_LIMIT, are_new, work
 from rsea_ros.processes import Stopped
 
 if TYPE_CHECKING:
@@ -131,10 +130,8 @@ def _recordings(args: argparse.Namespace) -> list[Held]:
 
 def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunSummary:
     """Write the rows of all new recordings, and return the outcomes."""
-    from rsea_ros.fleet import pool
     from rsea_ros.fleet.engine import Engine, EngineLimits
     from rsea_ros.fleet.store import hold_lock, open_store
-    from rsea_ros.fleet.task import are_new, work
 
     store = open_store(out, create=True)
     with hold_lock(store, None if args.no_wait else _say_waiting):
@@ -146,7 +143,7 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
             workers = args.workers or pool.cores()
             memory = int(args.memory * GIGA) if args.memory else pool.memory_for(workers)
         limits = EngineLimits(memory, time=args.time_limit * MINUTE, pages=args.pages)
-        place = _executor(args, workers, memory) if any(are_new(store, held)) else nullcontext(Serial())
+        place = _executor(args, workers, memory) if any(are_new(store, held)) else nullcontext(pool.Serial())
         with _reporting_what_is_left(store, held), place as places, progress("fleet") as tell:
             return Engine(store, places, work, tell, limits).run(held)
 
@@ -154,8 +151,6 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
 @contextmanager
 def _reporting_what_is_left(store: Store, held: Sequence[Held]) -> Iterator[None]:
     """Let the report of a signal that stops the block say how many recordings are left."""
-    from rsea_ros.fleet.task import are_new
-
     try:
         yield
     except Stopped as stop:
@@ -167,15 +162,13 @@ def _reporting_what_is_left(store: Store, held: Sequence[Held]) -> Iterator[None
 
 def _executor(
     args: argparse.Namespace, workers: int, memory: int | None
-) -> AbstractContextManager[Executor]:
+) -> AbstractContextManager[pool.Executor]:
     """Return the executor of the tasks. memory: bytes of each worker on this machine."""
     if args.scheduler:
         from rsea_ros.fleet.cluster import on_scheduler
 
         return on_scheduler(args.scheduler)
-    from rsea_ros.fleet.pool import on_this_machine
-
-    return nullcontext(Serial()) if memory is None else on_this_machine(workers, memory)
+    return nullcontext(pool.Serial()) if memory is None else pool.on_this_machine(workers, memory)
 
 
 def _say_waiting(holder: str) -> None:
@@ -246,8 +239,8 @@ def _look(args: argparse.Namespace, held: list[Held], at_first: bool) -> int:
     if summary.rows:
         print(summary.sentence(), flush=True)
     alarms = write_alarms(open_store(args.store)) if summary.rows or at_first else []
-    for alarm in alarms:
-        print(f"alarm: {alarm.text}: {alarm.file}", flush=True)
+    for file, text in alarms:
+        print(f"alarm: {text}: {file}", flush=True)
     return len(alarms)
 
 

@@ -10,7 +10,7 @@ from rsea_ros.cli._output import add_json, add_results, path, print_file, result
 from rsea_ros.cli._terminal import progress, whole_number
 from rsea_ros.errors import ParameterError
 from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
-from rsea_ros.report.result_files import PAPER_JSON, REPORT
+from rsea_ros.report.result_files import PAPER_JSON, REPORT, json_text
 
 if TYPE_CHECKING:
     from rsea_ros.records.record import Record
@@ -46,7 +46,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulate the tests, recompute the paper, write the results."""
     from rsea_ros.report.paper.page import paper_json, paper_report
-    from rsea_ros.report.result_files import json_text
 
     if args.figures:
         return _figures(args)

@@ -8,7 +8,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._output import add_force, path
-from rsea_ros.cli._terminal import say
+from rsea_ros.cli._terminal import columns, say
 from rsea_ros.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -50,7 +50,6 @@ def _new(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> int:
-    from rsea_ros.cli._terminal import columns
     from rsea_ros.model.rig_file import load_rig
 
     rig = load_rig(args.rig)

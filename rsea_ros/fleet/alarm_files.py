@@ -9,7 +9,6 @@ import hashlib
 import json
 import math
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -25,16 +24,8 @@ from rsea_ros.trends import Alarm, alarms
 FOLDER = "alarms"
 
 
-@dataclass(frozen=True)
-class AlarmFile:
-    """A new alarm. file: its path. text: the event in a sentence."""
-
-    file: Path
-    text: str
-
-
-def write_alarms(store: Store) -> list[AlarmFile]:
-    """Write a file for each alarm that the store has not reported before, and return those.
+def write_alarms(store: Store) -> list[tuple[Path, str]]:
+    """Write a file for each alarm that the store has not reported before; return it and the event in words.
 
     Two processes at once write each alarm once. Raises OSError where the store cannot be written.
     """
@@ -49,7 +40,7 @@ def write_alarms(store: Store) -> list[AlarmFile]:
         file = folder / f"{alarm.joint}-{hashlib.sha256(alarm.key.encode()).hexdigest()[:12]}.json"
         with suppress(OutputError):
             write_file(file, json.dumps(webhook(alarm), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
-            written.append(AlarmFile(file, said(alarm)))
+            written.append((file, said(alarm)))
     return written
 
 

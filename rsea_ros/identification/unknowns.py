@@ -109,11 +109,8 @@ class Unknown:
         """Return how far from its start it can lie without data: its doubt, else the bounds."""
         if math.isfinite(self.doubt):
             return self.doubt
-        wide = (
-            self.inner(self.high) - self.inner(self.low)
-            if self.low > 0.0 or not self.logarithmic
-            else math.inf
-        )
+        bounded = self.low > 0.0 or not self.logarithmic
+        wide = self.inner(self.high) - self.inner(self.low) if bounded else math.inf
         return wide if math.isfinite(wide) else 1e6 * self.scale
 
     def at_bound(self, coordinate: float) -> bool:

@@ -131,11 +131,9 @@ def _memory(part: laws.FittedTerm, name: str, shape: str, state: int) -> tuple[l
         return [rung], state + 2
     if kind == "delay":
         return [f"{name} = from_ring(x, {state}, {of}, {shape} / s[STEP])"], state + RING + 1
-    made = (
-        f"bent(x[{state}], {of} - x[{state + 1}], {shape})"
-        if kind == "dahl"
-        else f"played(x[{state}], {of}, {shape})"
-    )
+    made = f"played(x[{state}], {of}, {shape})"
+    if kind == "dahl":
+        made = f"bent(x[{state}], {of} - x[{state + 1}], {shape})"
     keep = f"x[{state}], x[{state + 1}] = {name}, {of}"
     kept = ["if s[COMMIT] == 1.0:", f"    {keep}"] if part.term.place == "spring" else [keep]
     return [f"{name} = {made}", *kept], state + 2

@@ -126,6 +126,11 @@ def _transfer_function(fraction: Fraction) -> TransferFunction:
     return TransferFunction(fraction.numerator, fraction.denominator)
 
 
+def end_response(rig: Rig, hz: FloatArray, end: str = "spring_end") -> ComplexArray:
+    """Return the torque at an end over the motor's at frequencies, Hz, shape (n,)."""
+    return frequency_response(rig, outputs.end_torque(rig, end), hz)
+
+
 def frequency_response(rig: Rig, output: Output, hz: FloatArray, port: str = "gear") -> ComplexArray:
     """Return output over torque at a port, (M s^2 + D s + K) q = B tau with s = 2 pi i f.
 

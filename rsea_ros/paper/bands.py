@@ -17,14 +17,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.design.spring_design import band_range
-from rsea_ros.model import outputs
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.train import TRAINS, Train
 from rsea_ros.model.transfer import (
+    end_response,
     end_to_end,
     flat_band,
-    frequency_response,
     inner_inertia,
     pure_torque_bandwidth,
     undamped_band,
@@ -38,17 +37,9 @@ TOLERANCES = ((3.0, 90.0), (1.0, 90.0), (3.0, 10.0), (1.0, 5.0))
 
 
 @dataclass(frozen=True)
-class BandRow:
-    """hz: by tolerance of TOLERANCES."""
-
-    what: str
-    hz: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class Bands:
     """Of one actuator. eq_7: Hz, with J_sc. eq_7_spin: Hz, with J_sc + n J_r, of either sign; spin_range: the
-    same over 90 % of J_m within its spread.
+    same over 90 % of J_m within its spread. rows: the exact bands, Hz, by what they are of, for TOLERANCES.
 
     spring_limit: N m at the limit of 5 deg, of the nonlinear Eq. (8). motor_limit: by frequency (Hz), the
     amplitude of T_d, N m, that the motor's torque limit leaves against clamped ends.
@@ -57,7 +48,7 @@ class Bands:
     eq_7: float
     eq_7_spin: float
     spin_range: tuple[float, float]
-    rows: tuple[BandRow, ...]
+    rows: Mapping[str, tuple[float, ...]]
     spring_limit: float
     motor_limit: Mapping[float, float]
 
@@ -77,7 +68,7 @@ def bands(rig: Rig, motor_torque: float) -> Bands:
         eq_7=pure_torque_bandwidth(k_s, j_sc),
         eq_7_spin=edge,
         spin_range=band_range(k_s, j_sc, inner - j_sc, spread),
-        rows=tuple(BandRow(n, tuple(flat_band(f, *t) for t in TOLERANCES)) for n, f in functions.items()),
+        rows={n: tuple(flat_band(f, *t) for t in TOLERANCES) for n, f in functions.items()},
         spring_limit=0.5 * k_s * math.sin(2.0 * math.radians(5.0)),
         motor_limit={f: motor_torque * _gain(rig, f) for f in (1.0, 5.0, 10.0, edge)},
     )
@@ -85,9 +76,7 @@ def bands(rig: Rig, motor_torque: float) -> Bands:
 
 def _gain(rig: Rig, hz: float) -> float:
     clamped = replace(rig, clamped=frozenset(END_NAMES))
-    return float(
-        abs(frequency_response(clamped, outputs.end_torque(clamped, "spring_end"), np.array([hz]))[0])
-    )
+    return float(abs(end_response(clamped, np.array([hz]))[0]))
 
 
 HZ: FloatArray = np.geomspace(0.5, 140.0, 60)
@@ -115,13 +104,11 @@ class Limit:
 
 def arrangements(rig: Rig) -> tuple[Arrangement, ...]:
     """Return the rig's inertias with each train."""
-    return tuple(_arrangement(replace(rig, train=train)) for train in TRAINS)
-
-
-def _arrangement(rig: Rig) -> Arrangement:
-    n, j_r, j_sc = train_ratio(rig), rotor_inertia(rig), rig["chassis.inertia"]
-    outer = j_sc + n**2 * j_r
-    return Arrangement(rig.train, n, outer, inner_inertia(rig))
+    turned = [replace(rig, train=train) for train in TRAINS]
+    outer = [r["chassis.inertia"] + train_ratio(r) ** 2 * rotor_inertia(r) for r in turned]
+    return tuple(
+        Arrangement(r.train, train_ratio(r), j, inner_inertia(r)) for r, j in zip(turned, outer, strict=True)
+    )
 
 
 def limits(rig: Rig) -> tuple[Limit, ...]:
@@ -148,16 +135,8 @@ def _limit(what: str, of: str, values: Sequence[float], error: Callable[[float],
     return Limit(what, of, tuple(values), tuple(error(v) for v in values))
 
 
-def _distal(rig: Rig) -> ComplexArray:
-    return frequency_response(rig, outputs.end_torque(rig, "spring_end"), HZ)
-
-
-def _proximal(rig: Rig) -> ComplexArray:
-    return frequency_response(rig, outputs.end_torque(rig, "housing_end"), HZ)
-
-
 def _off(rig: Rig, other: Rig) -> float:
-    return _worst(_distal(rig), _distal(other))
+    return _worst(end_response(rig, HZ), end_response(other, HZ))
 
 
 def _off_eq_5(rig: Rig) -> float:
@@ -166,11 +145,12 @@ def _off_eq_5(rig: Rig) -> float:
     eq_5 = formulas.eq_5_proximal_per_motor(
         rig["spring.stiffness"], *rotor, ratio, rig["chassis.inertia"], rig["spring.damping"]
     )
-    return _worst(_proximal(rig), eq_5(2j * np.pi * HZ))
+    return _worst(end_response(rig, HZ, "housing_end"), eq_5(2j * np.pi * HZ))
 
 
 def _end_to_end_off(rig: Rig) -> float:
-    return _worst(_distal(rig) / _proximal(rig), np.ones(len(HZ), complex))
+    both = end_response(rig, HZ) / end_response(rig, HZ, "housing_end")
+    return _worst(both, np.ones(len(HZ), complex))
 
 
 def _worst(ours: ComplexArray, expected: ComplexArray) -> float:

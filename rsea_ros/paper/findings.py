@@ -14,12 +14,11 @@ import numpy as np
 
 from rsea_ros.design.mechanism import spring_radius
 from rsea_ros.documents.units import STANDARD_GRAVITY
-from rsea_ros.model import outputs
 from rsea_ros.model.rig import END_NAMES, Quantity
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.transfer import (
+    end_response,
     flat_band,
-    frequency_response,
     inner_inertia,
     pure_torque_bandwidth,
     resonance_peak,
@@ -156,7 +155,7 @@ def identification() -> Iterator[PaperFinding]:
 def moving_output() -> Iterator[PaperFinding]:
     rig = load_rig("paper_moving_output")
     at = np.array([10.0, 19.0, 33.0])
-    gains = 20.0 * np.log10(np.abs(frequency_response(rig, outputs.end_torque(rig, "spring_end"), at)))
+    gains = 20.0 * np.log10(np.abs(end_response(rig, at)))
     _, moving, grounded = readings(rig).values()
     gap_hz, gap = largest_gap(rig, grounded)
     stiffness = claims.PENDULUM_MASS * STANDARD_GRAVITY * claims.PENDULUM_LENGTH
@@ -243,7 +242,7 @@ def clamp_error() -> float:
     }
     loose = replace(rig, clamped=frozenset(), quantities={**rig.quantities, **values})
     hz = np.geomspace(0.1, 140.0, 200)
-    clamped, free = (frequency_response(r, outputs.end_torque(r, "spring_end"), hz) for r in (rig, loose))
+    clamped, free = (end_response(r, hz) for r in (rig, loose))
     return float(np.max(np.abs(free / clamped - 1.0)))
 
 

@@ -25,11 +25,10 @@ from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.model import outputs
 from rsea_ros.model.prediction_errors import Comparison, predict
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.model.transfer import frequency_response
+from rsea_ros.model.transfer import end_response
 from rsea_ros.records.record import Channel, FloatArray, Record
 
 
@@ -127,8 +126,7 @@ def largest_gap(rig: Rig, other: Rig) -> tuple[float, float]:
 
 
 def _decibel(rig: Rig, hz: FloatArray) -> FloatArray:
-    response = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
-    return np.asarray(20.0 * np.log10(np.abs(response)))
+    return np.asarray(20.0 * np.log10(np.abs(end_response(rig, hz))))
 
 
 def _sharpen(hz: FloatArray, at: int, cost: Callable[[float], float]) -> float:

@@ -10,9 +10,8 @@ import numpy as np
 from rsea_ros.control.following import Following
 from rsea_ros.control.robustness import Reach, Spread
 from rsea_ros.control.study import AtRate, Compensated, Study, TrialResult
-from rsea_ros.model import outputs
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.transfer import frequency_response
+from rsea_ros.model.transfer import end_response
 from rsea_ros.report import words
 from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
@@ -98,7 +97,7 @@ def _following_figure(
         for rate, (c, apart), colour in zip(rates(study), seen, _COLOURS, strict=False)
     ]
     hz = np.geomspace(1.0, 0.45 * max(at.design.rate for at in study.rates), 300)
-    opened = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
+    opened = end_response(rig, hz)
     curves.append(ResponseCurve("without control", fig.MEASURED, hz, opened, 1.2, "dot"))
     caption = f"Distal over desired torque, 1 N·m, sine by sine, in simulation. {BAND} {more}".strip()
     marks = [Mark(3.0 * study.resonance, "3 × resonance")]

@@ -21,8 +21,7 @@ from rsea_ros.design.spring_design import (
     spring_design,
     stiffness_bounds,
 )
-from rsea_ros.model import outputs
-from rsea_ros.model.transfer import end_to_end, frequency_response, undamped_stiffness
+from rsea_ros.model.transfer import end_response, end_to_end, undamped_stiffness
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z90
 from rsea_ros.report import words
@@ -182,7 +181,7 @@ def _open_loop(designs: Sequence[SpringDesign]) -> fig.Figure:
     curves = []
     for d, colour in zip(designs, _COLOURS, strict=False):
         rig = rig_of(d.requirement, d.unit, d.stiffness)
-        motor = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
+        motor = end_response(rig, hz)
         curves.append(
             ResponseCurve(f"{d.stiffness:.0f}: T_d/T_p", colour, hz, end_to_end(rig)(2j * np.pi * hz))
         )

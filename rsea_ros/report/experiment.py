@@ -122,15 +122,11 @@ def _proofs(proofs: Sequence[Proof]) -> list[Html]:
 
 def command_figure(p: Proposal) -> fig.Figure:
     """Return the command over time."""
-    t, caption = (
-        np.arange(len(p.command)) / p.rate,
-        "Commanded motor torque at the gear output; it begins and ends",
-    )
+    t = np.arange(len(p.command)) / p.rate
     drawn = fig.line(t, p.command, "command", fig.AFTER, 1.0, hovertemplate="%{y:.3g} N·m")
     plane = fig.layout(xaxis=fig.axis("time, s"), yaxis=fig.axis("torque, N·m"))
-    return fig.Figure(
-        f"The run: {shape_words(p)}", f"{caption} at zero under a raised cosine.", [drawn], plane, 300
-    )
+    caption = "Commanded motor torque at the gear output; it begins and ends at zero under a raised cosine."
+    return fig.Figure(f"The run: {shape_words(p)}", caption, [drawn], plane, 300)
 
 
 def spectrum_figure(runs: Sequence[tuple[str, Proposal]]) -> fig.Figure:
@@ -295,14 +291,10 @@ def proof_words(proof: Proof) -> str:
 
 def limit_rows(p: Proposal, stated: dict[str, float]) -> list[tuple[str, str, str, str, str]]:
     """Return each quantity: expected, at the level that is stated, limit, unit."""
+    limit = {n: f"{stated[n]:.4g}" if n in stated else "none" for n in UNITS}
     return [
-        (
-            n, f"{expected:.4g}", f"{p.peaks.at_level[n]:.4g}", f"{stated[n]:.4g}" if n in stated else "none",
-            plain(unit),
-        )
-        for n, unit, expected in (
-            (n, u, p.peaks.expected[n]) for n, u in UNITS.items() if n in p.peaks.expected
-        )
+        (n, f"{p.peaks.expected[n]:.4g}", f"{p.peaks.at_level[n]:.4g}", limit[n], plain(unit))
+        for n, unit in UNITS.items() if n in p.peaks.expected
     ]  # fmt: skip
 
 

@@ -106,14 +106,10 @@ def _usual(every: Sequence[Naming], joints: int, settings: TrendSettings) -> dic
     shares: dict[tuple[str, str], list[float]] = {}
     for n in every:
         shares.setdefault((n.kind, n.about), []).append(float(np.mean(n.named)))
-    lacking = {key: [0.0] * (joints - len(values)) for key, values in shares.items()}
-    alone = joints < settings.fewest_joints
-    return {
-        key: settings.background
-        if alone
-        else max(settings.background, float(np.median(values + lacking[key])))
-        for key, values in shares.items()
-    }
+    if joints < settings.fewest_joints:
+        return dict.fromkeys(shares, settings.background)
+    medians = {key: np.median(v + [0.0] * (joints - len(v))) for key, v in shares.items()}
+    return {key: max(settings.background, float(median)) for key, median in medians.items()}
 
 
 def _scan(n: Naming, usual: float, settings: TrendSettings) -> Scan:

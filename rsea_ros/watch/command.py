@@ -152,12 +152,8 @@ def _shape(wish: Wish, t: float) -> float:
         return math.sin(2.0 * math.pi * wish.frequency * t)
     rounds, rest = divmod(t, 2.0 * SWEEP)
     turn = _chirp_phase(wish.frequency, SWEEP)
-    back = rest > SWEEP
-    phase = (
-        2.0 * turn - _chirp_phase(wish.frequency, 2.0 * SWEEP - rest)
-        if back
-        else _chirp_phase(wish.frequency, rest)
-    )
+    phase = _chirp_phase(wish.frequency, min(rest, 2.0 * SWEEP - rest))
+    phase = 2.0 * turn - phase if rest > SWEEP else phase
     return math.sin(2.0 * rounds * turn + phase)
 
 

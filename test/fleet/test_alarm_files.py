@@ -28,14 +28,14 @@ def worn(store, folder, monkeypatch):
 
 def test_an_alarm_is_sent_once(worn):
     (first,) = alarm_files.write_alarms(worn)
-    assert first.text == "knee: Spring stiffness fell by 15 % from 14 November 2023 on"
+    assert first[1] == "knee: Spring stiffness fell by 15 % from 14 November 2023 on"
     assert alarm_files.write_alarms(worn) == []
-    assert [file.name for file in (worn.path / "alarms").iterdir()] == [first.file.name]
+    assert [file.name for file in (worn.path / "alarms").iterdir()] == [first[0].name]
 
 
 def test_an_alarm_has_the_form_that_a_webhook_accepts(worn):
     (first,) = alarm_files.write_alarms(worn)
-    body = json.loads(first.file.read_text(encoding="utf-8"))
+    body = json.loads(first[0].read_text(encoding="utf-8"))
     (alert,) = body["alerts"]
     assert (body["version"], body["status"], alert["status"]) == ("4", "firing", "firing")
     assert alert["labels"]["joint"] == "knee" and alert["startsAt"].startswith("2023-11-14T")

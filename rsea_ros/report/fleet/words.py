@@ -183,11 +183,7 @@ def _movement_text(change: Change, trend: Trend) -> str:
     size = change.size.value / abs(trend.first.value) if trend.first and trend.first.value else math.nan
     how = f"{way} by {amount(size)}" if math.isfinite(size) else way
     at = day(change.since_s)
-    return (
-        f"{how} on {at}"
-        if change.kind == "step"
-        else f"{how} from {at}{' on' if change.kind == 'ramp' else ''}"
-    )
+    return f"{how} on {at}" if change.kind == "step" else f"{how} from {at} on"
 
 
 def latest_causes(joints: Sequence[str], recordings: Table) -> Mapping[str, str]:

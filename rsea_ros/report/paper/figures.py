@@ -11,12 +11,11 @@ import numpy as np
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model import outputs, transfer
 from rsea_ros.model.equations import train_ratio
-from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.rival_models import MovingOutput, largest_gap, lumped_rig, readings, resonance_hz
-from rsea_ros.records.record import ComplexArray, FloatArray
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures.bode import thin
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, INK, MEASURED, QUIET, TRUTH, Figure, faint
@@ -62,17 +61,12 @@ def figure_9() -> list[Figure]:
     return [whole, views]
 
 
-def end_response(rig: Rig, hz: FloatArray) -> ComplexArray:
-    """Return the torque at the end of the spring over the motor's."""
-    return transfer.frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
-
-
 def figure_15(measured: FrequencyResponse) -> Figure:
     """Return the high-impedance test: the printed fit, Table 2, and the test of a simulated bench."""
     c_0, c_1, c_2 = formulas.EQ_10
     s = 2j * np.pi * _HZ
     element = formulas.eq_1_lumped_distal_per_motor(1530.456, 0.957, 26.088)(s)
-    table_2 = end_response(load_rig("paper_high_impedance"), _HZ)
+    table_2 = transfer.end_response(load_rig("paper_high_impedance"), _HZ)
     curves = [
         _measured_curve(measured, "simulated test"),
         ResponseCurve("Eq. (10) as printed", BEFORE, _HZ, np.asarray(c_0 / (s**2 + c_1 * s + c_2))),
@@ -91,7 +85,7 @@ def figure_18(test: MovingOutput) -> Figure:
     shares = [100 * rival.held_out[0].explained for rival in test.rivals]
     for rival, share, colour in zip(test.rivals, shares, (AFTER, BEFORE), strict=True):
         name = f"<b>{rival.name}</b>, fitted:<br>{share:.2f} % explained"
-        curves.append(ResponseCurve(name, colour, _HZ, end_response(rival.rig, _HZ)))
+        curves.append(ResponseCurve(name, colour, _HZ, transfer.end_response(rival.rig, _HZ)))
     title = (
         f"Fig. 18: the unlumped model explains {shares[0]:.2f} % of the held-out torque, the lumped "
         f"{shares[1]:.0f} %"
@@ -110,7 +104,7 @@ def figure_18_as_printed() -> Figure:
     models = readings(load_rig("paper_moving_output"))
     looks = ((AFTER, "solid"), (BEFORE, "solid"), (BEFORE, "dot"))
     curves = [
-        ResponseCurve(name.replace(", ", ",<br>"), colour, _HZ, end_response(model, _HZ), dash=dash)
+        ResponseCurve(name.replace(", ", ",<br>"), colour, _HZ, transfer.end_response(model, _HZ), dash=dash)
         for (name, model), (colour, dash) in zip(models.items(), looks, strict=True)
     ]
     unlumped, moving, grounded = models.values()
@@ -197,7 +191,7 @@ def documentation_figures() -> dict[str, str]:
     ]
     models = readings(load_rig("paper_moving_output")).items()
     moving = [
-        ResponseCurve(name, colour, hz, end_response(model, hz))
+        ResponseCurve(name, colour, hz, transfer.end_response(model, hz))
         for (name, model), colour in zip(models, (AFTER, TRUTH, BEFORE), strict=True)
     ]
     hz = np.geomspace(1.0, 300.0, 400)

@@ -135,7 +135,7 @@ def _bands(b: Bands) -> dict[str, Any]:
     return {
         **pick(b, f"eq_7_hz=eq_7 {spin}"),
         "tolerances_db_deg": strict(TOLERANCES),
-        "exact": {row.what: strict(row.hz) for row in b.rows},
+        "exact": strict(b.rows),
         **pick(b, "spring_limit"),
         "motor_limit": [{"hz": f, "torque": t} for f, t in b.motor_limit.items()],
     }
@@ -237,7 +237,7 @@ def bands_table(actuators: Mapping[str, Bands]) -> html.Html:
             ["Eq. (7) as printed", f"{b.eq_7:.1f}", *none],
             ["Eq. (7) with the rotor's spin", f"{b.eq_7_spin:.1f}", *none],
             ["the same over 90 % of J_m", " to ".join(map(words.hertz, b.spin_range)), *none],
-            *([row.what, *(words.hertz(v) for v in row.hz)] for row in b.rows),
+            *([what, *map(words.hertz, hz)] for what, hz in b.rows.items()),
         ]
         motor = ", ".join(f"{t:.2g} N·m at {f:.3g} Hz" for f, t in b.motor_limit.items())
         limits = f"Amplitude: {b.spring_limit:.0f} N·m at 5° of the spring; from the motor {motor}."
@@ -256,11 +256,8 @@ def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> 
     """Return transfer functions and limits of all arrangements."""
 
     def at(limit: Limit) -> str:
-        return (
-            " → ".join(words.number(v, 1) if v < 1e4 else f"{v:.0e}" for v in limit.values)
-            if limit.of
-            else ""
-        )
+        shown = (words.number(v, 1) if v < 1e4 else f"{v:.0e}" for v in limit.values)
+        return " → ".join(shown) if limit.of else ""
 
     shown = html.listed(
         rows,
@@ -299,11 +296,8 @@ def moving_table(tests: Mapping[str, MovingOutput]) -> html.Html:
         (n, r.name, j) for n, test in tests.items() for r in test.rivals for j in r.held_out
     ):
         end = "spring end" if j.sensor == "spring_end" else "housing end (never fitted)"
-        share = (
-            f"{100 * j.explained:.2f} %"
-            if j.explained > 0.0
-            else f"none: off by {j.rms_error / j.rms:.0f} times"
-        )
+        off = f"none: off by {j.rms_error / j.rms:.0f} times"
+        share = f"{100 * j.explained:.2f} %" if j.explained > 0.0 else off
         rows.append([name.replace("_", " "), model, end, share, f"{j.rms_error:.3f}", f"{j.rms:.2f}"])
     head = [
         "Bench",
