@@ -101,10 +101,6 @@ class Slope(NamedTuple):
     matrix: FloatArray
     theta: FloatArray
 
-    def holds_at(self, theta: FloatArray, unknowns: Sequence[Unknown]) -> bool:
-        """Return whether another place is so near that the derivatives are the same."""
-        return bool(np.all(np.abs(theta - self.theta) < _NEAR * np.array([u.scale for u in unknowns])))
-
 
 @dataclass(frozen=True)
 class LinearisedRows:
@@ -153,7 +149,8 @@ def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> F
 def rows_of(setting: LinearSetting, residual: FitResidual, known: Slope | None = None) -> LinearisedRows:
     """Lay out the rows about a state: one simulation for each unknown, none where a slope is known near."""
     (case,), n, at = residual.problem.cases, len(setting.values), residual.theta
-    if known is None or not known.holds_at(at, residual.problem.unknowns):
+    near = _NEAR * np.array([u.scale for u in residual.problem.unknowns])
+    if known is None or not np.all(np.abs(at - known.theta) < near):
         known = Slope(jacobian(residual.problem, at, residual.residual), at)
     moved = known.matrix
     t = _of_rows(case, case.t, setting.timed)

@@ -18,15 +18,13 @@ from rsea_ros.cli._output import FOUND, Action, add_actions, add_fail_on, add_fo
 from rsea_ros.cli._terminal import progress
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.fleet import FleetError, need_extra, pool
+from rsea_ros.fleet import FleetError, need_extra, pool, task
 from rsea_ros.fleet.joints import Diagnose, load_joints
-from rsea_ros.fleet.task import TIME_LIMIT, are_new, work
 from rsea_ros.processes import Stopped
 
 if TYPE_CHECKING:
     from rsea_ros.fleet.engine import RunSummary
     from rsea_ros.fleet.store import Store
-    from rsea_ros.fleet.task import Held
 
 HELP = "process bags of many joints: store (run), reports (report), alarms (watch), queries (sql)"
 EXAMPLE = "rsea fleet run recordings --map joints.yaml --out store && rsea fleet report store --out report"
@@ -55,7 +53,7 @@ def _add_work(parser: argparse.ArgumentParser) -> None:
     add("--pages", action="store_true", help="keep the page of each new diagnosis, for links of the report")
     add("--again", action="store_true", help="retry quarantined recordings")
     limit = "quarantine a recording whose joint takes longer than this (default %(default)g)"
-    add("--time-limit", type=float, default=TIME_LIMIT / MINUTE, metavar="MIN", help=limit)
+    add("--time-limit", type=float, default=task.TIME_LIMIT / MINUTE, metavar="MIN", help=limit)
     add = parser.add_argument_group("workers").add_argument
     add("--workers", type=int, metavar="N", help="processes on this machine (default: cores)")
     add("--memory", type=float, metavar="GB", help="of each worker (default: all, shared)")
@@ -107,7 +105,7 @@ def _run(args: argparse.Namespace) -> int:
     return FOUND if set(summary.outcomes).intersection(args.fail_on) else 0
 
 
-def _hints(args: argparse.Namespace, summary: RunSummary, held: Sequence[Held]) -> Iterator[str]:
+def _hints(args: argparse.Namespace, summary: RunSummary, held: Sequence[task.Held]) -> Iterator[str]:
     seen = {joint.name for _, joints in held for joint in joints}
     missing = [joint for joint in load_joints(args.map) if joint.name not in seen]
     for joint in missing[:MOST_SHOWN]:
@@ -118,7 +116,7 @@ def _hints(args: argparse.Namespace, summary: RunSummary, held: Sequence[Held]) 
         yield "without a date no trend can be estimated: state in the map, as “date”, how paths contain it"
 
 
-def _recordings(args: argparse.Namespace) -> list[Held]:
+def _recordings(args: argparse.Namespace) -> list[task.Held]:
     """Return the recordings of the sources with the joints that each holds, diagnosed as the options say."""
     from rsea_ros.fleet.sources import bags_of
 
@@ -128,7 +126,7 @@ def _recordings(args: argparse.Namespace) -> list[Held]:
     return bags_of(args.sources, joints)
 
 
-def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunSummary:
+def write_rows(args: argparse.Namespace, out: str, held: Sequence[task.Held]) -> RunSummary:
     """Write the rows of all new recordings, and return the outcomes."""
     from rsea_ros.fleet.engine import Engine, EngineLimits
     from rsea_ros.fleet.store import hold_lock, open_store
@@ -143,19 +141,20 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunS
             workers = args.workers or pool.cores()
             memory = int(args.memory * GIGA) if args.memory else pool.memory_for(workers)
         limits = EngineLimits(memory, time=args.time_limit * MINUTE, pages=args.pages)
-        place = _executor(args, workers, memory) if any(are_new(store, held)) else nullcontext(pool.Serial())
+        is_new = any(task.are_new(store, held))
+        place = _executor(args, workers, memory) if is_new else nullcontext(pool.Serial())
         with _reporting_what_is_left(store, held), place as places, progress("fleet") as tell:
-            return Engine(store, places, work, tell, limits).run(held)
+            return Engine(store, places, task.work, tell, limits).run(held)
 
 
 @contextmanager
-def _reporting_what_is_left(store: Store, held: Sequence[Held]) -> Iterator[None]:
+def _reporting_what_is_left(store: Store, held: Sequence[task.Held]) -> Iterator[None]:
     """Let the report of a signal that stops the block say how many recordings are left."""
     try:
         yield
     except Stopped as stop:
         with suppress(RseaError, OSError):
-            number, all_of = sum(are_new(store, held)), sum(len(joints) for _, joints in held)
+            number, all_of = sum(task.are_new(store, held)), sum(len(joints) for _, joints in held)
             stop.note = f"{number} of {all_of} recordings are left, run the same line again"
         raise
 
@@ -227,7 +226,7 @@ def _watch(args: argparse.Namespace) -> int:
         time.sleep(args.every)
 
 
-def _look(args: argparse.Namespace, held: list[Held], at_first: bool) -> int:
+def _look(args: argparse.Namespace, held: list[task.Held], at_first: bool) -> int:
     """Process recordings, print news, and return the number of new alarms.
 
     held: recordings unchanged since the previous look, so that none is still being recorded.

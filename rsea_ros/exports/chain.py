@@ -43,12 +43,6 @@ class Link:
         arm = self.weight / (self.mass * STANDARD_GRAVITY) if self.weight else 0.0
         return arm * math.sin(self.turned), 0.0 - arm * math.cos(self.turned)
 
-    @property
-    def about_centre(self) -> float:
-        """Return the inertia about the centre of mass, kg m^2."""
-        y, z = self.centre
-        return self.inertia - self.mass * (y * y + z * z)
-
 
 @dataclass(frozen=True)
 class Joint:

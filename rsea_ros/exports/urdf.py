@@ -90,7 +90,8 @@ def _parameters(rig: Rig, name: str) -> dict[str, float]:
 
 def inertia(link: Link) -> dict[str, str]:
     """Return the inertia of a link about its centre, kg m^2, by the names that both formats use."""
-    diagonal = repr(link.about_centre)
+    y, z = link.centre
+    diagonal = repr(link.inertia - link.mass * (y * y + z * z))
     return {"ixx": diagonal, "iyy": diagonal, "izz": diagonal, "ixy": "0", "ixz": "0", "iyz": "0"}
 
 

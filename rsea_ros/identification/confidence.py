@@ -259,11 +259,6 @@ FAR = 3.0
 """Stated spreads of a value: one right rig in 400 lies further off by chance."""
 
 
-def is_off(spreads: float, told_by_data: float) -> bool:
-    """Return whether a value is surely not the rig's: far from it, and determined by the data."""
-    return abs(spreads) > FAR and told_by_data >= IDENTIFIABLE_SHARE
-
-
 def is_off_rig(solution: Solution) -> bool:
     """Return whether a fit has taken some value of the rig that far, determined by the data or not."""
     stated = solution.problem.rig.free()
@@ -272,9 +267,9 @@ def is_off_rig(solution: Solution) -> bool:
 
 
 def off_rig(parameters: Iterable[ParameterEstimate]) -> tuple[Remark, ...]:
-    """Return a remark for each value that the data put far from the value of the rig."""
+    """Return a remark for each value that is surely not the rig's: far off, and determined by the data."""
+    off = (p for p in parameters if abs(p.spreads_off) > FAR and p.told_by_data >= IDENTIFIABLE_SHARE)
     return tuple(
         Remark("off_rig", (p.name,), (p.start, p.value, *p.ci95, p.spreads_off), p.unit)
-        for p in parameters
-        if not p.name.startswith(CLOCKS) and is_off(p.spreads_off, p.told_by_data)
-    )
+        for p in off if not p.name.startswith(CLOCKS)
+    )  # fmt: skip

@@ -208,11 +208,6 @@ def even_out(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
     return Evened(tuple(result), scatter)
 
 
-def may_be_even(record: Record) -> bool:
-    """Return whether the stamps of any channel scatter about an even clock."""
-    return bool(_on_even_clocks(record)[1])
-
-
 def even_clock(t: FloatArray, shared: float = 0.0) -> FloatArray:
     """Return the stamps of an even clock that come nearest to t, s, shape of t; samples may be missing.
 
@@ -329,7 +324,7 @@ def with_even_clocks(
     masked: samples that do not count, by channel, of each record.
     """
     steady = Evened(tuple(records), {})
-    if is_inverse(rig) or not any(may_be_even(record) for record in records):
+    if is_inverse(rig) or not any(_on_even_clocks(record)[1] for record in records):
         return steady
     while True:
         cases = [case_from(r, rig, bad) for r, bad in zip(steady.records, masked, strict=True)]

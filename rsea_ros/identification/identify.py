@@ -91,14 +91,9 @@ def explained_by_lost_cycles(identification: Identification) -> int:
 
 def lost_behind(faults: Sequence[Fault], overlays: Sequence[Overlay]) -> int:
     """Return how many cycles were lost, if the motor torque of a misfit shows them; otherwise 0."""
-    lost = count_of(faults)
+    lost = round(sum(f.size or 0.0 for f in faults if f.kind == KIND))
     torque = next((o for o in overlays if o.channel == "motor_torque"), None)
     return lost if lost and torque is not None and rises_behind_gaps(torque) else 0
-
-
-def count_of(faults: Sequence[Fault]) -> int:
-    """Return how many cycles the nodes of the run reported as lost."""
-    return round(sum(f.size or 0.0 for f in faults if f.kind == KIND))
 
 
 def rises_behind_gaps(overlay: Overlay) -> bool:

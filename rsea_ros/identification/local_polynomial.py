@@ -60,7 +60,8 @@ class Aligned:
 def align(record: Record, name: str) -> Aligned:
     """Lay a channel beside the command. Raises IdentificationError for too few samples in common."""
     command, channel = (usable(record[n], f"{record.source}: {n}") for n in ("command", name))
-    start, period = grid_of(command, channel)
+    start, period = clock(command.t)
+    period /= max(1, round(period * channel.rate))  # the command's clock, divided where this one is faster
     place = (channel.t - start) / period
     held = name == "motor_torque"
     if held:
@@ -94,13 +95,6 @@ def usable(channel: Channel, where: str) -> Channel:
             f"{where} has {np.count_nonzero(rising)} usable samples, expected at least {_FEWEST}"
         )
     return Channel(t[rising], y[rising])
-
-
-def grid_of(command: Channel, channel: Channel) -> tuple[float, float]:
-    """Return start and period of the grid, s: the command's clock, divided where the channel is faster."""
-    start, period = clock(command.t)
-    finer = max(1, round(period * channel.rate))
-    return start, period / finer
 
 
 def clock(t: FloatArray) -> tuple[float, float]:

@@ -71,11 +71,6 @@ def serial(function: Callable[[int], FloatArray], items: Sequence[int]) -> Seque
     return [function(i) for i in items]
 
 
-def in_pool(pool: Executor) -> Map:
-    """Return a map that uses a pool; the simulation runs without the interpreter's lock."""
-    return lambda function, items: list(pool.map(function, items))
-
-
 def jacobian(problem: Problem, theta: FloatArray, residual: FloatArray, run: Map = serial) -> FloatArray:
     """Return d residual / d theta, shape (m, n)."""
     return jacobian_columns(problem, theta, residual, range(len(theta)), run)
@@ -348,5 +343,6 @@ class Pools:
 @contextmanager
 def worker_pools() -> Iterator[Pools]:
     """Hold both pools within a with statement; linear algebra keeps to one thread meanwhile."""
-    with one_blas_thread(), ThreadPoolExecutor(cores()) as fits, ThreadPoolExecutor(cores()) as derivatives:
-        yield Pools(fits, in_pool(derivatives) if cores() > 1 else serial)
+    with one_blas_thread(), ThreadPoolExecutor(cores()) as fits, ThreadPoolExecutor(cores()) as threads:
+        # the simulation runs without the interpreter's lock
+        yield Pools(fits, (lambda f, items: list(threads.map(f, items))) if cores() > 1 else serial)

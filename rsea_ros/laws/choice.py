@@ -164,11 +164,6 @@ def surely_helps(
     return rms > MATTERS and _is_sure(fall, _SURE_ON_TEST, _WORSE_ON_TEST)
 
 
-def is_better(gain: float, ci95: tuple[float, float]) -> bool:
-    """Return whether a gain on the test blocks is worth writing down: it matters, and is surely above 0."""
-    return gain >= MATTERS and ci95[0] > 0.0
-
-
 def _is_sure(gain: FloatArray, errors: float, worse: float) -> bool:
     """Return whether the gains of groups exceed chance: by their error, or with hardly a loss.
 

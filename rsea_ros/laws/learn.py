@@ -211,16 +211,14 @@ def _result(
 ) -> LawResult:  # fmt: skip
     base = search.base
     gram, candidates, cases = search.gram, search.candidates, search.cases
-    laws = (
-        law_of(gram, candidates, cases, choice.taken)
-        if choice.curve is None
-        else [curve_of(gram, candidates, cases, choice.curve)]
-    )
+    laws = law_of(gram, candidates, cases, choice.taken)
+    if choice.curve is not None:
+        laws = [curve_of(gram, candidates, cases, choice.curve)]
     drafts = [draft_of(law) for law in laws]
     with lend(*(d.effect for d in drafts)):
         refined = refined_laws(base, drafts) if drafts else None
         gain, ci95 = gain_on_tests(base, refined) if refined else (0.0, (0.0, 0.0))
-        if refined is None or not choices.is_better(gain, ci95):
+        if refined is None or not (gain >= choices.MATTERS and ci95[0] > 0.0):
             return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,
                            tried=choices.summarize_models(search, choice, ()))  # fmt: skip
         before, noise = choices.levels_of(base.problem, base.outputs, base.cases)

@@ -26,7 +26,7 @@ from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.rig import Rig, check_two_torques
 from rsea_ros.model.transfer import edge_of_error, end_over_end, inner_inertia
-from rsea_ros.records.record import HUGE, FloatArray, is_measured
+from rsea_ros.records.record import HUGE, is_measured
 from rsea_ros.records.statistics import Z90
 
 LENGTH = 8192
@@ -43,11 +43,6 @@ AUDIBLE = 2.0
 """Torque times tolerance that can be judged, in sigmas of the observer's T_p and T_d together."""
 AGAIN = 1.0
 """s by which a stamp may be before the last one and of the same run; further back it begins anew."""
-
-
-def empty_ring() -> FloatArray:
-    """Return an empty ring of t, error^2 and torque^2 (s, N^2 m^2)."""
-    return np.zeros((LENGTH, 3))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -170,7 +165,7 @@ class ErrorFlag:
         s = settings or ErrorSettings()
         self.settings = s
         self.edge = edge_of(with_structure(rig), s.tolerance)
-        self._state, self._ring = np.zeros(STATE), empty_ring()
+        self._state, self._ring = np.zeros(STATE), np.zeros((LENGTH, 3))  # of t, error^2 and torque^2
         self._state[[TOLERANCE, WINDOW, HYSTERESIS, QUIET]] = s.tolerance, s.window, s.hysteresis, s.quiet
         self._state[[HEARD, SHARE, LAST]] = -math.inf, math.nan, -math.inf
         self.take(-math.inf, TorqueEstimate(*[0.0] * 6))  # compiles, and is too early to count

@@ -170,11 +170,14 @@ def moving_output(
     )
     command = Channel(np.arange(len(values)) / RATE, values)
     ends = ["spring_end", *(["housing_end"] if "proximal_spring.stiffness" in rig.quantities else [])]
-    records = {end: bag(f"{rig.name}_{end}", _record(true_rig, end, command, seed)) for end in ends}
+    played = {e: synthesize(replace(true_rig, ft_end=e), command, seed=seed + len(e)) for e in ends}
+    records = {end: bag(f"{rig.name}_{end}", record) for end, record in played.items()}
     middle = 0.5 * duration
     train = _only(records["spring_end"].between(0.0, middle), channels)
     holdout = [(end, record.between(middle, duration + 1.0)) for end, record in records.items()]
-    rivals = compare({"unlumped": rig, "lumped": loosen(lumped_rig(rig))}, train, holdout)
+    wide = {n: replace(rig.quantities[n], spread=_LOOSE) for n in rig.free()}  # priors that hold nothing back
+    lumped = replace(lumped_rig(rig), quantities={**rig.quantities, **wide})
+    rivals = compare({"unlumped": rig, "lumped": lumped}, train, holdout)
     return MovingOutput(rivals, {end: estimate_response(r, "ft") for end, r in records.items()})
 
 
@@ -183,16 +186,6 @@ def draw(rig: Rig, seed: int) -> Rig:
     rng = np.random.default_rng(seed)
     factors = {n: float(np.exp(_PART * rig.spread(n) * rng.standard_normal())) for n in rig.free()}
     return rig.with_values({n: rig[n] * factor for n, factor in factors.items()})
-
-
-def loosen(rig: Rig) -> Rig:
-    """Return the rig with priors on its free values that hold nothing back."""
-    wide = {n: replace(rig.quantities[n], spread=_LOOSE) for n in rig.free()}
-    return replace(rig, quantities={**rig.quantities, **wide})
-
-
-def _record(true_rig: Rig, end: str, command: Channel, seed: int) -> Record:
-    return synthesize(replace(true_rig, ft_end=end), command, seed=seed + len(end))
 
 
 def _only(record: Record, channels: tuple[str, ...]) -> Record:

@@ -135,11 +135,6 @@ class Course:
         """Return the place of the slope, or of the first term, among the coefficients."""
         return int(self.base.x.shape[1])
 
-    def at_mean_temperature(self) -> FloatArray:
-        """Return the days' means without the effect of temperature, in units of the scale, shape (n,)."""
-        r = self.regression()
-        return np.asarray(self.base.y - r.x[:, 1 : self.at] @ r.coefficients[1 : self.at])
-
     def fit_values(self) -> FloatArray:
         """Return the course without temperature and without the level, shape (n,)."""
         r = self.regression()

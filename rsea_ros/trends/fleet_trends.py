@@ -114,7 +114,9 @@ def _curve(course: courses.Course) -> ParameterCourse:
 
 
 def _by_day(course: courses.Course) -> ParameterCourse:
-    days, value = course.days, course.at_mean_temperature() * course.days.scale
+    """Return the days' means without the effect of temperature."""
+    days, r = course.days, course.regression()
+    value = (course.base.y - r.x[:, 1 : course.at] @ r.coefficients[1 : course.at]) * days.scale
     half = Z95 * np.sqrt(days.variance) * days.scale
     return ParameterCourse(days.t * DAY, value, value - half, value + half)
 

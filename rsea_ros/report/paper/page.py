@@ -46,7 +46,7 @@ def paper_report(tests: PaperTests) -> str:
         html.section(
             "The equations as printed, and where the equations of motion differ", html.equation(EQUATIONS)
         ),
-        table_1(_drawings()), table_2(_rig_values()),
+        _table_1(), table_2(_rig_values()),
         *figures.figure_9(), figures.figure_15(tests.high_impedance), figures.figure_18(first),
         figures.figure_18_as_printed(), moving_table(tests.moving), figures.figure_20(),
         bands_table(actuator_bands()), arrangements_table(arrangements(rig), limits(rig)),
@@ -86,20 +86,13 @@ def _keys() -> list[tuple[str, str]]:
     ]
 
 
-def _drawings() -> list[tuple[str, str]]:
-    return [
-        ("Fig. 6: between two loads. Z_m = b_m and the rotor, Z_s = b_s + K_s/s", figures.circuit("general")),
-        (
-            "Fig. 7: both ends clamped. The branches of the loads are open (the paper's text: "
-            "short-circuited; the figure itself we have not seen)",
-            figures.circuit("lumped"),
-        ),
-        (
-            "Fig. 8: the epicyclic train as a three-port. Mu_1 = 502, Mu_2 = 1 with our direction of ω_h "
-            "(paper: −1; its polarity dots we have not seen)",
-            figures.circuit("epicyclic"),
-        ),
-    ]
+_DRAWINGS = {
+    "general": "Fig. 6: between two loads. Z_m = b_m and the rotor, Z_s = b_s + K_s/s",
+    "lumped": "Fig. 7: both ends clamped. The branches of the loads are open (the paper's text: "
+    "short-circuited; the figure itself we have not seen)",
+    "epicyclic": "Fig. 8: the epicyclic train as a three-port. Mu_1 = 502, Mu_2 = 1 with our direction of "
+    "ω_h (paper: −1; its polarity dots we have not seen)",
+}
 
 
 def _rig_values() -> dict[str, float]:
@@ -199,12 +192,12 @@ def findings_list(findings: Sequence[PaperFinding]) -> html.Html:
     return html.section(title, html.listed(findings, *columns))
 
 
-def table_1(drawings: Sequence[tuple[str, str]]) -> html.Html:
-    """Return Table 1 and the drawings, (caption, SVG)."""
+def _table_1() -> html.Html:
+    """Return Table 1 and the drawings."""
     return html.section(
         "Table 1 and Figs. 6 to 8: the same machine as a circuit",
         html.table(["Mechanical", "Impedance", "Electrical", "Impedance"], TABLE_1),
-        *(html.Html(f"<h3>{escape(caption)}</h3>{svg}") for caption, svg in drawings),
+        *(html.Html(f"<h3>{escape(of)}</h3>{figures.circuit(n)}") for n, of in _DRAWINGS.items()),
         caption="Torque is voltage, velocity is current.",
     )
 
