@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -223,9 +222,7 @@ def sense_unknown(rows: Sequence[WithTrain]) -> bool:
     return len({row.turns > 0.0 for row in rows}) > 1
 
 
-SPREADS: Mapping[str, float] = MappingProxyType(
-    {"rate": 0.05, "arm": 0.005, "spring_radius": 0.04, "inertia": 0.05, "motor": 0.05}
-)
+SPREADS = {"rate": 0.05, "arm": 0.005, "spring_radius": 0.04, "inertia": 0.05, "motor": 0.05}
 """Relative, one sigma. rate: the paper's springs were 9.5 % below the maker's number. The rotor's spread is
 the unit's (motor_gear_units.py)."""
 SAMPLES = 20_000

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache, partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -251,14 +250,12 @@ def _top(shape: Shape, rate: float) -> float:
     return min(shape.high, NYQUIST_SHARE * rate / 2.0)
 
 
-KINDS: Mapping[Kind, Callable[[Shape, int, float], FloatArray]] = MappingProxyType(
-    {
-        "multisine": lambda s, n, rate: _flat_multisine(n, rate, s.low, _top(s, rate), s.tilt),
-        "chirp": _chirp,
-        "steps": partial(_levels, _STEPS),
-        "holds": partial(_levels, _HOLDS),
-    }
-)
+KINDS: Mapping[Kind, Callable[[Shape, int, float], FloatArray]] = {
+    "multisine": lambda s, n, rate: _flat_multisine(n, rate, s.low, _top(s, rate), s.tilt),
+    "chirp": _chirp,
+    "steps": partial(_levels, _STEPS),
+    "holds": partial(_levels, _HOLDS),
+}
 """Each makes the moving part, its peak 1, from shape, number of samples and rate."""
-FEWEST: Mapping[Kind, int] = MappingProxyType({"multisine": 4, "chirp": 10, "steps": 4, "holds": 4})
+FEWEST: Mapping[Kind, int] = {"multisine": 4, "chirp": 10, "steps": 4, "holds": 4}
 """Samples of a run, with which it still has its form, a soft start and a soft stop."""

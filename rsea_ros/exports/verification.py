@@ -7,7 +7,6 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree as xml
 
@@ -223,7 +222,7 @@ def play_fmu(archive: bytes, rig: Rig, command: FloatArray) -> dict[str, FloatAr
     return {name: np.asarray(result[name], np.float64) for name in names}
 
 
-PLAYERS: Mapping[str, Callable[..., Any]] = MappingProxyType({"mjcf": play_mujoco, "fmu": play_fmu})
+PLAYERS: Mapping[str, Callable[..., Any]] = {"mjcf": play_mujoco, "fmu": play_fmu}
 NO_NOISE = "the rig states no sensor noise, expected sensors.ft.noise or another"
 
 

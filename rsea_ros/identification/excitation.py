@@ -7,9 +7,7 @@ command line choose it. `excitation()` adds the ramps.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -165,9 +163,7 @@ def _band_noise(settings: ExcitationSettings, deviation: float) -> FloatArray:
     return noise
 
 
-KINDS: Mapping[str, Callable[[ExcitationSettings], FloatArray]] = MappingProxyType(
-    {"chirp": chirp, "multisine": multisine, "white_noise": white_noise, "steps": steps}
-)
+KINDS = {"chirp": chirp, "multisine": multisine, "white_noise": white_noise, "steps": steps}
 PERIODIC = frozenset({"multisine"})
 
 

@@ -62,25 +62,23 @@ _LIMIT_FIELDS = {
 }
 LOOP_LIMITS = tuple(_LIMIT_FIELDS)
 
-FIELDS: Mapping[str, Field] = MappingProxyType(
-    {
-        "rotor.reflected_inertia": Field("kg m^2", low_allowed=False),
-        "rotor.reflected_damping": Field("N m s/rad"),
-        "gear.ratio": Field("1", low=1.0, default=1.0),
-        "gear.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
-        "gear.damping": Field("N m s/rad", default=0.0),
-        "chassis.inertia": Field("kg m^2", default=0.0),
-        "spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
-        "spring.damping": Field("N m s/rad", default=0.0),
-        "housing.inertia": Field("kg m^2", default=0.0),
-        "proximal_spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
-        "proximal_spring.damping": Field("N m s/rad", default=0.0),
-        **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
-        **{f"controller.{key}": f for gains in LOOP_FIELDS.values() for key, f in gains.items()},
-        **{f"controller.{key}": f for key, f in _LIMIT_FIELDS.items()},
-        "spring_end.above_sensor": Field("1", default=0.0),
-    }
-)
+FIELDS: Mapping[str, Field] = {
+    "rotor.reflected_inertia": Field("kg m^2", low_allowed=False),
+    "rotor.reflected_damping": Field("N m s/rad"),
+    "gear.ratio": Field("1", low=1.0, default=1.0),
+    "gear.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
+    "gear.damping": Field("N m s/rad", default=0.0),
+    "chassis.inertia": Field("kg m^2", default=0.0),
+    "spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
+    "spring.damping": Field("N m s/rad", default=0.0),
+    "housing.inertia": Field("kg m^2", default=0.0),
+    "proximal_spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
+    "proximal_spring.damping": Field("N m s/rad", default=0.0),
+    **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
+    **{f"controller.{key}": f for gains in LOOP_FIELDS.values() for key, f in gains.items()},
+    **{f"controller.{key}": f for key, f in _LIMIT_FIELDS.items()},
+    "spring_end.above_sensor": Field("1", default=0.0),
+}
 
 
 def unit_of(name: str) -> str:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import END_NAMES, Rig, motor_torque
 
 SLEW, POWER = 10_000.0, 250.0
 """N m/s, W: limits of a driver whatever the rig."""
-UNKNOWN: Mapping[str, float] = MappingProxyType({})
+UNKNOWN: Mapping[str, float] = {}
 FASTEST, FELT, BENT = 5.0, 110.0, math.radians(5.0)
 """Derived limits where rig and hardware state no smaller one: rad/s, half as much again as the paper's motor
 turns without load; N m, what the largest sensor of its series (120) measures with some to spare; rad, 5°."""

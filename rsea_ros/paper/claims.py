@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Literal
 
 from rsea_ros.documents.units import STANDARD_GRAVITY
@@ -18,23 +17,21 @@ from rsea_ros.model.train import Train
 from rsea_ros.model.transfer import pure_torque_bandwidth
 from rsea_ros.paper import formulas
 
-TABLE_2: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {
-        "J_op": ("0.0012", "kg m^2"),
-        "J_od": ("0.010", "kg m^2"),
-        "J_lp": ("1e8", "kg m^2"),
-        "J_ld": ("0.091", "kg m^2"),
-        "J_m": ("0.953", "kg m^2"),
-        "J_sc": ("0.0040", "kg m^2"),
-        "b_s": ("3", "N m s/rad"),
-        "b_m": ("23.088", "N m s/rad"),
-        "b_lp": ("1e8", "N m s/rad"),
-        "b_ld": ("0.02", "N m s/rad"),
-        "K_lp": ("1e8", "N m/rad"),
-        "K_ld": ("7", "N m/rad"),
-        "K_s": ("1530.456", "N m/rad"),
-    }
-)
+TABLE_2: Mapping[str, tuple[str, str]] = {
+    "J_op": ("0.0012", "kg m^2"),
+    "J_od": ("0.010", "kg m^2"),
+    "J_lp": ("1e8", "kg m^2"),
+    "J_ld": ("0.091", "kg m^2"),
+    "J_m": ("0.953", "kg m^2"),
+    "J_sc": ("0.0040", "kg m^2"),
+    "b_s": ("3", "N m s/rad"),
+    "b_m": ("23.088", "N m s/rad"),
+    "b_lp": ("1e8", "N m s/rad"),
+    "b_ld": ("0.02", "N m s/rad"),
+    "K_lp": ("1e8", "N m/rad"),
+    "K_ld": ("7", "N m/rad"),
+    "K_s": ("1530.456", "N m/rad"),
+}
 """Table 2 as printed (the paper leaves the per-radian out of its units)."""
 
 SPRING_RATE, ARM = 207350.0, 0.0635

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from rsea_ros.documents import strict_yaml
@@ -125,7 +124,7 @@ def _table(number: int, series: str, items: Mapping[str, Item], body: Mapping[st
     )
 
 
-TABLES: Mapping[int, ControlTable] = MappingProxyType(_tables())
+TABLES: Mapping[int, ControlTable] = _tables()
 """By model number."""
 
 

@@ -21,7 +21,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +32,7 @@ from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.records.record import UNITS, FloatArray
 
-NOTHING: Mapping[str, float] = MappingProxyType({})
+NOTHING: Mapping[str, float] = {}
 
 
 @dataclass(frozen=True)
