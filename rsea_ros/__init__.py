@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from rsea_ros.library.checking import check
     from rsea_ros.library.diagnosed import diagnose
     from rsea_ros.library.identified import identify
-    from rsea_ros.library.records import read_bag
-    from rsea_ros.library.records import simulate
+    from rsea_ros.library.records import read_bag, simulate
     from rsea_ros.model.observer.observer import Observer, observe
     from rsea_ros.model.prediction_errors import predict
     from rsea_ros.model.rig import Rig

@@ -107,26 +107,21 @@ def layout_of(
     is the first line, or below a preamble the first that names all requested columns; a comment above may
     name the columns of numbers. Without a delimiter it is the first of several with which the line has the
     requested columns; otherwise the one that yields most of them, and of these the one that makes most cells.
-    A comma between cells of decimal commas, which are quoted then, comes last. Where no columns are requested
-    all names of the first line count.
+    A comma between cells of decimal commas, which are quoted then, comes last.
     """
     columns, header = wanted.columns, wanted.header
     usual = "\t" if ".tsv" in path.suffixes else ","
     known = sorted(dict.fromkeys((usual, "\t", ";", ",", "|", BLANKS)), key=lambda one: one == wanted.decimal)
     tried = [wanted.delimiter] if wanted.delimiter else known
     layouts = [_layout(lines, one, wanted) for one in tried]
-    if not columns:
-        best = max(layouts, key=lambda one: sum(map(bool, one.names)))
-        said = (n for n in _commented(comments, known) if not best.headed and len(n) == len(best.names))
-        return 0, TextLayout(best.delimiter, next(said, best.names), best.headed)
-    for layout in sorted(layouts, key=lambda layout: layout.headed):
-        if all(_has(layout, column) for column in columns):
-            return 0, layout
     for layout in (one for one in layouts if not one.headed):
         for line, one in product(reversed(comments), known):  # as numpy.savetxt(header=…) writes them
             named = TextLayout(layout.delimiter, tuple(split(line.lstrip(" \t#%"), one)), False)
             if len(named.names) == len(layout.names) and all(_names(named, column) for column in columns):
                 return 0, named
+    for layout in sorted(layouts, key=lambda layout: layout.headed):
+        if all(_has(layout, column) for column in columns):
+            return 0, layout
     for at in range(1, len(lines) if header is not False else 0):
         for layout in (_layout(lines[at:], one, wanted) for one in tried):
             if layout.headed and all(_names(layout, column) for column in columns):

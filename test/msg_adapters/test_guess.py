@@ -70,7 +70,8 @@ def test_units_in_a_row_decimal_commas_texts_and_codes(tmp_path, comma, text):
 
 
 def test_names_of_columns_and_texts_stay_names(tmp_path):
-    columns = (("t", T), ("cmd: [x]\x85evil: 1", TORQUE), ('q "a"', ANGLE), ("p", ["\x85command: 1"] * len(T)))
+    texts = ["\x85command: 1"] * len(T)
+    columns = (("t", T), ("cmd: [x]\x85evil: 1", TORQUE), ('q "a"', ANGLE), ("p", texts))
     names = ('"' + name.replace('"', '""') + '"' for name, _ in columns)
     path = table(tmp_path / "run.csv", *((name, y) for name, (_, y) in zip(names, columns, strict=True)))
     record, _ = imported(path)
