@@ -4,8 +4,6 @@ The writing half is imported on first use: it brings the message definitions alo
 do without.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from msg_adapters.bags import iterate

@@ -9,8 +9,6 @@ not see that a function of another file was compiled into it, and it cannot writ
 Code in the folder is executed, so it is used only where nobody but this user (or root) can have written it.
 """
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import logging

@@ -1,7 +1,5 @@
 """Python files from outside the package, by an environment variable: effects, devices."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 from collections.abc import Iterator

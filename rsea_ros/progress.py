@@ -1,7 +1,5 @@
 """Progress: the callback by which long work reports its present stage."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 Progress = Callable[[str, float], None]

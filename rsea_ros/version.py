@@ -1,7 +1,5 @@
 """The version of this software."""
 
-from __future__ import annotations
-
 from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree

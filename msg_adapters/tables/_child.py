@@ -3,8 +3,6 @@
 See child.py. It imports nothing of this package, so that it starts fast and may be killed at any moment.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import resource

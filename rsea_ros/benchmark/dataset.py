@@ -1,7 +1,5 @@
 """A dataset of records with hidden causes, its documents, and a submission: JSON lines, one a record."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping

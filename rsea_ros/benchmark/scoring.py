@@ -1,7 +1,5 @@
 """Truth, scores of answers against it, and entries: the project's own and baselines."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence

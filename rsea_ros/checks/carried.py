@@ -1,7 +1,5 @@
 """The checks of a record as another verb carries them on, and which channels are usable."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All checks of a record before physics is fitted to it, in tenths of a second."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -8,8 +8,6 @@ Where x is what a model predicts of y at the same stamps, hold, sampling and lea
 is 1 at every line where the model is right.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

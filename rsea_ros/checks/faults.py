@@ -3,8 +3,6 @@
 Each takes a channel and returns which samples are bad, shape (n,). A sample that is masked is never fitted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """A finding: a line with its light, channel and share; channels that nothing used."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Frozen samples: a sensor that repeats a value, or a position that stands, while the machine moves."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 

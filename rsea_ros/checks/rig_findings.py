@@ -13,8 +13,6 @@ measured motion, without and with restoring terms:
     T = J q'' + b q' + c sign(q') + T_0 (+ K q + G sin(q - q_0))
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -9,8 +9,6 @@ and one of the samples on either side, made after the run, has its size without 
 a mode at the other sensor looks alike: it raises that one's response as an average lowers this one's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterator, Mapping
 

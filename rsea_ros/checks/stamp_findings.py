@@ -3,8 +3,6 @@
 Stamps at whole multiples of a step s, of samples whose period is no multiple of it, are off by up to s / 2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

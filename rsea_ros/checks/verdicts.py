@@ -11,8 +11,6 @@ each other without it, witness against it, and where nothing else explains as mu
 contradiction itself is the finding. Each span in which the pairs say the same is judged for itself.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

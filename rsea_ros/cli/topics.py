@@ -1,7 +1,5 @@
 """`rsea topics`: show the published topics without `ros2 topic`."""
 
-from __future__ import annotations
-
 import argparse
 
 from rsea_ros.cli._graph import need_ros

@@ -10,8 +10,6 @@ Sensor Nonlinearities, 1996, ch. 3, where it jumps):
     way = gap / 2 tanh(T / (0.3 K_s gap))
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass

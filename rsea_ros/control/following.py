@@ -4,8 +4,6 @@ Sines are followed one frequency at a time, so that they show the real controlle
 with its trust included, unlike an impulse: above the predicted band the torque comes two samples late.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ on and off makes the bench oscillate between the torque limits. Without feedback
 alone, which no lateness makes unstable.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from dataclasses import dataclass

@@ -17,8 +17,6 @@ Disturbance observer: Ohnishi, Shibata, Murakami, IEEE/ASME Trans. Mechatronics 
 A command that is computed at sample k acts from k+1 to k+2: one sample of delay.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

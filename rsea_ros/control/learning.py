@@ -26,8 +26,6 @@ disturbance. Recursive least squares with forgetting: Astrom,
 Wittenmark, Adaptive Control, 1995, ch. 2; an inverse from it: Widrow, Walach, Adaptive Inverse Control, 1996.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -9,8 +9,6 @@ inertia nor drag for the load, and any lag would swing a pendulum up: the parts 
 which every bench of the set keeps the largest sensitivities of the design.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ w_d is the speed of the distal side, w that of the gear, a and b the law's actio
 the bench without motor torque. A motor at rest leaves the spring: Z_s = K_s / s + b_s.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -19,8 +19,6 @@ learned by least squares with forgetting, from what the controller has sent:
     m[k] = (1 - a) u[k-1] + a u[k],     acted over the sample before = (1 - a) m[k] + a m[k-1]
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

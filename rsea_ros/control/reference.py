@@ -20,8 +20,6 @@ three 7. Since u follows from the state of the model, the model may receive anot
 and nothing winds up.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -14,8 +14,6 @@ bench makes of a desired torque. Feed-forward and law are linear, so this is exa
 what is learned of a bench brings it nearer to the nominal one up to 25 Hz, and costs gain above.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 

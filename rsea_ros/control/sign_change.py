@@ -8,8 +8,6 @@ Each is a test of two hypotheses on Gaussian noise, half the difference of two s
 (Wald, Sequential Analysis, 1947), e^SURE to 1. The variance is what a sample changes anyway on this bench.
 """
 
-from __future__ import annotations
-
 import math
 
 from rsea_ros.control.controller import Measurement

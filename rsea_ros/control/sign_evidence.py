@@ -7,8 +7,6 @@ m: motor torque, T: ft, q, w: angle and speed of the gear, c: friction, o: a bia
 A motor that somebody else moves makes the second line false; then the first alone counts.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import product
 

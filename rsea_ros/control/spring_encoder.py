@@ -7,8 +7,6 @@ scale is off by as much as the spring moves: then no angle is returned. It count
 a while in which the spring moved, so none makes a torque before it has been seen to be right.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

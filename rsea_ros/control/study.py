@@ -5,8 +5,6 @@ it: the worst case beside the nominal. The controller assumes a rig with both en
 bench has.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -15,8 +15,6 @@ the gains; then the poles of the closed loop, taken from the code that runs, dec
 through.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

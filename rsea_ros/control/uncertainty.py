@@ -12,8 +12,6 @@ Each is the response of an effect where it is linear (Effect.response): at the c
 the current, at the motor on all torque, at the F/T sensor on ft. The law does not know them; the margins do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product

@@ -5,8 +5,6 @@ T = 2 K (R^2 + r_s^2 / 3) sin(theta) cos(theta) = (K_s / 2) sin(2 theta)     Eq.
 so no deflection carries more than K_s / 2, at 45 degrees; the paper does not say so.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

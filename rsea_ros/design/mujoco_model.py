@@ -29,8 +29,6 @@ hangs along -y, half its inertia in a point mass; other masses are 1 kg on the a
 The rig's effects are left out; exports/mjcf.py adds them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Margins: Monte Carlo with every part within its tolerance, percentiles.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Backward elimination: no cause stays that the others make redundant, or that a simpler one replaces."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

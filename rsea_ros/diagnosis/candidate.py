@@ -1,7 +1,5 @@
 """A candidate: a variant of the problem fitted to the training blocks and scored on the validation blocks."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -8,8 +8,6 @@ It is accepted when, besides, it takes away enough (`refusal`). The verdict comp
 noise. All numbers are in DiagnosisSettings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar

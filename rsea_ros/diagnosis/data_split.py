@@ -8,8 +8,6 @@ Effects are screened on a few short pieces of the training blocks, spread over t
 promising effects from hopeless ones.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -5,8 +5,6 @@ accepted by the validation blocks (criteria.py); redundant ones are removed; the
 the test blocks (naming/weighing.py), and named with gain and probability where allowed (naming/status.py).
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 

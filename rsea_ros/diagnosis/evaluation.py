@@ -1,7 +1,5 @@
 """A selection of causes, and its evaluation on blocks that took no part."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

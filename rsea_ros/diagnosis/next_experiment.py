@@ -5,8 +5,6 @@ all its unknowns, is fitted to that (one linearised step), and its residual is c
 sensors' noise. No run is recommended where none would separate them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Where the residual is: by frequency, amplitude, velocity, time, angle, each with its uncertainty."""
 
-from __future__ import annotations
-
 import itertools
 from typing import NamedTuple
 

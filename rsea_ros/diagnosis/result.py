@@ -1,7 +1,5 @@
 """The result of a diagnosis as values, for reports and files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal

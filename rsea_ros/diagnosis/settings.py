@@ -8,8 +8,6 @@ is only shown (residual_analysis.py, score.lost_above). Those numbers stand with
 are used (docs/decisions/0180-which-numbers-are-settings.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import TypeVar

@@ -6,8 +6,6 @@ derivatives that are already known. Two such steps show what a full fit would ga
 that, and so is a guess that moves the nominal values: these need new derivatives, and more steps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -12,8 +12,6 @@ spring stands in for a stop, Coulomb friction for Stribeck's. Beside the causes 
 fits better.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

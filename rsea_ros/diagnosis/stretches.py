@@ -9,8 +9,6 @@ in the whole of it. A channel that is faster than the commands keeps a sample pe
 Checks of the data and the first estimate of the noise see the whole record.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

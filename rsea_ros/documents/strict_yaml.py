@@ -4,8 +4,6 @@ Numbers are plain decimals (`1e-3` too). Text that YAML 1.1 but not a person rea
 `1:30`, `1_000`, a date) is refused with its line, as are anchors, aliases and tags.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import stat

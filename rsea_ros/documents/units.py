@@ -1,7 +1,5 @@
 """Units as people write them: `Nm`, `N*m`, `N·m` and `N m` are one, `kg m^2`, `kgm2` and `kg*m²` too."""
 
-from __future__ import annotations
-
 import re
 
 STANDARD_GRAVITY = 9.80665

@@ -1,7 +1,5 @@
 """Names and values in a sentence, and text from outside on a terminal."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable, Sequence

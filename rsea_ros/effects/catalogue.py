@@ -1,7 +1,5 @@
 """The catalogue: every file of this folder that has an `EFFECT`, files that a user adds; its pages."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import pkgutil

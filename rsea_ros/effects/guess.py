@@ -4,8 +4,6 @@ An effect's file states its guesses. What several effects share is here: lines o
 torque, and compliant parts between rotor and spring.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Protocol
 

@@ -4,8 +4,6 @@ An effect's function gets the table as `s` and indexes it by these constants: `s
 The step fills the signals to be read, calls the effects that are on, and uses the changed signals.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

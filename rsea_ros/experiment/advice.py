@@ -8,8 +8,6 @@ so far). For linear rigs every spectrum is such a mixture; for others the bound 
 (Duality of the optimal design: Fedorov, Theory of Optimal Experiments, 1972.)
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 

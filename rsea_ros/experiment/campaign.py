@@ -4,8 +4,6 @@ The loop does not know how a run is played: `play` gets a proposal and returns i
 refuses. It raises DeviceError for a run that broke off, which is discarded, and the loop ends.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal

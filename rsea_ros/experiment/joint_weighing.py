@@ -12,8 +12,6 @@ A cause that the data cannot show weighs as much as no cause: it stays possible 
 it. All causes have the same prior probability.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -8,8 +8,6 @@ moved together, and at draws from its posterior. z is such that all causes toget
 break a limit with less than 1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product

@@ -7,8 +7,6 @@ longest run is designed instead. separation.py rates shapes by simulation and ha
 amplitude is the largest with which proposal.py keeps all limits.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

@@ -5,8 +5,6 @@ Schroeder's, then made flatter by clipping (Schroeder, IEEE Trans. Inf. Theory 1
 Schoukens, Renneboog, IEEE Trans. Instrum. Meas. 37, 1988).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields

@@ -7,8 +7,6 @@ expected gain of the logarithm of the odds of i over j where i is true: T-optima
 Biometrika 62, 1975), averaged over which is true (Ponce de Leon, Atkinson, Biometrika 78, 1991).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

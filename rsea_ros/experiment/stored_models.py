@@ -1,7 +1,5 @@
 """Models and causes out of stored files: diagnosis.json and model.yaml."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -4,8 +4,6 @@ pythonfmu3 puts this file into the archive and finds the class by its text. The 
 needs rsea_ros. Inputs are held over a communication step, which may be any whole number of steps of STEP.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

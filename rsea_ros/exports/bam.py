@@ -8,8 +8,6 @@ is twice the load, so their coefficients are half of ours. Source: Duclusaud, Pa
 friction models for the physics simulation of servo actuators, 2024; the parameters' names: bam/model.py.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 

@@ -10,8 +10,6 @@ for a harmonic drive with its circular spline held. Where the spring is rigid, c
 axis is x, level: gravity is along -z.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -3,8 +3,6 @@
 Source: FMI 3.0.2 specification, section 4 (co-simulation); pythonfmu3 builds the archive.
 """
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Source: Isaac Lab 2.3, isaaclab.actuators (ActuatorBaseCfg, DelayedPDActuatorCfg
 static friction in N m, dynamic_friction and viscous_friction need Isaac Sim 5.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

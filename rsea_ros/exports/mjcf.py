@@ -4,8 +4,6 @@ Source: MuJoCo 4.0 XML reference (actuator delay, filterexact, dcmotor; tendon s
 polynomials, springlength, springyield, frictionloss).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from xml.etree import ElementTree as xml

@@ -1,7 +1,5 @@
 """Effects in the terms of another simulator, and what is left out."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

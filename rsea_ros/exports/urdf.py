@@ -3,8 +3,6 @@
 The block holds every value and effect of the rig; other programs ignore it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

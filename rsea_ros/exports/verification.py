@@ -1,7 +1,5 @@
 """Exports played in MuJoCo and FMPy against the own simulation, and how they differ."""
 
-from __future__ import annotations
-
 import math
 import tempfile
 from collections.abc import Callable, Iterable, Mapping

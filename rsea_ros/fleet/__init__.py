@@ -3,8 +3,6 @@
 `history` and `recordings` read a store as columns; `rsea fleet` is the command line.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any

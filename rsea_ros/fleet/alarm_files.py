@@ -3,8 +3,6 @@
 A file has the form that Prometheus' Alertmanager sends to a webhook, so that any such receiver accepts it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -1,7 +1,5 @@
 """One recording read and analysed."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping

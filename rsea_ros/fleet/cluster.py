@@ -3,8 +3,6 @@
 Whoever reaches its scheduler runs code on its workers (SECURITY.md). Only `rsea fleet run` imports this.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import queue

@@ -1,7 +1,5 @@
 """Joints of a fleet, and the dates in the paths of their recordings."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Queries of a store, and its columns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path

@@ -7,8 +7,6 @@ A compacted file lists those that it replaces; it gets its name before they are 
 leaves rows twice, which every reader of this package counts once, until the next run removes the old files.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Where recordings are: folders, patterns, lists and URLs, all through fsspec."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

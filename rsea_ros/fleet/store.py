@@ -8,8 +8,6 @@
 One run at a time writes (see hold_lock); readers need no lock. A file gets its name when it is complete.
 """
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

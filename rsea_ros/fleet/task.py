@@ -6,8 +6,6 @@ The exception is raised inside the task, between two steps of Python, so its tem
 stays. A call that never returns to Python (a file system that hangs) ends its worker a while later.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import os

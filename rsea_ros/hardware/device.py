@@ -1,7 +1,5 @@
 """Device: the interface of an actuator, real or simulated, to a driver."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A Dynamixel on its bus as a device, with an ATI Net F/T sensor, an encoder on the spring, or neither."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping

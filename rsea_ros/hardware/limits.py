@@ -1,7 +1,5 @@
 """Limits of an actuator, the torque within them, and the fault that ends it until it is cleared."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence

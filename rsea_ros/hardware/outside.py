@@ -1,7 +1,5 @@
 """Devices from outside the package, as RSEA_EFFECTS adds effects: files that RSEA_DEVICES names."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What ends the torque if the process dies: the motor's own watchdog, or a supervisor."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

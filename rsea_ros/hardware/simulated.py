@@ -1,7 +1,5 @@
 """The simulated actuator: its physics follow a clock, independently of reads and writes."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping

@@ -10,8 +10,6 @@ together (a control group, a container, a login): a driver connects to the Unix 
 {"timeout": S, "frames": [HEX, …], "replies": [HEX, …]} with the descriptor of its port, and its beats.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -3,8 +3,6 @@
 Codes are permanent, because fault managers rely on them. A discarded code is never used again.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

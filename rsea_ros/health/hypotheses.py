@@ -9,8 +9,6 @@ c is the score and A Fisher's information of the changes: were the change d, log
 Source: Basseville, Nikiforov, Detection of Abrupt Changes, 1993, section 8.2 (the local approach).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -7,8 +7,6 @@ d = argmin d' (A + F_0) d / 2 - c' d,   F_0 = diag(1 / doubt^2),   |d| <= Z95 do
 for all parameters together. A deviation beyond the doubt stays a change and alarms.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace

@@ -19,8 +19,6 @@ innovations. A single look adds at most a share of h: a knock or an outlier is n
 Sources: Page, Biometrika 41, 1954; Lorden, Annals of Mathematical Statistics 42, 1971, theorem 2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -22,8 +22,6 @@ by -H^-1 J' c d, with c = d r / d clock. Channels of one message share a clock; 
 early sensor, all of them together.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ larger than the noise (White, Econometrica 48, 1980; Newey and West 1987), times
 p unknowns (MacKinnon and White, J. Econometrics 29, 1985). Never less than H^-1.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Every kind is a function of one `ExcitationSettings`, in KINDS under the name by
 command line choose it. `excitation()` adds the ramps.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -13,8 +13,6 @@ the misfit is credible, and its estimates widen the intervals (model averaging, 
 most careful form: the span). Only the diagnosis decides which law it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -30,8 +30,6 @@ noise, is nonlinear distortion: even at even lines, odd at odd ones.
 (Pintelon, Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., chapter 4.)
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass

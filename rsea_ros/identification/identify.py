@@ -5,8 +5,6 @@ Where the computer was too busy for a cycle, the motor got none; the measured mo
 the simulated one behind the gap, and less elsewhere. Any fault of the machine is as large elsewhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

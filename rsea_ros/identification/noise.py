@@ -7,8 +7,6 @@ is folded over it, the record does not show its noise; the rig's statement count
 residual.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

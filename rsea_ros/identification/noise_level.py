@@ -14,8 +14,6 @@ The command; laws of friction, play, springs, ripple and drift over the simulate
 residual of another sensor: two sensors that see the same misfit agree about it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Slow ramps against a locked output show travel, stiffness and limit without a dy
 the measured motor torque where present, so friction of motor and gear is in all three.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Numbers that steer a result, each with meaning, unit and reason: here those of noise and intervals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 

@@ -7,8 +7,6 @@ their doubt. Derivatives by forward differences of the simulation; those of the 
 all sensors at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager

@@ -12,8 +12,6 @@ u is the loop's law on the measured motion (its integral aside), q filtered both
 inverse model; Gautier, Janot et al.). Gravity's angle has two minima in an output error: this finds the side.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

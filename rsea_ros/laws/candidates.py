@@ -1,7 +1,5 @@
 """Candidate terms, and what repeats in the residual."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor

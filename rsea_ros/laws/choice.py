@@ -1,7 +1,5 @@
 """The choice among laws on the base model that they join."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ The file is a plugin like any other (RSEA_EFFECTS): readable, editable, and comp
 helpers.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The effect file of a law, with the claims that the data support."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A law learnt from a record: columns, regression, choice, and its fit in the simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -15,8 +15,6 @@ For every group and channel the sums A = X'X, b = X'r and r'r are kept. A fit on
 loss in another group is r'r - 2 beta'b + beta'A beta, without the data.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

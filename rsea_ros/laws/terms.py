@@ -5,8 +5,6 @@ file. In it: w speed, q angle, h angle of the load, theta rotor angle, d deflect
 (all SI), share of the record's length, m what a memory holds, a the shape, such as a width.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ The motion is the measured one, smoothed: the simulation plus the response to th
 Each is one small function of the state and the newest value; the generated files call the same.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """`rsea.check`: the data checks of a record against a rig."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from rsea_ros.checks.finding import Finding, Findings, Light

@@ -1,7 +1,5 @@
 """Arguments and results of the library: records in, tables and a notebook's bar of progress out."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """`rsea.read_bag` and `rsea.simulate`: the record of a run, recorded or simulated, without ROS."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -5,8 +5,6 @@ pauses while others go on is no such gap. Nor are commands that pause, which hol
 the measured motor torque shows that others acted.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

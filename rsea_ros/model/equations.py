@@ -15,8 +15,6 @@ spring (d = c), a stiff gear (c = g) and no spring on the proximal side (p = h) 
 q_full = P q, so M = P' M_full P and so on.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Extent and pace of a machine: how far and how fast it moves."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -10,8 +10,6 @@ torques, filtered alike:
 Effects on a command are undone where only the commanded torque is known; a limit cannot be undone.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -8,8 +8,6 @@ both ends are positive for positive motor torque: on the housing end backward, o
 which Eqs. (5) and (6) have without n J_r, the spin of the rotor (docs/physics.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal

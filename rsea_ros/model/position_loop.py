@@ -10,8 +10,6 @@ while u is at its limit and the error would drive it further (conditional integr
 Advanced PID Control, 2006, section 3.5).
 """
 
-from __future__ import annotations
-
 import math
 
 from rsea_ros.effects.effect import compiled

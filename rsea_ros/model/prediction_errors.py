@@ -1,7 +1,5 @@
 """Errors of a prediction of a record."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

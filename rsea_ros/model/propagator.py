@@ -1,7 +1,5 @@
 """From the equations of motion to the propagators of one step."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -10,8 +10,6 @@ possible. The verdict changes beyond a hysteresis, and only where the torque is 
 doubt of it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ A value is written `{value: 0.953, unit: kg m^2, spread: 0.3, source: Table 2}`;
 `rig.FIELDS`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any

@@ -3,8 +3,6 @@
 `model.yaml`, written by identification and diagnosis, is a rig file with an `effects` list.
 """
 
-from __future__ import annotations
-
 import os
 import sysconfig
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Limits of a machine that nobody states: the smallest that its rig, motor and sensor give (decision 213)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

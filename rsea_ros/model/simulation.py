@@ -3,8 +3,6 @@
 Fixed step, deterministic. The same compiled step (step.py) serves the plant, one sample at a time.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping, Sequence

@@ -10,8 +10,6 @@ between x and an x_next predicted with the last step's f: one evaluation a step,
 Friction takes its mean over the step instead (effects/_friction.py).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -11,8 +11,6 @@ integration with w = tan(pi f_c dt) keeps the corner, and for every dt: stamps m
 Source: Zavalishin, The Art of VA Filter Design, 2018, section 4.4.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

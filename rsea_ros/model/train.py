@@ -14,8 +14,6 @@ ratio R = z_f / (z_c - z_f) with z_f, z_c teeth of flexspline and circular splin
 "rotational direction and reduction ratio"). test/model/test_train.py derives every n from rolling contacts.
 """
 
-from __future__ import annotations
-
 from typing import Literal, get_args
 
 Train = Literal[

@@ -8,8 +8,6 @@ ratio, J_r = J_m / N^2 and Z = J s^2 + b_s s + K_s:
     den = (J_sc + n^2 J_r) s^2 + (b_m + b_s) s + K_s
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ follow from others of the paper count (`found`); the rest need one that it does 
 that it says it tuned or that our sources only bound (`unclear`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

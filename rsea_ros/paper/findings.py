@@ -4,8 +4,6 @@
 another machine, or what rests on an estimate of ours is none.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

@@ -12,8 +12,6 @@ spread; the command is the paper's white noise of 30 N m, half of it for the fit
 model is fitted with loose priors, so that only its structure limits it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -9,8 +9,6 @@ commands the other one is wrong by all of its size, so the data decide; a torque
 moves into the time in which they hold.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

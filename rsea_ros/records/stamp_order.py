@@ -5,8 +5,6 @@ with those before it. The two are distinguished by density: late samples are nev
 ticks of the clock.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 
 import numpy as np

@@ -7,8 +7,6 @@ A clock that jumped shifts all the samples after the jump: sorted, they would mi
 the jump is removed first. A motor torque that belongs behind the edge of its command goes there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

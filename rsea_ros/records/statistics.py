@@ -5,8 +5,6 @@ takes longer than a diagnosis that finds nothing wrong. scipy.fft has the length
 every start; numpy.fft transforms alike.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

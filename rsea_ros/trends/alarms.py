@@ -1,7 +1,5 @@
 """Alarms, and the ranking of joints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

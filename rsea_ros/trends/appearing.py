@@ -1,7 +1,5 @@
 """Causes that appear, and whether that is significant."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

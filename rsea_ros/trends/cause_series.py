@@ -1,7 +1,5 @@
 """Causes and faults of the data as series of their own, from what each recording names."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

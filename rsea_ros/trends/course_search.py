@@ -4,8 +4,6 @@ Where the days fall into pieces: optimal partitioning, with the days weighted by
 2005, An algorithm for optimal partitioning of data on an interval).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Days: effects of single days, and of temperature."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Trends of a whole fleet in units and dates, from courses in relative units and days, and outliers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ torque(t) = envelope(t) · shape(t), |shape| ≤ 1. The envelope grows and shrin
 falls to zero within RELEASE when the hold ends. Another shape begins when that of the one before is zero.
 """
 
-from __future__ import annotations
-
 import math
 import threading
 from dataclasses import dataclass

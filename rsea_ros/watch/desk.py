@@ -1,7 +1,5 @@
 """The requests of pages (commands, recordings, evaluations), and the frames and state sent to them."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Handlers of requests, and who has access."""
 
-from __future__ import annotations
-
 import asyncio
 import hmac
 import secrets

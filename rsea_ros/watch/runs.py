@@ -1,7 +1,5 @@
 """Recordings that the page starts and stops, and their evaluations, each in a child process."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

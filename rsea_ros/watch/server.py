@@ -1,7 +1,5 @@
 """The server of the page, in a thread of its own: HTTP and WebSocket by tornado, thinned frames at 30 Hz."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import socket

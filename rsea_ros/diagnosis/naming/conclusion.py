@@ -1,8 +1,6 @@
 """The conclusion of a diagnosis: names with their sizes and gains, verdict, and what remains.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping, Sequence

@@ -11,8 +11,6 @@ that block b prefers. A right law gives 1 in every block; a look-alike is too la
 in others, although it helps overall. By amplitude, time and frequency lambda shows how a law is wrong.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

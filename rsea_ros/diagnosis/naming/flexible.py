@@ -8,8 +8,6 @@ The responses to the spline's parts are simulated: a torque at the gear or in th
 the command, one in the spring also shows in the F/T sensor, and a sensor's own error adds to its channel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

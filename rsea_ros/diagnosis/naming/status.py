@@ -14,8 +14,6 @@ The features f are the fit of the law's shape (evidence.py), the further gain of
 Written by `python -m bench calibration fit`, from records of the project's own plants; `score` tests them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -10,8 +10,6 @@ v: Dirichlet weights of the blocks times their number. A rival that is ahead by 
 get all the weight, as it would from the sum alone (Yao, Vehtari, Simpson, Gelman, Bayesian Anal. 13, 2018).
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Transactions with one motor: every result and error byte is checked, every failure counted by kind."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Control tables of the motors, and the settings of one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

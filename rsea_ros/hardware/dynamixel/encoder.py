@@ -1,7 +1,5 @@
 """An encoder on the motor's bus, and the sample of one exchange."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections import Counter

@@ -3,8 +3,6 @@
 Source: Dynamixel Protocol 2.0 of the maker. Pure functions of bytes, no port.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable
 

@@ -3,8 +3,6 @@
 txPacket of dynamixel-sdk 4.1.0 sends FF FF FD unstuffed, removeStuffing loses bytes, and rxPacket spins.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from dynamixel_sdk import (

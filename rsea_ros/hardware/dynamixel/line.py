@@ -5,8 +5,6 @@ and that a motor does not make its torque shows in its current. Its own bus watc
 the torque of each motor after the driver's death.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A Dynamixel in torque (current) mode: one read and one write a cycle, in SI units."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Limits that the motor holds itself, and registers that must not change."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Calibration of the sensor, from its web page."""
 
-from __future__ import annotations
-
 import io
 import math
 import re

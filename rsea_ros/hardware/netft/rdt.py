@@ -1,7 +1,5 @@
 """RDT: requests, records of 36 bytes, and lost records by their counters."""
 
-from __future__ import annotations
-
 import struct
 from collections import Counter
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Drains the socket on request and in a thread: every record has the stamp of its arrival."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 import struct

@@ -1,7 +1,5 @@
 """The F/T sensor as a device, and values that stand still."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """A simulated F/T sensor, and how it misbehaves."""
 
-from __future__ import annotations
-
 import operator
 import random
 import socket

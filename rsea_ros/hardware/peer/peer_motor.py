@@ -1,7 +1,5 @@
 """A simulated motor and a simulated encoder."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from typing import Protocol

@@ -1,7 +1,5 @@
 """Protocol 2.0 as the motor sees it. Written apart from the driver's codec: bit by bit, byte by byte."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The control tables in the motors: addresses of items and permitted values."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 EEPROM, RAM, READ_ONLY = "eeprom", "ram", "read only"

@@ -1,7 +1,5 @@
 """Requests to a simulated bench, and the station that serves them."""
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -1,7 +1,5 @@
 """The motor's end of the serial line: a pseudo-terminal that answers every instruction of Protocol 2.0."""
 
-from __future__ import annotations
-
 import os
 import secrets
 import tty

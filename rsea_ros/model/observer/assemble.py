@@ -6,8 +6,6 @@ Measured and estimated signals are rows on z. The torques on both ends have torq
 once (outputs.py): y = C x + D tau.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

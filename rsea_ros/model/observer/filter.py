@@ -18,8 +18,6 @@ So T_d becomes the reading, of variance r', as M grows. M is at least kappa time
 of the spring make (consider parameters: Schmidt, 1966); kappa: the share that nu confirms, 1 at first.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, NamedTuple
 

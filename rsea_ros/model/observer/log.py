@@ -7,8 +7,6 @@ The events are in order, so there is no log of checkpoints as `Observer` keeps o
 said of the torques' doubt.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Numba unpacks every array of its arguments at every call from Python, 0.2 us eac
 it takes longer than the filter. So one array has their addresses and shapes, and compiled code rebuilds them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple

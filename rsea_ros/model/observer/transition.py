@@ -7,8 +7,6 @@ balanced (scipy.linalg.matrix_balance) with their scale: A = T A_b T^-1, T = dia
 Source: Moler, Van Loan, SIAM Review 45, 2003, method 3; Anderson, Moore, Optimal Filtering, 1979, sec. 6.7.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rsea_ros.compiler import njit

@@ -1,7 +1,5 @@
 """Figures of a joint over time: a parameter with its course and changes, a cause by its size or its share."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
