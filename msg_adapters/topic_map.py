@@ -6,16 +6,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import BagError, ParameterError
-
-if TYPE_CHECKING:
-    from rosbags.typesys.store import Typestore
-
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"

@@ -138,12 +138,9 @@ def _of_rows(case: Case, what: Mapping[str, float | FloatArray], timed: Sequence
 
 def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> FloatArray:
     """Return the RMS over noise of each channel's residual, without bias and gain."""
-    misfits = []
-    for k in range(m):
-        columns, residuals = plain[of == k], residual[of == k]
-        unexplained = residuals - columns @ np.linalg.lstsq(columns, residuals, rcond=None)[0]
-        misfits.append(float(np.sqrt(np.mean(unexplained**2))))
-    return np.array(misfits)
+    parts = [(plain[of == k], residual[of == k]) for k in range(m)]
+    unexplained = [y - columns @ np.linalg.lstsq(columns, y, rcond=None)[0] for columns, y in parts]
+    return np.array([np.sqrt(np.mean(left**2)) for left in unexplained])
 
 
 def rows_of(setting: LinearSetting, residual: FitResidual, known: Slope | None = None) -> LinearisedRows:

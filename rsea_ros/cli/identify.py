@@ -1,20 +1,15 @@
 """`rsea identify`: parameters with confidence from recorded runs."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
 from msg_adapters import read_record
 from rsea_ros.cli import _output, _topics
 from rsea_ros.cli._terminal import progress, say, show
-from rsea_ros.identification.result import Verdict
+from rsea_ros.identification.result import Identification, Verdict
 from rsea_ros.report.result_files import IDENTIFICATION, IDENTIFICATION_JSON, MODEL
-
-if TYPE_CHECKING:
-    from rsea_ros.identification.result import Identification
 
 HELP = "identify frequency response and parameters with intervals from recorded runs"
 EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"

@@ -1,18 +1,13 @@
 """`rsea rig`: start a new rig, and check a rig file."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING
 
 from rsea_ros.cli._output import add_force, path
 from rsea_ros.cli._terminal import columns, say
 from rsea_ros.errors import ParameterError
-
-if TYPE_CHECKING:
-    from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import END_NAMES, Rig
 
 HELP = "start a rig for your bench (new), or check a rig and show its values (check)"
 EXAMPLE = "rsea rig new my_bench && rsea rig check my_bench.yaml"
@@ -50,14 +45,22 @@ def _new(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> int:
+    from rsea_ros.documents.wording import list_names
     from rsea_ros.model.rig_file import load_rig
 
     rig = load_rig(args.rig)
     say(f"{rig.name}: {rig.about}" if rig.about else rig.name, indent=2)
     rows = [_row(rig, name) for name in sorted(rig.quantities)]
     print(columns([("", "value", "unit", "known to", "source"), *rows]))
-    for line in remarks(rig):
-        say(line, indent=2)
+    ends = [f"{end} {'moves' if rig.end_is_free(end) else 'is clamped'}" for end in END_NAMES]
+    noisy = [f"{name} ({sensor.noise:g})" for name, sensor in rig.sensors.items() if sensor.noise > 0.0]
+    free = list_names(rig.free()) if rig.free() else "nothing: every value is fixed"
+    said = list_names(noisy) if noisy else "no channel; it is estimated from each record"
+    say(f"ends: {list_names(ends)}", indent=2)
+    say(f"identify fits: {free}", indent=2)
+    say(f"noise stated for: {said}", indent=2)
+    if not rig.free():
+        say("give a value a spread (0.3: known to 30 %) if identify should estimate it", indent=2)
     return 0
 
 
@@ -68,18 +71,3 @@ def _row(rig: Rig, name: str) -> tuple[str, ...]:
     return name, f"{rig[name]:.6g}", plain(rig.unit(name)), doubt, rig.quantities[name].source
 
 
-def remarks(rig: Rig) -> list[str]:
-    """Return a summary of the rig: moving ends, fitted values, sensors."""
-    from rsea_ros.documents.wording import list_names
-    from rsea_ros.model.rig import END_NAMES
-
-    ends = [f"{end} {'moves' if rig.end_is_free(end) else 'is clamped'}" for end in END_NAMES]
-    noisy = [f"{name} ({sensor.noise:g})" for name, sensor in rig.sensors.items() if sensor.noise > 0.0]
-    lines = [
-        f"ends: {list_names(ends)}",
-        f"identify fits: {list_names(rig.free()) if rig.free() else 'nothing: every value is fixed'}",
-        f"noise stated for: {list_names(noisy) if noisy else 'no channel; it is estimated from each record'}",
-    ]
-    if not rig.free():
-        lines.append("give a value a spread (0.3: known to 30 %) if identify should estimate it")
-    return lines

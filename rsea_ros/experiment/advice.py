@@ -124,11 +124,9 @@ def _imitate(
 
 def _powers(problem: Problem, theta: FloatArray) -> FloatArray:
     """Return the squared residual of each case over the noise, summed, per second."""
-    powers = []
-    for c, made in zip(problem.cases, problem.outputs(theta), strict=True):
-        residuals = [(made[n] - c.measured[n]) / c.noise[n] for n in problem.present(c)]
-        powers.append(sum(float(np.sum(r**2)) for r in residuals) / c.duration)
-    return np.array(powers)
+    cases = zip(problem.cases, problem.outputs(theta), strict=True)
+    left = [(c, [(made[n] - c.measured[n]) / c.noise[n] for n in problem.present(c)]) for c, made in cases]
+    return np.array([sum(float(np.sum(r**2)) for r in residuals) / c.duration for c, residuals in left])
 
 
 ACCURACY = 0.01

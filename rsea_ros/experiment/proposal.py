@@ -8,7 +8,7 @@ moved together, and at draws from its posterior. z is such that all causes toget
 break a limit with less than 1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -54,9 +54,9 @@ class Peaks:
 def ends_of(hypotheses: Sequence[Hypothesis]) -> list[Group]:
     """Return for each hypothesis its most likely rig, the points of every axis, and those moved together."""
     quantiles = [quantile_of(h.probability, len(hypotheses)) for h in hypotheses]
-    axes = [_ends(h, z) for h, z in zip(hypotheses, quantiles, strict=True)]
-    corners = [_corners(h, z) for h, z in zip(hypotheses, quantiles, strict=True)]
-    return [Group((*a, *c), len(a)) for a, c in zip(axes, corners, strict=True)]
+    pairs = list(zip(hypotheses, quantiles, strict=True))
+    axes = [[*_ends(h, z)] for h, z in pairs]
+    return [Group((*a, *_corners(*pair)), len(a)) for a, pair in zip(axes, pairs, strict=True)]
 
 
 def quantile_of(probability: float, count: int) -> float:
@@ -65,22 +65,21 @@ def quantile_of(probability: float, count: int) -> float:
     return float(norm.isf(min(max(allowed, 1.0 - LEVEL), _LIKELIEST)))
 
 
-def _ends(hypothesis: Hypothesis, z: float) -> list[Rig]:
+def _ends(hypothesis: Hypothesis, z: float) -> Iterator[Rig]:
     unknowns, theta = hypothesis.problem.unknowns, hypothesis.theta
     moving = [i for i, u in enumerate(unknowns) if not u.is_clock]
     covariance = np.linalg.inv(hypothesis.information)[np.ix_(moving, moving)]
     sd = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
-    rigs = [hypothesis.rig]
+    yield hypothesis.rig
     for value, vector in zip(values, vectors.T, strict=True):
         for side in (-z, -0.5 * z, 0.5 * z, z):
             moved = theta.copy()
             moved[moving] += side * np.sqrt(max(value, 0.0)) * vector * sd
-            rigs.append(hypothesis.rig_at(moved))
-    return rigs
+            yield hypothesis.rig_at(moved)
 
 
-def _corners(hypothesis: Hypothesis, z: float) -> list[Rig]:
+def _corners(hypothesis: Hypothesis, z: float) -> Iterator[Rig]:
     """Return rigs with the cause's own parameters moved together, and some drawn from the posterior.
 
     A near stop is worst where it is stiff, at some distances more than at those beside them, and where the
@@ -88,16 +87,15 @@ def _corners(hypothesis: Hypothesis, z: float) -> list[Rig]:
     """
     positions, sd = hypothesis.cause_indices[:3], hypothesis.sd()
     if len(positions) < 2:
-        return []
+        return
     main = positions[0]
     low, high = ((bounds - hypothesis.theta)[main] / (z * sd[main]) for bounds in hypothesis.bounds())
     sizes = np.linspace(max(-1.0, low), min(1.0, high), _LEVELS)
-    rigs = []
     for corner in product(sizes, *[(-1.0, 0.0, 1.0)] * (len(positions) - 1)):
         moved = hypothesis.theta.copy()
         moved[positions] += z * np.array(corner) * sd[positions]
-        rigs.append(hypothesis.rig_at(moved))
-    return rigs + hypothesis.draws(_DRAWS, np.random.default_rng(0))
+        yield hypothesis.rig_at(moved)
+    yield from hypothesis.draws(_DRAWS, np.random.default_rng(0))
 
 
 def peaks(command: FloatArray, rate: float, groups: Sequence[Group]) -> Peaks:

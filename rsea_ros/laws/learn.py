@@ -123,12 +123,9 @@ def law_of(
     laws = []
     for place, items in parts.items():
         regressor = list_names(list(dict.fromkeys(p.term.regressor for p in items)))
-        law = Law(
-            f"law_of_{_slug(items[0].term.regressor)}", items[0].term.place, regressor, tuple(items), {}
-        )
-        laws.append(
-            replace(law, ranges=ranges_of(law, _all_letters(cases)), name=_name_with_place(law.name, place))
-        )
+        name = _name_with_place(f"law_of_{_slug(items[0].term.regressor)}", place)
+        law = Law(name, items[0].term.place, regressor, tuple(items), {})
+        laws.append(replace(law, ranges=ranges_of(law, _all_letters(cases))))
     return laws
 
 

@@ -15,7 +15,7 @@ For every group and channel the sums A = X'X, b = X'r and r'r are kept. A fit on
 loss in another group is r'r - 2 beta'b + beta'A beta, without the data.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -195,19 +195,16 @@ def paths(
     gram: Gram, candidates: Sequence[TermCandidate], given: Sequence[int] = (), most: int = MOST_TERMS
 ) -> list[SparseLaw]:
     """Return the models of one, two, … terms of every place. given: columns that are part of all."""
-    models = []
-    for place in dict.fromkeys(c.place for c in candidates):
-        models += _path(gram, candidates, place, given, most)
-    return models
+    places = dict.fromkeys(c.place for c in candidates)
+    return [model for place in places for model in _path(gram, candidates, place, given, most)]
 
 
 def _path(
     gram: Gram, candidates: Sequence[TermCandidate], place: Place, given: Sequence[int], most: int
-) -> list[SparseLaw]:
+) -> Iterator[SparseLaw]:
     first = len(gram.prior)
     free = [first + k for k, c in enumerate(candidates) if c.term is not None and c.place == place]
     chosen: list[int] = []
-    models: list[SparseLaw] = []
     left = gram.held_out(np.array([*given], np.int64))
     for _ in range(most):
         sums = fold_sums(gram, gram.weights(left, SELECTION))
@@ -215,12 +212,11 @@ def _path(
         ranked = sorted(free, key=lambda k: sums.loss(np.append(base, k)))
         taken = next((k for k in ranked if _acts_right(gram, candidates, [*given, *chosen, k])), None)
         if taken is None:
-            break
+            return
         chosen.append(taken)
         free = [k for k in free if not _same_form(candidates[k - first], candidates[taken - first])]
         left = gram.held_out(np.array([*given, *chosen], np.int64))
-        models.append(SparseLaw(place, tuple(chosen), left))
-    return models
+        yield SparseLaw(place, tuple(chosen), left)
 
 
 def _same_form(a: TermCandidate, b: TermCandidate) -> bool:

@@ -6,7 +6,7 @@ file. In it: w speed, q angle, h angle of the load, theta rotor angle, d deflect
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal, cast
@@ -226,9 +226,8 @@ def hum_terms(frequency: float) -> tuple[Term, ...]:
     )  # fmt: skip
 
 
-def mode_terms(frequencies: Sequence[float]) -> tuple[Term, ...]:
+def mode_terms(frequencies: Sequence[float]) -> Iterator[Term]:
     """Return terms of a mode that the load or the deflection shakes, and of a drive that overshoots."""
-    terms = []
     for name, zeta, tried in (
         *((f"mode_{round(100 * z)}", z, tuple(frequencies)) for z in (0.02, 0.05, 0.12)),
         *((f"overshoot_{round(100 * z)}", z, (12.0, 20.0, 32.0, 50.0, 80.0)) for z in (0.2, 0.4, 0.7)),
@@ -239,9 +238,6 @@ def mode_terms(frequencies: Sequence[float]) -> tuple[Term, ...]:
             ("command", "u", "command's past", "1"), ("motor", "u", "command's past", "1"),
         ):  # fmt: skip
             if tried and slow == (place in ("ft", "spring")):
-                terms.append(
-                    Term(f"{name}_percent", cast(Place, place), regressor, f"m - {letter}",
-                         f"(mode({letter}, {{a}}, ζ = {zeta:g}) - {letter})", unit, "mode_frequency", "Hz",
-                         "", tried, memory="ring", constant=zeta)
-                )  # fmt: skip
-    return tuple(terms)
+                yield Term(f"{name}_percent", cast(Place, place), regressor, f"m - {letter}",
+                           f"(mode({letter}, {{a}}, ζ = {zeta:g}) - {letter})", unit, "mode_frequency", "Hz",
+                           "", tried, memory="ring", constant=zeta)  # fmt: skip

@@ -7,7 +7,7 @@ A clock that jumped shifts all the samples after the jump: sorted, they would mi
 the jump is removed first. A motor torque that belongs behind the edge of its command goes there.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -23,7 +23,7 @@ _MOVED = 0.1
 """Of its range in the run: a sensor that changes more before the first command saw a motion."""
 
 
-def absent_spans(record: Record) -> list[Fault]:
+def absent_spans(record: Record) -> Iterator[Fault]:
     """Return a fault for each sensor that starts late or ends early, and for commands that do.
 
     Commands that start after the sensors are usual, the bench runs before its excitation does; they are a
@@ -31,9 +31,8 @@ def absent_spans(record: Record) -> list[Fault]:
     """
     driving = record.driving
     if driving is None or len(driving) < _FEWEST:
-        return []
+        return
     last = max(float(c.t[-1]) for c in record.channels.values() if len(c))
-    faults = []
     for name, channel in record.channels.items():
         if len(channel) < 2:
             continue
@@ -44,8 +43,7 @@ def absent_spans(record: Record) -> list[Fault]:
         spans += [(early, channel.t[-1], stop)] if early > longest else []
         if spans:
             held = ", the last command is held" if channel is driving and early > longest else ""
-            faults.append(_absence(name, spans, float(stop - start), held))
-    return faults
+            yield _absence(name, spans, float(stop - start), held)
 
 
 def _first(record: Record) -> float:

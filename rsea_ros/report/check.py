@@ -39,20 +39,18 @@ SAID_ELSEWHERE = ("identifiability", "rig_value", "noise", "excitation", "rest")
 """Kinds that identify and diagnose speak of in their results anyway; not a command that never changes."""
 
 
-def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
+def check_lines(findings: Findings, width: int = WIDTH) -> Iterator[Text]:
     """Return the findings of a record, each in lines of at most `width` columns: light, kind, channel, value.
 
     The expected value and the remedy follow where a light is not green.
     """
-    lines = []
     for f in _each_remedy_once(findings.findings):
         head = f"{f.light:<{_LIGHT}}{f'{kind(f)} ':<{_KIND}}{f'{_channel(f)} ':<{_CHANNEL}}"
         said = f"{number(f)} {f.detail}" if f.unit == "1" else ", ".join(filter(None, (number(f), f.detail)))
         if f.light != "green":
             said = "; ".join(filter(None, (said, f.expected and f"expected {f.expected}", f.remedy)))
         text = wrap(f"{head}{said}", width, min(len(head), _LIGHT + _KIND + _CHANNEL))
-        lines.append(Text.assemble((text[:_LIGHT], _STYLES[f.light]), text[_LIGHT:]))
-    return lines
+        yield Text.assemble((text[:_LIGHT], _STYLES[f.light]), text[_LIGHT:])
 
 
 def warnings(findings: Findings) -> list[str]:

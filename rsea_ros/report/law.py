@@ -280,13 +280,11 @@ def gain_sentence(result: LawResult) -> str:
     )
 
 
-def law_lines(result: LawResult) -> list[str]:
+def law_lines(result: LawResult) -> Iterator[str]:
     """Return the equations and their numbers, a line each."""
-    lines = []
     for written in result.laws:
-        lines.append(equation_of(written.law))
-        lines += [f"  {text}" for text in parameter_lines(written.law)]
-    return lines
+        yield equation_of(written.law)
+        yield from (f"  {text}" for text in parameter_lines(written.law))
 
 
 def parameter_lines(law: Law) -> list[str]:

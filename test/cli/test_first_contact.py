@@ -72,7 +72,7 @@ def test_a_folder_of_results_that_is_a_symbolic_link_is_named_as_such(target, tm
 def test_a_long_kind_of_finding_is_apart_from_its_channel(kind):
     """`dropped samplesposition`."""
     findings = Findings("run", "bench", (Finding("amber", kind, "position", 1.0, "1"),))
-    assert f"{kind.replace('_', ' ')} position" in check_lines(findings)[0].plain
+    assert f"{kind.replace('_', ' ')} position" in next(check_lines(findings)).plain
 
 
 def test_what_a_check_says_of_a_file_with_a_long_name_keeps_its_column():

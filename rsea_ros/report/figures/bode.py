@@ -1,5 +1,6 @@
 """Bode figure: measured response with its 95 % band, the model, their ratio, the coherence; its finding."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -38,7 +39,7 @@ def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) 
     phase = np.degrees(smooth + np.angle(response / reference))
     turn = np.degrees(np.arcsin(np.minimum(side, 1.0)))
     model_gain, model_phase = 20.0 * np.log10(np.abs(reference)), np.degrees(smooth)
-    data = _curves(hz, (gain + low, gain, gain + high), fit is not None, model_gain, "y", "%{y:.2f} dB")
+    data = list(_curves(hz, (gain + low, gain, gain + high), fit is not None, model_gain, "y", "%{y:.2f} dB"))
     data += _curves(hz, (phase - turn, phase, phase + turn), fit is not None, model_phase, "y2", "%{y:.1f}°")
     limit = 1.0
     if fit is not None:  # the ratio shows small departures: of trusted lines, and the tolerance
@@ -62,16 +63,13 @@ def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) 
 
 def _curves(
     hz: FloatArray, measured: Sides, has_model: bool, model: FloatArray, y: str, hover: str
-) -> list[fig.Json]:
+) -> Iterator[fig.Json]:
     """Return the measured values with their band, and the model's on top. measured: low, middle, high."""
     low, middle, high = measured
-    traces = [
-        fig.band(hz, low, high, fig.faint(fig.MEASURED, 0.28), yaxis=y),
-        fig.line(hz, middle, "measured", fig.faint(fig.MEASURED, 0.55), 5.0, yaxis=y, hovertemplate=hover),
-    ]
+    yield fig.band(hz, low, high, fig.faint(fig.MEASURED, 0.28), yaxis=y)
+    yield fig.line(hz, middle, "measured", fig.faint(fig.MEASURED, 0.55), 5.0, yaxis=y, hovertemplate=hover)
     if has_model:
-        traces.append(fig.line(hz, model, "model", fig.AFTER, 1.6, yaxis=y, hovertemplate=hover))
-    return traces
+        yield fig.line(hz, model, "model", fig.AFTER, 1.6, yaxis=y, hovertemplate=hover)
 
 
 def _decibel(ratio: FloatArray) -> FloatArray:
