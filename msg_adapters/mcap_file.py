@@ -83,9 +83,14 @@ class _Scanner:
                 continue
             opcode, size = mcap.RECORD.unpack_from(buffer, at) if at + mcap.RECORD.size <= stop else (0, 0)
             if opcode == 0 or at + mcap.RECORD.size + size > stop:
-                following = self._next_chunk(buffer, at)
+                later = self.summary.chunks[bisect_right(self.summary.chunks, at) :]
+                following = next((c for c in later if c < stop and buffer[c] == mcap.CHUNK), None)
                 if following is None:
-                    self._take_broken_chunk(buffer, at, opcode)
+                    if opcode == mcap.CHUNK and not self.ended:  # its present part, unless it is compressed
+                        self._chunk(buffer, at + mcap.RECORD.size, stop, complete=False)
+                    elif self.ended:
+                        rest = f"{stop - at} bytes at byte {at} are not records"
+                        self.add("damaged_records", rest, stop - at)
                     return self.ended
                 self.add("damaged_records", f"no record at byte {at}", following - at)
                 at = following
@@ -106,20 +111,6 @@ class _Scanner:
         if total is not None and not self.summary.counts and total != self.read.total():
             detail = f"{self.read.total()} read, {total} expected from the statistics"
             self.contents.tell("missing_messages", file, detail, abs(total - self.read.total()), "messages")
-
-    def _next_chunk(self, buffer: mcap.Buffer, at: int) -> int | None:
-        """Return where the next chunk begins by the index, or None."""
-        chunks = self.summary.chunks
-        later = chunks[bisect_right(chunks, at) :]
-        return next((start for start in later if start < len(buffer) and buffer[start] == mcap.CHUNK), None)
-
-    def _take_broken_chunk(self, buffer: mcap.Buffer, at: int, opcode: int) -> None:
-        """Use the present part of an uncompressed chunk; report other remains."""
-        if opcode == mcap.CHUNK and not self.ended:
-            self._chunk(buffer, at + mcap.RECORD.size, len(buffer), complete=False)
-        elif self.ended:
-            detail = f"{len(buffer) - at} bytes at byte {at} are not records"
-            self.add("damaged_records", detail, len(buffer) - at)
 
     def _take(self, buffer: mcap.Buffer, opcode: int, first: int, stop: int) -> None:
         if self.ended and opcode in (mcap.MESSAGE, mcap.CHUNK, mcap.DATA_END):

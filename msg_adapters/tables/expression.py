@@ -142,12 +142,10 @@ def _check(node: ast.AST, text: str, *, is_quoted: bool) -> None:
         raise ValueError(f"has {part!r}, expected columns, numbers, + - * / ** and functions")
     if isinstance(node, ast.Call) and _column_name(node) is None:
         _check_call(node)
-    if isinstance(node, ast.Constant) and not is_quoted and not _is_plain(node.value):
-        raise ValueError(f"has {quote(node.value)}, expected a plain number")
-
-
-def _is_plain(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
+    if isinstance(node, ast.Constant) and not is_quoted:
+        value = node.value
+        if not isinstance(value, (int, float)) or isinstance(value, bool) or not abs(value) < 1e300:
+            raise ValueError(f"has {quote(value)}, expected a plain number")
 
 
 def _check_call(node: ast.Call) -> None:

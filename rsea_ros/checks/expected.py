@@ -160,14 +160,12 @@ def sides(record: Record, rig: Rig) -> Mapping[str, Side]:
         return {}
     try:
         with np.errstate(all="ignore"):
-            return _inverse(record, rig) if is_inverse(rig) else _forward(record, rig)
+            if is_inverse(rig):
+                return _inverse(record, rig)
+            predicted = {n: p for n, p in simulate(rig, record).items() if np.isfinite(p).all()}
+            return {n: Side(record[n].t, record[n].y, p) for n, p in predicted.items()}
     except (RseaError, ValueError, np.linalg.LinAlgError):
         return {}
-
-
-def _forward(record: Record, rig: Rig) -> Mapping[str, Side]:
-    predicted = {n: p for n, p in simulate(rig, record).items() if np.isfinite(p).all()}
-    return {n: Side(record[n].t, record[n].y, p) for n, p in predicted.items()}
 
 
 def _inverse(record: Record, rig: Rig) -> Mapping[str, Side]:

@@ -179,7 +179,8 @@ def without_held_samples(record: Record) -> tuple[Record, list[Fault]]:
     for name in SENSED:
         repeats = repeats_of(record[name].y) if name in record else 1
         if repeats > 1:
-            arrived[name] = _arrivals(record[name])
+            new = _is_new(record[name].y)
+            arrived[name] = Channel(record[name].t[new], record[name].y[new])
             share = 1.0 - len(arrived[name]) / len(record[name])
             detail = f"the log repeats every value {repeats} times; the first of each is used"
             faults.append(Fault("held_samples", name, share, detail, record[name].rate / repeats, "Hz"))
@@ -198,12 +199,6 @@ def repeats_of(values: FloatArray) -> int:
     steps = np.abs(np.diff(values[new] / np.max(np.abs(values))))
     regular = usual >= _REPEATED and long < _REGULAR * usual
     return int(usual) if regular and np.median(steps) > _MANY_STEPS * steps.min() else 1
-
-
-def _arrivals(channel: Channel) -> Channel:
-    """Return the samples that differ from the one before; all that lack a value, which a check reports."""
-    new = _is_new(channel.y)
-    return Channel(channel.t[new], channel.y[new])
 
 
 def _is_new(values: FloatArray) -> BoolArray:

@@ -204,7 +204,9 @@ def _without_repeats(channel: Channel, name: str) -> tuple[Channel, list[Fault]]
     Repeats with other values that fit an even clock are samples between the ticks of a coarse one; all others
     are left out but for the first of each.
     """
-    repeated = np.diff(channel.t, prepend=-np.inf) <= _repeat(channel.t)
+    step = np.diff(channel.t)
+    nearly_all = np.quantile(step[step > 0.0], 0.9) if np.any(step > 0.0) else 0.0
+    repeated = np.diff(channel.t, prepend=-np.inf) <= _REPEAT * nearly_all
     if not repeated.any():
         return channel, []
     even, share = even_behind_ticks(channel.t), float(repeated.mean())
@@ -213,12 +215,6 @@ def _without_repeats(channel: Channel, name: str) -> tuple[Channel, list[Fault]]
         return channel, [Fault("duplicate_stamps", name, share)]
     detail = f"{int(repeated.sum())} of {len(even)} stamps repeat: dated by the even clock that they fit"
     return Channel(even, channel.y), [Fault("coarse_stamps", name, share, detail)]
-
-
-def _repeat(t: FloatArray) -> float:
-    """Return up to which step two samples are one, s: a small part of nearly all steps."""
-    step = np.diff(t)
-    return _REPEAT * float(np.quantile(step[step > 0.0], 0.9)) if np.any(step > 0.0) else 0.0
 
 
 def _check_even(channel: Channel, where: str) -> None:
