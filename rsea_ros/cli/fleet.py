@@ -18,7 +18,7 @@ from rsea_ros.cli._output import FOUND, Action, add_actions, add_fail_on, add_fo
 from rsea_ros.cli._terminal import progress
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.fleet import FleetError, need_extra, pool, task
+from rsea_ros.fleet import FleetError, pool, task
 from rsea_ros.fleet.joints import Diagnose, load_joints
 from rsea_ros.processes import Stopped
 
@@ -40,7 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the action."""
-    need_extra()
     return ACTIONS[args.action].run(args)
 
 

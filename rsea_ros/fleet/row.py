@@ -15,13 +15,14 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.compute as pc
-from pyarrow import parquet
-
 from rsea_ros.documents.wording import brief
-from rsea_ros.fleet import FleetError
+from rsea_ros.fleet import FleetError, need_extra
 from rsea_ros.outputs.new_files import Destination, NewFiles
+
+need_extra()  # says in one line what the next ones lack
+import pyarrow as pa  # noqa: E402
+import pyarrow.compute as pc  # noqa: E402
+from pyarrow import parquet  # noqa: E402
 
 SCHEMA = 1
 """Grows when a column changes its meaning; a store of a higher one is not read."""
