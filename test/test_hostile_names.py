@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rsea_ros.cli._fleet_sql import no_formula
+from rsea_ros.cli.fleet import no_formula
 from rsea_ros.effects.effect import Claims
 from rsea_ros.exports.fmu import export_fmu
 from rsea_ros.exports.isaac import export_isaac

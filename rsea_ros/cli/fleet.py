@@ -4,23 +4,26 @@ come (watch); pages (report) and queries (sql) of a store."""
 from __future__ import annotations
 
 import argparse
+import csv
+import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
+from datetime import date, datetime
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
-from rsea_ros.cli import _fleet_sql
 from rsea_ros.cli._output import FOUND, Action, add_actions, add_fail_on, add_force, results_place
-from rsea_ros.cli._terminal import progress
+from rsea_ros.cli._terminal import columns, progress
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.fleet import FleetError, pool, task
 from rsea_ros.fleet.joints import Diagnose, load_joints
 from rsea_ros.processes import Stopped
+from rsea_ros.report.result_files import strict
 
 if TYPE_CHECKING:
     from rsea_ros.fleet.engine import RunSummary
@@ -31,6 +34,9 @@ EXAMPLE = "rsea fleet run recordings --map joints.yaml --out store && rsea fleet
 GIGA, MINUTE = 1e9, 60.0
 MOST_SHOWN = 10
 """Largest number of quarantined recordings to print; the store has all."""
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+_WIDEST = 60
+"""Largest width of a cell on a terminal, characters."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -242,9 +248,67 @@ def _look(args: argparse.Namespace, held: list[task.Held], at_first: bool) -> in
     return len(alarms)
 
 
+def _add_sql(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `sql`."""
+    parser.add_argument(
+        "query", help="SELECT … FROM recordings, parameters, causes, faults or analyses (docs/fleet.md)"
+    )
+    parser.add_argument("--store", required=True, help="folder of the store")
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true", help="print a list of JSON objects")
+    form.add_argument("--csv", action="store_true", help="print CSV: a line of names, then one line per row")
+
+
+def _sql(args: argparse.Namespace) -> int:
+    """Print the answer."""
+    from rsea_ros.fleet.query import answer
+    from rsea_ros.fleet.store import open_store
+
+    names, rows = answer(open_store(args.store), args.query)
+    if args.json:
+        print(_json([dict(zip(names, row, strict=True)) for row in rows], indent=1))
+    elif args.csv:
+        writer = csv.writer(sys.stdout, lineterminator="\n")
+        writer.writerow(map(no_formula, names))
+        writer.writerows([no_formula(value) for value in row] for row in rows)
+    else:
+        print(columns([names, *([_cell(value) for value in row] for row in rows)]))
+    return 0
+
+
+def no_formula(value: Any) -> str:
+    """Return a value in full; a text that a spreadsheet would run begins with an apostrophe."""
+    text = _text(value)
+    return f"'{text}" if isinstance(value, str) and text.startswith(_FORMULA) else text
+
+
+def _json(value: Any, indent: int | None = None) -> str:
+    return json.dumps(strict(value), default=_other, indent=indent, allow_nan=False, ensure_ascii=False)
+
+
+def _other(value: Any) -> str:
+    return value.isoformat() if isinstance(value, date) else str(value)
+
+
+def _text(value: Any) -> str:
+    plain = strict(value)
+    if plain is None:
+        return ""
+    return _json(plain) if isinstance(plain, (bool, int, float, list, dict)) else _other(plain)
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, datetime):
+        return value.strftime("%Y-%m-%d %H:%M:%S")
+    text = " ".join(_text(value).split())
+    return text if len(text) <= _WIDEST else f"{text[: _WIDEST - 1]}…"
+
+
 ACTIONS = {
     "run": Action("process new recordings, on all cores or a cluster", _add_run, _run),
     "report": Action("write pages of the fleet and of each joint", _add_report, _report),
     "watch": Action("run at intervals and report changes", _add_watch, _watch),
-    "sql": Action("query the store", _fleet_sql.add_sql, _fleet_sql.run),
+    "sql": Action("query the store", _add_sql, _sql),
 }

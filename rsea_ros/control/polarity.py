@@ -76,13 +76,17 @@ class Polarity:
         self._pulsing, self._back, self._full, self._torque = False, False, False, 0.0
         self._rested = self._broke = 0.0
 
-    def probe(self, reading: Measurement, desired: float | None, missed: int = 0) -> float | None:
+    def probe(
+        self, reading: Measurement, desired: float | None, missed: int = 0, *, acts: bool = True
+    ) -> float | None:
         """Return the torque, N m, that acts from the next sample on; None once the signs are proven.
 
         desired: N m; None: no torque was ever desired, and there is none. missed: samples lost before.
+        acts: whether its command can act; of samples that wait together only the newest one's can, and a
+        pulse that went on in the others would be ahead of the motor, which still makes the one before.
         """
         self._seen.hear(reading, self._sent[1], missed)
-        torque = 0.0 if desired is None else self._next()
+        torque = 0.0 if desired is None else self._next() if acts else self._sent[0]
         if self._pulsing:
             self._decide()
         if self.proven:

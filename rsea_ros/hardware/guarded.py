@@ -24,6 +24,7 @@ from rsea_ros.hardware.limits import (
     without,
 )
 from rsea_ros.hardware.protection import NONE, PROCESS
+from rsea_ros.hardware.witnesses import Witnesses
 from rsea_ros.records.record import is_measured
 
 
@@ -131,15 +132,18 @@ class GuardedDevice:
     lifted: limits that do not apply, of what a simulation does not have.
     spring: turns a measured deflection into a wrench where no sensor measures one; None: no such wrench.
     derive: returns the limits for what motor and sensor can do, known once it is open; None: `limits`.
+    testify: returns likewise what holds the wrench against deflection and motor torque; None: nobody does.
     """
 
     def __init__(
         self, device: Device, limits: Limits, rate: float, spring: Spring | None = None,
         derive: Callable[[Rating], Limits] | None = None,
+        testify: Callable[[Rating], Witnesses | None] = lambda rating: None,
     ) -> None:  # fmt: skip
         self.device, self.guard = device, Guard(limits, 1.0 / rate)
         self._limits, self._period = limits, 1.0 / rate
-        self._spring, self._derive = spring, derive
+        self._spring, self._derive, self._testify = spring, derive, testify
+        self._witnesses: Witnesses | None = None
         self.interlock = self.guard.interlock
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
@@ -153,6 +157,11 @@ class GuardedDevice:
     def fault(self) -> DeviceFault | None:
         """The latched fault, or the stop."""
         return self.guard.fault or (STOPPED if self.interlock.stopped else None)
+
+    @property
+    def is_off(self) -> bool:
+        """Whether the motor has acknowledged since the last stop that its torque is off."""
+        return not (self.away or self._off_due)
 
     @property
     def enabled(self) -> bool:
@@ -171,8 +180,10 @@ class GuardedDevice:
             losses.clear()
         try:
             self._check_protection(unprotected=unprotected)
+            rating = self.device.rating if isinstance(self.device, Rated) else UNRATED
             if self._derive is not None:
-                self._limits = self._derive(self.device.rating if isinstance(self.device, Rated) else UNRATED)
+                self._limits = self._derive(rating)
+            self._witnesses = self._testify(rating)
             self._check_measured()
         except Exception:
             self.device.close()
@@ -238,6 +249,8 @@ class GuardedDevice:
         if fault := self._step(before, state):
             self.guard.trip(fault)
         self.guard.look(state)
+        if self._witnesses and (fault := self._witnesses.take(state, self.guard.torque)):
+            self.guard.trip(fault)
         fault = self.guard.fault
         if state.motor_trouble or (fault is not None and fault is not latched and fault.cause in UNOBEYED):
             self._off_due = True
@@ -298,8 +311,9 @@ class GuardedDevice:
                 raise
 
     def stop(self, *, is_answered: bool = True) -> None:
-        """End the torque with the next cycle, until a clear that is called later. See Interlock.stop."""
+        """Zero the torque and switch it off in the next cycle, until a later clear. See Interlock.stop."""
         self.interlock.stop(is_answered=is_answered)
+        self._off_due = True
 
     def disable(self) -> None:
         """Command zero torque and switch it off. The thread that uses the device does it while it is away."""
@@ -318,6 +332,8 @@ class GuardedDevice:
         try:
             self.device.zero_ft()
         finally:
+            if self._witnesses:
+                self._witnesses.restart()
             self._tare.release()
 
     def clear(self, asked: int | None = None) -> bool:
@@ -329,8 +345,7 @@ class GuardedDevice:
         if self.fault is None:
             return False
         asked = event() if asked is None else asked
-        self._alone(self._recover)
-        self.interlock.end_stop(asked)
+        self._alone(self._recover, asked)
         return True
 
     def reboot(self) -> None:
@@ -367,6 +382,11 @@ class GuardedDevice:
         self.device.protection.beat(False)
 
     @property
+    def contradiction(self) -> str:
+        """What speaks against the wrench, in words; empty where nothing does."""
+        return self._witnesses.words if self._witnesses else ""
+
+    @property
     def ft_source(self) -> str:
         """Where the wrench of the newest reading comes from, in words."""
         if self.state is None or self.state.wrench is None or self._spring is None:
@@ -391,8 +411,11 @@ class GuardedDevice:
                 return self._read()
         return self._read()
 
-    def _alone(self, work: Callable[[], None]) -> None:
-        """Use the device while the cycles leave it alone, then restart at zero torque."""
+    def _alone(self, work: Callable[[], None], asked: int = 0) -> None:
+        """Use the device while the cycles leave it alone, then restart at zero torque.
+
+        asked: the number of a request that ends stops; 0: none.
+        """
         with self._turn:
             if self.away:
                 raise DeviceError(BUSY)
@@ -406,8 +429,12 @@ class GuardedDevice:
                 self.device.enable()
             self.guard.restart()
             self.interlock.end_fault(began)
+            if asked:
+                self.interlock.end_stop(asked)
         finally:
             with self._turn:
+                if self.interlock.stopped:
+                    self._off_due = True
                 self.away = False
                 if not self.enabled:  # also where it was requested meanwhile
                     with suppress(DeviceError):

@@ -75,7 +75,7 @@ class Interlock:
     def answer(self) -> None:
         """Note that a stop is answered now."""
         with self._lock:
-            self._stopped_at, self._unanswered = event(), self._unanswered - 1
+            self._stopped_at, self._unanswered = event(), max(self._unanswered - 1, 0)
 
     def disable(self) -> None:
         """End the activity."""

@@ -1,7 +1,7 @@
 """Limits of an actuator, the torque within them, and the fault that ends it until it is cleared."""
 
 import math
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
@@ -153,9 +153,7 @@ class Guard:
         self._ramp = self._ramp_from = self._room = 0.0
         self._written: deque[float] = deque(maxlen=HEARD_LATE)
         self._missed = 0
-        self._unfelt: Counter[str] = Counter()
-        self._measured: set[str] = set()
-        self._complete = False
+        self._unfelt = {"ft": 0}
 
     @property
     def fault(self) -> DeviceFault | None:
@@ -188,40 +186,22 @@ class Guard:
 
     def complaint(self, state: State) -> DeviceFault | None:
         """Return the first fault in a reading; once measured, a deflection is expected."""
-        return complaint(self.limits, state, deflects="deflection" in self._measured)
+        return complaint(self.limits, state, deflects="deflection" in self._unfelt)
 
     def _blind(self, state: State) -> DeviceFault | None:
         """Return a fault while a limit cannot be applied for too long, also once it was cleared.
 
-        A limit of NO_LIMIT counts if its quantity was measured before: `GuardedDevice.open` refuses others.
+        But for ft it counts if its quantity was measured before: `GuardedDevice.open` refuses others.
         """
-        felt = is_measured(ft_torque(self.limits, state))
-        if is_measured(state.deflection):
-            self._measured.add("deflection")
-        before, self._complete = (
-            self._complete,
-            felt
-            and math.isfinite(state.temperature + state.current + state.voltage)
-            and ("deflection" not in self._measured or is_measured(state.deflection)),
-        )
-        if before and self._complete:
-            return None
-        lacking = unmeasured_quantities(self.limits, state)
-        self._measured |= NO_LIMIT.keys() - set(lacking)
-        lacking = [name for name in lacking if name in self._measured]
-        if not felt and not math.isinf(self.limits.ft):
-            lacking.insert(0, "ft")
-        limited = "deflection" in self._measured and not math.isinf(self.limits.deflection)
-        if limited and not is_measured(state.deflection):
-            lacking.append("deflection")
-        for name in lacking:
-            self._unfelt[name] += 1
-            if self._unfelt[name] * self._period > UNFELT:
-                quantity = "torque" if name == "ft" else name
-                detail = f"no {quantity} measured for {UNFELT:g} s, expected one for {name}_limit"
-                return DeviceFault(name, detail=detail)
-        for name in self._unfelt.keys() - set(lacking):
-            self._unfelt[name] = 0
+        for name in ("ft", "deflection", *NO_LIMIT):
+            if is_measured(ft_torque(self.limits, state) if name == "ft" else getattr(state, name)):
+                self._unfelt[name] = 0
+            elif getattr(self.limits, name) != NO_LIMIT.get(name, math.inf) and name in self._unfelt:
+                self._unfelt[name] += 1
+                if self._unfelt[name] * self._period > UNFELT:
+                    quantity = "torque" if name == "ft" else name
+                    detail = f"no {quantity} measured for {UNFELT:g} s, expected one for {name}_limit"
+                    return DeviceFault(name, detail=detail)
         return None
 
     def allowed_torque(self, wanted: float, age: float | None) -> float:

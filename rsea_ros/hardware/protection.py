@@ -2,15 +2,13 @@
 
 import json
 import math
-import os
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
 
 from rsea_ros.errors import DeviceError
 
@@ -22,6 +20,7 @@ ANSWER = 1.0
 """s that a supervisor may take to answer, or to end."""
 ECHO = 0.5
 """s without an echo after which a supervisor stands still: the driver has no guard."""
+READY = b"ready\n"
 SCRIPT = Path(__file__).with_name("supervisor.py")
 
 
@@ -33,96 +32,53 @@ class HeldUp(DeviceError):
     """This process was stopped with torque on for about as long as the supervisor tolerates."""
 
 
-class _End(Protocol):
-    """Where beats go."""
+class _End:
+    """This end of the socket to a supervisor.
 
-    def send(self, beat: bytes) -> None:
-        """Send a beat. Raises OSError when nobody listens."""
+    That is a child, in a session of its own: it survives every signal to the driver's group. Or, with a path,
+    a service at a Unix socket: it survives the group.
+    """
 
-    def heard(self) -> bool:
-        """Return whether it has answered beats since the last call."""
-
-    def alive(self) -> bool:
-        """Return whether the supervisor runs."""
-
-    def close(self) -> None:
-        """End the connection."""
-
-
-class _Child:
-    """A process of this driver, in a session of its own: it survives every signal to the driver's group."""
-
-    def __init__(
-        self, descriptor: int, timeout: float, frames: Sequence[str], replies: Sequence[str]
-    ) -> None:
-        words = [str(descriptor), f"{timeout:g}", *frames, "--", *replies]
-        self._process = subprocess.Popen(
-            [sys.executable, "-I", "-S", str(SCRIPT), *words],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-            pass_fds=(descriptor,), start_new_session=True,
-        )  # fmt: skip
-        assert self._process.stdin is not None and self._process.stdout is not None
-        self._stdin, self._stdout = self._process.stdin, self._process.stdout
-        for end in (self._stdin, self._stdout):
-            os.set_blocking(end.fileno(), False)  # one that stands still is lost, and holds up no cycle
-
-    def send(self, beat: bytes) -> None:
-        os.write(self._stdin.fileno(), beat)
-
-    def heard(self) -> bool:
+    def __init__(self, path: str, descriptor: int, order: Mapping[str, object]) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        answer = b""
         try:
-            return os.read(self._stdout.fileno(), 4096) != b""
-        except BlockingIOError:
-            return False
-
-    def alive(self) -> bool:
-        return self._process.poll() is None
-
-    def close(self) -> None:
-        self._stdin.close()
-        try:
-            self._process.wait(ANSWER)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._stdout.close()
-
-
-class _Service:
-    """A supervisor that runs apart from the driver, at a Unix socket: it survives the driver's group."""
-
-    def __init__(
-        self, path: str, descriptor: int, timeout: float, frames: Sequence[str], replies: Sequence[str]
-    ) -> None:
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.settimeout(ANSWER)
-        words = {"timeout": timeout, "frames": list(frames), "replies": list(replies)}
-        order = json.dumps(words).encode() + b"\n"
-        try:
-            self._socket.connect(path)
-            socket.send_fds(self._socket, [order], [descriptor])
-            answer = self._socket.recv(64)
+            if path:
+                self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+                self._socket.settimeout(ANSWER)
+                self._socket.connect(path)
+            else:
+                self._socket, far = socket.socketpair()
+                with far:
+                    self._process = subprocess.Popen(
+                        [sys.executable, "-I", "-S", str(SCRIPT)], start_new_session=True,
+                        stdin=far.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                    )  # fmt: skip
+            socket.send_fds(self._socket, [json.dumps(order).encode() + b"\n"], [descriptor])
+            answer = self._socket.recv(64) if path else READY  # a child takes its time on a busy machine
         except OSError as error:
             answer = str(error).encode()
-        if answer != b"ready\n":
+        if answer != READY:
             self._socket.close()
             raise SupervisorLost(
                 f"parameter supervisor = {path!r}: {answer.decode() or 'no answer'}, expected a supervisor"
                 " that listens there (docs/hardware.md)"
             )
-        self._socket.settimeout(0.0)
+        self._socket.settimeout(0.0)  # one that stands still is lost, and holds up no cycle
 
     def send(self, beat: bytes) -> None:
+        """Send a beat. Raises OSError when nobody listens."""
         self._socket.send(beat)
 
     def heard(self) -> bool:
+        """Return whether it has answered beats since the last call."""
         try:
             return self._socket.recv(4096) != b""
         except OSError:
             return False
 
     def alive(self) -> bool:
-        self.heard()
+        """Return whether the supervisor runs, once all that it has answered is heard."""
         try:
             return self._socket.recv(1, socket.MSG_PEEK) != b""
         except BlockingIOError:
@@ -131,13 +87,16 @@ class _Service:
             return False
 
     def close(self) -> None:
-        """Wait until it has let the port go, which nobody else can open before."""
+        """End the connection, and wait until it has let the port go, which nobody else can open before."""
         self._socket.settimeout(ANSWER)
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
             while self._socket.recv(4096):
                 pass
         self._socket.close()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
 
 
 class Supervisor:
@@ -157,13 +116,12 @@ class Supervisor:
     ) -> None:
         self._timeout, self._last, self._beat, self._armed = timeout, 0.0, 0.0, False
         self._lost, self._unanswered = False, math.inf
-        words = [frame.hex() for frame in frames], [reply.hex() for reply in replies]
-        self._end: _End = (
-            _Service(service, descriptor, timeout, *words) if service else _Child(descriptor, timeout, *words)
-        )
+        words = {"frames": [frame.hex() for frame in frames], "replies": [reply.hex() for reply in replies]}
+        self._end = _End(service, descriptor, {"timeout": timeout, **words})
 
     def alive(self) -> bool:
         """Return whether it runs, and takes beats."""
+        self._listen()
         return not self._lost and self._end.alive()
 
     def beat(self, armed: bool | None = None) -> None:
@@ -183,10 +141,13 @@ class Supervisor:
             limit = f"{1e3 * SURE * self._timeout:.0f} ms"
             raise HeldUp(f"no cycle for {1e3 * gap:.0f} ms, limit {limit}: the motor may have been stopped")
 
-    def _tell(self, now: float) -> None:
-        """Send a beat, and look for the echo of the last ones."""
+    def _listen(self) -> None:
         if self._end.heard():
             self._unanswered = math.inf
+
+    def _tell(self, now: float) -> None:
+        """Send a beat, and look for the echo of the last ones."""
+        self._listen()
         self._unanswered, wrong = min(self._unanswered, now), ""
         if now - self._unanswered > ECHO:
             wrong = f"no answer for {now - self._unanswered:.2f} s, limit {ECHO:g} s"

@@ -1,13 +1,13 @@
 """A process that outlives the driver: when the driver ends or hangs, it sends the frames that stop the motor.
 
 Run as a file of its own with nothing but the standard library:
-supervisor.py DESCRIPTOR TIMEOUT_S FRAME_HEX… [-- REPLY_HEX…] with the driver's beats on stdin: `a` torque is
-on, `d` it is off, `q` all is well, end. End of input without `q` is the death of the driver, by whatever
-signal. Each beat is answered on stdout. Frames go out again until the motor has acknowledged each with a
-REPLY, where there are any; a motor that does not is reported to the system log.
-supervisor.py --listen SOCKET is the same as a service, which survives anything that kills driver and children
-together (a control group, a container, a login): a driver connects to the Unix socket, sends a line
-{"timeout": S, "frames": [HEX, …], "replies": [HEX, …]} with the descriptor of its port, and its beats.
+supervisor.py, with a Unix socket as stdin, gets {"timeout": S, "frames": [HEX, …], "replies": [HEX, …]} in a
+line, with the descriptor of the port, and then the driver's beats: `a` torque is on, `d` it is off, `q` all
+is well, end. End of input without `q` is the death of the driver, by whatever signal. Each beat is answered.
+Frames go out again until the motor has acknowledged each with a reply, where there are any; a motor that does
+not is reported to the system log.
+supervisor.py --listen SOCKET is the same as a service, for every driver that connects there, which survives
+anything that kills driver and children together (a control group, a container, a login).
 """
 
 import contextlib
@@ -72,17 +72,17 @@ class Line:
         return False
 
 
-def watch(inlet: int, outlet: int, line: Line, timeout: float, *, acknowledged: bool) -> None:
+def watch(place: int, line: Line, timeout: float, *, acknowledged: bool) -> None:
     """Follow the beats until they end. acknowledged: whether the motor's answers are waited for."""
     armed = False
     while True:
-        ready, _, _ = select.select((inlet,), (), (), timeout)
+        ready, _, _ = select.select((place,), (), (), timeout)
         if not ready:
             if armed:
                 line.stop(1, min(timeout, HANG) if acknowledged else 0.0)
             continue
         try:
-            beats = os.read(inlet, 4096)
+            beats = os.read(place, 4096)
         except OSError:  # a connection that was reset
             beats = b""
         if beats.endswith(b"q"):
@@ -92,7 +92,7 @@ def watch(inlet: int, outlet: int, line: Line, timeout: float, *, acknowledged: 
                 report("the driver has died, and the motor has not acknowledged zero torque: cut its supply")
             return
         with contextlib.suppress(OSError):  # nobody reads that any more
-            os.write(outlet, b"e")
+            os.write(place, b"e")
         armed = beats.endswith(b"a")
 
 
@@ -111,8 +111,8 @@ def serve(connection: socket.socket) -> None:
         connection.sendall(b"ready\n")
         try:
             frames, replies = (list(map(bytes.fromhex, order.get(n, []))) for n in ("frames", "replies"))
-            place, line = connection.fileno(), Line(descriptor, frames, replies)
-            watch(place, place, line, float(order["timeout"]), acknowledged=bool(replies))
+            line = Line(descriptor, frames, replies)
+            watch(connection.fileno(), line, float(order["timeout"]), acknowledged=bool(replies))
         finally:
             os.close(descriptor)
 
@@ -130,18 +130,14 @@ def listen(path: str) -> None:
 
 
 def main() -> None:
-    """Watch the process at the other end of stdin; signals of the terminal are not meant for this one."""
+    """Watch the driver at the other end of stdin; signals of the terminal are not meant for this process."""
     hurry()
     if sys.argv[1:2] == ["--listen"]:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
         return listen(sys.argv[2])
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
-    descriptor, timeout, *words = sys.argv[1:]
-    at = words.index("--") if "--" in words else len(words)
-    frames, replies = (list(map(bytes.fromhex, part)) for part in (words[:at], words[at + 1 :]))
-    line = Line(int(descriptor), frames, replies)
-    watch(0, 1, line, float(timeout), acknowledged=bool(replies))
+    serve(socket.socket(fileno=0))
 
 
 if __name__ == "__main__":

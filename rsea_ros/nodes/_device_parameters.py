@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 from rsea_ros.errors import ParameterError
@@ -91,7 +92,10 @@ LIMITS = (
     NodeParameter(
         "velocity_limit", DERIVED, "of the gear output; 0: none; -1: derived", "rad/s", DERIVED, 1000.0
     ),
-    NodeParameter("position_limit", 0.0, "either way from zero (position_zero); 0: none", "rad", 0.0, 1e4),
+    NodeParameter(
+        "position_limit", 0.0, "either way from zero (position_zero), 3 turns at most; 0: none",
+        "rad", 0.0, 3.0 * math.tau,
+    ),
     NodeParameter(
         "ft_limit", DERIVED, "of the torque that ft measures; 0: none; -1: derived", "N m", DERIVED, 1000.0
     ),
@@ -106,7 +110,7 @@ LIMITS = (
     NodeParameter("lost_cycles", 3, "cycles in a row without an answer that are a fault", "", 1, 100),
     NodeParameter("lost_time", 0.01, "which they last at least, at any rate", "s", 0.0, 0.1),
     AXIS,
-)
+)  # fmt: skip
 
 
 def devices_of(

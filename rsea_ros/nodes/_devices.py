@@ -18,7 +18,8 @@ from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.limits import UNRATED, Limits, Rating
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
-from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.hardware.witnesses import Actuator, Witnesses
+from rsea_ros.model.rig import END_NAMES, Rig, motor_torque
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import derive, felt_through_spring
 from rsea_ros.nodes._parameters import stated_limits
@@ -80,6 +81,30 @@ def spring_of(values: Values) -> Spring | None:
         return None
     sign, place = sign_and_index(values["axis"])
     return Spring(rig["spring.stiffness"], place, sign)
+
+
+def witnesses_of(values: Values, rating: Rating = UNRATED) -> Witnesses | None:
+    """Return what holds ft against deflection and motor torque; None where nothing can.
+
+    Doubts are three of the rig's standard deviations, and at least what gains, laws of the spring and
+    friction that the rig does not state make (decision 314).
+    """
+    rig, spring = load_rig(values["rig"]), spring_of(values)
+    if spring is None or rig.encoder_end != "gear_output":
+        return None
+    names = ("spring.stiffness", "rotor.reflected_inertia", "rotor.reflected_damping")
+    stiffness, inertia, damping = (3.0 * rig.spread(name) for name in names)
+    stated = {name: value for effect in rig.effects for name, value in effect.parameters.items()}
+    torque = min(motor_torque(rig)[0], rating.torque)
+    actuator = Actuator(
+        damping=rig["spring.damping"], inertia=rig["rotor.reflected_inertia"],
+        drag=rig["rotor.reflected_damping"], by_angle=_deflects(values, rig),
+        bent=math.hypot(0.2, stiffness), driven=0.3, risen=max(0.3, inertia), dragged=max(0.5, damping),
+        play=0.02 * torque + spring.stiffness * stated.get("gap", 0.0),
+        friction=0.1 * torque + stated.get("torque", 0.0) + stated.get("coulomb_torque", 0.0),
+        grave=0.1 * torque, creep=2e-3,
+    )  # fmt: skip
+    return Witnesses(spring, actuator, 1.0 / values["rate"])
 
 
 def device_of(values: Values, known: Mapping[str, Callable[[Values], Device]]) -> Device:

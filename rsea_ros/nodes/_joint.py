@@ -10,7 +10,7 @@ from typing import Any
 from rclpy.node import Node
 
 from msg_adapters.ros import Trigger
-from rsea_ros.errors import RseaError
+from rsea_ros.errors import DeviceError, RseaError
 from rsea_ros.hardware.device import Device, State
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault, event
@@ -19,14 +19,16 @@ from rsea_ros.model.rig_limits import check_travel
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import BenchTopics
 from rsea_ros.nodes._cycle import Cycle
-from rsea_ros.nodes._devices import limits_of, spring_of
+from rsea_ros.nodes._devices import limits_of, spring_of, witnesses_of
 from rsea_ros.nodes._drive import DriverCycle
-from rsea_ros.nodes._health import ERROR, OK, Health, NodeHealth
+from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._joints import Jobs
 
 LOST = {"failed_reads": "reads lost", "failed_writes": "writes lost"}
 OVERTAKING = 0.05
 """s for which a stop waits with its answer: requests that were sent before may still be on their way."""
+CONFIRMING = 0.5
+"""s for which a motor may owe the acknowledgement that it is off, beside a reboot or a lost port."""
 Work = Callable[[int], str]
 """What a service does; it is given the number of the request's event."""
 
@@ -46,7 +48,9 @@ class DrivenJoint:
         self._offers = offers
         self._node, self._jobs, self.part, self._values = node, jobs, part, values
         limits = partial(limits_of, values)
-        self.guarded = GuardedDevice(device, limits(), values["rate"], spring_of(values), limits)
+        self.guarded = GuardedDevice(
+            device, limits(), values["rate"], spring_of(values), limits, partial(witnesses_of, values)
+        )
         self.drive: DriverCycle | None = None
         self.topics: BenchTopics | None = None
         self._cycle: Cycle | None = None
@@ -57,7 +61,7 @@ class DrivenJoint:
             ("zero_ft", self._zero_ft), ("clear_fault", self.clear_fault), ("reboot", self._reboot),
             ("stop", self._stop),
         ):  # fmt: skip
-            after = self._answered if name == "stop" else self._told
+            after = self._answered if name == "stop" else self._health.publish
             offers.append(Offer(node, jobs, f"{part}/{name}" if part else name, self._guard(work), after))
 
     def open(self, anchor: Anchor) -> None:
@@ -136,12 +140,8 @@ class DrivenJoint:
     def _stop(self, asked: int) -> str:
         return stop([self])
 
-    def _answered(self, is_done: bool) -> None:
-        if is_done:
-            answer_stop([self], self._offers)
-        self._told(is_done)
-
-    def _told(self, is_done: bool) -> None:
+    def _answered(self) -> None:
+        answer_stop([self], self._offers)
         self._health.publish()
 
     def _zero_ft(self, asked: int) -> str:
@@ -186,19 +186,32 @@ class DrivenJoint:
             "torque_limit": f"{self.guarded.guard.limits.torque:.6g}",
             **self.guarded.device.health(),
         }
-        if fault is None:
+        told, level = (f"fault {fault}", ERROR) if fault is not None else (self.guarded.contradiction, WARN)
+        if not told:
             return NodeHealth(report.level, report.summary, values)
         besides = "" if report.level == OK else f"; {report.summary}"
-        return NodeHealth(ERROR, f"fault {fault}{besides}", values)
+        return NodeHealth(level, f"{told}{besides}", values)
 
 
 def stop(joints: Sequence[DrivenJoint]) -> str:
-    """End the torque until a clear_fault that is asked for after the answer."""
+    """End the torque until a clear_fault that is asked for after the answer.
+
+    Raises DeviceError where a motor has not acknowledged that it is off; the stop holds all the same.
+    """
     for joint in joints:
         assert joint.drive is not None
         joint.drive.stop(is_answered=False)
     time.sleep(OVERTAKING)
-    return "torque zero until clear_fault"
+    end = time.monotonic() + CONFIRMING
+    while on := [joint for joint in joints if not joint.guarded.is_off]:
+        if time.monotonic() > end:
+            why = ", ".join(joint.with_name(f"{joint.guarded.fault}") for joint in on)
+            raise DeviceError(
+                f"zero is commanded until clear_fault, but no motor has confirmed it ({why}), expected it"
+                f" to be off within {CONFIRMING:g} s: cut its power"
+            )
+        time.sleep(0.1 * OVERTAKING)
+    return "torque zero until clear_fault, the motor is off"
 
 
 def answer_stop(joints: Sequence[DrivenJoint], offers: Sequence[Offer]) -> None:
@@ -215,11 +228,11 @@ def answer_stop(joints: Sequence[DrivenJoint], offers: Sequence[Offer]) -> None:
 class Offer:
     """A service ~/NAME that does some work in a thread, and answers with the error where it fails.
 
-    after: called before the answer, with whether the work is done.
+    after: called before the answer.
     """
 
     def __init__(
-        self, node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[bool], None]
+        self, node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[], None]
     ) -> None:
         self._node, self._jobs, self._name, self._work, self._after = node, jobs, name, work, after
         self._service = node.create_service(Trigger, f"~/{name}", self._serve, callback_group=jobs.group)
@@ -247,7 +260,7 @@ class Offer:
         except RseaError as error:
             response.success, response.message = False, f"{self._name}: {' '.join(str(error).split())}"
         self._node.get_logger().info(response.message)
-        self._after(response.success)
+        self._after()
         return response
 
 

@@ -108,7 +108,7 @@ class ControllerNode:
             self._polarity.start()
         late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
         trust = self._limits.lateness.take(max(late, missed), max(together, int(missed > 0)))
-        torque = self._next_torque(reading, missed, trust, off)
+        torque = self._next_torque(reading, missed, trust, off, acts=together > 0)
         desired = self._desired.torque if self._polarity.proven else reading.ft
         if fault := self._polarity.contradiction or self._limits.fault(reading.ft, desired):
             return self._latch(fault)
@@ -120,7 +120,9 @@ class ControllerNode:
         self._late += late > self._limits.lateness.tolerance.late
         self._squares.append((reading.ft - self._desired.torque) ** 2)
 
-    def _next_torque(self, reading: Measurement, missed: int, trust: float, off: float) -> float:
+    def _next_torque(
+        self, reading: Measurement, missed: int, trust: float, off: float, *, acts: bool
+    ) -> float:
         """Return the torque that acts next: none before a desired torque, then pulses, then control.
 
         A desired torque that ceases or comes back is nobody's step: its error comes in as at a start.
@@ -128,7 +130,7 @@ class ControllerNode:
         desired = self._desired.torque if self._wished else None
         before, self._held = self._held, self._desired.age(0) is not None
         if not self._polarity.proven:
-            torque = self._polarity.probe(reading, desired, missed)
+            torque = self._polarity.probe(reading, desired, missed, acts=acts)
             if torque is not None:
                 return torque
             self._controller.start(reading, self._desired.torque)

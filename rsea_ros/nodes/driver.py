@@ -80,7 +80,7 @@ class DriverNode(ManagedEntity):
         if named[0][0]:
             for service, work, after in (
                 ("stop", self._stop, self._answered),
-                ("clear_fault", self._clear_faults, lambda is_done: None),
+                ("clear_fault", self._clear_faults, lambda: None),
             ):
                 self._offers.append(Offer(node, self._jobs, service, work, after))
         self._cycle: Cycle | None = None
@@ -222,9 +222,8 @@ class DriverNode(ManagedEntity):
         self._check_configured()
         return stop(self.joints)
 
-    def _answered(self, is_done: bool) -> None:
-        if is_done:
-            answer_stop(self.joints, self._offers)
+    def _answered(self) -> None:
+        answer_stop(self.joints, self._offers)
 
     def _clear_faults(self, asked: int) -> str:
         """Clear every joint's fault; one that cannot be cleared does not affect the others.

@@ -1,5 +1,6 @@
 """The supervisor of a motor: a process of its own that the machine's other work must not hold up."""
 
+import json
 import os
 import socket
 import subprocess
@@ -18,20 +19,23 @@ def may_hurry():
     return subprocess.run([sys.executable, "-c", code], capture_output=True, check=False).returncode == 0
 
 
+def begin(*words):
+    """Start one; return the process, and the driver's end of its stdin."""
+    near, far = socket.socketpair()
+    with far:
+        words = [sys.executable, "-I", "-S", supervisor.__file__, *words]
+        return subprocess.Popen(words, stdin=far), near
+
+
 @pytest.mark.parametrize("listens", [False, True])
 def test_it_runs_before_all_other_processes_where_it_may(listens, tmp_path):
-    reader, writer = os.pipe()
-    words = ["--listen", str(tmp_path / "socket")] if listens else [str(writer), "0.1", "ff"]
-    process = subprocess.Popen(
-        [sys.executable, "-I", "-S", supervisor.__file__, *words], stdin=subprocess.PIPE, pass_fds=(writer,)
-    )
+    process, driver = begin(*(["--listen", str(tmp_path / "socket")] if listens else []))
     wanted = os.SCHED_FIFO if may_hurry() else os.SCHED_OTHER
     until(lambda: os.sched_getscheduler(process.pid) == wanted)
     assert process.poll() is None
     process.kill()
-    process.communicate()
-    os.close(reader)
-    os.close(writer)
+    process.wait()
+    driver.close()
 
 
 FRAMES, REPLY = (b"zero", b"off!"), b"done"
@@ -41,15 +45,13 @@ FRAMES, REPLY = (b"zero", b"off!"), b"done"
 def test_it_repeats_its_frames_until_the_motor_has_acknowledged_them(ignored):
     """It sent them 20 times, whatever the motor answered, and nobody knew whether one had arrived."""
     motor, port = socket.socketpair()
-    words = [str(port.fileno()), "0.1", *(frame.hex() for frame in FRAMES), "--", REPLY.hex()]
-    process = subprocess.Popen(
-        [sys.executable, "-I", "-S", supervisor.__file__, *words],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=(port.fileno(),),
-    )  # fmt: skip
-    process.stdin.write(b"a")
-    process.stdin.flush()
-    assert process.stdout.read(1) == b"e", "it echoes"
-    process.stdin.close()  # the driver is dead
+    process, driver = begin()
+    order = {"timeout": 0.1, "frames": [frame.hex() for frame in FRAMES], "replies": [REPLY.hex()]}
+    socket.send_fds(driver, [json.dumps(order).encode()], [port.fileno()])
+    assert driver.recv(6) == b"ready\n"
+    driver.send(b"a")
+    assert driver.recv(1) == b"e", "it echoes"
+    driver.close()  # it is dead
     port.close()
     heard = []
     while frame := motor.recv(4):
@@ -58,6 +60,5 @@ def test_it_repeats_its_frames_until_the_motor_has_acknowledged_them(ignored):
             with suppress(BrokenPipeError):  # it has read an earlier reply and ended
                 motor.send(b"noise" + REPLY)
     assert process.wait(10.0) == 0
-    process.stdout.close()
     motor.close()
     assert set(heard) == set(FRAMES) and len(heard) <= ignored + 2 + 2 * (ignored > 0)

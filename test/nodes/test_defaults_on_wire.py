@@ -172,7 +172,8 @@ def test_a_stop_while_a_clear_waits_for_the_sensor_holds_until_a_later_clear(wir
         wire.bench.ask("misbehave", ft_silent=True)
         listener.until(wire.latched)
         clear = wire.request("clear_fault")
-        listener.until(lambda clear=clear: clear.done() or wire.trigger("stop").success)
+        while not clear.done() and "until clear_fault" not in wire.trigger("stop").message:
+            listener.until(lambda: True)
         waits = not clear.done()
         CALM(wire)
         answer = listener.until(lambda clear=clear: clear.done() and clear.result())
@@ -184,6 +185,24 @@ def test_a_stop_while_a_clear_waits_for_the_sensor_holds_until_a_later_clear(wir
     fault = listener.until(wire.latched)
     assert fault.startswith("stopped") or is_stall(fault), fault
     assert not any(goal and on for _, goal, on in wire.bench.log(since)["torque"])
+
+
+@pytest.mark.parametrize(
+    ("happens", "undone", "confirmed"),
+    [
+        (ask("set", mode=1, goal_velocity=3000), HEALTHY, True),
+        (ask("vanish"), ask("appear"), False),
+    ],
+)
+def test_a_stop_says_whether_the_motor_has_confirmed_it(wire, listener, happens, undone, confirmed):
+    """It was "torque zero" with 6.8 N·m in another mode, and with a port that was away."""
+    wire.ready()
+    happens(wire)
+    answer, on = wire.trigger("stop"), wire.goal()[1]
+    assert answer.success == confirmed == (not on), answer.message
+    assert ("the motor is off" if confirmed else "cut its power") in answer.message
+    undone(wire)
+    listener.until(lambda: wire.clear()[-1].success)
 
 
 @pytest.mark.parametrize("service", ["clear_fault", "reboot"])

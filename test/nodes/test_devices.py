@@ -79,6 +79,14 @@ def test_a_limit_that_cannot_be_applied_or_reached_is_refused(values, told):
         limits(**values)
 
 
+@pytest.mark.parametrize("value", [10_000.0, 180.0])
+def test_a_position_limit_in_degrees_or_without_end_is_refused(value):
+    """On a free end it stood for none, and was activated."""
+    table = {parameter.name: parameter for parameter in driver.TABLE}
+    with pytest.raises(ParameterError, match=r"expected a number from 0 to 18\.8496 rad"):
+        table["position_limit"].check(value)
+
+
 def test_limits_that_nobody_states_come_from_rig_motor_and_sensor():
     rig = limits()
     assert (rig.torque, rig.velocity) == (68.0, pytest.approx(0.8 * 68.0 / 23.088))

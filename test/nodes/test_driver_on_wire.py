@@ -1,6 +1,7 @@
 """The driver node on a simulated bench: what it publishes, its services, zero torque on every way out."""
 
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -8,10 +9,10 @@ from pathlib import Path
 import pytest
 from lifecycle_msgs.msg import Transition
 
-from msg_adapters.ros import JointState, WrenchStamped
+from msg_adapters.ros import WARN, JointState, WrenchStamped
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
-from test.nodes.on_wire import Driven
+from test.nodes.on_wire import Driven, newest_status
 from test.nodes.stalls import is_stall
 from test.nodes.warm import Bench
 
@@ -62,9 +63,14 @@ def test_commands_beyond_the_limit_are_cut_down_and_counted(wire, listener):
 
 
 def test_zero_ft_is_refused_under_torque_and_takes_the_offset_away_without(wire, listener):
+    """Also one of another client of the sensor, 10 N·m, which was taken for a torque without a word."""
     wire.drive()
     answer = wire.trigger("zero_ft")
     assert not answer.success and "N·m is commanded, expected 0 N·m" in answer.message
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.sendto(bytes((0x12, 0x34, 0, 0x42, 0, 0, 0, 0)), ("127.0.0.1", wire.bench.ft_port))
+    wire.push(lambda: "contradict each other" in newest_status(wire.health, "/main/driver").message)
+    assert newest_status(wire.health, "/main/driver").level == WARN
     wire.push(lambda: wire.goal()[0] == 0, torque=0.0)
     wire.push(lambda: wire.trigger("zero_ft").success, torque=0.0)  # refused while the load still swings
 

@@ -223,7 +223,7 @@ def test_a_joint_that_is_stopped_while_another_one_is_cleared_stays_stopped(make
     program, _ = make_driver("held", values_of(joints=["hip", "knee"], autostart=True, resume=True))
     hip, knee = program.joints
     program._stop(event())
-    program._answered(True)
+    program._answered()
     monkeypatch.setattr(spies["hip"], "recover", lambda: knee._stop(event()))
     with pytest.raises(DeviceError, match="knee: stopped: ~/stop was called meanwhile"):
         program._clear_faults(event())

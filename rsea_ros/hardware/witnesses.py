@@ -1,0 +1,163 @@
+"""Holds zero point and gain of ft against what else tells the spring's torque, while there is torque.
+
+    spring   K d + D d', of the measured deflection d
+    motor    m - J w' - b w, motor torque less momentum and damping of the gear
+
+All signals pass one low-pass and one window of equal weights. Then means of sums add up: one that differs is
+a zero point or a gain; and standard deviations do not depend on delays: one that differs is a gain. Friction
+moves a mean only by how much more the gear goes one way than the other (decision 314).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from rsea_ros.hardware.device import Spring, State
+from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.records.record import is_measured
+
+SMOOTH, MEMORY = 0.03, 0.5
+"""s: time constants of low-pass and window. Above 5 Hz a delay of the velocity makes a false momentum."""
+PAUSE, LASTING = 0.1, 0.5
+"""s without torque that are a rest; s that a window has at least, and for which a contradiction lasts."""
+LOST = 1.5
+"""Periods from one reading to the next, from which on the momentum between them is not known."""
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """What the rig says, SI: damping of the spring, inertia and drag of the gear.
+
+    by_angle: whether the gear's angle is the spring's deflection, where that is not measured. bent, driven,
+    risen, dragged: doubts, parts of the torques of spring and motor, of J w' and b w. play, friction: N m.
+    grave: N m of difference from which on a contradiction of both is a fault. creep: rad/s, below which the
+    way is not known.
+    """
+
+    damping: float
+    inertia: float
+    drag: float
+    by_angle: bool
+    bent: float
+    driven: float
+    risen: float
+    dragged: float
+    play: float
+    friction: float
+    grave: float
+    creep: float
+
+
+class Signals(NamedTuple):
+    """Torques in N m, and the way the gear goes: 1, -1, 0 where that is not known."""
+
+    ft: float
+    spring: float
+    motor: float
+    rise: float
+    drag: float
+    way: float
+
+
+class Witnesses:
+    """Takes readings in. words: a lasting contradiction with its numbers, empty without one."""
+
+    def __init__(self, spring: Spring, actuator: Actuator, period: float) -> None:
+        self._spring, self._rig, self._period = spring, actuator, period
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget everything, also where ft is zero."""
+        self._before: State | None = None
+        self._zero, self._rests, self._idle = math.nan, True, 0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin a window."""
+        self.words, self._count, self._off, self._both = "", 0, 0, 0
+        self._low = self._mean = self._square = Signals(*[0.0] * len(Signals._fields))
+
+    def take(self, state: State, torque: float) -> DeviceFault | None:
+        """Take a reading in; return the fault where both contradict ft gravely. torque: N m, commanded."""
+        before, self._before = self._before, state
+        time = 0.0 if before is None else 1e-9 * (state.stamp - before.stamp)
+        if before is None or state.wrench is None or not 0.0 < time < LOST * self._period:
+            return None
+        self._idle = 0 if torque != 0.0 else self._idle + 1
+        rests = self._idle * self._period > PAUSE
+        signals = self._signals(before, state, state.wrench[self._spring.place], time)
+        if not is_measured(signals.ft + signals.motor):
+            return None
+        if rests != self._rests or math.isnan(signals.spring) != math.isnan(self._low.spring):
+            self._rests = rests
+            self._begin()
+        self._follow(signals)
+        if self._count * self._period < LASTING:
+            return None
+        if not rests:
+            return self._judge()
+        self._zero = self._mean.ft - self._mean.spring
+        return None
+
+    def _signals(self, before: State, state: State, felt: float, time: float) -> Signals:
+        """Return what a reading says. felt: N m, as the sensor counts. time: since the one before, s."""
+        rig, bend, rate = self._rig, state.deflection, (state.deflection - before.deflection) / time
+        if rig.by_angle and not is_measured(bend):
+            bend, rate = state.position, state.velocity
+        rise, drag = rig.inertia * (state.velocity - before.velocity) / time, rig.drag * state.velocity
+        return Signals(
+            ft=self._spring.sign * felt,
+            spring=math.nan if state.inferred else self._spring.stiffness * bend + rig.damping * rate,
+            motor=state.motor_torque - rise - drag,
+            rise=rise,
+            drag=drag,
+            way=math.copysign(abs(state.velocity) > rig.creep, state.velocity),
+        )
+
+    def _follow(self, signals: Signals) -> None:
+        self._count += 1
+        if self._count == 1:
+            self._low = self._mean = signals
+        smooth, part = self._period / SMOOTH, max(1.0 / self._count, self._period / MEMORY)
+        self._low = Signals(*(low + smooth * (x - low) for low, x in zip(self._low, signals, strict=True)))
+        pairs = list(zip(self._low, self._mean, self._square, strict=True))
+        self._mean = Signals(*(mean + part * (low - mean) for low, mean, _ in pairs))
+        self._square = Signals(*(square + part * (low * low - square) for low, _, square in pairs))
+
+    def _judge(self) -> DeviceFault | None:
+        """Compare means, and standard deviations."""
+        mean, rms = self._mean, Signals(*map(math.sqrt, self._square))
+        swing = Signals(*(math.sqrt(max(q - m * m, 0.0)) for q, m in zip(self._square, mean, strict=True)))
+        sizes = rms._replace(spring=abs(mean.spring) + 0.5 * swing.spring, rise=abs(mean.rise))
+        zeroed = mean._replace(spring=mean.spring + self._zero)
+        still = self._parts(zeroed, sizes, abs(mean.way) + 1.0 - self._square.way)
+        moving = self._parts(swing, swing, 1.0)
+        motor, spring = map(max, zip(still, moving, strict=True))
+        x, of = (zeroed, "") if max(still) > max(moving) else (swing, " RMS")
+        off = abs(x.ft - x.motor)
+        self._off = self._off + 1 if max(motor, spring) > 1.0 else 0
+        self._both = self._both + 1 if min(motor, spring) > 1.0 and off > self._rig.grave else 0
+        told = f"ft {x.ft:.3g}, motor torque less momentum {x.motor:.3g}"
+        told += "" if math.isnan(x.spring) else f", K times deflection {x.spring:.3g}"
+        lasts = self._off * self._period > LASTING
+        self.words = f"{told} N·m{of} contradict each other, expected them alike" if lasts else ""
+        if self._both * self._period <= LASTING:
+            return None
+        return DeviceFault("ft", off, self._rig.grave, "N m", f"off: {told} N·m{of}")
+
+    def _parts(self, x: Signals, sizes: Signals, one_way: float) -> tuple[float, float]:
+        """Return what motor and spring contradict ft by, as parts of what is allowed.
+
+        one_way: part of the friction that counts. Where the motor sides with ft it is the spring that is
+        not as stated.
+        """
+        rig, by_motor, by_spring = self._rig, abs(x.ft - x.motor), abs(x.ft - x.spring)
+        motion = rig.risen * sizes.rise + rig.dragged * sizes.drag + rig.friction * one_way
+        if math.isnan(by_spring) or by_motor < abs(x.spring - x.motor):
+            by_spring = 0.0
+        return (
+            by_motor / (rig.play + rig.driven * sizes.motor + motion),
+            by_spring / (rig.play + rig.bent * sizes.spring) if by_spring else 0.0,
+        )

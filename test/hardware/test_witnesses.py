@@ -1,0 +1,117 @@
+"""ft beside K times deflection and motor torque: zero point and gain under torque."""
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes import driver
+from rsea_ros.nodes._devices import limits_of, spring_of, witnesses_of
+
+RATE = 280.0
+RIG, FREE = "paper_high_impedance", "paper_moving_output"
+WAVES = {
+    "hold": lambda t, dice: 1.0,
+    "sine": lambda t, dice: math.sin(2.0 * math.pi * 2.0 * t),
+    "step": lambda t, dice: 1.0 if t % 2.0 < 1.0 else -1.0,
+    "noise": lambda t, dice: np.clip(0.4 * dice.standard_normal(), -1.0, 1.0),
+}
+
+
+def bench(rig, plant=None):
+    """The driver's device on a simulated plant, a clock for it, and the device."""
+    values = {p.name: p.default for p in driver.TABLE} | {"rig": rig, "soft_start": 1e6}
+    now = [1_700_000_000 * SECOND]
+    device = SimulatedDevice(plant or load_rig(rig), RATE, clock=lambda: now[0])
+    guarded = GuardedDevice(
+        device, limits_of(values), RATE, spring_of(values), testify=partial(witnesses_of, values)
+    )
+    guarded.open()
+    guarded.enable()
+    return guarded, now, device
+
+
+def play(guarded, now, wave, torque, seconds, *, until_fault=False):
+    """Play a wave until something is told or the time is over; return what was told and the time, s."""
+    dice = np.random.default_rng(0)
+    for k in range(round(seconds * RATE)):
+        now[0] += round(SECOND / RATE)
+        guarded.cycle(torque * WAVES[wave](k / RATE, dice), 0.0)
+        if guarded.fault or (guarded.contradiction and not until_fault):
+            break
+    return guarded.contradiction, k / RATE
+
+
+def falsify(device, monkeypatch, gain=1.0, bias=0.0):
+    read = device.read
+
+    def false():
+        state = read()
+        return replace(state, wrench=(*state.wrench[:5], gain * state.wrench[5] - bias))
+
+    monkeypatch.setattr(device, "read", false)
+
+
+@pytest.mark.parametrize(
+    ("wave", "torque", "wrong", "most"),
+    [
+        ("hold", 10.0, {"bias": 8.0}, 0.7),
+        ("sine", 10.0, {"bias": -8.0}, 1.0),
+        ("noise", 27.0, {"bias": 8.0}, 1.0),
+        ("hold", 10.0, {"gain": 0.5}, 0.8),
+        ("hold", 5.0, {"gain": 2.0}, 1.0),
+        ("sine", 10.0, {"gain": 0.5}, 3.0),
+        ("step", 10.0, {"gain": 2.0}, 1.0),
+    ],
+)
+def test_a_zero_or_gain_that_changes_under_torque_is_told_with_the_numbers(
+    monkeypatch, wave, torque, wrong, most
+):
+    """The driver went on without a word."""
+    guarded, now, device = bench(RIG)
+    play(guarded, now, wave, 0.0, 1.0)
+    assert play(guarded, now, wave, torque, 2.0)[0] == ""
+    falsify(device, monkeypatch, **wrong)
+    told, time = play(guarded, now, wave, torque, 6.0)
+    assert time < most and guarded.fault is None
+    assert told.startswith("ft ") and ", motor torque less momentum " in told and "deflection " in told
+
+
+@pytest.mark.parametrize(
+    ("wave", "torque", "wrong"), [("hold", 27.0, {"gain": 2.0}), ("sine", 5.0, {"bias": 8.0})]
+)
+def test_what_both_contradict_gravely_is_a_fault(monkeypatch, wave, torque, wrong):
+    guarded, now, device = bench(RIG)
+    play(guarded, now, wave, 0.0, 1.0)
+    play(guarded, now, wave, torque, 2.0)
+    falsify(device, monkeypatch, **wrong)
+    play(guarded, now, wave, torque, 4.0, until_fault=True)
+    assert guarded.fault.cause == "ft" and guarded.fault.limit == pytest.approx(6.8)
+    assert guarded.cycle(10.0, 0.0) is not None and guarded.guard.torque == 0.0
+
+
+@pytest.mark.parametrize("wave", WAVES)
+@pytest.mark.parametrize("sigmas", [-2.0, 2.0])
+@pytest.mark.parametrize("name", [RIG, FREE])
+def test_a_sound_machine_with_values_at_the_ends_of_their_spread_is_told_nothing(name, sigmas, wave):
+    """A rule that stops it would be worse than none."""
+    rig = load_rig(name)
+    plant = rig.with_values(
+        {n: max(rig[n] * (1 + sigmas * rig.spread(n)), 0.05 * rig[n]) for n in rig.free()}
+    )
+    guarded, now, _ = bench(name, plant.with_effect("coulomb_friction", torque=4.0))
+    play(guarded, now, wave, 0.0, 0.7)
+    assert play(guarded, now, wave, 40.0 if name == RIG else 8.0, 2.5)[0] == "" and guarded.fault is None
+
+
+def test_a_spring_that_is_not_as_stated_is_not_laid_on_ft():
+    """Beyond what its stated spread allows, but the motor torque sides with ft."""
+    plant = load_rig(RIG).with_effect("nonlinear_spring")
+    guarded, now, _ = bench(RIG, plant)
+    play(guarded, now, "hold", 0.0, 1.0)
+    assert play(guarded, now, "sine", 60.0, 2.0)[0] == ""
