@@ -103,6 +103,18 @@ def test_samples_between_the_ticks_of_a_coarse_clock_get_their_own_times(tick):
     assert fault.share == pytest.approx(1.0 - PERIOD / tick, abs=0.01)
 
 
+def test_samples_that_arrived_together_keep_their_order():
+    """A tenth of them was left out, and the rest looked late: nothing explained a sound machine."""
+    true = np.arange(20 * COUNT) * PERIOD
+    late = np.random.default_rng(3).exponential(0.6 * PERIOD, true.size)
+    arrived = np.maximum.accumulate(true + late)
+    record = _record(arrived).with_channels(ft=Channel(arrived, np.arange(true.size) * 1.0))
+    repaired, (fault,) = repair_stamps(record)
+    assert np.array_equal(repaired["ft"].y, record["ft"].y) and np.diff(repaired["ft"].t).min() > 0.0
+    assert np.abs(repaired["ft"].t - arrived).max() < 0.1 * PERIOD
+    assert fault.kind == "coarse_stamps" and "arrived together" in fault.detail
+
+
 def test_messages_logged_twice_are_copies_not_samples_of_a_coarse_clock():
     twice = np.repeat(np.arange(COUNT // 2) * 2.0 * PERIOD, 2)
     record = _record(twice).with_channels(ft=Channel(twice, np.repeat(np.arange(COUNT // 2), 2) * 1.0))

@@ -171,6 +171,8 @@ _ONE_SIDED = 1.0
 """Skewness of stamps of arrival: an exponential delay has 2, even scatter 0, of 280 samples to 0.15."""
 _EARLIEST, _AHEAD = 0.01, 8
 """Share of the stamps of arrival before their edge; stamps ahead of which the earliest dates a sample."""
+_SCATTERED, _MANY = 0.5, 64
+"""Of a step, between the quartiles of all: then its median is no longer the period. Samples."""
 _FALL = 0.8
 """Of the residual at the stamps: the even clock must leave less."""
 _NO_WORSE = 1.02
@@ -216,10 +218,11 @@ def even_clock(t: FloatArray, shared: float = 0.0) -> FloatArray:
     line = _line(t)
     period = shared if abs(line.period - shared) < _SURE * line.doubt else line.period
     even = period * line.place + float(np.mean(t - period * line.place))
-    usual, off = float(np.median(np.diff(t))), t - even
+    (usual, _), off = _usual_step(t), t - even
     late = float(np.mean(off**3)) > _ONE_SIDED * max(float(np.mean(off**2)), _TINY) ** 1.5
     early = float(np.quantile(off, _EARLIEST)) if late else 0.0
-    farthest = -early if late else line.farthest
+    is_whole = late and line.place[-1] == len(t) - 1  # their order alone tells which is which
+    farthest = 0.0 if is_whole else -early if late else line.farthest
     if farthest > _FARTHEST * usual or line.scatter < SCATTER * usual:
         return t
     return np.asarray(even + early)
@@ -239,10 +242,21 @@ class _StampFit:
     scatter: float
 
 
+def _usual_step(t: FloatArray) -> tuple[float, int]:
+    """Return the usual time between samples, s, and of how many the earliest stamp dates one.
+
+    Of many where stamps scatter by much of a step: then the median of the steps is not the period.
+    """
+    low, usual, high = (float(q) for q in np.quantile(np.diff(t), (0.25, 0.5, 0.75)))
+    if high - low < _SCATTERED * usual or len(t) < 2 * _MANY:
+        return usual, _AHEAD
+    return float(np.median(t[_MANY:] - t[:-_MANY])) / _MANY, _MANY
+
+
 def _line(t: FloatArray) -> _StampFit:
-    usual = float(np.median(np.diff(t)))
-    ahead = np.pad(t - usual * np.arange(len(t)), (0, _AHEAD - 1), constant_values=np.inf)
-    earliest = np.lib.stride_tricks.sliding_window_view(ahead, _AHEAD).min(axis=1)  # of the next few stamps
+    usual, count = _usual_step(t)
+    ahead = np.pad(t - usual * np.arange(len(t)), (0, count - 1), constant_values=np.inf)
+    earliest = np.lib.stride_tricks.sliding_window_view(ahead, count).min(axis=1)  # of the next few stamps
     place = np.concatenate([[0.0], np.cumsum(np.round(np.diff(earliest) / usual + 1.0))])
     period, first = np.polyfit(place, t, 1)
     off = np.abs(t - (first + period * place))

@@ -162,6 +162,8 @@ _REPEAT = 1e-3
 """Of nearly all steps: what is closer is a repeat."""
 _NEW_VALUES = 0.5
 """Share of samples with a stamp that repeats that differ from the one before, from which none is a copy."""
+_STEADIER = 0.5
+"""Of the first samples' unsteadiness: what all of them may have whose count is the clock."""
 _MOST_PLACES, _MOST_PER_SAMPLE = 1e7, 100.0
 """Periods that a channel may span, and times its number of samples: a long run at 2 kHz has 1e6."""
 _EXPLAIN_GAPS = ("duplicate_stamps", "dropped_samples")
@@ -187,7 +189,8 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         _check_even(channel, f"{record.source}: {name}")
         ordered = record.with_channels(**{name: channel})
         pauses = holds.paused_steps(ordered, name) if name in holds.COMMANDS else None
-        faults += stamp_order.dropped_samples(channel, name, count - len(channel), pauses)
+        if not any(fault.kind == "coarse_stamps" for fault in repeats):  # else what looks like a gap is none
+            faults += stamp_order.dropped_samples(channel, name, count - len(channel), pauses)
         channels[name] = channel
     repaired, held = holds.without_held_samples(record.with_channels(**channels))
     repaired, _ = holds.with_held_commands(repaired)
@@ -201,20 +204,33 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
 def _without_repeats(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
     """Return a channel without stamps that repeat, and the fault.
 
-    Repeats with other values that fit an even clock are samples between the ticks of a coarse one; all others
-    are left out but for the first of each.
+    Repeats with other values that fit an even clock are samples between the ticks of a coarse one. Those that
+    arrived together keep their order, where all of them make a steadier count than the first of each. All
+    others are left out but for the first of each.
     """
     step = np.diff(channel.t)
-    nearly_all = np.quantile(step[step > 0.0], 0.9) if np.any(step > 0.0) else 0.0
-    repeated = np.diff(channel.t, prepend=-np.inf) <= _REPEAT * nearly_all
+    least = _REPEAT * float(np.quantile(step[step > 0.0], 0.9)) if np.any(step > 0.0) else 0.0
+    repeated = np.diff(channel.t, prepend=-np.inf) <= least
     if not repeated.any():
         return channel, []
     even, share = even_behind_ticks(channel.t), float(repeated.mean())
-    if even is None or np.mean(np.diff(channel.y)[repeated[1:]] != 0.0) < _NEW_VALUES:
-        channel = Channel(channel.t[~repeated], channel.y[~repeated])
-        return channel, [Fault("duplicate_stamps", name, share)]
-    detail = f"{int(repeated.sum())} of {len(even)} stamps repeat: dated by the even clock that they fit"
+    first = Channel(channel.t[~repeated], channel.y[~repeated])
+    is_new = np.mean(np.diff(channel.y)[repeated[1:]] != 0.0) >= _NEW_VALUES
+    if not is_new or (even is None and _unsteadiness(channel.t) > _STEADIER * _unsteadiness(first.t)):
+        return first, [Fault("duplicate_stamps", name, share)]
+    how = "dated by the even clock that they fit"
+    if even is None:
+        how = "they arrived together, in their order"
+        apart = 2.0 * least * np.arange(len(channel))
+        even = np.asarray(np.maximum.accumulate(channel.t - apart) + apart)
+    detail = f"{int(repeated.sum())} of {len(even)} stamps repeat: {how}"
     return Channel(even, channel.y), [Fault("coarse_stamps", name, share, detail)]
+
+
+def _unsteadiness(t: FloatArray) -> float:
+    """Return the RMS distance of stamps from the line over their numbers, s."""
+    place = np.arange(len(t)) - 0.5 * (len(t) - 1)
+    return float(np.std(t - place * float(place @ t) / float(place @ place)))
 
 
 def _check_even(channel: Channel, where: str) -> None:
