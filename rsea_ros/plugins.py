@@ -25,7 +25,7 @@ def plugin_constant(variable: str, path: str, name: str, kind: type[T]) -> T:
     """
     spec = importlib.util.spec_from_file_location(Path(path).stem, path)
     if spec is None or spec.loader is None or not Path(path).exists():
-        expected = f"expected a Python file with {_article(name)} {name}"
+        expected = f"expected a Python file with {'an' if name[0] in 'AEIOU' else 'a'} {name}"
         raise ParameterError(f"{variable}: {path}: no such file, {expected}")
     module = importlib.util.module_from_spec(spec)
     try:
@@ -37,7 +37,3 @@ def plugin_constant(variable: str, path: str, name: str, kind: type[T]) -> T:
         expected = f"expected a constant of type {kind.__name__}"
         raise ParameterError(f"{variable}: {path}: no {name} in it, {expected}")
     return constant
-
-
-def _article(name: str) -> str:
-    return "an" if name[0] in "AEIOU" else "a"

@@ -9,7 +9,7 @@ import numpy as np
 from rsea_ros.checks import expected, rig_findings, signal_findings
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings, in_words_of, missing_command, unused_sentence
-from rsea_ros.checks.linearised_rig import LinearisedFit, Start, linear_of
+from rsea_ros.checks.linearised_rig import LinearisedFit, Number, Start, linear_of
 from rsea_ros.checks.pairs import is_held
 from rsea_ros.checks.stamp_findings import command_band, fault_finding, order, rates
 from rsea_ros.checks.verdicts import RIGHT_RIG, in_step, start_of, verdict_findings
@@ -164,7 +164,8 @@ def _compare(
     wrong = {f.channel for f in findings if f.light == "red"}
     findings += [] if wrong & {"ft", "command"} else signal_findings.offset_findings(record, compared)
     findings += signal_findings.noises(record, rig, but=_bridged_channels(checked) | wrong)
-    related = expected.quotients(compared)
+    quotients = {n: expected.quotient(n, s.t, s.y, s.p) for n, s in compared.items()}
+    related = {n: q for n, q in quotients.items() if q is not None}
     findings += signal_findings.smoothing_findings(related, {n: 1.0 / record[n].rate for n in related})
     findings += _another(record, rig, related, findings)
     if late or any(f.light == "red" and f.kind in _NO_FIT for f in findings):
@@ -212,7 +213,8 @@ def _linearise(
     except (RseaError, ValueError, np.linalg.LinAlgError):
         return [], None
     duration = checked.record.stop - checked.record.start
-    return [*rig_findings.clock_findings(rig_findings.with_rates(linear, rates), duration), *fitted], linear
+    drift = {n: Number(d.value + rates.get(n, 0.0), d.sd) for n, d in linear.drift.items()}
+    return [*rig_findings.clock_findings(replace(linear, drift=drift), duration), *fitted], linear
 
 
 def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) -> Iterator[Finding]:

@@ -183,12 +183,6 @@ def is_full_of_gaps(record: Record) -> bool:
     return not period > 0.0 or record.stop - record.start > MOST_STEPS * period * len(t)
 
 
-def quotients(compared: Mapping[str, Side]) -> dict[str, Quotient]:
-    """Return the quotient of every channel that has one."""
-    by_channel = {n: quotient(n, s.t, s.y, s.p) for n, s in compared.items()}
-    return {n: q for n, q in by_channel.items() if q is not None}
-
-
 WITNESSES = {
     "position": ("ft", "velocity", "motor_torque", "command"),
     "ft": ("position", "deflection", "velocity", "motor_torque", "command"),

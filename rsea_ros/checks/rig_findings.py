@@ -200,12 +200,6 @@ def at_rates(record: Record, rates: Mapping[str, float]) -> Record:
     return record.with_channels(**moved)
 
 
-def with_rates(linear: LinearisedFit, rates: Mapping[str, float]) -> LinearisedFit:
-    """Return the fit of a record at_rates as one of the record with its stamps."""
-    drift = {n: Number(d.value + rates.get(n, 0.0), d.sd) for n, d in linear.drift.items()}
-    return replace(linear, drift=drift)
-
-
 _FALLS = 0.55
 """Of what is left of the torque: with a spring or pendulum that is there, less is left."""
 _EDGE = 0.02

@@ -16,7 +16,6 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.model import transfer
 from rsea_ros.model.rig import END_NAMES, Quantity, Rig
 from rsea_ros.model.train import Train
-from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z90
 
 DAMPING_RATIO = 0.025
@@ -251,7 +250,8 @@ def margins(
     """
     if spreads is None:
         spreads = spreads_of(design.unit)
-    r, draw = design.requirement, _draws(spreads, seed)
+    r, rng = design.requirement, np.random.default_rng(seed)
+    draw = {name: np.exp(spread * rng.standard_normal(SAMPLES)) for name, spread in spreads.items()}
     arm, radius = r.arm * draw["arm"], r.spring_radius * draw["spring_radius"]
     k_s = 2.0 * design.rate * draw["rate"] * (arm**2 + radius**2 / 3.0)
     inertia = r.inertia * draw["inertia"]
@@ -266,9 +266,10 @@ def margins(
     ]  # fmt: skip
     met = [values >= limit if least else values <= limit for _, _, values, limit, least in demands]
     rows = [
-        Margin(name, unit, _percentiles(values), limit, float(ok.mean()))
+        Margin(name, unit, tuple(np.percentile(values, (5.0, 50.0, 95.0), method="nearest").tolist()), limit,
+               float(ok.mean()))
         for (name, unit, values, limit, _), ok in zip(demands, met, strict=True)
-    ]
+    ]  # fmt: skip
     together = float(np.logical_and.reduce(met).mean())
     return (*rows, Margin("All at once", "", (np.nan, np.nan, np.nan), np.nan, together))
 
@@ -286,12 +287,3 @@ def robust_stiffness(requirement: Requirement, unit: MotorGear) -> float:
     return bisect(reaches, low, 100.0 * low, 12) if reaches(100.0 * low) else float("inf")
 
 
-def _draws(spreads: Mapping[str, float], seed: int) -> dict[str, FloatArray]:
-    """Return log-normal factors by part, shape (SAMPLES,)."""
-    rng = np.random.default_rng(seed)
-    return {name: np.exp(spread * rng.standard_normal(SAMPLES)) for name, spread in spreads.items()}
-
-
-def _percentiles(values: FloatArray) -> tuple[float, float, float]:
-    low, middle, high = np.percentile(values, (5.0, 50.0, 95.0), method="nearest")
-    return float(low), float(middle), float(high)

@@ -52,17 +52,15 @@ class Peaks:
 
 
 def ends_of(hypotheses: Sequence[Hypothesis]) -> list[Group]:
-    """Return for each hypothesis its most likely rig, the points of every axis, and those moved together."""
-    quantiles = [quantile_of(h.probability, len(hypotheses)) for h in hypotheses]
+    """Return for each hypothesis its most likely rig, the points of every axis, and those moved together.
+
+    A less likely one may break a limit more often: its points are nearer.
+    """
+    allowed = [(1.0 - LEVEL) / (len(hypotheses) * max(h.probability, 1e-9)) for h in hypotheses]
+    quantiles = [float(norm.isf(min(max(a, 1.0 - LEVEL), _LIKELIEST))) for a in allowed]
     pairs = list(zip(hypotheses, quantiles, strict=True))
     axes = [[*_ends(h, z)] for h, z in pairs]
     return [Group((*a, *_corners(*pair)), len(a)) for a, pair in zip(axes, pairs, strict=True)]
-
-
-def quantile_of(probability: float, count: int) -> float:
-    """Return z of one of `count` causes: a less likely one may break a limit more often."""
-    allowed = (1.0 - LEVEL) / (count * max(probability, 1e-9))
-    return float(norm.isf(min(max(allowed, 1.0 - LEVEL), _LIKELIEST)))
 
 
 def _ends(hypothesis: Hypothesis, z: float) -> Iterator[Rig]:

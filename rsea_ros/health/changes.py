@@ -91,9 +91,10 @@ class Fitter:
         weights = np.exp(np.clip(gains - gains.max(), -700.0, 0.0))
         shares = (weights / weights.sum()).tolist()
         explained = [(excess + usual - f.cost) / max(excess, 1.0) for f in fits]
+        half = [Z95 * f.sigma * math.sqrt(phi) for f in fits]
         candidates = [
-            ChangeCause(f.hypothesis, f.change, _interval(f, phi), share, part, f.cost)
-            for f, share, part in zip(fits, shares, explained, strict=True)
+            ChangeCause(f.hypothesis, f.change, (f.change - h, f.change + h), share, part, f.cost)
+            for f, h, share, part in zip(fits, half, shares, explained, strict=True)
         ]
         return sorted(candidates, key=lambda cause: -cause.probability)
 
@@ -167,11 +168,6 @@ class Fitter:
 def cost(w: FloatArray) -> float:
     """Return the cost of innovations; those that are missing cost nothing."""
     return 0.5 * (FREEDOM + 1.0) * float(np.nansum(np.log1p(w * w / FREEDOM)))
-
-
-def _interval(fit: _Fit, phi: float) -> tuple[float, float]:
-    half = Z95 * fit.sigma * math.sqrt(phi)
-    return fit.change - half, fit.change + half
 
 
 SURE = 0.95

@@ -252,9 +252,11 @@ def _remainder(solution: Solution, columns: FloatArray, chosen: Sequence[Unknown
 def _cost(solution: Solution, columns: FloatArray, free: Sequence[Unknown]) -> dict[str, float]:
     """Return by unknown how many times as wide its interval would be, were some clocks free beside it.
 
-    Of the unknowns that the residual shows: the interval of another is that of its bounds in any case.
+    Of the unknowns that change the residual by one standard deviation at all within their bounds: the
+    interval of another is that of its bounds in any case.
     """
-    shown = [i for i, u in enumerate(solution.problem.unknowns) if _is_shown(solution.jacobian[:, i], u)]
+    columns_of = zip(solution.jacobian.T, solution.problem.unknowns, strict=True)
+    shown = [i for i, (column, u) in enumerate(columns_of) if np.linalg.norm(column) * u.reach >= 1.0]
     jacobian, unknowns = solution.jacobian[:, shown], [solution.problem.unknowns[i] for i in shown]
     without, beside = (
         np.diag(np.linalg.pinv(base.T @ base + np.diag([u.doubt**-2 for u in known]), hermitian=True))
@@ -262,11 +264,6 @@ def _cost(solution: Solution, columns: FloatArray, free: Sequence[Unknown]) -> d
     )
     wider = np.sqrt(beside[: len(unknowns)] / np.maximum(without, 1e-300))
     return {u.name: float(w) for u, w in zip(unknowns, wider, strict=True)}
-
-
-def _is_shown(column: FloatArray, unknown: Unknown) -> bool:
-    """Return whether an unknown changes the residual by one standard deviation at all within its bounds."""
-    return float(np.linalg.norm(column)) * unknown.reach >= 1.0
 
 
 def with_even_clocks(
@@ -293,7 +290,8 @@ def _clock_sensitivities(
     if not any(doubts):
         return
     columns = _columns(solution)
-    of = _case_of(problem)
+    numbers = {id(case): float(k) for k, case in enumerate(problem.cases)}
+    of = problem.by_row(lambda case, n: numbers[id(case)])
     for k, groups in enumerate(doubts):
         for names, doubt in groups:
             chosen = columns if "command" in names else columns.keys() & set(names)
@@ -307,12 +305,6 @@ def _columns(solution: Solution) -> dict[str, FloatArray]:
     timed = [n for n in measured if n != "motor_torque"]
     columns = clock_columns(problem, solution.theta, clocks(timed, problem.rig))
     return dict(zip(timed, columns.T, strict=True))
-
-
-def _case_of(problem: Problem) -> FloatArray:
-    """Return the number of the case of every residual."""
-    numbers = {id(case): float(k) for k, case in enumerate(problem.cases)}
-    return problem.by_row(lambda case, n: numbers[id(case)])
 
 
 def _doubts(stamped: Record, even: Record) -> list[tuple[tuple[str, ...], float]]:

@@ -145,7 +145,8 @@ def undetermined_remarks(unknowns: Sequence[Unknown], confidence: Confidence) ->
     asked = [i for i, u in enumerate(unknowns) if not u.is_clock]
     stuck = [i for i in asked if unknowns[i].at_bound(float(theta[i]))]
     index = [i for i in asked if i not in stuck]
-    remarks = [_at_bound(unknowns[i], float(theta[i])) for i in stuck]
+    remarks = [Remark("at_bound", (u.name,), (u.outer(float(theta[i])),), u.unit)
+               for i, u in enumerate(unknowns) if i in stuck]  # fmt: skip
     if not index:
         return tuple(remarks)
     reach = np.array([unknowns[i].reach for i in index])
@@ -185,10 +186,6 @@ def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArr
 def _size(unknown: Unknown, coordinate: float) -> float:
     """Return the reference of a change of the coordinate: the value, or near 0 its typical size."""
     return 1.0 if unknown.logarithmic else max(abs(coordinate), 0.1 * unknown.scale)
-
-
-def _at_bound(unknown: Unknown, coordinate: float) -> Remark:
-    return Remark("at_bound", (unknown.name,), (unknown.outer(coordinate),), unknown.unit)
 
 
 def _remark(unknowns: Sequence[Unknown], moved: FloatArray) -> Remark:

@@ -94,7 +94,8 @@ def fit(
     solution = solve(problem, _better_start(problem, start, run), run=run)
     outputs = problem.outputs(solution.theta)
     known = with_noise_of(problem, outputs)
-    if _has_changed(problem.cases, known):
+    changes = [b.noise[n] / a.noise[n] for a, b in zip(cases, known, strict=True) for n in a.noise]
+    if not all(1.0 / _OTHER_NOISE < change < _OTHER_NOISE for change in changes):
         solution = solve(replace(problem, cases=known), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
         known = with_noise_of(solution.problem, outputs)
@@ -124,12 +125,6 @@ def with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) ->
     """Return the cases with the noise that the residual of simulated outputs shows."""
     ratio = problem.rig["gear.ratio"]
     return tuple(reestimate_noise(c, out, ratio) for c, out in zip(problem.cases, outputs, strict=True))
-
-
-def _has_changed(before: Sequence[Case], after: Sequence[Case]) -> bool:
-    """Return whether the noise of any channel has changed by more than a fit would notice."""
-    ratios = [b.noise[n] / a.noise[n] for a, b in zip(before, after, strict=True) for n in a.noise]
-    return any(not 1.0 / _OTHER_NOISE < r < _OTHER_NOISE for r in ratios)
 
 
 def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
@@ -403,16 +398,12 @@ def alternatives(solution: Solution, cases: Sequence[Case], pools: Pools) -> tup
 def _fit_with(solution: Solution, effect: Effect, run: Map) -> Solution | None:
     """Return the fit with one more effect; None where the rig cannot have it."""
     try:
-        problem_and_start = add_effect(solution.problem, _clocks_at_zero(solution), effect, effect.typical)
+        clocks = np.array([u.is_clock for u in solution.problem.unknowns])
+        theta = np.where(clocks, 0.0, solution.theta)  # beside a misfit they run to their bounds
+        problem_and_start = add_effect(solution.problem, theta, effect, effect.typical)
         return solve(*problem_and_start, iterations=_ITERATIONS, run=run)
     except RseaError:
         return None
-
-
-def _clocks_at_zero(solution: Solution) -> FloatArray:
-    """Return where a solution ended with its clocks right: beside a misfit they run to their bounds."""
-    clocks = np.array([u.is_clock for u in solution.problem.unknowns])
-    return np.where(clocks, 0.0, solution.theta)
 
 
 def _refit(name: str, solution: Solution, cases: Sequence[Case], run: Map) -> ExtendedFit:

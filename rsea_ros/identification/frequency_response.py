@@ -84,7 +84,8 @@ def welch(aligned: lpm.Aligned) -> lpm.Lines:
     effective = len(starts) / (1.0 + 2.0 * _OVERLAP_CORRELATION**2)
     residual = np.sum(np.abs(y - response * u) ** 2, axis=0) / len(starts) * effective / (effective - 1.0)
     next_to = (starts[1:] - starts[:-1] == length // 2)[:, None]
-    overlap = np.sum(next_to * _align_phases(u[1:] * u[:-1].conj(), length).real, axis=0)
+    turns = (-1.0) ** np.arange(u.shape[1])  # neighbours refer to one time: half a segment is pi a line
+    overlap = np.sum(next_to * (u[1:] * u[:-1].conj() * turns).real, axis=0)
     spread = np.sqrt(residual * np.maximum(s_uu + 2.0 * _OVERLAP_CORRELATION * overlap, 0.5 * s_uu)) / s_uu
     s_yy = np.sum(np.abs(y) ** 2, axis=0) + _TINY
     keep = slice(_FIRST_LINE, None)
@@ -115,12 +116,6 @@ def _segments(values: FloatArray, starts: IntArray, length: int) -> ComplexArray
     windows = np.lib.stride_tricks.sliding_window_view(lpm.detrend(values), length)[starts]
     spectra: ComplexArray = rfft(windows * hann(length), axis=1)
     return spectra
-
-
-def _align_phases(cross: ComplexArray, length: int) -> ComplexArray:
-    """Refer the product of neighbouring spectra to one time: half a segment is a turn of pi a line."""
-    turned: ComplexArray = cross * (-1.0) ** np.arange(cross.shape[1])
-    return turned
 
 
 _ORDERS = np.arange(1, 5)
@@ -292,7 +287,9 @@ def multisine(aligned: lpm.Aligned, periods: Periods) -> lpm.Lines:
     if np.count_nonzero(whole) >= 2:
         u, y = u[whole], y[whole]
     mean_u, mean_y, count = u.mean(axis=0), y.mean(axis=0), len(y)
-    excited = excited_lines(mean_u)
+    size = np.abs(mean_u)
+    size[0] = 0.0
+    excited = np.flatnonzero(size > _EXCITED * size.max())
     variance = np.sum(np.abs(y - mean_y) ** 2, axis=0) / (count - 1)
     levels = _levels(mean_y, variance / count, excited, periods.length)
     odd = 0.0 if levels.odd is None else levels.odd**2 * periods.length**2 / 2.0
@@ -306,13 +303,6 @@ def multisine(aligned: lpm.Aligned, periods: Periods) -> lpm.Lines:
         coherence=power / (power + variance[excited] + 1e-300), noise=levels.noise * np.sqrt(count),
         distortion=levels.total,
     )
-
-
-def excited_lines(mean_u: ComplexArray) -> IntArray:
-    """Return the lines that hold command: within 40 dB of the strongest, without the mean."""
-    size = np.abs(mean_u)
-    size[0] = 0.0
-    return np.flatnonzero(size > _EXCITED * size.max())
 
 
 def _periods(values: FloatArray, periods: Periods, spectrum: bool = True) -> ComplexArray:

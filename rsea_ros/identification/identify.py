@@ -124,7 +124,10 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
     with worker_pools() as pools:
-        solution, cases, required = fit(cases, rig, run=pools.run, start=_start(records[0], rig, responses))
+        start = None
+        if not is_inverse(rig):
+            start = start_from(responses, rig) if rig.loop is None else joint_start(records[0], rig)
+        solution, cases, required = fit(cases, rig, run=pools.run, start=start)
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
         while misfits and (more := even_out(steady.records, rig, solution)).scatter:
             steady = Evened(more.records, {**steady.scatter, **more.scatter})
@@ -143,13 +146,6 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
         remarks=(*steady.remarks, *result.remarks),
         clocks=required.remarks,
     )
-
-
-def _start(record: Record, rig: Rig, responses: Sequence[FrequencyResponse]) -> Rig | None:
-    """Return a start of the fit other than the rig's own values."""
-    if is_inverse(rig):
-        return None
-    return start_from(responses, rig) if rig.loop is None else joint_start(record, rig)
 
 
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:

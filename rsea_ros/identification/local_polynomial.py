@@ -66,7 +66,8 @@ def align(record: Record, name: str) -> Aligned:
     held = name == "motor_torque"
     if held:
         place = np.rint(place) - 1.0
-    offset = _offset(place)
+    mean = np.exp(2j * np.pi * place).mean()
+    offset = float(np.angle(mean) / (2.0 * np.pi)) if abs(mean) > 0.5 else 0.0  # of the samples, in periods
     first, last = max(0, int(np.ceil(place[0] - offset - 1e-6))), int(place[-1] - offset + 1e-6)
     last = min(last, round((command.t[-1] - start) / period))
     if last - first < _FEWEST:
@@ -114,12 +115,6 @@ def held_mean(command: Channel, edges: FloatArray) -> FloatArray:
     reach += command.y[0] * np.minimum(edges - command.t[0], 0.0)
     means: FloatArray = np.diff(reach) / np.diff(edges)
     return means
-
-
-def _offset(place: FloatArray) -> float:
-    """Return the typical offset of samples from the grid, in periods, -0.5 … 0.5; 0 without one."""
-    mean = np.exp(2j * np.pi * place).mean()
-    return float(np.angle(mean) / (2.0 * np.pi)) if abs(mean) > 0.5 else 0.0
 
 
 def _at(place: FloatArray, y: FloatArray, wanted: FloatArray) -> FloatArray:

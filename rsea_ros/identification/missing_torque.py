@@ -114,7 +114,9 @@ class Injector:
             rig, drive.step, drive.drift_time, in_loop=len(drive.reference) > 0 or rig.loop is not None
         )
         if torque is not None:
-            machine = with_injection(machine, torque, PORTS[place], _kind(rig, place))
+            moves = {True: 5.0, False: 6.0}[rig.end_is_free("housing_end")]
+            kind = moves if place == "load" else float(PORTS[place])
+            machine = with_injection(machine, torque, PORTS[place], kind)
         machine.begin(drive.initial)
         out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
         out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
@@ -124,12 +126,6 @@ class Injector:
         run(machine, command, out[1:], reference=reference)
         out[0, 2] = out[1, 2]
         return out
-
-
-def _kind(rig: Rig, place: Place) -> float:
-    if place != "load":
-        return float(PORTS[place])
-    return 5.0 if rig.end_is_free("housing_end") else 6.0
 
 
 def with_injection(machine: Machine, torque: FloatArray, port: Port, kind: float) -> Machine:

@@ -116,7 +116,8 @@ def noise_floor(record: Record, name: str, sensor: Sensor, rule: NoiseSettings =
 
     sensor: as the rig states it; its statement counts where the record does not show the noise.
     """
-    t, y = _finite(record[name])
+    channel = record[name]
+    t, y = (values[np.isfinite(channel.y) & np.isfinite(channel.t)] for values in (channel.t, channel.y))
     least = least_noise(y, sensor, rule)
     stated = sensor.level
     if len(y) < _FEWEST:
@@ -183,8 +184,3 @@ def _top(lines: FloatArray, rule: NoiseSettings) -> slice:
     """Return where the top of the band lies: one line at least."""
     first, last = math.ceil(rule.top_from * len(lines)), math.floor(rule.top_to * len(lines))
     return slice(first, max(last, first + 1))
-
-
-def _finite(channel: Channel) -> tuple[FloatArray, FloatArray]:
-    good = np.isfinite(channel.y) & np.isfinite(channel.t)
-    return channel.t[good], channel.y[good]

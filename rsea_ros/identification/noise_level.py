@@ -203,7 +203,8 @@ def reestimate_noise(
     above = [n for n in channels if rms[n] > rule.above * noise[n]]
     if not above or not all(is_noise(case, outputs, n, ratio, rule) for n in above):
         return replace(case, noise=noise, coloured=frozenset())
-    coloured = frozenset(n for n in above if rms[n] > _surely_above(case, n, rule) * noise[n])
+    chance = {n: rule.sure * _WHITE_DOUBT / float(np.sqrt(np.count_nonzero(case.mask[n]))) for n in above}
+    coloured = frozenset(n for n in above if rms[n] > max(rule.above, 1.0 + chance[n]) * noise[n])
     for n in above:
         noise[n] = rms[n] * (1.0 + 2.0 * _doubt(case, residuals[n], n) if n in coloured else 1.0)
     return replace(case, noise=noise, coloured=coloured)
@@ -222,12 +223,6 @@ def _seams(case: Case, channel: str) -> IntArray:
         return np.empty(0, np.int64)
     ends = [drive.start + drive.step * end for _, end in drive.spans[:-1]]
     return np.searchsorted(case.t[channel], ends)
-
-
-def _surely_above(case: Case, channel: str, rule: NoiseSettings) -> float:
-    """Return the RMS of a residual over its white part that chance does not reach, `rule.above` at least."""
-    samples = np.count_nonzero(case.mask[channel])
-    return max(rule.above, 1.0 + rule.sure * _WHITE_DOUBT / float(np.sqrt(samples)))
 
 
 def _doubt(case: Case, residual: FloatArray, channel: str) -> float:

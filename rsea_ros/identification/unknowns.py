@@ -191,11 +191,8 @@ def idle(effect: Effect, rig: Rig) -> frozenset[str]:
 
 def clocks(channels: Iterable[str], rig: Rig) -> tuple[Unknown, ...]:
     """Return the clock errors of sensors, s: measured later than stamped when positive."""
-    return tuple(_clock(c, rig.clock_doubt(c)) for c in channels if c != "motor_torque")
-
-
-def _clock(channel: str, doubt: float) -> Unknown:
-    return Unknown(f"{CLOCK}.{channel}", 0.0, "s", -3.0 * doubt, 3.0 * doubt, False, doubt, doubt)
+    doubts = {c: rig.clock_doubt(c) for c in channels if c != "motor_torque"}
+    return tuple(Unknown(f"{CLOCK}.{c}", 0.0, "s", -3.0 * d, 3.0 * d, False, d, d) for c, d in doubts.items())
 
 
 def clock_rates(channels: Iterable[str]) -> tuple[Unknown, ...]:

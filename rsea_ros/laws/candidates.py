@@ -157,7 +157,7 @@ def terms_for(cases: Sequence[CaseModel]) -> tuple[terms.Term, ...]:
     for cycles in wave_numbers(model):
         made += terms.wave_terms(cycles)
     for cycles in wave_numbers(model, "d"):
-        made += terms.stiffness_waves(cycles)
+        made += terms.waves("spring_", "spring", "deflection and position, periodic", "N m/rad", cycles, "d")
     if "ft" in model.places:
         made += [t for f in sensor_lines(model) for t in terms.hum_terms(f)]
         keep = model.case.mask["ft"]

@@ -17,7 +17,7 @@ from rsea_ros.laws import choice as choices
 from rsea_ros.laws.candidates import SPLINES, TermCandidate, basis_of, spline_knots
 from rsea_ros.laws.effect_source import LawProvenance
 from rsea_ros.laws.file import Draft, Refined, draft_of, finish_laws, refine
-from rsea_ros.laws.law import FittedTerm, Law, LawResult, LearntCurve, WrittenLaw, ranges_of
+from rsea_ros.laws.law import FittedTerm, Law, LawResult, LearntCurve, ranges_of
 from rsea_ros.laws.sparse_regression import SELECTION, Dependence, Gram, SparseLaw, dependences
 from rsea_ros.laws.variables import CaseModel
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -224,18 +224,13 @@ def _result(
         rigs = [
             apply(s.problem.rig, s.problem.unknowns, s.theta)[0] for s in (base.solution, refined.solution)
         ]
+    acting = {e.name for e in rigs[0].effects}
+    with_files = (EffectSetting(w.law.name, w.law.parameters) for w in written)
     return LawResult(
         rig_name=rigs[0].name, sources=tuple(r.source for r in records),
         duration=sum(c.duration for c in base.cases), base_rig=rigs[0],
-        rig=_with_files(rigs[1], rigs[0], written),
+        rig=rigs[1].with_effects(*(e for e in rigs[1].effects if e.name in acting), *with_files),
         dependences=tuple(depends), tried=choices.summarize_models(search, choice, choice.taken),
         laws=tuple(written), gain=gain, gain_ci95=ci95, share=share, before=before, after=after, noise=noise,
         at_floor=False,
     )  # fmt: skip
-
-
-def _with_files(rig: Rig, base: Rig, written: Sequence[WrittenLaw]) -> Rig:
-    """Return a rig with the effects of the base and the laws that have files, with their parameters."""
-    acting = {e.name for e in base.effects}
-    laws = (EffectSetting(w.law.name, w.law.parameters) for w in written)
-    return rig.with_effects(*(e for e in rig.effects if e.name in acting), *laws)

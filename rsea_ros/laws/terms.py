@@ -195,20 +195,15 @@ ENCODER_TERMS = (
 def wave_terms(cycles: float) -> tuple[Term, ...]:
     """Return terms that repeat with the rotor's angle, so often a turn: torque, encoder error."""
     return (
-        *_waves("", "gear", "position, periodic", "N m", cycles),
-        *_waves("angle_", "encoder", "position, periodic, at the encoder", "rad", cycles),
+        *waves("", "gear", "position, periodic", "N m", cycles),
+        *waves("angle_", "encoder", "position, periodic, at the encoder", "rad", cycles),
     )
 
 
-def stiffness_waves(cycles: float) -> tuple[Term, ...]:
-    """Return a stiffness of the spring that repeats with the rotor's angle, so often a turn."""
-    return _waves("spring_", "spring", "deflection and position, periodic", "N m/rad", cycles, "d")
-
-
-def _waves(
+def waves(
     prefix: str, place: Place, regressor: str, unit: str, cycles: float, factor: str = ""
 ) -> tuple[Term, ...]:
-    """Return a sine and a cosine of the rotor's angle, times a factor."""
+    """Return a sine and a cosine of the rotor's angle, times a factor, so often a turn."""
     shape = ("cycles_per_revolution", "1", "", (cycles,))
     return tuple(
         Term(f"{prefix}{name}", place, regressor, f"{factor} * {f}(a * theta)".removeprefix(" * "),

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.records.record import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, Record
 
 LARGEST = 1e30
 """In any unit: a larger number is not a measurement, and squares and sums of it overflow."""
@@ -22,7 +22,8 @@ def check_extent(record: Record, start: float, stop: float) -> None:
 
     A clock that was set during the recording, or a pause of hours, would need millions of empty steps.
     """
-    covered = max(_covered_time(c.t) for c in record.channels.values())
+    stamps = [c.t for c in record.channels.values()]
+    covered = max(len(t) * float(np.median(np.diff(t))) if len(t) > 1 else 0.0 for t in stamps)
     if stop - start <= LONGEST_PAUSE + (1.0 + MOST_EMPTY) * covered:
         return
     pauses = [(n, int(np.argmax(np.diff(c.t))), c.t) for n, c in record.channels.items() if len(c) > 1]
@@ -33,11 +34,6 @@ def check_extent(record: Record, start: float, stop: float) -> None:
         f"{pause if t[k + 1] - t[k] > 0.2 * (stop - start) else ', not all channels at the same time'}: "
         "did the clock jump? Cut the bag there, or record again with one clock for all topics"
     )
-
-
-def _covered_time(t: FloatArray) -> float:
-    """Return how long samples last with their median interval, s."""
-    return len(t) * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
 
 
 def bound_values(record: Record) -> Record:

@@ -67,7 +67,10 @@ def end_torque(rig: Rig, end: str, sees: Sees = "spring_and_damper") -> Output:
     Raises RigError for the element alone where the spring is rigid.
     """
     if end == "spring_end" and sees == "element":
-        return _spring_element(rig)
+        if rig.rigid_spring:
+            what = "expected a spring with a stiffness to read its element"
+            raise RigError(f"rig {rig.name}: spring.rigid = True, {what}")
+        return Output(rig["spring.stiffness"] * deflection().c, np.zeros(len(equations.PORTS)))
     coordinate = next(c for c, name in equations.END_COORDINATES if name == end)
     owner = equations.owners(rig)
     rows = [c for c in owner if owner[c] == owner[coordinate]]
@@ -77,14 +80,6 @@ def end_torque(rig: Rig, end: str, sees: Sees = "spring_and_damper") -> Output:
     inside = np.isin(equations.PORTS, ("gear", "spring", "joint"))
     torques = equations.PORT_DIRECTIONS[:, rows].sum(axis=1) * inside
     return Output(np.array([stiffness, damping, mass]), -sign * torques)
-
-
-def _spring_element(rig: Rig) -> Output:
-    if rig.rigid_spring:
-        raise RigError(
-            f"rig {rig.name}: spring.rigid = True, expected a spring with a stiffness to read its element"
-        )
-    return Output(rig["spring.stiffness"] * deflection().c, np.zeros(len(equations.PORTS)))
 
 
 def _of_coordinates(factors: Mapping[int, float]) -> Output:

@@ -208,7 +208,8 @@ def edge_of(rig: Rig, tolerance: float) -> Edge:
 def _possible(rig: Rig) -> Iterator[Rig]:
     """Yield the rig with its damping and rotor at both ends and in the middle of 90 %, with each train, and
     with the rotor whose spin cancels the chassis where it is between: the edge is highest there."""
-    ranges = {n: _range(rig, n) for n in ("spring.damping", ROTOR) if n in rig.quantities}
+    wide = {n: math.exp(Z90 * rig.spread(n)) for n in ("spring.damping", ROTOR) if n in rig.quantities}
+    ranges = {n: (rig[n] / w, rig[n], rig[n] * w) for n, w in wide.items()}
     for train in (rig.train, *rig.other_trains):
         turned = replace(rig, train=train)
         rotors = (
@@ -216,12 +217,6 @@ def _possible(rig: Rig) -> Iterator[Rig]:
         )
         for values in product(*(ranges | rotors).values()):
             yield turned.with_values(dict(zip(ranges, values, strict=True)))
-
-
-def _range(rig: Rig, name: str) -> tuple[float, float, float]:
-    """Return both ends and the middle of 90 % of a value."""
-    wide = math.exp(Z90 * rig.spread(name))
-    return rig[name] / wide, rig[name], rig[name] * wide
 
 
 def _cancelling_inertias(rig: Rig, j_m: tuple[float, ...]) -> list[float]:

@@ -1,7 +1,5 @@
 """Nodes, thin: parameters to objects, callbacks of three lines, exceptions to diagnostics and a log line."""
 
-from __future__ import annotations
-
 import sys
 from types import TracebackType
 

@@ -5,8 +5,6 @@ clock's time, which a network or a person may set: the difference is followed wh
 clock is trimmed, and measured again when it has been set.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Topics of a bench: what it publishes, what it hears, and the states of several joints in one message."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Torque commands by the instant at which they take effect, with a watchdog."""
 
-from __future__ import annotations
-
 import math
 import threading
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The controller's cycle and its limits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

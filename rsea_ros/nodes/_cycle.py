@@ -1,7 +1,5 @@
 """A thread that works at absolute deadlines. Timers of rclpy lose ticks at 1 kHz and drift; this does not."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

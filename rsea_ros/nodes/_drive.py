@@ -1,7 +1,5 @@
 """Driving a device: cycles, and the alarm that ends them."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

@@ -1,7 +1,5 @@
 """The health of a node on /diagnostics, once a second."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What the health node hears, and the noise that it and the model node expect."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """What a controller measures: the actuator's topics and the link's motion."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence

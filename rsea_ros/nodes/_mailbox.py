@@ -1,7 +1,5 @@
 """A topic whose messages wait until somebody takes them: their numbers, read out of the serialised ones."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

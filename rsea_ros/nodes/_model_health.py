@@ -1,7 +1,5 @@
 """Health of the model node, and its latched flags."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

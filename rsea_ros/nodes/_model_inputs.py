@@ -1,7 +1,5 @@
 """What the model node hears, and sensors that stopped or stand still."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections import deque

@@ -1,7 +1,5 @@
 """Parameters of a node: a table with description, unit and range; other values are refused."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ and services are listed. `operator` stands for a person, who may listen to every
 publish nothing.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys

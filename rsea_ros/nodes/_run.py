@@ -5,8 +5,6 @@ Fast DDS gives messages to listeners on the same machine through shared memory. 
 interpreter meanwhile: the cycle stands still under torque.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """A node that visits a graph: it looks, listens, calls services (transitions, triggers) and leaves."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping

@@ -5,8 +5,6 @@ It waits for a driver that is not active, and ends with one line where it has la
 What keeps a bench from acting on commands, as its driver says on /diagnostics: a fault, no activation.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import time

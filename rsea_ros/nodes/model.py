@@ -1,7 +1,5 @@
 """model: torques on both ends by sample, and whether the actuator is a pure torque source just now."""
 
-from __future__ import annotations
-
 import sys
 import threading
 from typing import Any

@@ -1,7 +1,5 @@
 """plant: a simulated bench in real time, for any rig."""
 
-from __future__ import annotations
-
 import sys
 import time
 from typing import Any

@@ -1,7 +1,5 @@
 """record: writes the messages on the topics of a bench into a bag."""
 
-from __future__ import annotations
-
 import sys
 import time
 from functools import partial

@@ -4,8 +4,6 @@ The page requests the newest samples of each topic. All subscriptions to measure
 hold a bounded queue: a publisher neither waits for this node nor repeats anything for it.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import time

@@ -62,12 +62,8 @@ def compare(
 
     Nothing is fitted to the held-out records: a second sensor tests what the first one identified.
     """
-    return tuple(_rival(name, rig, train, holdout) for name, rig in rivals.items())
-
-
-def _rival(name: str, rig: Rig, train: Record, holdout: Sequence[tuple[str, Record]]) -> Rival:
-    fitted = identify([train], rig).rig
-    return Rival(name, fitted, tuple(test_on(fitted, end, record) for end, record in holdout))
+    fitted = {name: identify([train], rig).rig for name, rig in rivals.items()}
+    return tuple(Rival(n, rig, tuple(test_on(rig, *held) for held in holdout)) for n, rig in fitted.items())
 
 
 def test_on(rig: Rig, end: str, record: Record) -> HeldOutFit:

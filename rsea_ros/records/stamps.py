@@ -7,7 +7,7 @@ A clock that jumped shifts all the samples after the jump: sorted, they would mi
 the jump is removed first. A motor torque that belongs behind the edge of its command goes there.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -43,7 +43,9 @@ def absent_spans(record: Record) -> Iterator[Fault]:
         spans += [(early, channel.t[-1], stop)] if early > longest else []
         if spans:
             held = ", the last command is held" if channel is driving and early > longest else ""
-            yield _absence(name, spans, float(stop - start), held)
+            lost = sum(length for length, _, _ in spans)
+            detail = " and ".join(f"nothing from {a:.4g} s to {b:.4g} s" for _, a, b in spans)
+            yield Fault("partly_recorded", name, lost / float(stop - start), detail + held, lost, "s")
 
 
 def _first(record: Record) -> float:
@@ -60,13 +62,6 @@ def _range(channel: Channel) -> float:
     """Return the range of the finite values of a channel."""
     y = channel.y[np.isfinite(channel.y)]
     return float(np.ptp(y)) if len(y) else 0.0
-
-
-def _absence(name: str, spans: Sequence[tuple[float, float, float]], whole: float, then: str) -> Fault:
-    """Return the fault of the spans without a channel: length, begin and end each, s. whole: the run, s."""
-    lost = sum(length for length, _, _ in spans)
-    detail = " and ".join(f"nothing from {a:.4g} s to {b:.4g} s" for _, a, b in spans)
-    return Fault("partly_recorded", name, lost / whole, detail + then, lost, "s")
 
 
 _AROUND = 16

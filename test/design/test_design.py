@@ -107,7 +107,7 @@ def test_the_amplitude_of_a_band_is_limited_by_motor_and_travel():
     assert widths.motor_limit[10.0] == pytest.approx(44.2 * gain)
     assert widths.spring_limit == pytest.approx(1530.456 / 2 * math.sin(math.radians(10.0)))
     assert widths.eq_7 == pytest.approx(53.20, abs=5e-3)
-    assert widths.rows[1].hz[0] == pytest.approx(112.1, abs=0.05)
+    assert [*widths.rows.values()][1][0] == pytest.approx(112.1, abs=0.05)
 
 
 def test_both_arrangements_of_the_prototypes_drive_are_designed():

@@ -66,14 +66,10 @@ def noise_of(rig: Rig, noise_rms: Mapping[str, float] = NOTHING,
     sigma = max(known[0] if known else 0.0, math.sqrt(max(0.0, unexplained)))
     if sigma == 0.0:
         raise RigError(f"rig {rig.name}: sensors has no torque, expected motor_torque or ft with noise, N·m")
-    return Noise(position, ft, torque if math.isfinite(torque) else 0.0, sigma, 1.0 / slowest_rate(rig))
-
-
-def slowest_rate(rig: Rig) -> float:
-    """Return |slowest pole| of the actuator between clamped ends, 1/s; of the rig itself without a spring."""
     held = rig if rig.rigid_spring else replace(rig, clamped=frozenset(END_NAMES))
     rates = np.abs(np.linalg.eigvals(state_space(held).a))
-    return float(rates[rates > 1e-6 * rates.max()].min())
+    slowest = float(rates[rates > 1e-6 * rates.max()].min())
+    return Noise(position, ft, torque if math.isfinite(torque) else 0.0, sigma, 1.0 / slowest)
 
 
 def _sigma(rig: Rig, channel: str, noise_rms: Mapping[str, float]) -> float:
