@@ -65,7 +65,7 @@ def written(request):
 
 def test_a_law_that_rings_names_the_effect_of_its_form():
     """A mode at 31 Hz was found, and nothing said that the catalogue has it."""
-    mode = FittedTerm(mode_terms((31.0,))[0], 1.0, 31.0)
+    mode = FittedTerm(next(mode_terms((31.0,))), 1.0, 31.0)
     assert kin(Law("m", "ft", "past", (mode,), RANGES)) == ": it rings at 31 Hz, as structural resonance does"
     assert kin(DRAG) == ""
 
