@@ -169,7 +169,13 @@ def _session(outcome: CampaignOutcome, limits: RunLimits) -> Iterator[Block]:
         (f"{weighing.left:.2f}", "times the noise remains"),
     ])  # fmt: skip
     yield probability_figure(outcome)
-    yield _rounds(outcome)
+    rows = []
+    for k, r in enumerate(outcome.rounds):
+        order = by_probability(r.weighing, 0.0)
+        possible = ", ".join(f"{plain_name(n)} {p:.2f}" for n, p in order[:_ROWS] if p >= _SHOWN)
+        run = f"{shape_words(r.proposal)}; {r.proposal.resolved:.0%} expected" if r.proposal else ""
+        rows.append((f"run {k}" if k else "first records", possible, size(r.weighing, order[0][0]), run))
+    yield section("Run by run", table(("after", "possible", "size of the likeliest", "next run"), rows))
     if played:
         yield spectrum_figure([(f"run {k}", p) for k, p in played])
         yield from (command_figure(p) for _, p in played)
@@ -202,16 +208,6 @@ def probability_figure(outcome: CampaignOutcome) -> fig.Figure:
         "other before the first record."
     )
     return fig.Figure("Remaining causes after each run", caption, traces, drawing, height=360)
-
-
-def _rounds(outcome: CampaignOutcome) -> Html:
-    rows = []
-    for k, r in enumerate(outcome.rounds):
-        order = by_probability(r.weighing, 0.0)
-        possible = ", ".join(f"{plain_name(n)} {p:.2f}" for n, p in order[:_ROWS] if p >= _SHOWN)
-        run = f"{shape_words(r.proposal)}; {r.proposal.resolved:.0%} expected" if r.proposal else ""
-        rows.append((f"run {k}" if k else "first records", possible, size(r.weighing, order[0][0]), run))
-    return section("Run by run", table(("after", "possible", "size of the likeliest", "next run"), rows))
 
 
 SCHEMA = 1

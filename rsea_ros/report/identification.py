@@ -79,7 +79,10 @@ def _blocks(i: Identification) -> Iterator[html.Block]:
     yield from map(bode_figure, i.responses, models)
     by_name = {o.channel: o for o in i.overlays}  # the motor torque only repeats the command
     for overlay in [by_name[n] for n in SENSED if n in by_name] or i.overlays:
-        yield _over_time(i, overlay)
+        n, o = overlay.channel, overlay
+        left = f"{i.fit_percent[n]:.2f} % explained, {words.quantity(i.residual_rms[n], UNITS[n])} RMS left"
+        title = words.sentence(f"{words.channel(n)} over time: {left}")
+        yield overlay_figure(title, n, o.t, o.measured, [Curve("simulated", AFTER, o.simulated)])
         yield _over_frequency(i, overlay)
     unclear = (*doubt_sentences(i), *remark_sentences(rigs.split_off_rig(i.remarks)[1]))
     yield undetermined_section(unclear)
@@ -165,14 +168,6 @@ def _interval(p: ParameterEstimate) -> html.Html:
         f'stroke="{QUIET}"/>{stroke(*p.ci95, faint(AFTER, 0.55), 6)}'
         f'<circle cx="{at(p.value)}" cy="{middle:g}" r="4" fill="{AFTER}"/></svg>'
     )
-
-
-def _over_time(i: Identification, overlay: Overlay) -> Figure:
-    n = overlay.channel
-    left = f"{i.fit_percent[n]:.2f} % explained, {words.quantity(i.residual_rms[n], UNITS[n])} RMS left"
-    title = words.sentence(f"{words.channel(n)} over time: {left}")
-    simulated = Curve("simulated", AFTER, overlay.simulated)
-    return overlay_figure(title, n, overlay.t, overlay.measured, [simulated])
 
 
 def _over_frequency(i: Identification, overlay: Overlay) -> Figure:
