@@ -157,8 +157,9 @@ _REPEAT = 1e-3
 """Of nearly all steps: what is closer is a repeat."""
 _NEW_VALUES = 0.5
 """Share of samples with a stamp that repeats that differ from the one before, from which none is a copy."""
-_STEADIER = 0.5
-"""Of the first samples' unsteadiness: what all of them may have whose count is the clock."""
+_STEADIER, _RARE = 0.5, 0.01
+"""Of the first samples' unsteadiness: what all of them may have whose count is the clock. Share of the
+samples that is rather lost than dated by its order."""
 _MOST_PLACES, _MOST_PER_SAMPLE = 1e7, 100.0
 """Periods that a channel may span, and times its number of samples: a long run at 2 kHz has 1e6."""
 _EXPLAIN_GAPS = ("duplicate_stamps", "dropped_samples")
@@ -211,7 +212,8 @@ def _without_repeats(channel: Channel, name: str) -> tuple[Channel, list[Fault]]
     even, share = even_behind_ticks(channel.t), float(repeated.mean())
     first = Channel(channel.t[~repeated], channel.y[~repeated])
     is_new = np.mean(np.diff(channel.y)[repeated[1:]] != 0.0) >= _NEW_VALUES
-    if not is_new or (even is None and _unsteadiness(channel.t) > _STEADIER * _unsteadiness(first.t)):
+    steady = share > _RARE and _unsteadiness(channel.t) < _STEADIER * _unsteadiness(first.t)
+    if not is_new or (even is None and not steady):
         return first, [Fault("duplicate_stamps", name, share)]
     how = "dated by the even clock that they fit"
     if even is None:
