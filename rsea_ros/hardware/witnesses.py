@@ -22,6 +22,8 @@ SMOOTH, MEMORY = 0.03, 0.5
 """s: time constants of low-pass and window. Above 5 Hz a delay of the velocity makes a false momentum."""
 PAUSE, LASTING = 0.1, 0.5
 """s without torque that are a rest; s that a window has at least, and for which a contradiction lasts."""
+UNEVEN = 0.5
+"""Part of a deviation that a law which is not the same either way may make a mean of."""
 LOST = 1.5
 """Periods from one reading to the next, from which on the momentum between them is not known."""
 
@@ -128,9 +130,10 @@ class Witnesses:
 
     def _judge(self) -> DeviceFault | None:
         """Compare means, and standard deviations."""
-        mean, rms = self._mean, Signals(*map(math.sqrt, self._square))
+        mean = self._mean
         swing = Signals(*(math.sqrt(max(q - m * m, 0.0)) for q, m in zip(self._square, mean, strict=True)))
-        sizes = rms._replace(spring=abs(mean.spring) + 0.5 * swing.spring, rise=abs(mean.rise))
+        sizes = Signals(*(abs(m) + UNEVEN * s for m, s in zip(mean, swing, strict=True)))
+        sizes = sizes._replace(rise=abs(mean.rise))
         zeroed = mean._replace(spring=mean.spring + self._zero)
         still = self._parts(zeroed, sizes, abs(mean.way) + 1.0 - self._square.way)
         moving = self._parts(swing, swing, 1.0)
