@@ -8,8 +8,6 @@ a zero point or a gain; and standard deviations do not depend on delays: one tha
 moves a mean only by how much more the gear goes one way than the other (decision 314).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
