@@ -22,7 +22,7 @@ PAUSE, LASTING = 0.1, 0.5
 """s without torque that are a rest; s that a window has at least, and for which a contradiction lasts."""
 UNEVEN = 0.5
 """Part of a deviation that a law which is not the same either way may make a mean of."""
-LOST = 1.5
+LOST = 4.0
 """Periods from one reading to the next, from which on the momentum between them is not known."""
 
 
