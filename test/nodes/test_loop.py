@@ -11,7 +11,7 @@ from msg_adapters.ros import Clock, JointState, WrenchStamped, stamp_of
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.nodes._qos import COMMAND, RECORD_RELIABLE
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 from rsea_ros.records.record import Channel
 
 RIG = "paper_high_impedance"
