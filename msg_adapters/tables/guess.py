@@ -22,20 +22,22 @@ from msg_adapters.tables.text_file import column_names, read_text
 from rsea_ros.errors import ImportMapError
 from rsea_ros.records.record import FloatArray
 
-_ANGLE = "pos|angle|theta|phi|encoder|ticks|joint|_q_"
+_ANGLE = r"pos|angle|theta|phi|encoder|ticks|_q\d*_"
 _WISHED = "target|goal|des_|desired|ref|cmd|command|setpoint"
 _WORDS: Mapping[str, str] = {
     "reference": f"({_WISHED}).*({_ANGLE})|({_ANGLE}).*({_WISHED}|_d_)",
     "command": f"^_u_$|{_WISHED}|_[dc]_$",
     "deflection": "defl|spring|twist|delta",
-    "ft": "^_ft|^_[tmf][xyz]|load_?cell|wrench|sensor|output",
-    "velocity": "^_[wv]_|_dq_|_qd|vel|omega|speed|rpm|rate",
+    "ft": "^_ft|^_[tmf][xyz]|load_?cell|wrench|(sensor|output).*(torq|force)|(torq|force).*(sensor|output)",
+    "velocity": r"^_[wv]_|_dq\d*_|_qd|vel|omega|speed|rpm|_rate_",
     "position": _ANGLE,
     "motor_torque": "tau|torque|effort|load|curr|_i_|_i?q_|_i_q",
 }
 """What is in a channel's column's name, between underlines; the first that fits counts."""
 _TIMES = re.compile("^_t_$|time|stamp|_secs?_|nanos?|clock|millis|micros")
 _IN_NAME, _ENDING = re.compile(r"[\[(]([^\])]+)[\])]"), re.compile(r"_([A-Za-z]+)$")
+_YAML = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
+"""Words that YAML takes for values."""
 _SHORT = {"nm": "N m", "mnm": "mN m", "ma": "mA", "a": "A", "degps": "deg/s", "radps": "rad/s", "sec": "s"}
 """Units as names of columns write them."""
 _CURRENT, _TORQUE = re.compile("curr|amp|_i_|_iq_|_i_q"), re.compile("tau|torque|effort|load")
@@ -112,7 +114,7 @@ def _range(values: FloatArray) -> str:
 
 def _quoted(name: str) -> str:
     """Return a name as YAML takes it: a word as it is."""
-    is_word = re.fullmatch(r"[A-Za-z_]\w*", name)
+    is_word = re.fullmatch(r"[A-Za-z_]\w*", name) and name.lower() not in _YAML
     return name if is_word else json.dumps(name, ensure_ascii=not name.isprintable())
 
 

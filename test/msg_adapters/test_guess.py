@@ -50,6 +50,23 @@ def test_the_step_tells_the_unit_of_the_stamps_and_the_position_that_of_its_rate
     assert "# command: ?" in text
 
 
+@pytest.mark.parametrize(
+    ("column", "channel"),
+    [
+        ("u", "command"), ("cmdTorque", "command"), ("tau_des", "command"), ("goal_current", "command"),
+        ("q_des", "reference"), ("TargetPosition", "reference"), ("desired_angle", "reference"),
+        ("joint_torque", "motor_torque"), ("iq", "motor_torque"), ("present_load", "motor_torque"),
+        ("Fz", "ft"), ("tz", "ft"), ("load_cell", "ft"), ("output_torque", "ft"), ("SensorForce", "ft"),
+        ("output_angle", "position"), ("q1", "position"), ("encoder_ticks", "position"),
+        ("spring_deflection", "deflection"), ("omega", "velocity"), ("no", ""), ("integrated", ""),
+    ],
+)  # fmt: skip
+def test_names_of_columns(tmp_path, column, channel):
+    text = guess_map(table(tmp_path / "run.csv", ("t", T), (column, TORQUE + 0.3 * T)))
+    found = re.findall(r"^  (\w+): [{]column: (\w+)", text, re.MULTILINE)
+    assert found == ([(channel, column)] if channel else [])
+
+
 def test_a_velocity_that_is_no_rate_in_any_unit_is_asked_for(tmp_path):
     _, text = imported(table(tmp_path / "run.csv", ("t", T), ("q", ANGLE), ("w", 3.7 * RATE), ("u", TORQUE)))
     assert re.search("the rate of q; [?] 3.7[0-9]? times too large for that", text)
