@@ -17,7 +17,7 @@ from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.holds import with_held_commands, words_on_steps
 from rsea_ros.records.record import Channel, Fault, FloatArray, Record
-from rsea_ros.records.stamp_order import polls_unevenly
+from rsea_ros.records.stamp_order import GAP, local_period, polls_unevenly
 
 _RED_SHARE = 0.2
 """Of a channel's samples: more bad ones make the channel, not some samples, doubtful."""
@@ -107,6 +107,11 @@ def _rate(
     steps = np.diff(channel.t)
     rate = channel.rate
     longest = f"longest interval {1e3 * float(steps.max()):.3g} ms"
+    local = local_period(channel.t)
+    if max(local[0], local[-1]) > GAP * min(local[0], local[-1]) > 0.0:
+        other = np.maximum(local / local[0], local[0] / local) > GAP
+        at = channel.t[int(np.argmax(other))]
+        longest = f"{1.0 / local[0]:.4g} Hz until {at:.4g} s, {1.0 / local[-1]:.4g} Hz at the end; {longest}"
     if 0.0 < rate < math.inf and polls_unevenly(steps, 1.0 / rate):
         low, high = 1e3 * np.quantile(steps, (0.05, 0.95))
         longest = f"uneven, mostly {low:.3g} to {high:.3g} ms; {longest}"

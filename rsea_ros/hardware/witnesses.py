@@ -61,8 +61,20 @@ class Signals(NamedTuple):
     way: float
 
 
+class Window(NamedTuple):
+    """Readings so far, and the mean and mean square of their signals."""
+
+    readings: int = 0
+    mean: Signals = Signals(*[0.0] * 6)
+    square: Signals = Signals(*[0.0] * 6)
+
+
 class Witnesses:
-    """Takes readings in. words: a lasting contradiction with its numbers, empty without one."""
+    """Takes readings in. words: a lasting contradiction with its numbers, empty without one.
+
+    One window follows the torque, over its pauses; another one each rest, at which ft has its zero. A zero
+    that is another one than at the rest before is none: ft has been changed meanwhile.
+    """
 
     def __init__(self, spring: Spring, actuator: Actuator, period: float) -> None:
         self._spring, self._rig, self._period = spring, actuator, period
@@ -71,13 +83,14 @@ class Witnesses:
     def restart(self) -> None:
         """Forget everything, also where ft is zero."""
         self._before: State | None = None
-        self._zero, self._rests, self._idle = math.nan, True, 0
+        self._zero, self._known, self._idle = math.nan, math.nan, 0
         self._begin()
 
     def _begin(self) -> None:
-        """Begin a window."""
-        self.words, self._count, self._off, self._both = "", 0, 0, 0
-        self._low = self._mean = self._square = Signals(*[0.0] * len(Signals._fields))
+        """Begin anew."""
+        self.words, self._off, self._both = "", 0, 0
+        self._low: Signals | None = None
+        self._rest, self._work = Window(), Window()
 
     def take(self, state: State, torque: float) -> DeviceFault | None:
         """Take a reading in; return the fault where both contradict ft gravely. torque: N m, commanded."""
@@ -86,19 +99,20 @@ class Witnesses:
         if before is None or state.wrench is None or not 0.0 < time < LOST * self._period:
             return None
         self._idle = 0 if torque != 0.0 else self._idle + 1
-        rests = self._idle * self._period > PAUSE
         signals = self._signals(before, state, state.wrench[self._spring.place], time)
         if not is_measured(signals.ft + signals.motor):
             return None
-        if rests != self._rests or math.isnan(signals.spring) != math.isnan(self._low.spring):
-            self._rests = rests
+        if self._low is None or math.isnan(signals.spring) != math.isnan(self._low.spring):
             self._begin()
-        self._follow(signals)
-        if self._count * self._period < LASTING:
-            return None
-        if not rests:
-            return self._judge()
-        self._zero = self._mean.ft - self._mean.spring
+        self._low = signals if self._low is None else _nearer(self._low, signals, self._period / SMOOTH)
+        if self._idle * self._period <= PAUSE:
+            self._rest, self._known = Window(), self._zero
+            self._work = self._followed(self._work, self._low)
+            return self._judge(self._work) if self._work.readings * self._period >= LASTING else None
+        self._rest = self._followed(self._rest, self._low)
+        if self._rest.readings * self._period >= LASTING:
+            zero = self._rest.mean.ft - self._rest.mean.spring
+            self._zero = self._known if abs(zero - self._known) > self._rig.play else zero
         return None
 
     def _signals(self, before: State, state: State, felt: float, time: float) -> Signals:
@@ -116,24 +130,20 @@ class Witnesses:
             way=math.copysign(abs(state.velocity) > rig.creep, state.velocity),
         )
 
-    def _follow(self, signals: Signals) -> None:
-        self._count += 1
-        if self._count == 1:
-            self._low = self._mean = signals
-        smooth, part = self._period / SMOOTH, max(1.0 / self._count, self._period / MEMORY)
-        self._low = Signals(*(low + smooth * (x - low) for low, x in zip(self._low, signals, strict=True)))
-        pairs = list(zip(self._low, self._mean, self._square, strict=True))
-        self._mean = Signals(*(mean + part * (low - mean) for low, mean, _ in pairs))
-        self._square = Signals(*(square + part * (low * low - square) for low, _, square in pairs))
+    def _followed(self, window: Window, low: Signals) -> Window:
+        part = min(max(1.0 / (window.readings + 1), self._period / MEMORY), 1.0)
+        squares = Signals(*(x * x for x in low))
+        mean, square = _nearer(window.mean, low, part), _nearer(window.square, squares, part)
+        return Window(window.readings + 1, mean, square)
 
-    def _judge(self) -> DeviceFault | None:
+    def _judge(self, window: Window) -> DeviceFault | None:
         """Compare means, and standard deviations."""
-        mean = self._mean
-        swing = Signals(*(math.sqrt(max(q - m * m, 0.0)) for q, m in zip(self._square, mean, strict=True)))
+        mean = window.mean
+        swing = Signals(*(math.sqrt(max(q - m * m, 0.0)) for q, m in zip(window.square, mean, strict=True)))
         sizes = Signals(*(abs(m) + UNEVEN * s for m, s in zip(mean, swing, strict=True)))
         sizes = sizes._replace(rise=abs(mean.rise))
         zeroed = mean._replace(spring=mean.spring + self._zero)
-        still = self._parts(zeroed, sizes, abs(mean.way) + 1.0 - self._square.way)
+        still = self._parts(zeroed, sizes, abs(mean.way) + 1.0 - window.square.way)
         moving = self._parts(swing, swing, 1.0)
         motor, spring = map(max, zip(still, moving, strict=True))
         x, of = (zeroed, "") if max(still) > max(moving) else (swing, " RMS")
@@ -141,7 +151,9 @@ class Witnesses:
         self._off = self._off + 1 if max(motor, spring) > 1.0 else 0
         self._both = self._both + 1 if min(motor, spring) > 1.0 and off > self._rig.grave else 0
         told = f"ft {x.ft:.3g}, motor torque less momentum {x.motor:.3g}"
-        told += "" if math.isnan(x.spring) else f", K times deflection {x.spring:.3g}"
+        if not math.isnan(x.spring):
+            told += f", K times deflection {x.spring if of else mean.spring:.3g}"
+            told += f" (ft is {self._zero:.3g} at rest)" if abs(self._zero) > self._rig.play else ""
         lasts = self._off * self._period > LASTING
         self.words = f"{told} N·m{of} contradict each other, expected them alike" if lasts else ""
         if self._both * self._period <= LASTING:
@@ -162,3 +174,8 @@ class Witnesses:
             by_motor / (rig.play + rig.driven * sizes.motor + motion),
             by_spring / (rig.play + rig.bent * sizes.spring) if by_spring else 0.0,
         )
+
+
+def _nearer(signals: Signals, to: Signals, part: float) -> Signals:
+    """Return signals that have gone a part of the way, all of it at most, to others."""
+    return Signals(*(x + min(part, 1.0) * (y - x) for x, y in zip(signals, to, strict=True)))

@@ -205,6 +205,10 @@ def stop(joints: Sequence[DrivenJoint]) -> str:
     end = time.monotonic() + CONFIRMING
     while on := [joint for joint in joints if not joint.guarded.is_off]:
         if time.monotonic() > end:
+            if all(joint.guarded.away for joint in on):
+                raise DeviceError(
+                    "zero is commanded until clear_fault; the motor confirms it when another service is over"
+                )
             why = ", ".join(joint.with_name(f"{joint.guarded.fault}") for joint in on)
             raise DeviceError(
                 f"zero is commanded until clear_fault, but no motor has confirmed it ({why}), expected it"

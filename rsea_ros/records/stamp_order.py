@@ -8,6 +8,7 @@ ticks of the clock.
 from bisect import bisect_right
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from rsea_ros.records.record import BoolArray, Channel, Fault, FloatArray, IntArray
 
@@ -165,12 +166,11 @@ typical long step is no multiple."""
 def dropped_samples(
     channel: Channel, name: str, taken_out: int, pauses: BoolArray | None = None
 ) -> list[Fault]:
-    """Return the fault of missing samples.
+    """Return the fault of missing samples. A rate that is another one from somewhere on loses none.
 
     taken_out: how many had a stamp that was not theirs. pauses: steps, shape (n - 1,), without lost samples.
     """
-    step = np.diff(channel.t)
-    period = float(np.median(step)) if len(step) else 0.0
+    step, period = np.diff(channel.t), local_period(channel.t)
     step = step if pauses is None else np.where(pauses, period, step)
     if not np.any(step > GAP * period) or polls_unevenly(step, period):
         return []
@@ -183,7 +183,17 @@ def dropped_samples(
     return [Fault("dropped_samples", name, lost / (len(channel) + lost), detail, lost, "samples")]
 
 
-def polls_unevenly(step: FloatArray, period: float) -> bool:
+def local_period(t: FloatArray) -> FloatArray:
+    """Return the usual step about each step of stamps, s, shape (n - 1,): that of all, or a longer rate's."""
+    step, around = np.diff(t), 6 * AROUND + 1
+    usual = np.full(len(step), np.median(step) if len(step) else 0.0)
+    if len(step) < 2 * around:
+        return usual
+    local = np.asarray(median_filter(step, around, mode="nearest"))
+    return np.where(np.maximum(local, usual) > GAP * np.minimum(local, usual), local, usual)
+
+
+def polls_unevenly(step: FloatArray, period: float | FloatArray) -> bool:
     """Return whether the long steps, s, are no multiples of a period: a host that polls as it can.
 
     A steady clock that lost samples leaves steps as near to a multiple as its others are to one period.
@@ -196,7 +206,7 @@ def polls_unevenly(step: FloatArray, period: float) -> bool:
     return float(np.median(off[long])) > max(_NO_MULTIPLE, _TIMES * usual)
 
 
-def _ticks(step: FloatArray, period: float) -> FloatArray:
+def _ticks(step: FloatArray, period: FloatArray) -> FloatArray:
     """Return at which tick of a steady clock each sample was taken, counted along the record.
 
     The clock follows the stamps slowly: jitter is made up for by the next samples, a gap is not.

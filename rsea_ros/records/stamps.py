@@ -157,7 +157,7 @@ _REPEAT = 1e-3
 """Of nearly all steps: what is closer is a repeat."""
 _NEW_VALUES = 0.5
 """Share of samples with a stamp that repeats that differ from the one before, from which none is a copy."""
-_STEADIER, _RARE = 0.5, 0.01
+_STEADIER, _RARE = 0.5, 0.05
 """Of the first samples' unsteadiness: what all of them may have whose count is the clock. Share of the
 samples that is rather lost than dated by its order."""
 _MOST_PLACES, _MOST_PER_SAMPLE = 1e7, 100.0

@@ -20,6 +20,8 @@ WAVES = {
     "sine": lambda t, dice: math.sin(2.0 * math.pi * 2.0 * t),
     "step": lambda t, dice: 1.0 if t % 2.0 < 1.0 else -1.0,
     "noise": lambda t, dice: np.clip(0.4 * dice.standard_normal(), -1.0, 1.0),
+    "pulses": lambda t, dice: 1.0 if t % 0.6 < 0.4 else 0.0,
+    "rest": lambda t, dice: 0.0,
 }
 
 
@@ -67,6 +69,8 @@ def falsify(device, monkeypatch, gain=1.0, bias=0.0):
         ("hold", 5.0, {"gain": 2.0}, 1.0),
         ("sine", 10.0, {"gain": 0.5}, 3.0),
         ("step", 10.0, {"gain": 2.0}, 1.0),
+        ("pulses", 20.0, {"bias": 30.0}, 1.5),
+        ("pulses", 20.0, {"gain": -1.0}, 1.5),
     ],
 )
 def test_a_zero_or_gain_that_changes_under_torque_is_told_with_the_numbers(
@@ -115,3 +119,30 @@ def test_a_spring_that_is_not_as_stated_is_not_laid_on_ft():
     guarded, now, _ = bench(RIG, plant)
     play(guarded, now, "hold", 0.0, 1.0)
     assert play(guarded, now, "sine", 60.0, 2.0)[0] == ""
+
+
+def test_a_rest_does_not_make_a_falsified_zero_the_true_one(monkeypatch):
+    """It was told under torque, and after a pause of two seconds no more."""
+    guarded, now, device = bench(RIG)
+    for wave, torque in (("rest", 0.0), ("hold", 10.0)):
+        assert play(guarded, now, wave, torque, 1.0)[0] == ""
+    falsify(device, monkeypatch, bias=8.0)
+    assert play(guarded, now, "rest", 0.0, 3.0)[0] == ""
+    words, after = play(guarded, now, "hold", 10.0, 3.0)
+    assert "contradict each other" in words and after < 1.5
+
+
+def test_a_slow_rate_does_not_let_the_low_pass_run_away():
+    """Below 17 Hz a sound machine had 1e15 N m, and a fault."""
+    values = {p.name: p.default for p in driver.TABLE} | {"rig": RIG, "rate": 12.0, "soft_start": 1e6}
+    now = [1_700_000_000 * SECOND]
+    device = SimulatedDevice(load_rig(RIG), 12.0, clock=lambda: now[0])
+    guarded = GuardedDevice(
+        device, limits_of(values), 12.0, spring_of(values), testify=partial(witnesses_of, values)
+    )
+    guarded.open()
+    guarded.enable()
+    for _ in range(600):
+        now[0] += round(SECOND / 12.0)
+        guarded.cycle(8.0, 0.0)
+        assert guarded.contradiction == "" and (guarded.fault is None or guarded.fault.cause != "ft")
