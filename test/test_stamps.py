@@ -103,6 +103,14 @@ def test_samples_between_the_ticks_of_a_coarse_clock_get_their_own_times(tick):
     assert fault.share == pytest.approx(1.0 - PERIOD / tick, abs=0.01)
 
 
+def test_a_rate_that_halves_loses_nothing():
+    """Three red lines asked for a deeper queue."""
+    t = np.append(np.arange(COUNT // 2) * PERIOD, (COUNT // 2 + 2.0 * np.arange(COUNT // 4)) * PERIOD)
+    assert repair_stamps(_record(t))[1] == []
+    t = np.delete(t, COUNT // 2 + 200)
+    assert [(f.kind, f.size) for f in repair_stamps(_record(t))[1]] == [("dropped_samples", 1.0)]
+
+
 def test_samples_that_arrived_together_keep_their_order():
     """A tenth of them was left out, and the rest looked late: nothing explained a sound machine."""
     true = np.arange(COUNT) * PERIOD
