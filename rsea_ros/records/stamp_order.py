@@ -8,7 +8,6 @@ ticks of the clock.
 from bisect import bisect_right
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from rsea_ros.records.record import BoolArray, Channel, Fault, FloatArray, IntArray
 
@@ -184,12 +183,19 @@ def dropped_samples(
 
 
 def local_period(t: FloatArray) -> FloatArray:
-    """Return the usual step about each step of stamps, s, shape (n - 1,): that of all, or a longer rate's."""
+    """Return the usual step about each step of stamps, s, shape (n - 1,): that of all, or another rate's.
+
+    Another rate is one that lasts: the median of some steps, or of those before or behind them.
+    """
     step, around = np.diff(t), 6 * AROUND + 1
     usual = np.full(len(step), np.median(step) if len(step) else 0.0)
-    if len(step) < 2 * around:
+    if len(step) < 2 * around or not np.any(step > GAP * usual):
         return usual
-    local = np.asarray(median_filter(step, around, mode="nearest"))
+    parts = np.array_split(step, len(step) // around)
+    medians = np.pad([float(np.median(part)) for part in parts], 1, mode="edge")
+    of = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    near = np.stack([medians[of + k] for k in range(3)])
+    local = near[np.argmin(np.abs(near - step), axis=0), np.arange(len(step))]
     return np.where(np.maximum(local, usual) > GAP * np.minimum(local, usual), local, usual)
 
 
