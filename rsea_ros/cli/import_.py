@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     if args.guess:
         return _guess(args.files, Path(args.guess), args.force)
     if args.out is None:
-        raise ParameterError("rsea import: no --out, expected a name for the bag")
+        raise ParameterError("no --out, expected a name for the bag")
     path = map_path(args.map)
     check_free([Path(args.out)], force=args.force, inputs=[*args.files, path])
     mapping = load_map(path)
@@ -64,7 +64,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _guess(files: list[str], path: Path, force: bool) -> int:
-    """Write a map for the first file, and say what comes next."""
+    """Write a map for the one file, and say what comes next."""
+    if len(files) > 1:
+        raise ParameterError(f"--guess: {len(files)} files, expected one: its map may serve the others")
     check_free([path], force=force, inputs=files)
     text = guess_map(files[0])
     write_file(path, text, force=force)

@@ -13,6 +13,7 @@ from rsea_ros.checks.pairs import Pair
 from rsea_ros.documents.wording import list_names
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import UNITS, FloatArray, Record
+from rsea_ros.records.stamps import repair_stamps
 from rsea_ros.report import page as html, words
 from rsea_ros.report.figures.figure import BEFORE, MEASURED, QUIET, Figure, axis, label, layout, line
 from rsea_ros.report.result_files import (
@@ -195,7 +196,8 @@ _MOST = 800
 
 
 def _over_time(c: Findings, record: Record) -> Figure:
-    """Return every channel over time, one below the other; what must not count in another colour."""
+    """Return every channel at its repaired stamps, which the masks have; what must not count is orange."""
+    record, _ = repair_stamps(record)
     parts, data, names, height = {}, [], [], 1.0 / len(record.channels)
     for k, (name, channel) in enumerate(record.channels.items()):
         mark = "" if k == 0 else str(k + 1)

@@ -56,6 +56,26 @@ def test_the_page_says_first_what_to_put_right(bag, good, tmp_path, capsys):
     assert main(words) == 2 and "exists" in capsys.readouterr().err
 
 
+def repeated(record):
+    """Stamps that repeat: the record that is judged has fewer samples."""
+    t = record["ft"].t.copy()
+    t[500:560:7] = t[499:559:7]
+    return Channel(t, record["ft"].y)
+
+
+def held(record):
+    """A sensor that is slower than the log."""
+    return Channel(record["ft"].t, np.repeat(record["ft"].y[::4], 4)[: len(record["ft"])])
+
+
+@pytest.mark.parametrize("change", [repeated, held])
+def test_the_page_shows_the_repaired_record(bag, good, tmp_path, change):
+    """It ended with a request to report a bug."""
+    words = ["check", bag(ft=change(good)), "--rig", "paper_high_impedance", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    assert "Every channel over time" in (tmp_path / "out" / "report.html").read_text()
+
+
 def test_for_a_dead_axis_the_one_that_follows_the_command_is_suggested(bag, capsys):
     assert main(["check", bag(), "--axis", "torque.x", "--fail-on", "red"]) == 1
     assert "--axis torque.z" in capsys.readouterr().out
