@@ -9,18 +9,22 @@
 Each name is imported on first use; none of them needs ROS.
 """
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rsea_ros import effects
-    from rsea_ros.control.controller import TorqueController
+    from rsea_ros.control.controller import Measurement, TorqueController
+    from rsea_ros.control.following import closed_loop
     from rsea_ros.diagnosis.settings import DiagnosisSettings
     from rsea_ros.errors import RseaError
     from rsea_ros.library.checking import check
     from rsea_ros.library.diagnosed import diagnose
     from rsea_ros.library.identified import identify
     from rsea_ros.library.records import read_bag, simulate
+    from rsea_ros.library.studies import design, experiment, law, save
     from rsea_ros.model.observer.observer import Observer, observe
     from rsea_ros.model.prediction_errors import predict
     from rsea_ros.model.rig import Rig
@@ -29,36 +33,72 @@ if TYPE_CHECKING:
 
 DOOR = {
     "DiagnosisSettings": "diagnosis.settings",
+    "Measurement": "control.controller",
     "Observer": "model.observer.observer",
     "Record": "records.record",
     "Rig": "model.rig",
     "RseaError": "errors",
     "TorqueController": "control.controller",
     "check": "library.checking",
+    "closed_loop": "control.following",
+    "design": "library.studies",
     "diagnose": "library.diagnosed",
     "effects": "effects",
+    "experiment": "library.studies",
     "identify": "library.identified",
+    "law": "library.studies",
     "load_rig": "model.rig_file",
     "observe": "model.observer.observer",
     "predict": "model.prediction_errors",
     "read_bag": "library.records",
+    "save": "library.studies",
     "simulate": "library.records",
 }
 """The names that `import rsea_ros` offers, and the module of each."""
+STUDIES = ("design", "experiment")
+"""Those that are names of packages too."""
 
 __all__ = [
-    "DiagnosisSettings", "Observer", "Record", "Rig", "RseaError", "TorqueController", "check", "diagnose",
-    "effects", "identify", "load_rig", "observe", "predict", "read_bag", "simulate",
+    "DiagnosisSettings", "Measurement", "Observer", "Record", "Rig", "RseaError", "TorqueController", "check",
+    "closed_loop", "design", "diagnose", "effects", "experiment", "identify", "law", "load_rig", "observe",
+    "predict", "read_bag", "save", "simulate",
 ]  # fmt: skip
 
 
+class _Study(ModuleType):
+    """A package that can be called as the function of its name: `rsea.design(torque=40.0)`."""
+
+    @property
+    def __wrapped__(self) -> Any:
+        name = self.__name__.rpartition(".")[2]
+        return getattr(import_module(f"rsea_ros.{DOOR[name]}"), name)
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        return self.__wrapped__(*arguments, **options)
+
+
+class _Door(ModuleType):
+    """This package, whoever loads the packages below it."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in STUDIES and isinstance(value, ModuleType):
+            value.__class__ = _Study
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Door
+
+
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module("rsea_ros.version").version()
     if name not in DOOR:
         raise AttributeError(f"module 'rsea_ros' has no attribute {name!r}; it offers {', '.join(DOOR)}")
+    if name in STUDIES:
+        return import_module(f"rsea_ros.{name}")
     module = import_module(f"rsea_ros.{DOOR[name]}")
-    value = module if name == "effects" else getattr(module, name)
-    globals()[name] = value
-    return value
+    globals()[name] = module if name == "effects" else getattr(module, name)
+    return globals()[name]
 
 
 def __dir__() -> list[str]:

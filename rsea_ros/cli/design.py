@@ -8,7 +8,7 @@ from typing import Any
 from rsea_ros.cli import _output
 from rsea_ros.cli._output import path
 from rsea_ros.cli._terminal import say
-from rsea_ros.design.mechanism import Requirement, check_magnitude
+from rsea_ros.design.mechanism import Requirement
 from rsea_ros.model.train import TRAINS
 from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report.result_files import DESIGN_JSON, REPORT, json_text
@@ -36,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     example = {**vars(default), "deflection": math.degrees(default.deflection)}
     for name, about in DEMANDS.items():
         add(f"--{name.replace('_', '-')}", type=float, default=example[name], help=about)
-    about = "stiffness to test, N·m/rad (default %(default)s, the paper's)"
-    add("--stiffness", type=float, default=STIFFNESS, help=about)
+    about = f"stiffness to test, N·m/rad (default: the least for your demands; the paper's: {STIFFNESS:g})"
+    add("--stiffness", type=float, help=about)
     add("--unit", default=UNIT, help="motor-gear unit of the catalogue (default %(default)s)")
     add("--train", choices=TRAINS, help="gear train, if it differs from that of the unit")
     about = "YAML of motor-gear units (default config/design/motor_gear_units.yaml)"
@@ -54,13 +54,14 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.report.design import design_json, design_report
 
     place = _output.results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
-    check_magnitude("stiffness", args.stiffness, "N m/rad")
     values = {name: getattr(args, name) for name in DEMANDS}
     requirement = Requirement(**{**values, "deflection": math.radians(args.deflection)})
     unit = unit_named(args.unit, args.catalogue)
     unit = unit.with_train(args.train) if args.train else unit
-    asked = spring_design(requirement, unit, args.stiffness)
     least = spring_design(requirement, unit, least_stiffness(requirement, unit))
+    asked = least
+    if args.stiffness is not None or requirement == Requirement():
+        asked = spring_design(requirement, unit, STIFFNESS if args.stiffness is None else args.stiffness)
     enough = robust_stiffness(requirement, unit)
     robust = spring_design(requirement, unit, enough) if math.isfinite(enough) else None
     source = _output.provenance("design", [args.catalogue] if args.catalogue else [])
@@ -74,6 +75,19 @@ def run(args: argparse.Namespace) -> int:
     return 1 if args.fail_on and not asked.feasible else 0
 
 
+def unstated(d: Any) -> str:
+    """Return what nobody stated, with its value: demands that are the paper's, motor and gear."""
+    from rsea_ros.design.mechanism import UNITS
+    from rsea_ros.report import words
+
+    mine, papers = vars(d.requirement), vars(Requirement())
+    values = {n: (v, words.unit(UNITS[n])) for n, v in mine.items() if v == papers[n]}
+    if "deflection" in values:
+        values["deflection"] = math.degrees(d.requirement.deflection), "°"
+    parts = [f"{name.replace('_', ' ')} {value:.3g} {unit}" for name, (value, unit) in values.items()]
+    return ", ".join([*parts, *(["motor and gear"] if d.unit.name == UNIT else [])])
+
+
 def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
     from rsea_ros.design.spring_design import by_train
     from rsea_ros.report import words
@@ -85,8 +99,13 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
         sign = ">=" if check.least else "<="
         limit = f"required {sign} {check.limit:.4g} {words.unit(check.unit)}"
         say(f"  {'yes' if check.met else 'NO '}  {check.name}: {value}, {limit}", indent=7)
-    smallest = f"{least.stiffness:.0f} N·m/rad, springs of {least.rate:.0f} N/m"
-    say(f"smallest stiffness that meets all demands on the spring: {smallest}")
+    rate = f"springs of {least.rate:.0f} N/m"
+    if asked is least:
+        say(f"no softer spring meets them: {rate}")
+    else:
+        say(f"smallest stiffness that meets all demands on the spring: {least.stiffness:.0f} N·m/rad, {rate}")
+    if papers := unstated(asked):
+        say(f"not stated, so the paper's: {papers}", indent=2)
     for row in by_train(asked.requirement, asked.unit, asked.stiffness):
         low, high = row.band_range
         say(

@@ -41,7 +41,7 @@ class Requirement:
     tolerance_deg: float = 90.0
 
     def __post_init__(self) -> None:
-        for name, unit in _UNITS.items():
+        for name, unit in UNITS.items():
             value = getattr(self, name)
             check_magnitude(name, value, unit)
         if self.deflection > math.radians(_LARGEST):
@@ -59,7 +59,7 @@ class Requirement:
         return 0.5 * self.separation
 
 
-_UNITS = {
+UNITS = {
     "torque": "N m",
     "bandwidth": "Hz",
     "inertia": "kg m^2",

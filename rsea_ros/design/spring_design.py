@@ -12,7 +12,6 @@ import numpy as np
 from rsea_ros.design import mechanism
 from rsea_ros.design.mechanism import Requirement, spring_rate
 from rsea_ros.design.motor_gear_units import MotorGear
-from rsea_ros.errors import ParameterError
 from rsea_ros.model import transfer
 from rsea_ros.model.rig import END_NAMES, Quantity, Rig
 from rsea_ros.model.train import Train
@@ -68,9 +67,8 @@ class SpringDesign:
 
 
 def spring_design(requirement: Requirement, unit: MotorGear, stiffness: float) -> SpringDesign:
-    """Return the design of a stiffness (N m/rad). Raises ParameterError unless it is above 0."""
-    if not (math.isfinite(stiffness) and stiffness > 0.0):
-        raise ParameterError(f"stiffness = {stiffness:g} N·m/rad, expected a finite value > 0 N·m/rad")
+    """Return the design of a stiffness (N m/rad). Raises ParameterError for one of no possible size."""
+    mechanism.check_magnitude("stiffness", stiffness, "N m/rad")
     inner = requirement.inertia + unit.spin
     function = transfer.end_over_end(rig_of(requirement, unit, stiffness))
     exact = transfer.flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)

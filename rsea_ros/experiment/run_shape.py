@@ -79,17 +79,23 @@ def limits_from(text: str) -> RunLimits:
     values: dict[str, float] = {}
     for item in filter(None, text.split(",")):
         name, _, value = (part.strip() for part in item.partition("="))
-        if name not in UNITS:
-            near = did_you_mean(name, UNITS)
-            raise ParameterError(f"--limits: {quote(name)}, expected one of {', '.join(UNITS)}{near}")
-        if not is_decimal(value):
+        if name in UNITS and not is_decimal(value):
             expected = f"expected a number in {plain(UNITS[name])}"
             raise ParameterError(f"--limits: {name} = {quote(value)}, {expected}")
         if name in values:
             raise ParameterError(f"--limits: {name} is given twice, expected once")
-        values[name] = float(value)
+        values[name] = float(value) if name in UNITS else math.nan
+    return limits_of(values, "--limits")
+
+
+def limits_of(values: Mapping[str, float], source: str = "limits") -> RunLimits:
+    """Return the limits of values by name, SI. Raises ParameterError for an unknown name, or no torque."""
+    for name in values:
+        if name not in UNITS:
+            near = did_you_mean(name, UNITS)
+            raise ParameterError(f"{source}: {quote(name)}, expected one of {', '.join(UNITS)}{near}")
     if "torque" not in values:
-        raise ParameterError("--limits: no torque, expected at least torque=… in N·m")
+        raise ParameterError(f"{source}: no torque, expected at least that of the command, N·m")
     return RunLimits(**values)
 
 

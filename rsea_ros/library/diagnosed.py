@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import Record
 
@@ -76,6 +76,10 @@ class Diagnosed:
         from rsea_ros.library.result_figures import overlay_figure
 
         return overlay_figure(self.result.before, self.result.after)
+
+    def save(self, path: str | Path, *, force: bool = False) -> None:
+        """Write the extended model as YAML for `load_rig`. Raises RigError where it cannot be written."""
+        save_rig(self.rig, path, force=force)
 
     def write_report(self, directory: str | Path, *, force: bool = False) -> Path:
         """Write diagnosis.json, model.yaml, overlay.mcap and report.html; return the report's path.

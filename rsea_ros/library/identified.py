@@ -11,7 +11,7 @@ from rsea_ros.documents import units
 from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.library.notebook import parameter_frame, plain
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import Record
 
@@ -62,6 +62,10 @@ class Fit:
         from rsea_ros.library.result_figures import fit_figure
 
         return fit_figure(self.result, response)
+
+    def save(self, path: str | Path, *, force: bool = False) -> None:
+        """Write the fitted rig as YAML for `load_rig`. Raises RigError where it cannot be written."""
+        save_rig(self.rig, path, force=force)
 
     def write_report(self, directory: str | Path, *, force: bool = False) -> Path:
         """Write identification.json, model.yaml and report.html; return the report's path.

@@ -16,7 +16,7 @@ from rich.table import Table
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.progress import Progress
-from rsea_ros.records.record import MEASURED, Channel, Record
+from rsea_ros.records.record import MEASURED, Channel, Record, pandas_for
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,7 @@ def parameter_frame(parameters: Sequence[ParameterEstimate]) -> Any:
 
     Raises ParameterError where pandas is not installed.
     """
-    try:
-        pandas = import_module("pandas")
-    except ImportError:
-        raise ParameterError("to_frame: pandas is not installed, expected it (pip install pandas)") from None
+    pandas = pandas_for("to_frame")
     rows = {p.name: (p.value, p.unit, *p.ci95, p.start, p.told_by_data) for p in parameters}
     columns = ["value", "unit", "low", "high", "rig", "told_by_data"]
     return pandas.DataFrame.from_dict(rows, orient="index", columns=columns)

@@ -35,13 +35,14 @@ def read_bag(
 
 
 def simulate(
-    rig: Rig | str, command: npt.ArrayLike, rate: float = 280.0, *, seed: int = 0, noise: bool = True
+    rig: Rig | str, command: npt.ArrayLike, rate: float | None = None, *, seed: int = 0, noise: bool = True
 ) -> Record:
     """Return the simulated record of a bench that holds each command for 1 / rate.
 
     command: motor torque at the gear output, N m, shape (n,); for a rig with a position loop the target, rad.
-    rate: Hz. seed: of the sensor noise. noise: False for perfect sensors. Measurements are stamped at the end
-    of each hold, commands at its beginning. Raises ParameterError for an invalid command or rate.
+    rate: of the commands, Hz. seed: of the sensor noise. noise: False for perfect sensors. Measurements are
+    stamped at the end of each hold, commands at its beginning. Raises ParameterError for a command or rate
+    that is none.
     Not to be confused with predict, which simulates the commands of a record and compares the result.
     """
     given = np.asarray(command)
@@ -49,6 +50,8 @@ def simulate(
         kind = f"shape {given.shape} of {given.dtype}"
         raise ParameterError(f"command: {kind}, expected (n,) finite torques in N·m with n >= 2 samples")
     values = given.astype(np.float64)
+    if rate is None:
+        raise ParameterError("rate: not stated, expected that of the commands, Hz")
     if not (math.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"rate = {rate:g} Hz, expected a finite rate > 0")
     return synthesize(load_rig(rig), Channel(np.arange(len(values)) / rate, values), seed=seed, noise=noise)

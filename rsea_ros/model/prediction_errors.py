@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.errors import IdentificationError
+from rsea_ros.errors import IdentificationError, ParameterError
 from rsea_ros.model.drive import outside_gaps
 from rsea_ros.model.extent import SKIPPED_START, bound_values, check_command, check_pace
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
@@ -98,14 +98,18 @@ def fit_percent(error: FloatArray, measured: FloatArray) -> float:
     return 100.0 * (1.0 - float(np.linalg.norm(error)) / float(np.linalg.norm(measured - measured.mean())))
 
 
-def predict(rig: Rig | str, record: Record) -> Mapping[str, Comparison]:
+def predict(record: Record | Rig | str, rig: Rig | str | Record) -> Mapping[str, Comparison]:
     """Simulate a rig on the commands of a record and compare it with every measured channel.
 
-    rig: a Rig, a file, or the name of a rig in config/rigs. Returns a Comparison for each channel by name.
+    rig: a Rig, a file, or the name of a rig in config/rigs; the other order means the same. Returns a
+    Comparison for each channel by name.
     For a rig without a spring it compares the torque of the measured motion (see inverse.py); for a sensor
     with an unknown zero it compares changes. Behind a gap of the whole record it begins anew.
     Raises IdentificationError for a record with nothing to compare. Nothing is fitted.
     """
+    record, rig = (rig, record) if isinstance(rig, Record) else (record, rig)
+    if not isinstance(record, Record) or isinstance(rig, Record):
+        raise ParameterError("predict: expected a Record and a rig")
     rig = load_rig(rig)
     record = bound_values(with_command(record, rig))
     check_command(record)

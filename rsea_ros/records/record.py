@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -13,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.documents.units import plain
-from rsea_ros.errors import ChannelError
+from rsea_ros.errors import ChannelError, ParameterError
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -184,6 +185,15 @@ class Record:
         series = {name: _column(table, column, source) for name, column in {"t": time, **columns}.items()}
         return record_from_arrays(series.pop("t"), source, series)
 
+    def to_frame(self) -> Any:
+        """Return a DataFrame: a column for each channel, over all stamps, s; NaN where one has no sample.
+
+        Of samples with the same stamp the last is kept. Raises ParameterError without pandas.
+        """
+        pandas = pandas_for("to_frame")
+        columns = {name: pandas.Series(c.y, c.t) for name, c in self.channels.items()}
+        return pandas.DataFrame({n: c[~c.index.duplicated(keep="last")] for n, c in columns.items()})
+
     def __repr__(self) -> str:
         """Return source, duration and the rate of each channel in one line."""
         rates = ", ".join(f"{name} {channel.rate:.4g} Hz" for name, channel in self.channels.items())
@@ -242,7 +252,6 @@ ALIASES: Mapping[str, str] = {
     "qd": "velocity",
     "tau": "ft",
     "tau_d": "ft",
-    "torque": "ft",
     "q_ref": "reference",
     "target_position": "reference",
     "q_spring": "deflection",
@@ -260,6 +269,15 @@ class NamedColumns(Protocol):
     """A table with named columns, such as a pandas or Polars DataFrame."""
 
     def __getitem__(self, name: str, /) -> Any: ...
+
+
+def pandas_for(purpose: str) -> Any:
+    """Return pandas. Raises ParameterError where it is not installed."""
+    try:
+        return import_module("pandas")
+    except ImportError:
+        words = f"{purpose}: pandas is not installed, expected it (pip install pandas)"
+        raise ParameterError(words) from None
 
 
 def record_from_arrays(t: npt.ArrayLike, source: str, channels: Mapping[str, npt.ArrayLike]) -> Record:
@@ -282,6 +300,8 @@ def record_from_arrays(t: npt.ArrayLike, source: str, channels: Mapping[str, npt
 
 def _channel(name: str, source: str) -> str:
     channel = ALIASES.get(name, name)
+    if name == "torque":
+        raise ChannelError(f"{source}: 'torque' may be three channels, expected command, motor_torque or ft")
     if channel not in UNITS:
         known = ", ".join((*UNITS, *ALIASES))
         raise ChannelError(f"{source}: unknown channel {name!r}, expected one of {known}")

@@ -51,7 +51,7 @@ def test_importing_brings_neither_ros_nor_numerics_and_opening_every_name_change
         "import rsea_ros as rsea\n"
         "heavy = [m for m in ('rclpy', 'numpy', 'scipy', 'numba', 'control', 'plotly') if m in sys.modules]\n"
         "names = dir(rsea)\n"
-        "opened = all(getattr(rsea, name) is not None for name in names)\n"
+        "opened = all(callable(getattr(rsea, name)) or name == 'effects' for name in names)\n"
         "same = dict(os.environ) == before\n"
         "print(json.dumps([heavy, names, opened, same, 'rclpy' in sys.modules]))"
     )
@@ -93,6 +93,11 @@ def test_stamps_may_count_from_any_epoch():
         ([0.0, 1.0, 1.0], {"command": [1.0, 2.0, 3.0]}, "t[2] = 1 s after 1 s, expected stamps that rise"),
         ([0.0, 1.0], {"command": ["a", "b"]}, "command holds <U1, expected real numbers in N·m"),
         ([0.0, 1.0], {"command": [1, 2], "u": [1, 2]}, "name a channel twice"),
+        (
+            [0.0, 1.0],
+            {"torque": [1, 2]},
+            "'torque' may be three channels, expected command, motor_torque or ft",
+        ),
         ([0.0, 1.0], {}, "no channel, expected one or more of command"),
         ([0.0, np.nan], {"command": [1, 2]}, "t[1] = nan, expected a finite value in s"),
         ([0.0, 1.0], {"command": [1, -np.inf]}, "command[1] = -inf, expected a finite value in N·m"),
@@ -151,6 +156,12 @@ def test_arguments_of_the_wrong_kind_are_named(record):
         rsea.simulate("paper_high_impedance", record)
     with pytest.raises(ParameterError, match=r"of complex128, expected \(n,\) finite torques"):
         rsea.simulate("paper_high_impedance", [1j, 2.0])
+    with pytest.raises(ParameterError, match="rate: not stated"):
+        rsea.simulate("paper_high_impedance", [1.0, 2.0])
+    with pytest.raises(ParameterError, match="predict: expected a Record and a rig"):
+        rsea.predict("paper_high_impedance", "pendulum")
+    with pytest.raises(ParameterError, match="save: dict, expected a Rig, a fit"):
+        rsea.save({}, "x.yaml")
     with pytest.raises(ParameterError, match="rate = nan Hz"):
         rsea.simulate("paper_high_impedance", [1.0, 2.0], rate=float("nan"))
 
@@ -177,6 +188,38 @@ def test_results_are_short_in_a_notebook(record):
     comparison = rsea.predict("paper_high_impedance", record)["ft"]
     assert repr(comparison).startswith("Comparison(") and len(repr(comparison)) < 100
     assert rsea.check(record, "paper_high_impedance")._repr_html_().startswith("<pre>green")
+
+
+def test_what_is_saved_is_read_back(record, fit, tmp_path):
+    rsea.save(fit, tmp_path / "model.yaml")
+    again = rsea.load_rig(tmp_path / "model.yaml")
+    assert again["spring.stiffness"] == pytest.approx(fit.rig["spring.stiffness"], rel=1e-9)
+    rsea.save(record, tmp_path / "run")
+    there = rsea.read_bag(tmp_path / "run")
+    np.testing.assert_allclose(there["ft"].y, record["ft"].y)
+    for first, second in ((there, again), (again, there)):
+        assert rsea.predict(first, second)["ft"].rms_error < 0.04, "in any order: N·m, the noise is 0.03"
+    with pytest.raises(rsea.RseaError, match=r"model\.yaml"):
+        fit.save(tmp_path / "model.yaml")
+
+
+def test_the_studies_answer_as_the_verbs_do(record):
+    assert rsea.law(record, "paper_high_impedance").laws == ()
+    wanted = rsea.design(torque=40.0, bandwidth=12.0)
+    assert wanted.feasible and wanted.stiffness == pytest.approx(460.7, abs=0.1), "5 deg at 40 N·m, Eq. (8)"
+    assert not rsea.design(torque=40.0, bandwidth=12.0, stiffness=260.0).feasible
+    with pytest.raises(ParameterError, match="demand 'torqe', did you mean torque"):
+        rsea.design(torqe=40.0)
+    rig = rsea.load_rig("paper_high_impedance")
+    models = (
+        rig.with_effect("current_loop_lag", time_constant=3e-3),
+        rig.with_effect("command_delay", delay=3e-3),
+    )
+    advice = rsea.experiment(models, {"torque": 20.0}, rate=280.0, longest=2.0)
+    assert np.abs(advice.proposal.command).max() <= 20.0
+    with pytest.raises(ParameterError, match="limits: 'torqe', expected one of torque"):
+        rsea.experiment(models, {"torqe": 20.0}, rate=280.0)
+    assert rsea.__version__ == "0.1.0"
 
 
 class Cell:
