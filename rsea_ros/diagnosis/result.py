@@ -200,6 +200,13 @@ class Diagnosis:
     rig_choice: RigChoice = field(default_factory=RigChoice)
 
     @property
+    def why_stopped(self) -> Literal["only_noise", "most_causes", "nothing_better"]:
+        """Why the search for causes ended, as the final model shows it."""
+        if self.at_noise_floor:
+            return "only_noise"
+        return "most_causes" if len(self.causes) >= self.settings.max_causes else "nothing_better"
+
+    @property
     def final(self) -> tuple[ParameterEstimate, ...]:
         """The rig's own values in the extended model: those of `baseline` compensate the missing causes."""
         extended = {p.name: p for p in self.extended}

@@ -223,6 +223,12 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the contents of diagnosis.json; infinite numbers and NaN are null."""
     d, numbers = diagnosis, {s.name: outputs.strict(s.value) for s in diagnosis.settings.numbers()}
     following = d.next_experiment
+    stuck = {name for r in d.remarks if r.code == "at_bound" for name in r.names}
+    others = [
+        {**pick(a, "name instead_of probability channel"), "parameters": _sizes(a),
+         "gain": pick(a, "holdout=gain_holdout holdout_ci95=gain_holdout_ci95")}
+        for a in d.alternatives
+    ]  # fmt: skip
     return {
         "schema": SCHEMA,
         "rig": d.rig_name,
@@ -234,12 +240,11 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "baseline": {"parameters": parameters_json(d.baseline),
                      **pick(d, "residual_rms noise_rms fit_percent")},
         "misfit": _misfits(d.misfit),
-        "causes": [_cause_json(c) for c in d.causes],
-        "alternatives": [
-            {**pick(a, "name instead_of probability channel"), "parameters": _sizes(a),
-             "gain": pick(a, "holdout=gain_holdout holdout_ci95=gain_holdout_ci95")}
-            for a in d.alternatives
+        "causes": [
+            {**_cause_json(c), "alternatives": [a for a in others if a["instead_of"] == c.name]}
+            for c in d.causes
         ],
+        "alternatives": others,
         "rejected": [
             {**pick(r, "name gain_holdout"), "why": say.rejection(r), "reason": r.reason,
              "rival": r.rival or None, **pick(r, "fitted=is_fitted probability")}
@@ -250,6 +255,11 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
             **pick(d, "residual_rms=extended_residual_rms fit_percent=extended_fit_percent at_noise_floor"),
             "misfit": _misfits(d.remaining),
         },
+        "nuisance": [
+            {**pick(p, "name value unit stated=start spreads_off"), "at_bound": p.name in stuck}
+            for p in d.final if p.value != p.start
+        ],
+        "why_stopped": d.why_stopped,
         "next_experiment": following and {"why": say.next_run(following), **pick(following, "excitation")},
         "statements": list(remark_sentences(d.remarks)),
         "settings": {**pick(d.settings, "max_causes without"), **numbers},
