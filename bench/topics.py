@@ -27,7 +27,7 @@ TOPICS: Mapping[str, Mapping[str, str]] = {
     },
     "health": _named("score", "alarms", "faults", "node"),
     "diagnosis": {
-        "score": "score", **_named("hidden", "coverage", "overlap"),
+        "score": "score", **_named("hidden", "coverage", "overlap"), **_named("edits", "edits"),
         **_mains("intervals", "settings", "model_doubt"),
     },
     "frozen": _mains("play", "ablation"),

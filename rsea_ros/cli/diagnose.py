@@ -10,6 +10,7 @@ from msg_adapters.records import write_overlay
 from rsea_ros.cli import _output, _terminal, _topics
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
+from rsea_ros.errors import ParameterError
 from rsea_ros.records.record import Record
 from rsea_ros.report.result_files import DIAGNOSIS, DIAGNOSIS_JSON, MODEL
 
@@ -26,6 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     _topics.add_runs(parser, "several runs of one bench")
     add("--holdout", metavar="BAG", help="a run for testing only (default: a quarter of the runs, in blocks)")
+    about = "a run of the machine after one cause was taken out of it: is it predicted without that cause?"
+    add("--edited", metavar="BAG", help=about)
+    add("--without-cause", metavar="EFFECT", help="the cause that was taken out of the machine of --edited")
     _output.add_results(parser, ", ".join(DIAGNOSIS), "out/diagnose-BAG")
     about = "effects to leave out of the search"
     add("--without", nargs="+", action="extend", default=[], metavar="EFFECT", help=about)
@@ -40,7 +44,9 @@ def run(args: argparse.Namespace) -> int:
     """Diagnose and write the results."""
     from rsea_ros.model.rig_file import load_rig
 
-    inputs, default = [*args.bags, args.rig, args.holdout], f"diagnose-{Path(args.bags[0]).stem}"
+    if (args.edited is None) != (args.without_cause is None):
+        raise ParameterError("--edited BAG and --without-cause EFFECT: one is given, expected both or none")
+    inputs, default = [*args.bags, args.rig, args.holdout, args.edited], f"diagnose-{Path(args.bags[0]).stem}"
     place = _output.results_place(args, Path("out") / default, DIAGNOSIS, inputs)
     rig, topics = load_rig(args.rig), _topics.topic_map(args)
     with _terminal.progress("diagnose") as tell:
@@ -49,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
         records = [readable(bag, topics, args) for bag in runs]
         from rsea_ros.cli.check import check_records
 
+        changed = readable(args.edited, topics) if args.edited else None
         raw, records = records[0], check_records(records, rig, topics.axis, quiet=args.json, masks=True)
         holdout = records.pop() if args.holdout else None
         from rsea_ros.diagnosis.diagnose import (
@@ -57,15 +64,26 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.effects.catalogue import effect_named
         from rsea_ros.report.diagnosis.page import write_diagnosis
 
+        without = args.without_cause and effect_named(args.without_cause).name
         settings = DiagnosisSettings(args.max_causes, tuple(effect_named(name).name for name in args.without))
         choice = _topics.rig_choice(args)
         result = replace(diagnose(records, rig, holdout, tell, settings), rig_choice=choice)
+        refused: ParameterError | None = None
+        if changed is not None:
+            from rsea_ros.diagnosis.edit import edited
+
+            try:
+                result = replace(result, edit=edited(result, changed, without))
+            except ParameterError as error:  # the diagnosis stands
+                refused = error
         origin = _output.provenance("diagnose", args.bags, args.rig)
         report = write_diagnosis(result, raw, place, write_overlay, origin)
     if args.json:
         _output.print_file(report.parent / DIAGNOSIS_JSON)
     else:
         _print(result, report)
+    if refused is not None:
+        raise refused
     findings = {result.verdict, *([FAULTS] if result.faults else []), *_topics.off_rig(result.remarks)}
     return _output.FOUND if findings.intersection(args.fail_on) else 0
 

@@ -146,6 +146,33 @@ class Experiment:
 
 
 @dataclass(frozen=True)
+class Edit:
+    """RMS errors of predictions of a run of the edited machine, in the unit of `channel`.
+
+    error_before: of the extended model; error_after: with `cause` deleted and nothing fitted;
+    error_dense_fit: of the rig with every value fitted and no cause. own_error: of the extended model on
+    held-out data of its own machine.
+    """
+
+    cause: str
+    channel: str
+    noise: float
+    error_before: float
+    error_after: float
+    error_dense_fit: float
+    own_error: float
+
+    @property
+    def survived(self) -> bool:
+        """Whether the name survives: without the cause, no worse than on its own machine, and better."""
+        return self.error_after <= SAME * self.own_error and self.error_after < self.error_before
+
+
+SAME = 1.2
+"""Ratio of the errors of two runs that one model predicts equally well."""
+
+
+@dataclass(frozen=True)
 class Spectrum:
     """Amplitude spectral densities of a channel's residual: Hz; unit/sqrt(Hz)."""
 
@@ -198,6 +225,7 @@ class Diagnosis:
     masked: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     settings: DiagnosisSettings = DEFAULT
     rig_choice: RigChoice = field(default_factory=RigChoice)
+    edit: Edit | None = None
 
     @property
     def why_stopped(self) -> Literal["only_noise", "most_causes", "nothing_better"]:

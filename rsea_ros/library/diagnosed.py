@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis
+from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Edit
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.progress import Progress
@@ -55,6 +55,15 @@ class Diagnosed:
     def alternatives(self) -> tuple[Alternative, ...]:
         """Possible rivals of a cause: `name`, `instead_of`, `parameters`, gains, `probability`."""
         return self.result.alternatives
+
+    def edited(self, record: Record, without_cause: str) -> Edit:
+        """Return how well a run of the machine, after a cause was taken out of it, is predicted without it.
+
+        Raises ParameterError for a cause that is not named here.
+        """
+        from rsea_ros.diagnosis.edit import edited
+
+        return edited(self.result, record, without_cause)
 
     def summary(self) -> str:
         """Return the verdict and the evidence as plain text."""

@@ -48,6 +48,8 @@ def _blocks(d: Diagnosis) -> Iterator[html.Block]:
     if where := profiles(d, main):
         yield where_figure(where, bool(d.causes), AFTER if d.at_noise_floor and not d.causes else BEFORE)
     yield from (_cause(c, d) for c in d.causes)
+    if d.edit is not None:
+        yield html.section("The edited machine", words.sentence(f"{say.edit_sentence(d.edit)}."))
     together = " together with the causes" if d.causes else ""
     yield html.section(f"Values of the rig{together}", parameter_table(d.final))
     yield _tried(d)
@@ -260,6 +262,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
             for p in d.final if p.value != p.start
         ],
         "why_stopped": d.why_stopped,
+        "edit": d.edit and {**vars(d.edit), "survived": d.edit.survived},
         "next_experiment": following and {"why": say.next_run(following), **pick(following, "excitation")},
         "statements": list(remark_sentences(d.remarks)),
         "settings": {**pick(d.settings, "max_causes without"), **numbers},

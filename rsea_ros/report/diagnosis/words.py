@@ -12,6 +12,7 @@ from rsea_ros.diagnosis.result import (
     Cause,
     CauseParameter,
     Diagnosis,
+    Edit,
     Experiment,
     Misfit,
     Reason,
@@ -352,6 +353,19 @@ def terminal_lines(diagnosis: Diagnosis, width: int = WIDTH) -> list[Text]:
     return [Text(wrap(headline(d), width), style=style), *shown]
 
 
+def edit_sentence(e: Edit) -> str:
+    """Return what a run of the edited machine says of a name."""
+    after, before, dense, own = (
+        words.number(v / e.noise, 3) for v in (e.error_after, e.error_before, e.error_dense_fit, e.own_error)
+    )
+    verdict = "survives" if e.survived else "does not survive"
+    return (
+        f"{words.effect(e.cause)} {verdict} its removal: deleted from the model and nothing fitted, the "
+        f"{words.channel(e.channel)} of the edited machine is predicted within {after} times the noise "
+        f"({own} on its own machine); with it {before}, by the rig fitted without causes {dense}"
+    )
+
+
 def _rows(d: Diagnosis, remarks: Sequence[str]) -> Iterator[tuple[str, str]]:
     main = d.channel
     ratios, rms = residual_change(d, main), rms_change(d, main)
@@ -365,6 +379,8 @@ def _rows(d: Diagnosis, remarks: Sequence[str]) -> Iterator[tuple[str, str]]:
         gain, interval = percent(cause.gain_holdout), percent_range(cause.gain_holdout_ci95)
         yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
         yield "status", status_line(cause, d.alternatives, d.at_noise_floor)
+    if d.edit is not None:
+        yield "edited", edit_sentence(d.edit)
     if d.misfit and d.verdict != "nothing_wrong":
         worst: dict[str, Misfit] = {}  # in each respect
         for m in sorted(d.misfit, key=lambda m: -m.times_noise):

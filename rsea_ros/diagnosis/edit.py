@@ -1,0 +1,44 @@
+"""The edit test: a named cause must survive its removal from the machine.
+
+The machine is edited (play taken out, payload off) and runs again. Of the extended model only that cause is
+deleted, nothing is fitted, and the new run is predicted: within the error that the model has on its own
+machine, if the name is right. A fit that bent other values to imitate the cause predicts the edited machine
+worse than before. Beside it stand the model with the cause, and a dense fit of the same data: the rig with
+every value fitted and no cause.
+"""
+
+from __future__ import annotations
+
+from rsea_ros.diagnosis.result import Diagnosis, Edit
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.prediction_errors import predict
+from rsea_ros.model.rig import Rig
+from rsea_ros.records.record import Record
+
+
+def edited(diagnosis: Diagnosis, record: Record, cause: str) -> Edit:
+    """Return the errors of a diagnosis on a run of the edited machine.
+
+    record: as `predict` takes it. cause: that the edit has taken out. Raises ParameterError where the
+    diagnosis has not named it, or the run lacks the channel that the diagnosis speaks of.
+    """
+    names = [c.name for c in diagnosis.causes]
+    if cause not in names:
+        found = f"one of {', '.join(names)}" if names else "a diagnosis that names one"
+        raise ParameterError(f"--without-cause {cause}: not named by this diagnosis, expected {found}")
+    channel = next(c.channel for c in diagnosis.causes if c.name == cause)
+    extended = diagnosis.extended_rig
+    without = extended.with_effects(*(e for e in extended.effects if e.name != cause))
+
+    def error(rig: Rig) -> float:
+        compared = predict(record, rig)
+        if channel not in compared:
+            raise ParameterError(
+                f"{record.source}: no {channel}, expected the channel that {cause} was seen in"
+            )
+        return compared[channel].rms_error
+
+    return Edit(
+        cause, channel, diagnosis.noise_rms[channel], error(extended), error(without),
+        error(diagnosis.baseline_rig), diagnosis.extended_residual_rms[channel],
+    )  # fmt: skip

@@ -1,0 +1,70 @@
+"""The edit test: the right name survives its removal from the machine, a wrong one in its place does not."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import rsea_ros as rsea
+from rsea_ros.cli.main import main
+from rsea_ros.diagnosis.edit import edited
+
+SOUND = rsea.load_rig("paper_high_impedance").with_values(
+    {"spring.stiffness": 1480.0, "rotor.reflected_damping": 25.0}
+)
+RUBBING = SOUND.with_effect("coulomb_friction", torque=3.0)
+
+
+def run(rig, seed):
+    return rsea.simulate(rig, 15.0 * np.random.default_rng(seed).standard_normal(3360), 280.0, seed=seed)
+
+
+@pytest.fixture(scope="module")
+def diagnosis():
+    """What the test needs of a diagnosis that named the friction, and the rig that is fitted without it."""
+    levels = {"ft": 0.03}
+    dense = rsea.identify(run(RUBBING, 1), "paper_high_impedance").rig
+    cause = SimpleNamespace(name="coulomb_friction", channel="ft")
+    return SimpleNamespace(
+        causes=[cause],
+        extended_rig=RUBBING,
+        baseline_rig=dense,
+        noise_rms=levels,
+        extended_residual_rms=levels,
+    )
+
+
+def test_the_right_name_survives_its_removal_and_bent_values_do_not(diagnosis):
+    """Nothing is fitted: the values of the rig, fitted beside the cause, are those of the edited machine."""
+    edit = edited(diagnosis, run(SOUND, 2), "coulomb_friction")
+    assert edit.survived and edit.channel == "ft" and edit.error_after < 1.1 * edit.noise
+    assert edit.error_before > 10.0 * edit.error_after
+    assert edit.error_dense_fit > 3.0 * edit.error_after, "its damping stands for the friction that is gone"
+
+
+def test_a_name_that_was_not_taken_out_or_is_wrong_does_not_survive(diagnosis):
+    assert not edited(diagnosis, run(RUBBING, 2), "coulomb_friction").survived, "the machine is as it was"
+    wrong = diagnosis.baseline_rig.with_effect("coulomb_friction", torque=1.0)
+    assert not edited(
+        SimpleNamespace(**{**vars(diagnosis), "extended_rig": wrong}), run(SOUND, 2), "coulomb_friction"
+    ).survived
+    with pytest.raises(
+        rsea.RseaError, match="--without-cause backlash: not named by this diagnosis, expected one of"
+    ):
+        edited(diagnosis, run(SOUND, 2), "backlash")
+
+
+def test_the_verb_writes_the_edit_and_keeps_its_results_where_the_cause_is_another(tmp_path, capsys):
+    for name, rig, seed in (("run", RUBBING, 1), ("edited", SOUND, 2)):
+        rsea.save(run(rig, seed), tmp_path / name)
+    words = ["diagnose", str(tmp_path / "run"), "--edited", str(tmp_path / "edited"), "--max-causes", "1"]
+    out = ["--out", str(tmp_path / "out"), "--without-cause"]
+    assert main([*words, *out, "coulomb_friction"]) == 0
+    assert "Coulomb friction survives its removal" in " ".join(capsys.readouterr().out.split())
+    told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["edit"]
+    assert told["cause"] == "coulomb_friction" and told["error_after"] < told["error_dense_fit"]
+    assert main(words) == 2
+    assert "--edited BAG and --without-cause EFFECT: one is given" in capsys.readouterr().err
