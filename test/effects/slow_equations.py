@@ -76,6 +76,11 @@ def hysteresis(t, x, u, p):
     return [w, a, (w - x[2] * abs(w)) / p["angle"]], torque
 
 
+def viscoelastic(t, x, u, p):
+    w, a, torque = motion(x[:2], u, spring=p["share"] * K_S * x[2])
+    return [w, a, w - x[2] / p["time_constant"]], torque
+
+
 def current_lag(t, x, u, p):
     w, a, torque = motion(x[:2], x[2])
     return [w, a, (u - x[2]) / p["time_constant"]], torque
@@ -190,6 +195,7 @@ LAWS: dict[str, tuple[int, Law]] = {
     "torque_ripple": (2, plain(ripple)),
     "torque_saturation": (
         2, plain(lambda t, x, u, p: (math.copysign(min(abs(u), p["limit"]), u), 0.0, 0.0))),
+    "viscoelastic_spring": (3, viscoelastic),
     "voltage_sag": (2, plain(sag)),
 }  # fmt: skip
 """For each effect how many states its equations have, and the equations."""
