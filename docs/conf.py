@@ -54,6 +54,7 @@ def effects_page() -> str:
             "```text", effect.equation, "```", "",
             "| parameter | unit | typical | vanishes at | fitted within | grows with | why these bounds |",
             "|---|---|---|---|---|---|---|", *rows, "",
+            *([f"Look at: {effect.inspect}.", ""] if effect.inspect else []),
             *([f"Kind: {', '.join(effect.tags)}.", ""] if effect.tags else []),
             *([f"May be confused with {alike}.", ""] if alike else []),
             prose(page.description), "",

@@ -37,4 +37,6 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY,),
     tags=("friction",),
     about="friction that differs between forward and backward",
+    inspect="seals and bearings that rub one way, a worm or a preloaded gear, a weight or a cable "
+    "that pulls to one side",
 )

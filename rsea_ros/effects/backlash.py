@@ -102,4 +102,6 @@ EFFECT = Effect(
     tags=("play",),
     compensation=Gap(lambda p: p[0]),
     about="play between the gear output and the spring",
+    inspect="flexspline screws, set screws, keys and couplings, bearing preload; with two encoders, "
+    "the side that moves alone is the loose one",
 )

@@ -90,4 +90,5 @@ EFFECT = Effect(
     tags=("mode",),
     part="support",
     about="the clamped end of the spring gives",
+    inspect="the bolts of the clamped end, the table or profile it stands on, an adapter plate that bends",
 )

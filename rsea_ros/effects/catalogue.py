@@ -114,7 +114,8 @@ class EffectPage:
             + f": {p.reason}"
             for p in self.effect.parameters
         ]
-        return "\n".join([f"{self.name}: {self.effect.about}", f"  {self.equation}", *rows])
+        look = [f"  look at: {self.effect.inspect}"] if self.effect.inspect else []
+        return "\n".join([f"{self.name}: {self.effect.about}", f"  {self.equation}", *rows, *look])
 
     @staticmethod
     def grows_with(parameter: Parameter) -> str:

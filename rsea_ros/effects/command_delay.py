@@ -81,4 +81,6 @@ EFFECT = Effect(
     response=lambda p, s: np.exp(-p[0] * s),
     part="command",
     about="the command takes effect later than its stamp says",
+    inspect="the bus period and the driver's queue, a controller that commands a cycle late, the "
+    "latency timer of a USB adapter",
 )

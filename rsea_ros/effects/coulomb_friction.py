@@ -48,4 +48,5 @@ EFFECT = Effect(
     tags=("friction",),
     compensation=against(level, creep=1),
     about="friction torque of fixed size against the motion",
+    inspect="bearing preload, seals, a gear without grease or too tight a mesh, cables that rub",
 )

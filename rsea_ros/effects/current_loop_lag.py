@@ -44,4 +44,5 @@ EFFECT = Effect(
     tags=("lag",),
     response=lambda p, s: 1.0 / (p[0] * s + 1.0),
     about="first-order lag of the motor's current",
+    inspect="gains and low-pass of the drive's current loop, a slew limit of the command in the drive",
 )

@@ -78,4 +78,5 @@ EFFECT = Effect(
     tags=("lag",),
     response=response,
     about="second-order lag of the motor's current, with overshoot",
+    inspect="gains of the drive's current loop against this motor's resistance and inductance",
 )  # fmt: skip

@@ -30,4 +30,5 @@ EFFECT = Effect(
     function=apply,
     reads=(GEAR_VELOCITY,),
     about="damping of the gear that changes during the record",
+    inspect="grease and gear that warm up: let the joint run in, and compare cold with warm",
 )

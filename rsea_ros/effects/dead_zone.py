@@ -69,4 +69,6 @@ EFFECT = Effect(
     function=apply,
     guesses=guesses,
     about="commands that are too small make no torque",
+    inspect="the smallest current that the drive makes, its dead time, a threshold in firmware or in "
+    "the bridge",
 )

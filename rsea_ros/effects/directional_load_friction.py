@@ -57,4 +57,6 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY, LOAD),
     tags=("friction",),
     about="friction that grows unequally with the motor's torque and the load",
+    inspect="efficiency of the gear driving and driven back: lubrication, wear of the teeth, worm or "
+    "cycloid contact",
 )

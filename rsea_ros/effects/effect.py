@@ -101,6 +101,7 @@ class Effect:
     response: its linear frequency response on its signal (at a sensor, on ft), for a controller's margins.
     part: of the bench, if not the one of its port.
     idle: the parameters that do nothing on a rig: `f(rig) -> names`.
+    inspect: what a mechanic looks at where this is named.
     equation: by default the first indented lines of the docstring of its file, where it is written once.
     """
 
@@ -115,6 +116,7 @@ class Effect:
     order: int = 0
     is_searched: bool = True
     about: str = ""
+    inspect: str = ""
     equation: str = ""
     guesses: Guesses | None = None
     tags: tuple[Tag, ...] = ()

@@ -51,4 +51,6 @@ EFFECT = Effect(
     function=apply,
     guesses=guesses,
     about="angle error of the encoder that repeats with the rotor's angle",
+    inspect="the centre of the encoder's magnet or disc on the shaft, its distance, the encoder's "
+    "calibration",
 )  # fmt: skip

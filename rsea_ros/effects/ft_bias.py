@@ -28,4 +28,6 @@ EFFECT = Effect(
     claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_drift",)),
     function=apply,
     about="zero of the F/T sensor that is off",
+    inspect="tare the sensor at rest without load; weight of the tool, a cable that pulls, mounting "
+    "screws that strain it",
 )

@@ -30,4 +30,6 @@ EFFECT = Effect(
     claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_bias",)),
     function=apply,
     about="zero of the F/T sensor that walks during the record",
+    inspect="warm-up of the sensor (half an hour), heat of the motor that reaches it, an amplifier "
+    "that drifts",
 )

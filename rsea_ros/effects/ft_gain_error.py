@@ -29,4 +29,6 @@ EFFECT = Effect(
     function=apply,
     response=lambda p, s: p[0] + 0.0 * s,
     about="calibration of the F/T sensor that is off",
+    inspect="the sensor's calibration sheet and its axes in the driver, the unit of its counts; hang "
+    "a known weight on a lever",
 )

@@ -44,4 +44,6 @@ EFFECT = Effect(
     states=3,
     response=lambda p, s: 1.0 / (p[0] * s + 1.0),
     about="first-order lag of the F/T sensor",
+    inspect="the filter in the sensor's settings (Net F/T: the low-pass of its web page), averages "
+    "in the logger",
 )

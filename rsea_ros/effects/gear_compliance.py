@@ -72,5 +72,6 @@ EFFECT = Effect(
     structure=change,
     guesses=beside_softer_rotor,
     about="gear train that gives between rotor and spring",
+    inspect="teeth and flexspline of the gear, the coupling between motor and gear, a timing belt's tension",
     idle=idle,
 )

@@ -39,4 +39,6 @@ EFFECT = Effect(
     claims=Claims("position", "odd", amplitude_exponent=None),
     structure=change,
     about="weight on the output that the rig does not know of",
+    inspect="mass and lever of what hangs on the output, the mounting angle, a payload that the rig "
+    "does not state",
 )

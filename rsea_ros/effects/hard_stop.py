@@ -43,4 +43,5 @@ EFFECT = Effect(
     reads=(DEFLECTION,),
     guesses=at_ends_of_travel,
     about="a stop that the spring meets beyond an angle",
+    inspect="end stops, springs that are fully compressed, a cable or a cover in the way",
 )

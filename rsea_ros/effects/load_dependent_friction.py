@@ -40,4 +40,5 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY, LOAD),
     tags=("friction",),
     about="friction that grows with the torque in the spring",
+    inspect="lubrication of the gear under load, alignment of its shafts, bearings with radial load",
 )

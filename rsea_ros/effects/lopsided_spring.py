@@ -38,4 +38,5 @@ EFFECT = Effect(
     is_searched=False,
     reads=(DEFLECTION,),
     about="spring that is stiffer one way than the other",
+    inspect="springs of a pair that differ or are preloaded unequally, a spring that sits askew",
 )

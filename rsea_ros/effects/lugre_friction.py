@@ -69,4 +69,5 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY,),
     tags=("friction",),
     about="friction of bristles that bend before they slip",
+    inspect="seals and preloaded bearings near rest; repeat slow reversals of a few milliradians",
 )  # fmt: skip

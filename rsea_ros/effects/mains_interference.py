@@ -41,4 +41,5 @@ EFFECT = Effect(
     function=apply,
     guesses=at_lines("ft", sine=("amplitude", "phase")),
     about="mains hum in the F/T sensor",
+    inspect="the sensor cable's shield and its ground, supplies and motor cables beside it",
 )

@@ -35,4 +35,5 @@ EFFECT = Effect(
     function=apply,
     reads=(DEFLECTION,),
     about="spring that hardens or softens as it deflects",
+    inspect="the spring's angle of work against its drawing, coils that touch, cams and their preload",
 )

@@ -37,4 +37,5 @@ EFFECT = Effect(
     states=1,
     reads=(GEAR_VELOCITY,),
     about="drag that grows with the square of the speed",
+    inspect="oil level, fans, air or water that the joint moves",
 )

@@ -98,4 +98,5 @@ EFFECT = Effect(
     states=3,
     reads=(DEFLECTION,),
     about="spring torque that depends on the way the deflection came",
+    inspect="friction in the spring's seats and guides, coils that rub, rubber parts, bolted leaf packages",
 )

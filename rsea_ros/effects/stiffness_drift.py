@@ -28,4 +28,5 @@ EFFECT = Effect(
     function=apply,
     reads=(DEFLECTION,),
     about="stiffness of the spring that changes during the record",
+    inspect="screws of the spring that work loose, a spring that warms up or settles",
 )

@@ -60,4 +60,5 @@ EFFECT = Effect(
     tags=("friction",),
     compensation=against(level, creep=3),
     about="friction that is larger near rest than at speed",
+    inspect="grease (age, cold), seals, a joint that stood for long: let it run in and compare",
 )

@@ -63,4 +63,6 @@ EFFECT = Effect(
     tags=("mode",),
     part="support",
     about="a mode of the structure that the F/T sensor sees beside the spring",
+    inspect="what the sensor carries: brackets, long screws, the arm beyond it; tap it and look for "
+    "this frequency",
 )

@@ -51,4 +51,6 @@ EFFECT = Effect(
     guesses=guesses,
     response=lambda p, s: p[0] + 0.0 * s,
     about="the motor makes more or less torque than its current says",
+    inspect="the torque constant in the drive's settings, gear ratio, current scale; hang a known "
+    "weight on a lever",
 )

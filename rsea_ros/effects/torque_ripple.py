@@ -68,4 +68,6 @@ EFFECT = Effect(
         lambda p, start, end: float(mean_ripple.py_func(p, 0.5 * (start + end), end - start))
     ),
     about="torque that repeats with the rotor's angle",
+    inspect="cogging (turn it by hand without current), the encoder's commutation offset, the gear's "
+    "wave generator",
 )

@@ -38,4 +38,5 @@ EFFECT = Effect(
     guesses=at_limits,
     tags=("limit",),
     about="motor torque that stops growing at a limit",
+    inspect="current limit of drive and motor, the supply's limit, a limit in the driver's parameters",
 )

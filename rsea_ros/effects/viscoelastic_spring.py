@@ -53,4 +53,5 @@ EFFECT = Effect(
     states=3,
     reads=(DEFLECTION,),
     about="spring that creeps: stiffer at once than in the end",
+    inspect="polymer or rubber in the torque path, glued joints, a coupling's insert; compare cold with warm",
 )  # fmt: skip

@@ -50,4 +50,5 @@ EFFECT = Effect(
     guesses=at_limits,
     tags=("limit",),
     about="torque limit that falls with speed, by the supply's voltage",
+    inspect="the supply's voltage under load, cable length and gauge, the battery's charge",
 )  # fmt: skip

@@ -94,6 +94,7 @@ def _cause(cause: Cause, d: Diagnosis) -> html.Html:
         html.equation(cause.equation) if cause.equation else "", say.evidence(cause),
         f"95 % interval of that gain: {interval}; on the training data it is {train}.",
         f"These data do not distinguish it from {rivals}." if rivals else "",
+        f"Look at: {look}." if (look := say.inspection(cause.name)) else "",
     )  # fmt: skip
 
 
@@ -281,6 +282,7 @@ def _cause_json(cause: Cause) -> dict[str, Any]:
         "gain": pick(cause, "train=gain_train holdout=gain_holdout holdout_ci95=gain_holdout_ci95"),
         "evidence": say.evidence(cause),
         **pick(cause, "equation confusable_with"),
+        "inspect": say.inspection(cause.name),
     }
 
 

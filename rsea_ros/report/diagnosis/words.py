@@ -353,6 +353,11 @@ def terminal_lines(diagnosis: Diagnosis, width: int = WIDTH) -> list[Text]:
     return [Text(wrap(headline(d), width), style=style), *shown]
 
 
+def inspection(name: str) -> str:
+    """Return what a mechanic looks at where a cause is named; empty for an effect that does not say it."""
+    return effect_named(name).inspect if name in catalogue() else ""
+
+
 def edit_sentence(e: Edit) -> str:
     """Return what a run of the edited machine says of a name."""
     after, before, dense, own = (
