@@ -98,13 +98,14 @@ def tests_of(target: str, where: str) -> tuple[list[str], list[str]]:
     """Return the tests that may notice a fault in a function, the nearest first; those that wait apart.
 
     Those that call it; for what is outside a function, compiled, or called by none, all that call anything of
-    its module, then those that call anything of the modules that import it.
+    its module or stand in its folder, then those that call anything of the modules that import it.
     """
     known = calls()
     name = where.rpartition(".")[2]
     found = known.tests.get((target, name), set())
+    beside = [u for u in known.seconds if u.startswith(f"test/{Path(target).parent}/")]
     groups: list[Iterable[str]] = (
-        [found] if found else [_of_modules([target]), _of_modules(_importers(target))]
+        [found] if found else [{*_of_modules([target]), *beside}, _of_modules(_importers(target))]
     )
     ordered: list[str] = []
     for group in groups:

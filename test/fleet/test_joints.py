@@ -47,6 +47,7 @@ def test_a_joint_has_its_rig_topics_and_options(mapped):
     assert left.topics.topic("ft") == "/ati/wrench"
     assert left.topics.topic("joint_states") == "/left/knee/joint_states"
     assert (left.topics.joint, left.topics.axis, left.diagnose) == ("knee", "-torque.z", "misfit")
+    assert left.temperature == "/left/knee/temperature"
     assert right.rig.startswith("name: prototype_knee") and right.diagnose == "never"
     assert servo.table is not None and servo.index == 2
 

@@ -8,6 +8,7 @@ import threading
 import time
 
 import pytest
+from scipy import constants
 
 from rsea_ros.hardware.netft.calibration import parse
 from rsea_ros.hardware.netft.rdt import RESYNCHRONISE, RdtRecord, Sequence, decode, request, trouble
@@ -110,6 +111,20 @@ def test_the_calibration_is_counts_per_unit(counts, units, force, torque):
     expected = (force, 2 * force, 3 * force, torque, 2 * torque, 3 * torque)
     assert calibration.wrench((1, 2, 3, 1, 2, 3)) == pytest.approx(expected)
     assert math.isnan(calibration.rate)
+
+
+@pytest.mark.parametrize(
+    ("unit", "newton_metres"),
+    [
+        ("N-m", 1.0), ("Nm", 1.0), ("N-mm", 1e-3), ("Nmm", 1e-3), ("kN-m", 1e3), ("kNm", 1e3),
+        ("lbf-in", constants.lbf * constants.inch), ("lbf-ft", constants.lbf * constants.foot),
+        ("kgf-cm", constants.kgf * 0.01), ("kgfcm", constants.kgf * 0.01),
+    ],
+)  # fmt: skip
+def test_a_torque_is_in_the_unit_that_the_sensor_names(unit, newton_metres):
+    calibration = parse(PAGE.format(1000, 1000, "kgf", unit).encode())
+    assert calibration.torque == pytest.approx(1e-3 * newton_metres, rel=1e-12)
+    assert calibration.force == pytest.approx(1e-3 * constants.kgf, rel=1e-12)
 
 
 @pytest.fixture
