@@ -15,10 +15,10 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import case_from
-from rsea_ros.model.inverse import inverse_torque
+from rsea_ros.model.inverse import inverse_torque, motion_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel
+from rsea_ros.records.record import Channel, Record
 
 
 def test_the_missing_torque_of_a_rigid_joint_is_that_of_rotor_link_and_loop():
@@ -70,6 +70,18 @@ def test_cogging_of_a_bare_drive_is_named():
     assert cause.parameters["amplitude"].value == pytest.approx(3.0, abs=0.3)
     assert cause.parameters["cycles_per_revolution"].value == pytest.approx(7.0, rel=1e-3)
     assert not of_a_spring & {r.name for r in diagnosis.rejected}, "an effect without a place was tried"
+
+
+def test_no_effect_reads_the_torque_by_which_it_is_judged():
+    """Friction of the measured torque took its noise away: any other measurement gives the same model."""
+    rig, t = load_rig("pendulum"), np.arange(2800) / 280.0
+    angle, noise = 0.4 * np.sin(np.pi * t), np.random.default_rng(0).standard_normal(len(t))
+    channels = {"command": 0.0 * t, "position": angle, "motor_torque": noise}
+    motion = motion_from(Record({name: Channel(t, y) for name, y in channels.items()}))
+    other = replace(motion, torque=motion.torque[::-1])
+    for name in catalogue():
+        loaded = rig.with_effect(name)
+        assert np.array_equal(inverse_torque(loaded, motion), inverse_torque(loaded, other)), name
 
 
 def test_the_torque_of_a_pendulum_that_turns_over_is_filtered_like_its_measurement():
