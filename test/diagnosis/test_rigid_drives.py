@@ -79,9 +79,9 @@ def test_no_effect_reads_the_torque_by_which_it_is_judged():
     channels = {"command": 0.0 * t, "position": angle, "motor_torque": noise}
     motion = motion_from(Record({name: Channel(t, y) for name, y in channels.items()}))
     other = replace(motion, torque=motion.torque[::-1])
-    for name in catalogue():
-        loaded = rig.with_effect(name)
-        assert np.array_equal(inverse_torque(loaded, motion), inverse_torque(loaded, other)), name
+    for effect in (e for e in catalogue().values() if e.port not in (Port.SPRING, Port.STRUCTURE)):
+        loaded = rig.with_effect(effect.name)
+        assert np.array_equal(inverse_torque(loaded, motion), inverse_torque(loaded, other)), effect.name
 
 
 def test_the_torque_of_a_pendulum_that_turns_over_is_filtered_like_its_measurement():
