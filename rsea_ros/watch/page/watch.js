@@ -60,7 +60,9 @@ function draw() {
   }
 }
 
-function forget() { for (const t of [...TORQUES, DEFLECTION, PURE]) t.clear(); now = 0; }
+const REST = 1; /* s without a command but zero */
+let driven = -Infinity; /* s, the last command that was not zero */
+function forget() { for (const t of [...TORQUES, DEFLECTION, PURE]) t.clear(); now = 0; driven = -Infinity; }
 
 function onFrame(frame) {
   if (frame.t0 < now - 2) forget(); /* a bag that is played anew */
@@ -69,13 +71,15 @@ function onFrame(frame) {
     if (trace) for (let k = 0; k < row.length; k += 2) {
       const t = frame.t0 + row[k] / 1e3;
       trace.add(t, row[k + 1] * (SCALE[name] || 1));
+      if (name === "command" && row[k + 1] !== 0) driven = t;
       if (name !== "command") now = Math.max(now, t); /* a command is of the time to come */
     }
   }
   if (frame.pure !== null) PURE.add(frame.t0, frame.pure ? 1 : 0);
   const pill = $("pure");
-  pill.textContent = frame.pure === null ? "no flag" : frame.pure ? "pure torque" : "not pure torque";
-  pill.className = frame.pure === null ? "pill" : frame.pure ? "pill good" : "pill warn";
+  const idle = !frame.pure && now > driven + REST; /* without torque there is none to be pure */
+  pill.textContent = frame.pure === null ? "no flag" : idle ? "no torque commanded" : frame.pure ? "pure torque" : "not pure torque";
+  pill.className = frame.pure === null || idle ? "pill" : frame.pure ? "pill good" : "pill warn";
   dirty = true;
 }
 
