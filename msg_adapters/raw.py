@@ -9,7 +9,7 @@ import struct
 from collections.abc import Sequence
 
 from msg_adapters.cdr import STAMP, layout_of
-from msg_adapters.topic_map import JOINT_STATE
+from msg_adapters.topic_map import WRENCH
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import ParameterError
 
@@ -20,7 +20,7 @@ cycle does for a message must not depend on who sends it."""
 
 
 class RawReader:
-    """Reads the stamp and some numbers of the messages of a topic.
+    """Reads the stamp (0 of messages without one) and some numbers of the messages of a topic.
 
     fields: name and index of each number; one that a message does not have is nan.
     joint: name that the joint of a message with names must have; empty: any. Of a message with several
@@ -31,7 +31,7 @@ class RawReader:
         self, msgtype: str, fields: Sequence[tuple[str, int]], joint: str = "", most: int = 1
     ) -> None:
         self._msgtype, self._fields, self._joint, self._most = msgtype, fields, joint, most
-        self._length = -1
+        self._length, self._stamped = -1, True
         self._fixed: list[tuple[int, int, bytes]] = []
         self._stamp, self._double = struct.Struct("<iI"), struct.Struct("<d")
         self._at: list[int] = []
@@ -45,7 +45,7 @@ class RawReader:
             raise ParameterError(f"{len(raw)} bytes, expected at most {LONGEST} of a {self._msgtype}")
         if len(raw) != self._length or any(raw[a:b] != same for a, b, same in self._fixed):
             self._learn(raw)
-        seconds, nanoseconds = self._stamp.unpack_from(raw, STAMP)
+        seconds, nanoseconds = self._stamp.unpack_from(raw, STAMP) if self._stamped else (0, 0)
         unpack = self._double.unpack_from
         return seconds * SECOND + nanoseconds, [unpack(raw, at)[0] if at else math.nan for at in self._at]
 
@@ -56,14 +56,14 @@ class RawReader:
         except ValueError as error:
             raise ParameterError(f"no {self._msgtype}: {error}") from None
         place = self._place(layout.names)
-        for name in {name for name, _ in self._fields if self._msgtype == JOINT_STATE}:
+        for name in {name for name, _ in self._fields if self._msgtype != WRENCH}:
             if (count := layout.fields[name][1]) > max(len(layout.names), self._most):
                 raise ParameterError(f"{count} numbers of {name}, expected at most one for each joint")
         places = [(*layout.fields[name], place + index) for name, index in self._fields]
         self._at = [first + 8 * at if at < count else 0 for first, count, at in places]  # 0: not in it
         self._fixed = [(a, b, raw[a:b]) for a, b in _join_runs(layout.structure)]
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))
-        self._length = len(raw)
+        self._length, self._stamped = len(raw), layout.stamped
 
     def _place(self, joints: Sequence[str]) -> int:
         """Return the place of the joint in a message. Raises ParameterError where it is not, or twice."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import re
 import sys
 import types
 from collections.abc import Callable
@@ -20,9 +21,10 @@ API = {
     "launch.actions": ["DeclareLaunchArgument", "IncludeLaunchDescription"],
     "launch.conditions": ["IfCondition"],
     "launch.launch_description_sources": ["PythonLaunchDescriptionSource"],
-    "launch.substitutions": ["EqualsSubstitution", "LaunchConfiguration"],
+    "launch.substitutions": ["Command", "EqualsSubstitution", "LaunchConfiguration"],
     "launch_ros": [],
     "launch_ros.actions": ["Node"],
+    "launch_ros.parameter_descriptions": ["ParameterValue"],
 }
 
 
@@ -118,6 +120,19 @@ def test_hardware_launches_a_real_device_and_activates_it_only_on_request(descri
     given = {name: defaults(parts)[part.arguments[0]] for name, part in parameters.items()}
     assert given["device"] == "dynamixel_netft" and given["autostart"] == "false"
     assert {"port", "baud", "ft_host", "rig"} < set(given)
+
+
+def test_ros2_control_is_launched_with_files_arguments_and_controllers_that_exist(describe):
+    parts = describe("ros2_control")
+    assert configurations(parts) == set(defaults(parts))
+    manager = nodes(parts)["ros2_control_node"]["parameters"]
+    program, description, *_ = manager[0]["robot_description"].arguments[0].arguments[0]
+    xacro = Path(description).read_text()
+    stated = re.findall(r'<xacro:arg name="(\w+)" default="([^"]*)"/>', xacro)
+    assert program == "xacro " and dict(stated) == defaults(parts)
+    kinds = yaml.safe_load(Path(manager[1]).read_text())["controller_manager"]["ros__parameters"]
+    spawned = [part.options["arguments"][0] for part in parts if part.options.get("executable") == "spawner"]
+    assert len(set(spawned)) == 3 and all(kinds[name]["type"] for name in spawned)
 
 
 def nodes(parts: list[Part]) -> dict[str, dict[str, Any]]:

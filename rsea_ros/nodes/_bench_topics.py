@@ -8,6 +8,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
+from msg_adapters.cdr import VALUES
 from msg_adapters.raw import RawWriter
 from msg_adapters.ros import (
     JointState,
@@ -17,7 +18,7 @@ from msg_adapters.ros import (
     joint_states_message,
     wrench_message,
 )
-from msg_adapters.topic_map import JOINT_STATE, TYPES
+from msg_adapters.topic_map import FLOATS, JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import HORIZON, CommandQueue
@@ -55,6 +56,10 @@ SPRING_FRAME = NodeParameter(
     "spring_frame", "spring_deflection", "frame_id of deflection, and of ft where it is stiffness times that"
 )
 """Of a bench whose device may measure the spring by a second encoder."""
+COMMANDS = {JOINT_STATE: "effort", FLOATS: VALUES}
+"""By type of `torque_command`: the field whose one number is the torque, N m."""
+COMMAND_TYPE = NodeParameter("command_type", JOINT_STATE, "type of torque_command", choices=tuple(COMMANDS))
+"""Of a driver; numbers without a stamp take effect on arrival."""
 MOST = 100
 """Commands taken in a cycle: 28 kHz of them at 280 Hz; each costs 10 us."""
 
@@ -70,7 +75,7 @@ class BenchTopics:
         self, node: Node, names: Mapping[str, Any], *, strict: bool = False, every_record: bool = False,
         part: str = "", deflects: bool = False,
     ) -> None:  # fmt: skip
-        """names: values of NAMES, and of SPRING_FRAME and torque_limit where they may be.
+        """names: values of NAMES, and of SPRING_FRAME, COMMAND_TYPE and torque_limit where they may be.
 
         strict: see CommandQueue; then one publisher is obeyed at a time.
 
@@ -105,8 +110,9 @@ class BenchTopics:
             TYPES["deflection"], "position",
         )  # fmt: skip
         self._deflections = _publisher(node, JointState, f"{within}deflection") if deflects else None
+        kind = names.get(COMMAND_TYPE.name, JOINT_STATE)
         self._wanted = Mailbox(
-            node, f"{within}torque_command", MessageFields(JOINT_STATE, (("effort", 0),), joint),
+            node, f"{within}torque_command", MessageFields(kind, ((COMMANDS[kind], 0),), joint),
             COMMAND, self.commands.refuse, admit=self._admit if strict else None,
         )  # fmt: skip
 

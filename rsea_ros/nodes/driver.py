@@ -20,7 +20,7 @@ from rsea_ros.documents.wording import printable
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._bench_topics import NAMES, SPRING_FRAME, Combined
+from rsea_ros.nodes._bench_topics import COMMAND_TYPE, NAMES, SPRING_FRAME, Combined
 from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
 from rsea_ros.nodes._devices import DEVICES
@@ -49,6 +49,7 @@ TABLE = (
     *LIMITS,
     *NAMES,
     SPRING_FRAME,
+    COMMAND_TYPE,
 )
 PATIENCE = 10.0
 """s that a reboot may take which is under way when the program ends."""

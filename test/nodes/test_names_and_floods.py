@@ -1,13 +1,16 @@
 """Names and quality of service by parameter, floods of commands, services that take long."""
 
+import math
 import threading
 import time
 
 import pytest
 from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from msg_adapters.ros import JointState, Trigger, WrenchStamped, stamp_of, torque_command_message
+from msg_adapters.topic_map import FLOATS
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._anchor import Anchor
@@ -68,6 +71,32 @@ def test_a_cycle_takes_a_bounded_number_of_commands_and_the_newest_acts(listener
     assert max(counts) <= MOST
     bench.commands.take(anchor.now())
     assert bench.commands.torque == 999.0
+    bench.close()
+    listener.node.destroy_publisher(publisher)
+
+
+def test_numbers_without_names_and_stamps_are_commands_where_the_driver_is_told_so(listener):
+    """What clients of ros2_control's forward controllers send: on arrival, by the same rules as any other."""
+    names = {parameter.name: parameter.default for parameter in NAMES}
+    bench = BenchTopics(listener.node, names | {"command_type": FLOATS, "torque_limit": 68.0}, strict=True)
+    anchor = Anchor()
+    publisher = listener.node.create_publisher(Float64MultiArray, "torque_command", COMMAND)
+    listener.until(publisher.get_subscription_count)
+    for count, (numbers, torque, refused) in enumerate((
+        ([3.0], 3.0, 0), ([math.nan], 3.0, 1), ([681.0], 3.0, 2), ([1.0, 2.0], 3.0, 3), ([], 3.0, 4),
+        ([-5.0], -5.0, 4),
+    ), 1):  # fmt: skip
+        shape = [MultiArrayDimension(label="joint", size=1, stride=1)] * (count % 2)
+        publisher.publish(Float64MultiArray(layout=MultiArrayLayout(dim=shape), data=numbers))
+        heard = bench.commands
+
+        def poll(heard=heard):
+            bench.poll(anchor)
+            heard.take(anchor.now())
+            return heard.refused + heard.unstamped
+
+        listener.until(lambda poll=poll, count=count: poll() == count)
+        assert (heard.torque, heard.refused, heard.off) == (torque, refused, 0)
     bench.close()
     listener.node.destroy_publisher(publisher)
 
