@@ -1,6 +1,5 @@
 """Bags of all storages, opened and checked."""
 
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -61,14 +60,13 @@ def join(parts: Sequence[Contents], contents: Contents) -> None:
 
 
 def iterate(paths: BagPath | Sequence[BagPath]) -> Iterator[tuple[str, str, int, bytes]]:
-    """Yield (topic, type, log time in ns, serialised message) by log time."""
+    """Return (topic, type, log time in ns, serialised message) by log time."""
     rows = [
         (topic, messages.msgtype, log_time, raw)
         for topic, messages in read_contents(paths).topics.items()
         for log_time, raw in zip(messages.log_times, messages.raw, strict=True)
     ]
-    rows.sort(key=lambda row: row[2])
-    yield from rows
+    return iter(sorted(rows, key=lambda row: row[2]))
 
 
 def _bag(path: Path, contents: Contents) -> list[Contents]:
@@ -85,11 +83,9 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
     parts = _scan_all(files, contents)
     contents.notes.extend(known.remarks.notes)
     contents.faults.extend(known.remarks.faults)
-    read: Counter[str] = Counter()
-    for part in parts:
-        read.update({topic: len(messages.raw) for topic, messages in part.topics.items()})
     for topic, expected in known.counts.items():
-        contents.compare(topic, expected, read[topic], metadata.NAME)
+        read = sum(len(part.topics[topic].raw) for part in parts if topic in part.topics)
+        contents.compare(topic, expected, read, metadata.NAME)
     return parts
 
 
@@ -187,13 +183,12 @@ def on_the_clock_of_the_command(
 
     A simulation from the command's first stamp to their last would go through all the years between.
     """
-    command = series.get("command")
+    if (command := series.get("command")) is None:
+        return dict(series)
     kept = {}
     for name, one in series.items():
-        ahead = 0 if command is None else int(one.stamps.min()) - int(command.stamps.min())
-        if command is None or (
-            one.stamps.min() <= command.stamps.max() and command.stamps.min() <= one.stamps.max()
-        ):
+        ahead = int(one.stamps.min()) - int(command.stamps.min())
+        if one.stamps.min() <= command.stamps.max() and command.stamps.min() <= one.stamps.max():
             kept[name] = one
         else:
             detail = "left out: no moment in common with the command, its stamps are from another clock"

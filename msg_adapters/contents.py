@@ -7,7 +7,6 @@ import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from rsea_ros.documents.wording import brief
 from rsea_ros.records.record import Fault
@@ -99,9 +98,10 @@ class Remarks:
         return {name: text for name, text in texts.items() if text}
 
 
-def remarks_of(texts: Mapping[Any, object]) -> Remarks:
-    """Return this project's remarks among texts by name."""
-    notes, faults = (text if isinstance(text, str) else "" for text in map(texts.get, (NOTES, FAULTS)))
+def remarks_of(texts: object) -> Remarks:
+    """Return this project's remarks among texts by name; none of anything else."""
+    found = map(texts.get, (NOTES, FAULTS)) if isinstance(texts, Mapping) else ("", "")
+    notes, faults = (text if isinstance(text, str) else "" for text in found)
     lines = [brief(line, _LONGEST) for line in notes.splitlines()[:_MOST] if "\0" not in line]
     return Remarks(lines, _faults(faults))
 

@@ -67,13 +67,9 @@ class Decoded:
     def tell_empty(self, topic: str, report: Contents) -> None:
         """Report a field that some messages leave empty although they have the other fields."""
         for name, filled in self.filled.items():
-            beside = [
-                other for key, other in self.filled.items() if key != name and (other & filled).any()
-            ]
-            lacking = np.zeros(len(filled), bool)
-            for other in beside:
-                lacking |= other & ~filled
-            if count := int(lacking.sum()):
+            beside = [other for other in self.filled.values() if (other & filled).any()]
+            lacking = np.any([other & ~filled for other in beside], axis=0)
+            if count := int(np.sum(lacking)):
                 detail = f"{name} is empty, first in message {int(np.argmax(lacking))}"
                 report.tell("empty_fields", topic, detail, count, "messages", count / len(filled))
 

@@ -58,9 +58,6 @@ class Declarations:
         return key
 
 
-NO_END = "it does not end with a footer"
-
-
 @dataclass
 class McapSummary:
     """counts: messages by channel. total: of all channels. chunks: first byte of each, rising.
@@ -79,10 +76,9 @@ def read_summary(buffer: Buffer) -> McapSummary:
     """Return the summary of a file; an empty one where it has none."""
     summary = McapSummary()
     footer = len(buffer) - len(MAGIC) - RECORD.size - FOOTER_CONTENT.size
-    if footer < len(MAGIC) or buffer[-len(MAGIC) :] != MAGIC:
-        return McapSummary(damage=NO_END)
-    if RECORD.unpack_from(buffer, footer) != (FOOTER, FOOTER_CONTENT.size):
-        return McapSummary(damage=NO_END)
+    is_ended = footer >= len(MAGIC) and buffer[-len(MAGIC) :] == MAGIC
+    if not is_ended or RECORD.unpack_from(buffer, footer) != (FOOTER, FOOTER_CONTENT.size):
+        return McapSummary(damage="it does not end with a footer")
     start, _, checksum = FOOTER_CONTENT.unpack_from(buffer, footer + RECORD.size)
     if start == 0:
         return summary

@@ -102,10 +102,9 @@ def metadata_of(bag: Path, contents: Contents) -> Known:
 def remarks_in(path: Path, data: bytes) -> Remarks:
     """Return the remarks in the metadata that a storage file holds; none where they are not understood."""
     try:
-        custom = document(path, data)[ROOT]["custom_data"]
+        return remarks_of(document(path, data)[ROOT]["custom_data"])
     except (BagError, TypeError, ValueError, KeyError):
         return Remarks()
-    return remarks_of(custom if isinstance(custom, dict) else {})
 
 
 def _metadata_from(bag: Path, document: Any) -> Known:
@@ -118,8 +117,7 @@ def _metadata_from(bag: Path, document: Any) -> Known:
         (topic["topic_metadata"]["name"], topic) for topic in _list_of(root["topics_with_message_count"])
     ]
     counts = {_text_of(name): _count_of(topic["message_count"]) for name, topic in topics}
-    custom = root.get("custom_data")
-    return Known(files, counts, remarks_of(custom if isinstance(custom, dict) else {}))
+    return Known(files, counts, remarks_of(root.get("custom_data")))
 
 
 def _why(error: Exception) -> str:

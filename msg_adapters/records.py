@@ -95,11 +95,11 @@ def _in_order(series: Sequence[_Series]) -> Iterator[tuple[IntArray, IntArray, l
     longest = max((one.log_times for one in series), key=len)
     done = [0] * len(series)
     for stop in [*longest[BATCH::BATCH].tolist(), None]:
-        parts = []
-        for i, one in enumerate(series):
-            end = len(one.log_times) if stop is None else int(np.searchsorted(one.log_times, stop))
-            parts.append(slice(done[i], end))
-            done[i] = end
+        ends = [
+            len(one.log_times) if stop is None else int(np.searchsorted(one.log_times, stop))
+            for one in series
+        ]
+        parts, done = list(map(slice, done, ends)), ends
         log_times = np.concatenate([one.log_times[part] for one, part in zip(series, parts, strict=True)])
         which = np.repeat(np.arange(len(series)), [part.stop - part.start for part in parts])
         raws = list(chain.from_iterable(one.messages(part) for one, part in zip(series, parts, strict=True)))
