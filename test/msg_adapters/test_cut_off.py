@@ -44,15 +44,6 @@ def test_every_complete_chunk_before_the_cut_comes_back(tmp_path, how):
     assert len(set(recovered)) > 5
 
 
-def test_a_cut_off_bag_is_a_record_up_to_the_cut(tmp_path):
-    data = McapFile(run_rows(120)).file()
-    record = read_record(write(tmp_path / "cut.mcap", data[: len(data) // 2]))
-    got = record["command"].y
-    assert 40 <= len(got) <= 62
-    assert np.array_equal(got, np.arange(len(got)) * 0.5)
-    assert "cut off (recorder killed?)" in record.notes[0]
-
-
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_a_killed_recorder_leaves_a_bag_that_opens(tmp_path, storage):
     def record_and_die():
