@@ -95,7 +95,7 @@ def limits_of(values: Mapping[str, float], source: str = "limits") -> RunLimits:
             near = did_you_mean(name, UNITS)
             raise ParameterError(f"{source}: {quote(name)}, expected one of {', '.join(UNITS)}{near}")
     if "torque" not in values:
-        raise ParameterError(f"{source}: no torque, expected at least that of the command, N·m")
+        raise ParameterError(f"{source}: no torque, expected at least torque=… in N·m")
     return RunLimits(**values)
 
 

@@ -129,7 +129,7 @@ class Sensor:
     zero_unknown: the zero differs from record to record (an encoder that counts from power-on), so only
     changes of its values count. clock: s, delay of the reading after its stamp at the start of a record;
     clock_rate: ppm, growth of that delay with time. clock_doubt: s, one sigma of `clock`, which a fit
-    estimates.
+    estimates. delay: s, known, by which the reading is older than that: a filter's or a bus's.
     """
 
     noise: float = 0.0
@@ -138,6 +138,7 @@ class Sensor:
     clock: float = 0.0
     clock_doubt: float = CLOCK_DOUBT
     clock_rate: float = 0.0
+    delay: float = 0.0
 
     @property
     def level(self) -> float:
@@ -275,12 +276,12 @@ class Rig:
     def clock(self, channel: str, since: FloatArray | float = 0.0) -> FloatArray | float:
         """Return how much later than its stamps a channel is read, s; since: of the record's start, s."""
         sensor = self.sensors.get(channel, Sensor())
-        return sensor.clock + 1e-6 * sensor.clock_rate * since
+        return sensor.clock - sensor.delay + 1e-6 * sensor.clock_rate * since
 
     def is_on_time(self, channel: str) -> bool:
         """Return whether a channel is read when its stamps say."""
         sensor = self.sensors.get(channel)
-        return sensor is None or sensor.clock == sensor.clock_rate == 0.0
+        return sensor is None or sensor.clock == sensor.clock_rate == sensor.delay == 0.0
 
     def clock_doubt(self, channel: str) -> float:
         """Return one sigma of the error of a channel's clock beside `clock`, s."""

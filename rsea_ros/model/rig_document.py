@@ -117,6 +117,7 @@ SENSOR = (
     Key("zero_unknown", "true or false", "false", "the zero differs from record to record"),
     Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "delay of the reading after its stamp"),
     Key("clock_rate", "{value: …, unit: ppm}, below 1000 ppm", "0 ppm", "growth of that delay with time"),
+    Key("delay", "{value: …, unit: s}, 0 to 0.2 s", "0 s", "age of the reading at its stamp, known"),
 )
 CLOCK = (
     Key("value", "number", NEEDED),
@@ -191,6 +192,8 @@ def _expectation(field: Field) -> tuple[str, str]:
 
 _LATEST = 0.01
 """s. A clock further off than this is no clock error but a delay of the bench."""
+_OLDEST = 0.2
+"""s. A reading that is older than this, no controller and no fit can use."""
 _FASTEST = 1000.0
 """ppm. A clock that runs faster than this counts in other units."""
 
@@ -212,7 +215,8 @@ def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
                 f"sensors.{name}",
             )
         floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
-        sensors[name] = Sensor(noise, quantum, floating, *clock, _clock_rate(fields, name))
+        late = _clock_rate(fields, name), _delay(fields, name)
+        sensors[name] = Sensor(noise, quantum, floating, *clock, *late)
     return sensors
 
 
@@ -234,6 +238,17 @@ def _clock_rate(fields: Mapping[str, Any], name: str) -> float:
     item = mapping(fields.get("clock_rate", {"value": 0.0, "unit": "ppm"}), field)
     only_keys(item, names(CLOCK_RATE), field)
     return _small(item, field, "ppm", _FASTEST)
+
+
+def _delay(fields: Mapping[str, Any], name: str) -> float:
+    """Return s from `delay: {value: …, unit: s}`; 0 where there is none."""
+    field = f"sensors.{name}.delay"
+    item = mapping(fields.get("delay", {"value": 0.0, "unit": "s"}), field)
+    only_keys(item, names(CLOCK_RATE), field)
+    value = _small(item, field, "s", _OLDEST)
+    if value < 0.0:
+        raise RigError(f"{field}.value = {value:g} s, expected 0 or more: a reading is no younger", field)
+    return value
 
 
 def _small(item: Mapping[str, Any], field: str, unit_name: str, limit: float) -> float:

@@ -72,6 +72,7 @@ def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
         body["clock"] = {"value": sensor.clock, "unit": "s"}
     if sensor.clock_doubt != CLOCK_DOUBT:
         body["clock"]["doubt"] = sensor.clock_doubt
+    body |= {"delay": {"value": sensor.delay, "unit": "s"}} if sensor.delay else {}
     return body | ({"clock_rate": {"value": sensor.clock_rate, "unit": "ppm"}} if sensor.clock_rate else {})
 
 

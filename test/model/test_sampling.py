@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import rsea_ros as rsea
 from rsea_ros.model.simulation import sample
 
 STEPS = 40
@@ -40,3 +43,18 @@ def test_beyond_its_ends_a_channel_keeps_its_end_values():
     values = ENDS**2
     beyond = sample("ft", values, np.array([-3.0, STEPS + 3.0]), np.ones(STEPS))
     assert np.array_equal(beyond, [0.0, STEPS**2])
+
+
+def test_a_sensor_that_is_known_to_be_late_shows_what_was(tmp_path):
+    """A delay of one period is the sample before, through a file and back; one below zero is refused."""
+    rig = rsea.load_rig("paper_high_impedance")
+    late = replace(rig, sensors={**rig.sensors, "ft": replace(rig.sensors["ft"], delay=1.0 / 280.0)})
+    rsea.save(late, tmp_path / "late.yaml")
+    command = 15.0 * np.random.default_rng(0).standard_normal(280)
+    now = rsea.simulate(rig, command, 280.0, noise=False)["ft"].y
+    before = rsea.simulate(tmp_path / "late.yaml", command, 280.0, noise=False)["ft"].y
+    assert before[1:] == pytest.approx(now[:-1], abs=1e-6 * np.abs(now).max())
+    text = (tmp_path / "late.yaml").read_text().replace("value: 0.0035", "value: -0.0035")
+    (tmp_path / "early.yaml").write_text(text)
+    with pytest.raises(rsea.RseaError, match=r"sensors\.ft\.delay\.value = -0\.0035.*expected 0 or more"):
+        rsea.load_rig(tmp_path / "early.yaml")
