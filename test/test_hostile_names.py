@@ -15,9 +15,11 @@ import pytest
 
 from rsea_ros.cli.fleet import no_formula
 from rsea_ros.effects.effect import Claims
+from rsea_ros.exports.feedforward import export_feedforward
 from rsea_ros.exports.fmu import export_fmu
 from rsea_ros.exports.isaac import export_isaac
 from rsea_ros.exports.mjcf import export_mjcf
+from rsea_ros.exports.others import identifier
 from rsea_ros.exports.urdf import export_sdf, export_urdf
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import FittedTerm, Law
@@ -53,7 +55,11 @@ def isaac_file(name: str) -> str:
     return str(export_isaac(replace(RIG, name=name)).content)
 
 
-@pytest.mark.parametrize("generated", [law_file, isaac_file])
+def feedforward_file(name: str, suffix: str = ".py") -> str:
+    return str(export_feedforward(replace(RIG, name=name), suffix, [name]).content)
+
+
+@pytest.mark.parametrize("generated", [law_file, isaac_file, feedforward_file])
 def test_a_python_file_has_the_same_program_whatever_a_name_is(generated):
     """A bag whose name closes the docstring ran a command when the law was loaded as its page says."""
 
@@ -65,6 +71,22 @@ def test_a_python_file_has_the_same_program_whatever_a_name_is(generated):
     expected = program("run.mcap")
     for piece in PIECES:
         assert program(piece) == expected, piece
+
+
+def test_c_is_the_same_program_and_a_table_the_same_rows_whatever_a_name_is():
+    """The first end of a comment in the header is ours; only the prefix of the functions is a name's."""
+
+    def program(name: str) -> str:
+        text = feedforward_file(name, ".h").partition("*/")[2]
+        return text.replace(identifier(name).upper(), "X").replace(identifier(name), "X")
+
+    def rows(name: str) -> list[str]:
+        return [line for line in feedforward_file(name, ".csv").split("\n") if not line.startswith("# ")]
+
+    expected = program("knee"), rows("knee")
+    for piece in (*PIECES, "*/ int pwned; /*", "*??/\n/", "*\\\n/"):
+        assert identifier(piece).isidentifier() and identifier(piece).isascii()
+        assert (program(piece), rows(piece)) == expected, piece
 
 
 @pytest.mark.parametrize("export", [export_mjcf, export_urdf, export_sdf])

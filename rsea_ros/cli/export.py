@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Mapping
-from functools import partial
+import math
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsea_ros.cli._output import FOUND, add_force, path
+from rsea_ros.cli._output import FOUND, add_force, path, provenance
 from rsea_ros.cli._terminal import positive, say
-from rsea_ros.outputs.new_files import check_free, write_file
-from rsea_ros.report.result_files import pick
+from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_file
+from rsea_ros.report.result_files import DIAGNOSIS_JSON, MODEL, pick
 
 if TYPE_CHECKING:
     from rsea_ros.exports.others import Export
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from rsea_ros.model.rig import Rig
     from rsea_ros.records.record import FloatArray
 
-HELP = "convert a rig to MuJoCo, FMI, URDF, SDF, Isaac Lab or BAM, and list the parts left out"
+HELP = "convert a rig to MuJoCo, FMI, URDF, SDF, Isaac Lab, BAM or C; list the parts left out"
 EXAMPLE = "rsea export --mjcf paper_high_impedance --out bench.xml"
 TARGETS = {
     "mjcf": "MJCF for MuJoCo 4",
@@ -29,6 +30,7 @@ TARGETS = {
     "fmu": "FMU for co-simulation, FMI 3",
     "isaac": "actuator of Isaac Lab, a Python file",
     "bam": "parameters of BAM (M1 to M6), JSON",
+    "feedforward": "friction, ripple and gravity for your controller: C, Python, table",
 }
 DURATION = 2.0
 _NUMBERS = "times_noise rms signal noise unit"
@@ -42,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         about = f"rig, model.yaml or name of a rig: {about}"
         targets.add_argument(f"--{name}", *aliases, dest=name, metavar="RIG", help=about)
     add = parser.add_argument
-    add("--out", type=path, help="file to be written (default the rig's name)")
+    add("--out", type=path, help="file to be written, or folder of a feed-forward (default the rig's name)")
     add_force(parser)
     effect = "switch an effect on, SI units"
     add("--effect", action="append", default=[], metavar="NAME:param=value,…", help=effect)
@@ -67,12 +69,17 @@ def run(args: argparse.Namespace) -> int:
     rig = load_rig(source)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
     check_effects(rig.effects)
-    suffix = {"mjcf": ".xml", "isaac": ".py", "bam": ".json"}.get(target, f".{target}")
-    out = args.out or Path(f"{rig.name}{suffix}")
-    check_free([out], force=args.force, inputs=[source])
-    made = _exporters(args)[target](rig)
+    made = _export(target, rig, args)
+    out = args.out or Path(f"{rig.name}{made.suffix}")
+    files = [out / name for name in made.content] if isinstance(made.content, Mapping) else [out]
+    check_free(files, force=args.force, inputs=[source])
     verified = _verification(made, rig, args)
-    write_file(out, made.content, force=args.force)
+    if isinstance(made.content, Mapping):
+        with NewFiles(Destination(out, args.force)) as new:
+            for name, text in made.content.items():
+                new.write(name, text)
+    else:
+        write_file(out, made.content, force=args.force)
     if args.json:
         print(json.dumps(_document(made, rig, out, verified), indent=2))
     else:
@@ -83,17 +90,53 @@ def run(args: argparse.Namespace) -> int:
     return FOUND
 
 
-def _exporters(args: argparse.Namespace) -> Mapping[str, Callable[[Rig], Export]]:
-    from rsea_ros.exports.bam import export_bam
-    from rsea_ros.exports.fmu import export_fmu
-    from rsea_ros.exports.isaac import export_isaac
-    from rsea_ros.exports.mjcf import export_mjcf
-    from rsea_ros.exports.urdf import export_sdf, export_urdf
+def _export(target: str, rig: Rig, args: argparse.Namespace) -> Export:
+    """Return a rig for a target, by `export_TARGET` of exports/TARGET.py; SDF is in that of URDF."""
+    options: dict[str, Any] = {}
+    if target == "bam":
+        options = {"actuator": args.actuator}
+    elif target == "feedforward":
+        options = _measured(args.feedforward, rig) | {"suffix": args.out.suffix if args.out else ""}
+    module = import_module(f"rsea_ros.exports.{'urdf' if target == 'sdf' else target}")
+    made: Export = getattr(module, f"export_{target}")(rig, **options)
+    return made
 
-    return {
-        "mjcf": export_mjcf, "urdf": export_urdf, "sdf": export_sdf, "fmu": export_fmu, "isaac": export_isaac,
-        "bam": partial(export_bam, actuator=args.actuator),
-    }  # fmt: skip
+
+def _measured(source: str, rig: Rig) -> dict[str, Any]:
+    """Return where a rig's values come from; of a diagnosis beside its model: date, residuals, intervals.
+
+    Intervals are those of values that nobody has changed since. Raises RigError for an unreadable diagnosis.
+    """
+    from rsea_ros.documents.strict_yaml import interval, load, mapping, number, sequence
+    from rsea_ros.errors import RigError
+
+    lines = [*provenance("export", [], source).lines]
+    values = rig.values() | {f"{e.name}.{p}": v for e in rig.effects for p, v in e.parameters.items()}
+
+    def intervals(content: Any) -> dict[str, tuple[float, float]]:
+        body = mapping(content, "diagnosis")
+        extended = mapping(body.get("extended"), "extended")
+        origin = mapping(body.get("provenance", {}), "provenance")
+        rms = mapping(extended.get("residual_rms"), "residual_rms").items()
+        lines.append(f"diagnosed by {origin.get('version')}, {origin.get('date')}: {body.get('sentence')}")
+        residuals = ", ".join(f"{name} {number(v, name, '1'):.3g}" for name, v in rms)
+        lines.append(f"residual, RMS, SI: {residuals}")
+        sizes = dict(mapping(extended.get("parameters"), "parameters"))
+        for cause in sequence(body.get("causes"), "causes", "causes"):
+            found = mapping(mapping(cause, "causes").get("parameters"), "parameters")
+            sizes |= {f"{cause.get('name')}.{name}": size for name, size in found.items()}
+        known = {}
+        for name, size in sizes.items():
+            value, pair = (mapping(size, name).get(key) for key in ("value", "ci95"))
+            if name in values and pair and math.isclose(number(value, name, "1"), values[name]):
+                known[name] = interval(pair, f"{name}.ci95", "SI")
+        return known
+
+    beside = Path(source).parent / DIAGNOSIS_JSON
+    if Path(source).name != MODEL or not beside.is_file():
+        return {"measured": lines}
+    known = load(beside, "the diagnosis of the model beside it", RigError, intervals)
+    return {"measured": lines, "intervals": known}
 
 
 def _verification(made: Export, rig: Rig, args: argparse.Namespace) -> Verification:

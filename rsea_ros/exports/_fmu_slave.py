@@ -23,6 +23,7 @@ from pythonfmu3 import (
 )
 
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.exports.others import identifier
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import build, run
@@ -148,13 +149,3 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
             )  # fmt: skip
             self._at = stop
         return Fmi3StepResult(status=Fmi3Status.ok)
-
-
-_LONGEST = 60
-"""Characters of a rig's name in that of its model, which is that of a file too."""
-
-
-def identifier(name: str) -> str:
-    """Return a name as FMI wants that of a model: letters, digits and underscores, a letter first."""
-    plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name[:_LONGEST])
-    return plain if plain[:1].isalpha() else f"rig_{plain}"

@@ -65,7 +65,7 @@ def _friction(effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) 
 
 
 def _limits(rig: Rig, effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> dict[str, float]:
-    limits = [rig["controller.torque_limit"]] if rig.loop else []
+    limits = [others.command_limit(rig)]
     if "torque_saturation" in effects:
         limits.append(effects["torque_saturation"]["limit"])
         says["torque_saturation"] = "effort_limit"

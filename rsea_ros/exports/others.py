@@ -18,14 +18,14 @@ class Unrepresentable(Exception):
 
 @dataclass(frozen=True)
 class Export:
-    """The file for a target. content: text or the bytes of an archive.
+    """The file for a target. content: text, the bytes of an archive, or the texts of several files by name.
 
     says: the parts of a rig that the target has, in its terms. leaves_out: the others, and what it lacks.
     """
 
     target: str
     suffix: str
-    content: str | bytes
+    content: str | bytes | Mapping[str, str]
     says: Mapping[str, str]
     leaves_out: Mapping[str, str]
 
@@ -52,6 +52,11 @@ def finite_sizes(rig: Rig) -> dict[str, dict[str, float]]:
     """Return the parameters of the effects whose every size is a finite number, by name."""
     complete = {one.name: effect_named(one.name).complete(one.parameters) for one in rig.effects}
     return {name: p for name, p in complete.items() if all(map(math.isfinite, p.values()))}
+
+
+def command_limit(rig: Rig) -> float:
+    """Return the largest torque that the rig's loop commands, N m; infinite where it states none."""
+    return min(rig["controller.torque_limit"], rig.controller.limit if rig.controller else math.inf)
 
 
 def omitted_effects(rig: Rig, says: Mapping[str, str], why: str) -> dict[str, str]:
@@ -87,3 +92,13 @@ def omitted_parts(rig: Rig, why: str) -> dict[str, str]:
     load = "its load is the affair of the robot's own links"
     left |= {end: load for end in END_NAMES if rig.end_is_free(end)}
     return left | ({"sensor noise": "the target's observations have their own"} if rig.sensors else {})
+
+
+_LONGEST = 60
+"""Characters of a rig's name in that of a model or a function, which is that of a file too."""
+
+
+def identifier(name: str) -> str:
+    """Return a name as FMI and C want it: letters, digits and underscores, a letter first."""
+    kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in name[:_LONGEST])
+    return kept if kept[:1].isalpha() else f"rig_{kept}"

@@ -159,7 +159,7 @@ def test_the_limit_is_an_exit_status(tmp_path, capsys):
     assert document["loss"]["ft_bias"]["times_noise"] == pytest.approx(1.0 / 0.03, rel=0.01)
 
 
-@pytest.mark.parametrize("target", ["urdf", "sdf", "isaac", "bam"])
+@pytest.mark.parametrize("target", ["urdf", "sdf", "isaac", "bam", "feedforward"])
 def test_what_an_omitted_effect_costs_is_printed_for_targets_that_do_not_run_here(target, tmp_path, capsys):
     arguments = ["--effect", "ft_bias:bias=0.6", "--effect", "backlash", "--out", str(tmp_path / "a")]
     assert main(["export", f"--{target}", "paper_high_impedance", *arguments, "--duration", "0.4"]) == 0

@@ -6,11 +6,13 @@ import json
 import math
 import re
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.exports.bam import export_bam
+from rsea_ros.exports.feedforward import export_feedforward
 from rsea_ros.exports.isaac import export_isaac
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.urdf import export_sdf, export_urdf
@@ -19,8 +21,9 @@ from rsea_ros.model.rig_file import load_rig
 
 EXPORTS = {
     "bam": export_bam, "isaac": export_isaac, "mjcf": export_mjcf, "sdf": export_sdf, "urdf": export_urdf,
+    "feedforward": partial(export_feedforward, suffix=".h"),
 }  # fmt: skip
-FEWEST = {"mjcf": 15, "sdf": 3, "urdf": 3, "isaac": 5, "bam": 4}
+FEWEST = {"mjcf": 15, "sdf": 3, "urdf": 3, "isaac": 5, "bam": 4, "feedforward": 12}
 """Effects that a target has words for, and so must not leave out."""
 
 

@@ -38,8 +38,11 @@ VERBS: dict[str, tuple[str, ...]] = {
     "controlled": (f"control {RIG} --rate 280 --out controlled",),
     "paper": ("paper --duration 20 --out paper",),
     "exported": tuple(
-        f"export --{kind} diagnosed/model.yaml --out exported{number}.{kind}"
-        for number, kind in enumerate(("mjcf", "urdf", "sdf", "fmu", "isaac", "bam"))
+        f"export --{kind} diagnosed/model.yaml --out exported{name}"
+        for kind, name in zip(
+            ("mjcf", "urdf", "sdf", "fmu", "isaac", "bam", "feedforward"),
+            ("0.mjcf", "1.urdf", "2.sdf", "3.fmu", "4.isaac", "5.bam", "6.h"), strict=True,
+        )
     ),
     "lists": ("--help", "rigs", "maps", "effects"),
     "effects": tuple(f"effects {name}" for name in catalogue()),
