@@ -4,7 +4,6 @@ pythonfmu3 puts this file into the archive and finds the class by its text. The 
 needs rsea_ros. Inputs are held over a communication step, which may be any whole number of steps of STEP.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -56,7 +55,7 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
         self.description = (Path(self.resources) / "coverage.txt").read_text(encoding="utf-8")
         self.default_experiment = DefaultExperiment(start_time=0.0, stop_time=10.0, step_size=1e-3)
         self.register_units([Unit(name, **powers) for name, powers in UNITS.items()])
-        self._command, self._duration, self._at = 0.0, DURATION, 0
+        self._command, self._at, self._values = 0.0, 0, {"duration": DURATION}
         self._out = np.zeros((1, len(OUTPUTS)))
         clock = {"causality": Fmi3Causality.independent, "variability": Fmi3Variability.continuous}
         self.register_variable(Float64("time", unit="s", getter=self._time, **clock), nested=False)
@@ -66,7 +65,13 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
             if self._rig.measures(name):
                 unit = {"position": "rad", "velocity": "rad/s", "deflection": "rad"}.get(name, "N m")
                 self._declare(name, unit, "", Fmi3Causality.output, at)
-        self._declare_parameters()
+        self._parameter("duration", "s", DURATION)
+        for name, value in self._rig.values().items():
+            self._parameter(name, self._rig.unit(name), value)
+        for setting in self._rig.effects:
+            effect = effect_named(setting.name)
+            for p, value in zip(effect.parameters, effect.vector(setting.parameters), strict=True):
+                self._parameter(f"{effect.name}.{p.name}", p.unit, value)
 
     def _declare(self, name: str, unit: str, about: str, causality: object, at: int = 0) -> None:
         is_input = causality == Fmi3Causality.input
@@ -87,52 +92,32 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
     def _output(self, at: int) -> float:
         return float(self._out[-1, at])
 
-    def _declare_parameters(self) -> None:
-        get, change = partial(getattr, self, "_duration"), partial(setattr, self, "_duration")
-        self._parameter("duration", "s", get, change)
-        for name, quantity in self._rig.quantities.items():
-            if np.isfinite(quantity.value):
-                value, change = partial(self._value, name), partial(self._set, name)
-                self._parameter(name, self._rig.unit(name), value, change)
-        for setting in self._rig.effects:
-            for p in effect_named(setting.name).parameters:
-                key = setting.name, p.name
-                if np.isfinite(self._effect_value(*key)):
-                    size, change = partial(self._effect_value, *key), partial(self._set_effect, *key)
-                    self._parameter(".".join(key), p.unit, size, change)
-
-    def _parameter(
-        self, name: str, unit: str, getter: Callable[[], float], setter: Callable[[float], None]
-    ) -> None:
-        known = {"unit": unit} if unit in UNITS else {"description": unit}
-        self.register_variable(
-            Float64(
-                name, causality=Fmi3Causality.parameter, variability=Fmi3Variability.fixed,
-                getter=getter, setter=setter, **known,
-            ),
-            nested=False,
-        )  # fmt: skip
-
-    def _value(self, name: str) -> float:
-        return self._rig[name]
-
-    def _set(self, name: str, value: float) -> None:
-        self._rig = self._rig.with_values({name: value})
-
-    def _effect_value(self, effect: str, name: str) -> float:
-        setting = next(one for one in self._rig.effects if one.name == effect)
-        return effect_named(effect).complete(setting.parameters)[name]
-
-    def _set_effect(self, effect: str, name: str, value: float) -> None:
-        settings = [
-            replace(one, parameters={**one.parameters, name: value}) if one.name == effect else one
-            for one in self._rig.effects
-        ]
-        self._rig = self._rig.with_effects(*settings)
+    def _parameter(self, name: str, unit: str, value: float) -> None:
+        """Declare a value of the rig or of an effect, unless it is infinite."""
+        if np.isfinite(value):
+            self._values[name] = float(value)
+            known = {"unit": unit} if unit in UNITS else {"description": unit}
+            self.register_variable(
+                Float64(
+                    name, causality=Fmi3Causality.parameter, variability=Fmi3Variability.fixed, **known,
+                    getter=partial(self._values.__getitem__, name),
+                    setter=partial(self._values.__setitem__, name),
+                ),
+                nested=False,
+            )  # fmt: skip
 
     def exit_initialization_mode(self) -> None:
         """Make the machine of the parameters that were set."""
-        self._machine = build(self._rig, STEP, self._duration, in_loop=self._rig.loop is not None)
+        values, sizes = self._rig.values(), {one.name: dict(one.parameters) for one in self._rig.effects}
+        for name, value in self._values.items():
+            part, _, parameter = name.partition(".")
+            if name in values:
+                values[name] = value
+            elif part in sizes:
+                sizes[part][parameter] = value
+        settings = [replace(one, parameters=sizes[one.name]) for one in self._rig.effects]
+        rig, duration = self._rig.with_values(values).with_effects(*settings), self._values["duration"]
+        self._machine = build(rig, STEP, duration, in_loop=rig.loop is not None)
         self._machine.begin()
 
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
