@@ -57,14 +57,29 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
         self.register_units([Unit(name, **powers) for name, powers in UNITS.items()])
         self._command, self._at, self._values = 0.0, 0, {"duration": DURATION}
         self._out = np.zeros((1, len(OUTPUTS)))
-        clock = {"causality": Fmi3Causality.independent, "variability": Fmi3Variability.continuous}
-        self.register_variable(Float64("time", unit="s", getter=self._time, **clock), nested=False)
         driven, unit = ("torque_command", "N m") if self._rig.loop is None else ("desired_position", "rad")
-        self._declare(driven, unit, "held over a communication step", Fmi3Causality.input)
-        for at, name in enumerate(OUTPUTS):
-            if self._rig.measures(name):
-                unit = {"position": "rad", "velocity": "rad/s", "deflection": "rad"}.get(name, "N m")
-                self._declare(name, unit, "", Fmi3Causality.output, at)
+        flows, steps = Fmi3Variability.continuous, Fmi3Variability.discrete
+        declared = [
+            Float64(
+                "time", unit="s", causality=Fmi3Causality.independent, variability=flows,
+                getter=lambda: self._at * STEP,
+            ),
+            Float64(
+                driven, unit=unit, description="held over a communication step", start=0.0,
+                causality=Fmi3Causality.input, variability=steps,
+                getter=partial(getattr, self, "_command"), setter=partial(setattr, self, "_command"),
+            ),
+        ]  # fmt: skip
+        units = {"position": "rad", "velocity": "rad/s", "deflection": "rad"}
+        declared += [
+            Float64(
+                name, unit=units.get(name, "N m"), causality=Fmi3Causality.output, variability=flows,
+                initial=Fmi3Initial.calculated, getter=partial(self._output, at),
+            )
+            for at, name in enumerate(OUTPUTS) if self._rig.measures(name)
+        ]  # fmt: skip
+        for one in declared:
+            self.register_variable(one, nested=False)
         self._parameter("duration", "s", DURATION)
         for name, value in self._rig.values().items():
             self._parameter(name, self._rig.unit(name), value)
@@ -72,22 +87,6 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
             effect = effect_named(setting.name)
             for p, value in zip(effect.parameters, effect.vector(setting.parameters), strict=True):
                 self._parameter(f"{effect.name}.{p.name}", p.unit, value)
-
-    def _declare(self, name: str, unit: str, about: str, causality: object, at: int = 0) -> None:
-        is_input = causality == Fmi3Causality.input
-        self.register_variable(
-            Float64(
-                name, unit=unit, description=about or None, causality=causality,
-                variability=Fmi3Variability.discrete if is_input else Fmi3Variability.continuous,
-                start=0.0 if is_input else None, initial=None if is_input else Fmi3Initial.calculated,
-                getter=partial(getattr, self, "_command") if is_input else partial(self._output, at),
-                setter=partial(setattr, self, "_command") if is_input else None,
-            ),
-            nested=False,
-        )  # fmt: skip
-
-    def _time(self) -> float:
-        return self._at * STEP
 
     def _output(self, at: int) -> float:
         return float(self._out[-1, at])

@@ -56,21 +56,14 @@ def _model(effects: Mapping[str, Mapping[str, float]]) -> str:
 
 def _dry(effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> dict[str, float]:
     """Return the parameters that do not depend on the load."""
-    base = effects.get("coulomb_friction", {}).get("torque", 0.0)
-    if base:
-        says["coulomb_friction"] = "friction_base"
-    stribeck, speed = 0.0, 1.0
-    for name in ("stribeck_friction", "lugre_friction"):
-        if name in effects:
-            p = effects[name]
-            base, stribeck, speed = base + p["coulomb_torque"], p["stribeck_torque"], p["stribeck_velocity"]
-            left = ", its bristles left out" if name == "lugre_friction" else ""
-            says[name] = f"friction_base, friction_stribeck, dtheta_stribeck, alpha 2{left}"
+    curve = "friction_base, friction_stribeck, dtheta_stribeck, alpha 2"
+    words = {"coulomb_friction": "friction_base", "stribeck_friction": curve}
+    words["lugre_friction"] = f"{curve}, its bristles left out"
+    says |= {name: how for name, how in words.items() if name in effects}
+    base, stribeck, speed = others.dry_friction(effects)
     if _model(effects) in ("m1", "m3"):
         return {"friction_base": base}
-    return {
-        "friction_base": base, "friction_stribeck": stribeck, "dtheta_stribeck": speed, "alpha": ALPHA,
-    }  # fmt: skip
+    return {"friction_base": base, "friction_stribeck": stribeck, "dtheta_stribeck": speed, "alpha": ALPHA}
 
 
 def _load(effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> dict[str, float]:
@@ -83,17 +76,12 @@ def _load(effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> d
     if model not in ("m5", "m6"):
         return {}
     p = effects[name]
-    quad = ", and their quad" if model == "m6" else ""
-    says[name] = f"load_friction_motor, load_friction_external{quad}"
-    values = {
-        "load_friction_motor": p["motor_coefficient"],
-        "load_friction_external": p["load_coefficient"],
-        "load_friction_motor_stribeck": 0.0,
-        "load_friction_external_stribeck": 0.0,
-    }
+    says[name] = f"load_friction_motor, load_friction_external{', and their quad' if model == 'm6' else ''}"
+    sides = {"motor": p["motor_coefficient"], "external": p["load_coefficient"]}
+    values = {f"load_friction_{side}": size for side, size in sides.items()}
+    values |= {f"load_friction_{side}_stribeck": 0.0 for side in sides}
     if model == "m6":
-        quadratic = p["quadratic"]
-        values |= {"load_friction_motor_quad": quadratic, "load_friction_external_quad": quadratic}
+        values |= {f"load_friction_{side}_quad": p["quadratic"] for side in sides}
         if not effects.keys() & {"stribeck_friction", "lugre_friction"}:
             values["dtheta_stribeck"] = ANY_SPEED
     return values

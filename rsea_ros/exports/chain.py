@@ -11,7 +11,7 @@ axis is x, level: gravity is along -z.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from rsea_ros.documents.units import STANDARD_GRAVITY, plain
 from rsea_ros.errors import RigError
@@ -65,7 +65,7 @@ class Chain:
 
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
-    left_out: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, str]
 
 
 def chain_of(rig: Rig) -> Chain:

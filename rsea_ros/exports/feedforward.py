@@ -149,20 +149,18 @@ def _add_gravity(
 ) -> None:
     """Add the weight of a pendulum, with that of gravity_error, where one end moves: q or -q from hanging."""
     errors = [one for one in rig.effects if one.name == "gravity_error"]
-    hanging = with_structure(rig.with_effects(*errors))
-    free = [end for end in END_NAMES if rig.end_is_free(end)]
+    hanging, free = with_structure(rig.with_effects(*errors)), [e for e in END_NAMES if rig.end_is_free(e)]
     if not any(hanging[f"{end}.gravity"] for end in free):
         return
     if len(free) == 2:
         left["gravity"] = "both ends move, and neither by the joint's angle"
         return
-    names = {"weight": f"{free[0]}.gravity", "angle": f"{free[0]}.gravity_angle"}
-    for name, source in names.items():
-        is_stated = hanging[source] == rig[source]
-        gravity.add(name, hanging[source], rig.unit(source), intervals.get(source) if is_stated else None)
+    weight, angle = f"{free[0]}.gravity", f"{free[0]}.gravity_angle"
+    gravity.add("weight", hanging[weight], "N m", None if errors else intervals.get(weight))
+    gravity.add("angle", rig[angle], "rad", intervals.get(angle))
     side = "+" if free == ["spring_end"] else "-"
     gravity.statements.append(f"torque += weight * sin(position {side} angle)")
-    says |= dict.fromkeys([names["weight"], *(one.name for one in errors)], "gravity")
+    says |= dict.fromkeys([weight, *(one.name for one in errors)], "gravity")
 
 
 def _header_file(functions: Sequence[Function], lines: Sequence[str], prefix: str) -> str:
@@ -208,19 +206,14 @@ def _table(functions: Sequence[Function], lines: Sequence[str]) -> str:
     exec(_python(functions, []), held)  # without the lines: nothing in it comes from outside
     friction, ripple, gravity, _ = functions
     sizes = {name: value for one in functions for name, value, _ in one.constants}
-    loads = [0.0]
-    if any("load" in line for line in friction.statements):
-        most = sizes.get("limit", 1.0)
-        loads = [-most, 0.0, most]
-    rows = [
-        ("friction", 0.0, w, load, held["friction"](w, load, load)) for load in loads for w in SPEEDS.tolist()
-    ]
+    most = sizes.get("limit", 1.0) if any("load" in line for line in friction.statements) else 0.0
+    loads, turn = sorted({-most, 0.0, most}), np.linspace(-math.pi, math.pi, 65)
+    rows = [(0.0, w, load, "friction", held["friction"](w, load, load)) for load in loads for w in SPEEDS]
     if ripple.statements:
-        period = 2.0 * math.pi / (sizes["torque_ripple_cycles_per_revolution"] * abs(sizes["turns"]))
-        rows += [("ripple", q, 0.0, 0.0, held["ripple"](q)) for q in np.linspace(0.0, period, 65).tolist()]
+        period = turn / (sizes["torque_ripple_cycles_per_revolution"] * abs(sizes["turns"]))
+        rows += [(q, 0.0, 0.0, "ripple", held["ripple"](q)) for q in period]
     if gravity.statements:
-        turn = np.linspace(-math.pi, math.pi, 65).tolist()
-        rows += [("gravity", q, 0.0, 0.0, held["gravity"](q)) for q in turn]
+        rows += [(q, 0.0, 0.0, "gravity", held["gravity"](q)) for q in turn]
     text = [*(f"# {line}" for line in lines), "# SI; the motor's torque is that of the load"]
-    text += ["of,position,velocity,load,torque", *(",".join(map(str, row)) for row in rows)]
+    text += ["position,velocity,load,of,torque", *(f"{q},{w},{load},{of},{y}" for q, w, load, of, y in rows)]
     return "\n".join([*text, ""])

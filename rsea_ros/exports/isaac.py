@@ -45,32 +45,23 @@ def _loop(rig: Rig, says: dict[str, str]) -> dict[str, float]:
         says["torque command"] = "stiffness and damping 0: set joint efforts"
         return {"stiffness": 0.0, "damping": 0.0}
     says[f"{rig.loop} loop"] = "stiffness and damping"
-    if rig.loop == "pd":
-        return {"stiffness": rig["controller.k_p"], "damping": rig["controller.k_d"]}
-    k_v = rig["controller.k_v"]
-    return {"stiffness": rig["controller.k_pos"] * k_v, "damping": k_v}
+    return dict(zip(("stiffness", "damping"), others.pd_gains(rig), strict=True))
 
 
 def _friction(effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> dict[str, float]:
-    dynamic = effects.get("coulomb_friction", {}).get("torque", 0.0)
-    if dynamic:
-        says["coulomb_friction"] = "friction and dynamic_friction"
-    static = dynamic
-    for name in ("stribeck_friction", "lugre_friction"):
-        if name in effects:
-            dynamic += effects[name]["coulomb_torque"]
-            static += effects[name]["coulomb_torque"] + effects[name]["stribeck_torque"]
-            says[name] = "friction at rest, dynamic_friction at speed; not the curve between"
-    return {"friction": static, "dynamic_friction": dynamic}
+    at_rest = "friction at rest, dynamic_friction at speed; not the curve between"
+    words = {"coulomb_friction": "friction and dynamic_friction"}
+    words |= dict.fromkeys(("stribeck_friction", "lugre_friction"), at_rest)
+    says |= {name: how for name, how in words.items() if name in effects}
+    dynamic, stribeck, _ = others.dry_friction(effects)
+    return {"friction": dynamic + stribeck, "dynamic_friction": dynamic}
 
 
 def _limits(rig: Rig, effects: Mapping[str, Mapping[str, float]], says: dict[str, str]) -> dict[str, float]:
-    limits = [others.command_limit(rig)]
     if "torque_saturation" in effects:
-        limits.append(effects["torque_saturation"]["limit"])
         says["torque_saturation"] = "effort_limit"
-    finite = [limit for limit in limits if math.isfinite(limit)]
-    return {"effort_limit": min(finite)} if finite else {}
+    limit = min(others.command_limit(rig), effects.get("torque_saturation", {}).get("limit", math.inf))
+    return {"effort_limit": limit} if math.isfinite(limit) else {}
 
 
 def _file(

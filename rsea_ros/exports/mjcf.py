@@ -32,16 +32,9 @@ def tendon(root: xml.Element, name: str) -> xml.Element:
     return next(one for one in root.iter("fixed") if one.get("name") == name)
 
 
-def section(root: xml.Element, tag: str) -> xml.Element:
-    """Return the actuators, or the tendons, of a model."""
-    found = root.find(tag)
-    assert found is not None
-    return found
-
-
 def motor(root: xml.Element) -> xml.Element:
     """Return the actuator that the command drives, as the element that has every attribute."""
-    first = section(root, "actuator")[0]
+    first = next(root.iter("actuator"))[0]
     if first.tag == "motor":
         first.tag = "general"
         first.set("gainprm", "1")
@@ -50,7 +43,7 @@ def motor(root: xml.Element) -> xml.Element:
 
 def beside(root: xml.Element, name: str, like: str) -> xml.Element:
     """Add and return a sum of hinges of another name."""
-    copy = xml.SubElement(section(root, "tendon"), "fixed", name=name)
+    copy = xml.SubElement(next(root.iter("tendon")), "fixed", name=name)
     for joint in tendon(root, like):
         copy.append(xml.fromstring(xml.tostring(joint)))
     return copy
@@ -59,7 +52,7 @@ def beside(root: xml.Element, name: str, like: str) -> xml.Element:
 def passive(root: xml.Element, name: str, **attributes: str) -> xml.Element:
     """Add and return a dcmotor without input on the output: its friction or cogging alone."""
     fixed = {"name": name, "tendon": "motor", "input": "none", "motorconst": "0", "resistance": "1"}
-    return xml.SubElement(section(root, "actuator"), "dcmotor", {**fixed, **attributes})
+    return xml.SubElement(next(root.iter("actuator")), "dcmotor", {**fixed, **attributes})
 
 
 def _command_delay(root: xml.Element, rig: Rig, p: Parameters) -> str:
@@ -116,7 +109,7 @@ def _asymmetric_friction(root: xml.Element, rig: Rig, p: Parameters) -> str:
     if p["viscous_difference"]:
         raise others.Unrepresentable("damping is the same in both directions")
     bias = {"gainprm": "0", "biastype": "affine", "biasprm": f"{-p['offset']!r} 0 0"}
-    xml.SubElement(section(root, "actuator"), "general", {"name": "offset", "tendon": "motor", **bias})
+    xml.SubElement(next(root.iter("actuator")), "general", {"name": "offset", "tendon": "motor", **bias})
     return f"a second actuator with the constant bias {-p['offset']:g} N·m"
 
 
@@ -219,7 +212,9 @@ def say_loop(rig: Rig, root: xml.Element) -> tuple[dict[str, str], dict[str, str
     """Turn the motor into the loop's actuator; return exported and omitted parts."""
     if rig.loop is None:
         return {"motor": "motor on the tendon output - housing"}, {}
-    gains = _gains(rig)
+    k_p, k_d = others.pd_gains(rig)
+    named = {"kp": k_p, "ki": rig["controller.k_i"] if rig.loop == "pd" else 0.0, "kv": k_d}
+    gains = {name: value for name, value in named.items() if value}
     first = motor(root)
     first.tag = "pid"
     del first.attrib["gainprm"]
@@ -241,15 +236,6 @@ def say_loop(rig: Rig, root: xml.Element) -> tuple[dict[str, str], dict[str, str
     return {f"{rig.loop} loop": how}, left | others.omitted_terms(rig, terms)
 
 
-def _gains(rig: Rig) -> dict[str, float]:
-    if rig.loop == "pd":
-        named = {"kp": rig["controller.k_p"], "ki": rig["controller.k_i"], "kv": rig["controller.k_d"]}
-    else:
-        k_v = rig["controller.k_v"]
-        named = {"kp": rig["controller.k_pos"] * k_v, "kv": k_v}
-    return {name: value for name, value in named.items() if value}
-
-
 def export_mjcf(rig: Rig) -> others.Export:
     """Return the model of a rig.
 
@@ -261,19 +247,15 @@ def export_mjcf(rig: Rig) -> others.Export:
     play = next((float(one.parameters["gap"]) for one in rig.effects if one.name == "backlash"), 0.0)
     root = model_element(with_structure(rig), play)
     says, left = say_loop(rig, root)
-    for setting in sorted(rig.effects, key=lambda one: effect_named(one.name).order):
-        parameters = effect_named(setting.name).complete(setting.parameters)
+    for name in sorted(finite, key=lambda name: effect_named(name).order):
         try:
-            if setting.name not in finite:
-                raise others.Unrepresentable("a parameter of it is infinite")
-            if setting.name in STRUCTURES:
-                says[setting.name] = STRUCTURES[setting.name]
-            elif setting.name in EFFECTS:
-                says[setting.name] = EFFECTS[setting.name](root, rig, parameters)
-            else:
-                raise others.Unrepresentable("MuJoCo has no element for it")
+            if name in STRUCTURES:
+                says[name] = STRUCTURES[name]
+            elif name in EFFECTS:
+                says[name] = EFFECTS[name](root, rig, finite[name])
         except others.Unrepresentable as reason:
-            left[setting.name] = str(reason)
+            left[name] = str(reason)
+    left = others.omitted_effects(rig, says, "MuJoCo has no element for it") | left
     if rig.sensors:
         perfect = "sensors of MJCF are those of perfect instruments"
         left["sensor noise"] = f"{perfect}; the rig's noise and quanta stay with the rig"

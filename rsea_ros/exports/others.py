@@ -54,6 +54,22 @@ def finite_sizes(rig: Rig) -> dict[str, dict[str, float]]:
     return {name: p for name, p in complete.items() if all(map(math.isfinite, p.values()))}
 
 
+def pd_gains(rig: Rig) -> tuple[float, float]:
+    """Return the gains of a rig's loop on position, N m/rad, and on speed, N m s/rad."""
+    if rig.loop == "pd":
+        return rig["controller.k_p"], rig["controller.k_d"]
+    return rig["controller.k_pos"] * rig["controller.k_v"], rig["controller.k_v"]
+
+
+def dry_friction(effects: Mapping[str, Mapping[str, float]]) -> tuple[float, float, float]:
+    """Return what all effects of dry friction make at speed and more at rest, N m, and up to where, rad/s."""
+    coulomb, stribeck, speed = effects.get("coulomb_friction", {}).get("torque", 0.0), 0.0, 1.0
+    for p in (effects[name] for name in ("stribeck_friction", "lugre_friction") if name in effects):
+        coulomb, stribeck = coulomb + p["coulomb_torque"], stribeck + p["stribeck_torque"]
+        speed = p["stribeck_velocity"]
+    return coulomb, stribeck, speed
+
+
 def command_limit(rig: Rig) -> float:
     """Return the largest torque that the rig's loop commands, N m; infinite where it states none."""
     return min(rig["controller.torque_limit"], rig.controller.limit if rig.controller else math.inf)

@@ -54,15 +54,10 @@ def _coverage(rig: Rig, chain: Chain, *, has_springs: bool) -> tuple[dict[str, s
     left = {name: f"{why}; {only}" for name, why in chain.left_out.items()}
     if not has_springs and not rig.rigid_spring:
         left["spring.stiffness"] = f"URDF joints have no spring; {only}"
-    finite, has_stop = others.finite_sizes(rig), any(_acting(joint, rig)[0] for joint in chain.joints)
-    for one in rig.effects:
-        how = _EFFECTS.get(one.name)
-        if one.name not in finite:
-            left[one.name] = f"a parameter of it is infinite; {only}"
-        elif how is None or (one.name == "hard_stop" and not has_stop):
-            left[one.name] = only
-        else:
-            says[one.name] = how
+    acts = others.finite_sizes(rig).keys() & _EFFECTS
+    acts -= set() if any(_acting(joint, rig)[0] for joint in chain.joints) else {"hard_stop"}
+    says |= {one.name: _EFFECTS[one.name] for one in rig.effects if one.name in acts}
+    left |= others.omitted_effects(rig, says, only)
     if rig.loop is not None:
         left[f"{rig.loop} loop"] = f"a controller's affair; {only}"
     return says, left

@@ -166,18 +166,12 @@ def spring_torque(model_text: str, x: FloatArray, rate: FloatArray) -> FloatArra
     total = np.zeros(len(x))
     for one in root.iter("fixed"):
         if str(one.get("name")).startswith(BESIDE):
-            total += _torque(one, x)
-            damping = float(one.get("damping", "0"))
-            total += damping * rate
+            a, b, c = map(float, [*one.get("stiffness", "0").split(), "0", "0"][:3])
+            low, high = map(float, [*one.get("springlength", "0 0").split(), "0"][:2])
+            bent = x - _slip(x, float(one.get("springyield", "0")))
+            bent -= np.clip(bent, low, high)
+            total += bent * (a + bent * (b + bent * c)) + float(one.get("damping", "0")) * rate
     return total
-
-
-def _torque(one: xml.Element, x: FloatArray) -> FloatArray:
-    a, b, c = map(float, [*one.get("stiffness", "0").split(), "0", "0"][:3])
-    low, high = map(float, [*one.get("springlength", "0 0").split(), "0"][:2])
-    shift = _slip(x, float(one.get("springyield", "0")))
-    beyond = x - shift - np.clip(x - shift, low, high)
-    return np.asarray(beyond * (a + beyond * (b + beyond * c)))
 
 
 def _slip(x: FloatArray, limit: float) -> FloatArray:
@@ -241,23 +235,17 @@ def verify(made: Export, rig: Rig, command: FloatArray) -> Verification:
 
     command: N m, or target rad of a rig with a position loop, at RATE.
     """
-    if made.target not in PLAYERS:
-        why = "only --mjcf and --fmu are verified by simulation"
-        return Verification((), _losses(rig, made.leaves_out, command), why)
+    theirs, why = {}, "only --mjcf and --fmu are verified by simulation"
     try:
-        theirs = PLAYERS[made.target](made.content, rig, command)
-        mine = ours(rig, command)
+        if made.target in PLAYERS:
+            theirs, why = PLAYERS[made.target](made.content, rig, command), NO_NOISE
     except ParameterError as error:
-        return Verification((), _losses(rig, made.leaves_out, command), str(error))
-    apart = differences(rig, mine, theirs)
-    return Verification(apart, losses(rig, made.leaves_out, mine, command), "" if apart else NO_NOISE)
-
-
-def _losses(rig: Rig, omitted: Iterable[str], command: FloatArray) -> Mapping[str, Difference]:
-    """Return the losses of an export that is not played; none of a rig that cannot be simulated."""
-    if not {effect.name for effect in rig.effects}.intersection(omitted):
-        return {}
+        why = str(error)
+    if not theirs and not {effect.name for effect in rig.effects}.intersection(made.leaves_out):
+        return Verification(not_played=why)
     try:
-        return losses(rig, omitted, ours(rig, command), command)
-    except RseaError:
-        return {}
+        mine = ours(rig, command)
+        apart, lost = differences(rig, mine, theirs), losses(rig, made.leaves_out, mine, command)
+    except RseaError as error:  # a rig that cannot be simulated
+        return Verification(not_played=str(error) if theirs else why)
+    return Verification(apart, lost, "" if apart else why)

@@ -182,11 +182,19 @@ def test_three_files_hold_the_torque_its_intervals_and_the_residual_of_the_diagn
         assert "ft 0.0301" in text and "9.9.9, 2026-11-27" in text and "Friction explains it." in text
     for kind in (".h", ".py"):
         assert "N·m, 95 %: 2.7 to 3.3" in texts[kind]
-    rows = [line.split(",") for line in texts[".csv"].splitlines() if line.startswith("friction")]
-    held = {}
-    exec(texts[".py"], held)
-    assert [float(row[4]) for row in rows] == [held["friction"](float(row[2])) for row in rows]
-    assert len(rows) > 100
+
+
+def test_the_table_holds_what_the_functions_return():
+    rig = load_rig("pd_joint").with_effect("load_dependent_friction").with_effect("torque_ripple")
+    held, rows = in_python(rig), export_feedforward(rig, ".csv").content.splitlines()
+    rows = [row.split(",") for row in rows if not row.startswith("#")]
+    assert rows[0] == ["position", "velocity", "load", "of", "torque"]
+    for *at, of, torque in rows[1:]:
+        q, w, load = map(float, at)
+        assert float(torque) == (held[of](w, load, load) if of == "friction" else held[of](q))
+    assert {(row[2], row[3]) for row in rows[1:]} == {
+        ("-6.0", "friction"), ("0.0", "friction"), ("6.0", "friction"), ("0.0", "ripple"), ("0.0", "gravity"),
+    }  # fmt: skip
 
 
 def test_an_interval_of_a_value_that_was_changed_since_is_not_stated(tmp_path, capsys):
