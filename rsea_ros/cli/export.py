@@ -107,30 +107,26 @@ def _measured(source: str, rig: Rig) -> dict[str, Any]:
 
     Intervals are those of values that nobody has changed since. Raises RigError for an unreadable diagnosis.
     """
-    from rsea_ros.documents.strict_yaml import interval, load, mapping, number, sequence
-    from rsea_ros.errors import RigError
+    from rsea_ros.documents.strict_yaml import load
+    from rsea_ros.errors import FieldError, RigError
 
     lines = [*provenance("export", [], source).lines]
     values = rig.values() | {f"{e.name}.{p}": v for e in rig.effects for p, v in e.parameters.items()}
 
-    def intervals(content: Any) -> dict[str, tuple[float, float]]:
-        body = mapping(content, "diagnosis")
-        extended = mapping(body.get("extended"), "extended")
-        origin = mapping(body.get("provenance", {}), "provenance")
-        rms = mapping(extended.get("residual_rms"), "residual_rms").items()
-        lines.append(f"diagnosed by {origin.get('version')}, {origin.get('date')}: {body.get('sentence')}")
-        residuals = ", ".join(f"{name} {number(v, name, '1'):.3g}" for name, v in rms)
-        lines.append(f"residual, RMS, SI: {residuals}")
-        sizes = dict(mapping(extended.get("parameters"), "parameters"))
-        for cause in sequence(body.get("causes"), "causes", "causes"):
-            found = mapping(mapping(cause, "causes").get("parameters"), "parameters")
-            sizes |= {f"{cause.get('name')}.{name}": size for name, size in found.items()}
-        known = {}
-        for name, size in sizes.items():
-            value, pair = (mapping(size, name).get(key) for key in ("value", "ci95"))
-            if name in values and pair and math.isclose(number(value, name, "1"), values[name]):
-                known[name] = interval(pair, f"{name}.ci95", "SI")
-        return known
+    def intervals(found: Any) -> dict[str, tuple[float, float]]:
+        try:
+            sizes, origin = dict(found["extended"]["parameters"]), found.get("provenance", {})
+            for cause in found["causes"]:
+                sizes |= {f"{cause['name']}.{name}": size for name, size in cause["parameters"].items()}
+            rms = ", ".join(f"{name} {v:.3g}" for name, v in found["extended"]["residual_rms"].items())
+            lines.append(f"diagnosed by {origin.get('version')}, {origin.get('date')}: {found['sentence']}")
+            lines.append(f"residual, RMS, SI: {rms}")
+            known = {name: (size["value"], *(size["ci95"] or [None])) for name, size in sizes.items()}
+            finite = {name: size for name, size in known.items() if name in values and None not in size}
+            same = {name: ends for name, (v, *ends) in finite.items() if math.isclose(v, values[name])}
+            return {name: (float(low), float(high)) for name, (low, high) in same.items()}
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise FieldError(f"{error!r}, expected the diagnosis of the model beside it") from None
 
     beside = Path(source).parent / DIAGNOSIS_JSON
     if Path(source).name != MODEL or not beside.is_file():

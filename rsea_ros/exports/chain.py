@@ -11,7 +11,7 @@ axis is x, level: gravity is along -z.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rsea_ros.documents.units import STANDARD_GRAVITY, plain
 from rsea_ros.errors import RigError
@@ -117,13 +117,12 @@ def check_rotary(rig: Rig) -> None:
 
 def _chassis(rig: Rig) -> Link:
     """Return the chassis, with the distal side where the spring is rigid."""
-    inertia, load = rig["chassis.inertia"], None
-    if rig.rigid_spring and rig.end_is_free("spring_end"):
-        load = _end(rig, "spring_end", "distal")
-        inertia += load.inertia
+    is_one = rig.rigid_spring and rig.end_is_free("spring_end")
+    load = _end(rig, "spring_end", "chassis") if is_one else Link("chassis", 0.0)
+    inertia = rig["chassis.inertia"] + load.inertia
     if not inertia > 0.0:
         raise RigError(f"rig {rig.name}: chassis has inertia {inertia:g} kg·m², expected > 0 kg·m²")
-    return Link("chassis", inertia, load.weight, load.turned) if load else Link("chassis", inertia)
+    return replace(load, inertia=inertia)
 
 
 def _end(rig: Rig, end: str, name: str) -> Link:

@@ -162,10 +162,11 @@ def diagnosed(folder, **changed):
     found = {"torque": 3.0, "creep_velocity": 2e-3}
     rig = load_rig("paper_high_impedance").with_effect("coulomb_friction", **{**found, **changed})
     save_rig(rig, folder / "model.yaml")
-    sizes = {name: {"value": v, "unit": "", "ci95": [0.9 * v, 1.1 * v]} for name, v in found.items()}
+    sizes = {name: {"value": v, "ci95": [0.9 * v, 1.1 * v]} for name, v in found.items()}
+    unbounded = {"rotor.reflected_damping": {"value": 23.088, "ci95": [1.0, None]}}
     document = {
         "sentence": "*/ Friction explains it.", "causes": [{"name": "coulomb_friction", "parameters": sizes}],
-        "extended": {"parameters": {}, "residual_rms": {"ft": 0.0301}},
+        "extended": {"parameters": unbounded, "residual_rms": {"ft": 0.0301}},
         "provenance": {"date": "2026-11-27", "version": "9.9.9"},
     }  # fmt: skip
     (folder / "diagnosis.json").write_text(json.dumps(document))
