@@ -134,6 +134,7 @@ def _functions(rig: Rig, intervals: Intervals) -> tuple[list[Function], dict[str
         ripple.add("turns", train_ratio(rig), "1")
     limit = others.command_limit(rig)
     if math.isfinite(limit):
+        says["torque limit"] = "feedforward"
         whole.add("limit", limit, "N m")
         whole.statements.append("torque = fmin(fmax(torque, -limit), limit)")
     elif not effects.keys() & {"torque_saturation", "voltage_sag"}:
