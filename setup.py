@@ -47,7 +47,6 @@ setup(
     package_data={
         "": ["py.typed"],
         "rsea_ros.report.page": ["*.css", "*.js", "vendor/*"],
-        "rsea_ros.report.fleet": ["*.css"],
         "rsea_ros.report.paper": ["*.svg"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
         "rsea_ros.nodes": ["*.xml"],

@@ -25,7 +25,7 @@ _MARGIN = {"l": 64, "r": 24, "t": 12, "b": 40}
 _ACROSS: fig.Json = {"xref": "paper", "x0": 0.0, "x1": 1.0}
 
 
-def _date_axis(steps: Steps, until_s: float = 0.0) -> fig.Json:
+def date_axis(steps: Steps, until_s: float = 0.0) -> fig.Json:
     """Return an axis of dates over all steps, longer where something lies beyond them."""
     end = max(float(steps.edges[-1]), until_s)
     days = (end - float(steps.edges[0])) / DAY
@@ -75,7 +75,7 @@ def naming_figure(naming: Naming, appearance: Appearance | None, steps: Steps) -
         f"Median size of each {steps.name}, with the middle half. Grey at zero: recordings that do not name "
         "it; below the detection limit they could not.",
         _sizes(naming, naming.size * factor, unit, steps),
-        fig.layout(xaxis=_date_axis(steps), yaxis=height, shapes=since, annotations=note, margin=_MARGIN),
+        fig.layout(xaxis=date_axis(steps), yaxis=height, shapes=since, annotations=note, margin=_MARGIN),
         height=260,
     )
 
@@ -109,7 +109,7 @@ def _shares(naming: Naming, title: str, since: list[fig.Json], steps: Steps) -> 
         "hovertemplate": "%{customdata[0]} of %{customdata[1]} recordings<extra></extra>",
     }  # fmt: skip
     drawing = fig.layout(
-        xaxis=_date_axis(steps), yaxis=fig.axis("%", range=[0.0, 102.0]), shapes=since, margin=_MARGIN
+        xaxis=date_axis(steps), yaxis=fig.axis("%", range=[0.0, 102.0]), shapes=since, margin=_MARGIN
     )
     return fig.Figure(
         title, f"Share of the recordings of each {steps.name} that name it.", [bars], drawing, height=200
@@ -136,7 +136,7 @@ def parameter_figure(trend: Trend, steps: Steps) -> fig.Figure:
         _caption(trend),
         [*_course(trend, factor, fine), *ahead, *_weeks(bins, trend, steps, factor, unit, fine)],
         fig.layout(
-            xaxis=_date_axis(steps, until),
+            xaxis=date_axis(steps, until),
             yaxis=fig.axis(f"{say.name(trend.series.parameter)}, {unit}".rstrip(", "), hoverformat=".4g"),
             yaxis2={"overlaying": "y", "range": [0.0, 1.0], "visible": False, "fixedrange": True},
             shapes=shapes,

@@ -10,8 +10,8 @@ from rsea_ros.documents.wording import list_names
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.report.fleet import words as say
 from rsea_ros.report.fleet.joint_page import alarm_table, joint_page, joint_table, undetermined_table
-from rsea_ros.report.fleet.maps import heat_map, naming_map, shades, timeline
-from rsea_ros.report.page import Block, Html, bullets, fold, key_numbers, page, section
+from rsea_ros.report.fleet.maps import heat_map, naming_map, timeline
+from rsea_ros.report.page import Block, bullets, fold, key_numbers, page, section
 from rsea_ros.trends.alarms import Alarm, alarms_of, by_joint, worst_first
 from rsea_ros.trends.fleet_trends import fleet_trends
 from rsea_ros.trends.result import FleetTrends, Steps, steps_over
@@ -84,16 +84,14 @@ def _blocks(
         (_grouped(done), f"recordings used, of {_grouped(len(recordings['joint']))}"),
         (str(len(silent)), f"of {len(fleet.trends)} trends cannot be determined now"),
     ])  # fmt: skip
-    style = (Path(__file__).parent / "fleet.css").read_text(encoding="utf-8")
-    yield Html(f"<style>{style}{shades()}</style>")
-    yield timeline(ranked, steps, links)
+    yield from timeline(ranked, steps)
     if ranked:
         yield section("Worst joints first", alarm_table(ranked, links))
     for parameter in _parameters_with_map(fleet, joints[:_ROWS]):
-        yield heat_map(parameter, joints[:_ROWS], fleet, steps, links)
+        yield heat_map(parameter, joints[:_ROWS], fleet, steps)
     for kind, subject in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
         naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, subject)}
-        yield naming_map(subject, kind, [j for j in joints if j in naming][:_ROWS], fleet, steps, links)
+        yield naming_map(subject, kind, [j for j in joints if j in naming][:_ROWS], fleet, steps)
     yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
     number = "One trend" if len(silent) == 1 else f"{len(silent)} trends"
     if silent:

@@ -11,7 +11,7 @@ async function gunzipped(text) {
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
 }
 
-/* What report/figures/packing.py has packed: low bytes, then high bytes, of steps about a line. */
+/* What report/figures/overlay.py has packed: low bytes, then high bytes, of steps about a line. */
 async function unpacked({ first, slope, step, data }) {
   const planes = new Uint8Array(await (await gunzipped(data)).arrayBuffer()), n = planes.length / 2;
   return Float64Array.from({ length: n }, (_, k) => {
@@ -95,7 +95,7 @@ function button(text, about, act) {
 }
 
 /* A name without its marks; a break between two lines is a space. */
-function plain(name) { return String(name).replace(/<br>/g, " ").replace(/<[^>]*>/g, ""); }
+function plain(name) { return new DOMParser().parseFromString(String(name).replace(/<br>/g, " "), "text/html").body.textContent; }
 
 /* The title of the axis of a curve, which ends in the unit: of "x2" that of xaxis2, or of the next one with a title. */
 function quantity(layout, axis) {
@@ -111,12 +111,12 @@ function cell(value) {
   return Number.isNaN(+value) ? `"${String(value).replace(/"/g, '""')}"` : String(+(+value).toPrecision(7));
 }
 
-/* All samples of an overlay, the drawn points of any other figure: a column pair for each curve, with units. */
+/* All samples of an overlay, the drawn points of any other figure: a column pair for each curve or row, with units. */
 function csv(node, figure) {
   const times = figure.traces?.t.map((t) => Math.round(1e7 * t) / 1e7); /* without what the packing adds */
   const curves = figure.kind === "overlay"
     ? figure.traces.all.map((s) => ({ name: s.name, x: times, y: s.y, yaxis: s.axis }))
-    : node.data.filter((d) => d.x && d.y && d.name);
+    : node.data.flatMap((d) => (d.z && d.showscale !== false ? d.y.map((name, k) => ({ name, x: d.x, y: d.z[k] })) : d.x && d.y && d.name ? [d] : []));
   const quoted = (s) => '"' + plain(s).replace(/"/g, '""') + '"';
   const title = (c, letter) => quoted(`${c.name}: ${quantity(figure.layout, c[letter + "axis"] || letter)}`);
   const head = curves.flatMap((c) => [title(c, "x"), title(c, "y")]).join(",");

@@ -1,45 +1,30 @@
-"""What a browser shows of the pages of a fleet: colours, months, days."""
+"""What a browser shows of the pages of a fleet: joints, numbers, days."""
 
 from __future__ import annotations
-
-from itertools import pairwise
 
 import pytest
 
 from rsea_ros.report.fleet.page import write_fleet_report
 
-COLOURS = (
-    """[...document.querySelectorAll('.rail i:last-child')].map((i) => getComputedStyle(i).backgroundColor)"""
-)
-CELLS = """[...document.querySelectorAll('.heat svg [class^=u], .heat svg [class^=d]')]
-  .map((c) => getComputedStyle(c).fill)"""
-MONTHS = """[...document.querySelectorAll('.months')].map((m) => [...m.children]
-  .map((c) => c.getBoundingClientRect()).map((r) => [r.left, r.right]))"""
+ROWS = """[...document.querySelectorAll('.figure')].filter((f) => f.data[0].type === 'heatmap')
+  .map((f) => [...f.querySelectorAll('.ytick text')].map((t) => t.textContent))"""
+PRESS = "[...document.querySelectorAll('.tools button')].filter((b) => b.textContent === 'CSV')[1].click()"
 
 
 @pytest.fixture(scope="module")
 def fleet_in_browser(tables, browser, tmp_path_factory):
     browser.open(write_fleet_report(*tables, tmp_path_factory.mktemp("fleet") / "out").as_uri())
-    browser.until("document.querySelector('.heat')")
+    browser.until("document.querySelectorAll('.tools').length > 2")
     return browser
 
 
-def test_bars_and_cells_have_their_colours_in_a_browser(fleet_in_browser):
-    """A script took `--before` in the style for an option of a command: no bar was seen, all cells black."""
-    bars, cells = fleet_in_browser.value(COLOURS), fleet_in_browser.value(CELLS)
-    assert bars and set(bars) == {"rgb(217, 115, 13)"}
-    assert cells and set(cells) <= {"rgb(217, 115, 13)", "rgb(24, 100, 171)"}
-
-
-@pytest.mark.parametrize("width", [1400, 400, 320])
-def test_names_of_months_do_not_overlap(fleet_in_browser, width):
-    """On a phone the names of five months lay on each other."""
-    fleet_in_browser.size(width, 900)
-    rows = fleet_in_browser.value(MONTHS)
-    assert rows
-    for row in rows:
-        assert len(row) > 1 and row[0][0] >= 0.0 and row[-1][1] <= width
-        assert all(before[1] <= after[0] for before, after in pairwise(row))
+def test_a_map_names_its_joints_and_gives_its_numbers(fleet_in_browser, tables):
+    assert fleet_in_browser.errors == []
+    assert set(fleet_in_browser.value(ROWS)[0]) == set(tables[0]["joint"])
+    fleet_in_browser.value("save = (name, text) => { window.saved = text; }")
+    fleet_in_browser.value(PRESS)
+    head, first, *_ = fleet_in_browser.value("window.saved").splitlines()
+    assert head.count(" <left>: ") == 2 and first.count("2025-") == len(set(tables[0]["joint"]))
 
 
 def test_the_axis_of_a_few_days_names_days(young, fleet_in_browser):
