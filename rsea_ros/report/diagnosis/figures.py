@@ -72,28 +72,19 @@ _OF_PORT = {
     Port.COMMAND: "motor", Port.MOTOR: "motor", Port.GEAR: "gear", Port.SPRING: "spring",
     Port.SENSOR: "F/T sensor", Port.STRUCTURE: "gear",
 }  # fmt: skip
-_BOX, _HEIGHT = 104, 40
-_ROW, _COLUMN = 128, 56
-"""From a part to the next one, side by side and, for phones, one below the other."""
 
 
 def sketch(causes: Sequence[str]) -> Html:
-    """Return the drawing, in a row and, for phones, in a column; empty without a cause.
-
-    causes: names of effects, the largest first.
+    """Return the parts of the bench in their order, culprits marked; page.css draws them in a row or, for
+    phones, in a column. Empty without a cause. causes: names of effects, the largest first.
     """
-    if not causes:
-        return Html()
-    marked = {part_of(effect_named(name)): name for name in reversed(causes)}
-    spoken = escape(", ".join(f"{name} at the {part}" for part, name in marked.items()))
-    drawings = []
-    for kind, size in (("sketch", "900 92"), ("upright sketch", f"344 {len(_PARTS) * _COLUMN - 8}")):
-        boxes = "".join(
-            _box(i, part, marked.get(part, ""), kind != "sketch") for i, part in enumerate(_PARTS)
-        )
-        look = f'class="{kind}" viewBox="0 0 {size}" role="img" aria-label="{spoken}"'
-        drawings.append(f"<svg {look}><title>{spoken}</title>{boxes}</svg>")
-    return Html("".join(drawings))
+    marked = {part_of(effect_named(name)): words.effect(name) for name in reversed(causes)}
+    parts = (
+        f'<li class="culprit"><b>{part}</b><small class="cause">{escape(marked[part])}</small></li>'
+        if part in marked else f"<li><b>{part}</b></li>"
+        for part in _PARTS
+    )  # fmt: skip
+    return Html(f'<ol class="sketch">{"".join(parts)}</ol>' if marked else "")
 
 
 def part_of(effect: Effect) -> str:
@@ -101,31 +92,6 @@ def part_of(effect: Effect) -> str:
     if effect.port == Port.SENSOR and effect.claims.channel in ("position", "velocity"):
         return "encoder"
     return effect.part if effect.part in _PARTS else _OF_PORT[effect.port]
-
-
-def _box(index: int, part: str, culprit: str, upright: bool) -> str:
-    """Return a part with the line to the next one, in orange with its cause where it is to blame.
-
-    The name of the cause stands under its part in a row, where the edge would cut off those of the outer
-    parts if they were centred, and right of it in a column.
-    """
-    x, y = (2, index * _COLUMN + 4) if upright else (index * _ROW + 2, 4)
-    middle, level = x + _BOX // 2, y + _HEIGHT // 2
-    if upright:
-        line, beside = (middle, middle, y + _HEIGHT, y + _COLUMN), (x + _BOX + 10, level + 5, "start")
-    else:
-        line, beside = (x + _BOX, x + _ROW, level, level), (middle, y + _HEIGHT + 24, "middle")
-        if part in (_PARTS[0], _PARTS[-1]):
-            beside = (x, beside[1], "start") if part == _PARTS[0] else (x + _BOX, beside[1], "end")
-    link = '<line x1="{}" x2="{}" y1="{}" y2="{}"/>'.format(*line) if part != _PARTS[-1] else ""
-    name = escape(words.effect(culprit)) if culprit else ""
-    place = 'x="{}" y="{}" style="text-anchor:{}"'.format(*beside)
-    under = f'<text class="cause" {place}>{name}</text>' if culprit else ""
-    return (
-        f'<g class="{"culprit" if culprit else "part"}">{link}'
-        f'<rect x="{x}" y="{y}" width="{_BOX}" height="{_HEIGHT}" rx="6"/>'
-        f'<text x="{middle}" y="{level + 5}">{escape(part)}</text>{under}</g>'
-    )
 
 
 BINS = 16
