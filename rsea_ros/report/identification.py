@@ -299,22 +299,13 @@ def statics_sentences(statics: Statics) -> tuple[str, ...]:
 
 
 def value_text(p: ParameterEstimate) -> tuple[str, str]:
-    """Return a value and its 95 % interval: ("1530.5", " ± 0.1"), or lopsided ("1391", " (1391 … 1531)").
+    """Return a value and its 95 % interval: ("1530", " ± 30"), or lopsided ("1391.345", " −0.060/+139").
 
     Far from the noise there is no interval: it would hold the noise alone, not the law that is missing.
     """
-    value, half = words.with_interval(p.value, *p.ci95)
     if p.beside_misfit:
-        return value, " (no interval)"
-    low, high = p.ci95
-    sides = sorted((p.value - low, high - p.value))
-    if not half or sides[1] <= words.LOPSIDED * sides[0]:
-        return value, f" ± {half}" if half else ""
-    decimals = 2 - math.floor(math.log10(sides[1]))
-    step = 10.0**-decimals
-    ends = (p.value, step * math.floor(low / step), step * math.ceil(high / step))
-    shown = [words.minus(f"{v:.{max(0, decimals)}f}" if decimals < 9 else f"{v:.2e}") for v in ends]
-    return shown[0], f" ({shown[1]} … {shown[2]})"
+        return words.with_interval(p.value, *p.ci95)[0], " (no interval)"
+    return words.with_doubt(p.value, *p.ci95)
 
 
 def terminal_table(identification: Identification, truth: Mapping[str, float] | None = None) -> Table:

@@ -1,7 +1,6 @@
 """A law that no effect covers: page, figures, sentences and law.json beside its files."""
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from rsea_ros.effects.catalogue import lend
 from rsea_ros.laws.law import Law, LawResult, WrittenLaw, about_of, equation_of
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
-from rsea_ros.records.record import UNITS, FloatArray, IntArray
+from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import page as html, words
 from rsea_ros.report.figures import figure as fig
@@ -123,8 +122,8 @@ def _files(result: LawResult) -> html.Html:
     ))  # fmt: skip
 
 
-_WINDOWS = 12
-_CURVE = 160
+_CURVE, _FEWEST = 160, 5
+"""Bins along the law's variable, and points of a bin that has a mean."""
 
 
 def over_figure(written: WrittenLaw) -> fig.Figure:
@@ -135,20 +134,15 @@ def over_figure(written: WrittenLaw) -> fig.Figure:
         x = np.mod(x, 2.0 * np.pi / cycles[0])
     over, over_unit = _LETTERS[shown.over]
     quantity, unit = ("angle", "rad") if law.place == "encoder" else ("torque", words.unit("N m"))
-    centre, low, high = _curve(x, shown.law)
-    middle, error = _bin_means(x, y, centre)
+    centre, low, high, middle, error = _in_bins(x, y, shown.law)
     mean = np.flatnonzero(np.isfinite(middle))[::6]
-    windows = np.array_split(np.argsort(shown.t), _WINDOWS)
-
-    def cloud(k: IntArray | slice, colour: str, size: float, name: str, visible: bool = True) -> fig.Json:
-        look = {"marker": {"size": size, "color": colour}, "visible": visible, "hoverinfo": "skip"}
-        return fig.points(fig.numbers(x[k]), fig.numbers(y[k]), name, **look)
-
+    when: fig.Json = {"color": fig.numbers(shown.t), "colorscale": [[0.0, fig.NOISE], [1.0, fig.BEFORE]],
+                      "colorbar": {"title": {"text": "time, s"}, **fig.KEY}}  # fmt: skip
     sides: fig.Json = {"type": "data", "array": fig.numbers(error[mean]), "thickness": 1.2, "width": 0,
                        "color": fig.INK}  # fmt: skip
     data: list[fig.Json] = [
-        cloud(slice(None), fig.faint(fig.MEASURED, 0.28), 3.5, "measured"),
-        *(cloud(k, fig.faint(fig.BEFORE, 0.85), 5, "", i == 0) for i, k in enumerate(windows)),
+        fig.points(fig.numbers(x), fig.numbers(y), "measured", hoverinfo="skip",
+                   marker={"size": 3.5, "opacity": 0.5, **when}),
         fig.band(centre, low, high, fig.faint(fig.AFTER, 0.16)),
         fig.points(fig.numbers(centre[mean]), fig.numbers(middle[mean]), "mean",
                    marker={"size": 6, "color": fig.INK}, error_y=sides),
@@ -158,52 +152,32 @@ def over_figure(written: WrittenLaw) -> fig.Figure:
     wave = "one period of the " if cycles and cycles[0] else ""
     return fig.Figure(
         f"The missing {quantity} over the {over}, and the law in it",
-        f"Grey: missing in the simulation, point by point (one sigma {shown.sd:.2g} {unit}). Black: its "
-        "mean with 95 %. Blue: the law; its band is the spread from its other variables. The slider shows "
-        "one stretch of time in orange.",
+        f"Points: missing in the simulation (one sigma {shown.sd:.2g} {unit}), the later the more orange. "
+        "Black: their mean with 95 %. Blue: the law; its band is the spread from its other variables.",
         data,
         fig.layout(
             xaxis=fig.axis(f"{wave}{over}, {words.unit(over_unit)}"),
             yaxis=fig.axis(f"missing, {unit}", range=[-top, top]),
-            hovermode="closest", sliders=[_slider(shown.t, windows)],
-            margin={"l": 64, "r": 24, "t": 12, "b": 96},
+            hovermode="closest",
         ),
         560,
     )  # fmt: skip
 
 
-def _slider(t: FloatArray, windows: Sequence[IntArray]) -> fig.Json:
-    """Return the slider that shows one window of the record at a time. windows: indices into t (s)."""
-    steps = [
-        {"label": f"{t[k[0]]:.0f}", "method": "restyle",
-         "args": ["visible", [True, *(j == i for j in range(len(windows))), True, True, True]]}
-        for i, k in enumerate(windows)
-    ]  # fmt: skip
-    small = {"size": 12, "color": fig.QUIET}
-    value = {"prefix": "orange: from ", "suffix": " s on", "font": small}
-    return {"active": 0, "currentvalue": value, "steps": steps, "pad": {"t": 44}, "len": 1.0, "x": 0.0,
-            "tickcolor": fig.QUIET, "font": small}  # fmt: skip
-
-
-def _curve(x: FloatArray, law: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return places along x, and the 10 to 90 % range of the law at each, by its other variables."""
+def _in_bins(x: FloatArray, y: FloatArray, law: FloatArray) -> FloatArray:
+    """Return at places along x, shape (5, n): the place, the 10 and 90 % of the law by its other variables,
+    the mean of y and its 95 % half-width, NaN where few points are.
+    """
     first, last = np.quantile(x, [0.002, 0.998])
     edges = np.linspace(first, last, _CURVE + 1)
     which = np.clip(np.searchsorted(edges, x) - 1, 0, _CURVE - 1)
-    places = np.unique(which)
-    low, high = (np.array([np.quantile(law[which == k], q) for k in places]) for q in (0.1, 0.9))
-    return 0.5 * (edges[1:] + edges[:-1])[places], low, high
-
-
-def _bin_means(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the mean of y near each centre with its 95 % half-width, nan where few points are."""
-    edges = np.concatenate([[-np.inf], 0.5 * (centre[1:] + centre[:-1]), [np.inf]])
-    which = np.searchsorted(edges, x) - 1
-    count = np.bincount(which, minlength=len(centre))[: len(centre)]
-    mean = np.bincount(which, y, len(centre))[: len(centre)] / np.maximum(count, 1)
-    square = np.bincount(which, y * y, len(centre))[: len(centre)] / np.maximum(count, 1)
-    error = Z95 * np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count, 1))
-    return np.where(count > 4, mean, np.nan), error
+    rows = []
+    for k in np.unique(which):
+        values, few = y[which == k], np.sum(which == k) < _FEWEST
+        mean = (np.nan, np.nan) if few else (values.mean(), Z95 * values.std() / np.sqrt(len(values)))
+        rows.append((0.5 * (edges[k] + edges[k + 1]), *np.quantile(law[which == k], (0.1, 0.9)), *mean))
+    shown: FloatArray = np.array(rows).T
+    return shown
 
 
 def time_figure(written: WrittenLaw) -> fig.Figure:
@@ -290,7 +264,8 @@ def law_lines(result: LawResult) -> Iterator[str]:
 def parameter_lines(law: Law) -> list[str]:
     """Return each parameter with its value, interval and unit."""
     return [
-        f"{n} = {_value_text(*of[:2])} {words.unit(of[2])}".rstrip() for n, of in _parameters(law).items()
+        f"{n} = {''.join(words.with_doubt(v, *(ci95 or (v, v))))} {words.unit(unit)}".rstrip()
+        for n, (v, ci95, unit) in _parameters(law).items()
     ]
 
 
@@ -305,13 +280,6 @@ def _parameters(law: Law) -> dict[str, Size]:
         if shape:
             sizes.setdefault(shape, (part.shape, part.shape_ci95, part.term.shape_unit))
     return sizes
-
-
-def _value_text(value: float, ci95: tuple[float, float] | None) -> str:
-    if ci95 is None or not all(map(math.isfinite, ci95)):
-        return f"{value:.4g}"
-    middle, half = words.with_interval(value, *ci95)
-    return f"{middle} ± {half}" if half else middle
 
 
 def law_json(result: LawResult) -> dict[str, Any]:

@@ -25,6 +25,8 @@ NOISE = "#adb5bd"
 TRUTH = "#2b8a3e"
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+KEY: Json = {"thickness": 9, "outlinewidth": 0}
+"""The bar that names colours."""
 _DIGITS, _MOST_DIGITS = 5, 15
 """Significant digits of a number, at least and at most: a double has 15."""
 

@@ -27,7 +27,6 @@ _SINCE = 34
 """Pixels of a finding: its words, and its bar below them."""
 _PALE = fig.faint(fig.MEASURED, 0.1)
 _HOVER = "%{{y}}, %{{x}}: {}<extra></extra>"
-_KEY: fig.Json = {"thickness": 9, "outlinewidth": 0}
 _TONES = {"change": fig.AFTER, "fault": fig.MEASURED}
 """Colours of the findings that neither go on nor have a name: those that do are orange."""
 
@@ -52,7 +51,7 @@ def heat_map(parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: S
         "recordings that do not determine it, or of too few days for a level. Empty: no recording."
     )
     shades, ends = [[0.0, fig.AFTER], [0.5, _PALE], [1.0, fig.BEFORE]], [-full, 0.0, full]
-    key = {"tickvals": ends, "ticktext": [say.percent(-full), "first day", say.percent(full)], **_KEY}
+    key = {"tickvals": ends, "ticktext": [say.percent(-full), "first day", say.percent(full)], **fig.KEY}
     unknown = {"z": np.where(undetermined, 1.0, np.nan), "hovertemplate": _HOVER.format("not determined"),
                "colorscale": [[0.0, fig.NOISE], [1.0, fig.NOISE]], "showscale": False}  # fmt: skip
     cells = {"z": change, "zmin": -full, "zmax": full, "colorscale": shades, "colorbar": key}
@@ -71,7 +70,7 @@ def naming_map(
     plain = say.name(subject) + ("" if kind == "cause" else " in the data")
     title = f"{plain}: often in {often} of {len(fleet.joints)} joints"
     caption = f"Share of the recordings of each {steps.name} that name it, for joints with at least one."
-    key = {"tickvals": [0.0, 1.0], "ticktext": ["none", "all"], **_KEY}
+    key = {"tickvals": [0.0, 1.0], "ticktext": ["none", "all"], **fig.KEY}
     shades = [[0.0, _PALE], [1.0, fig.BEFORE]]
     cells = {"z": share, "zmin": 0.0, "zmax": 1.0, "colorscale": shades, "colorbar": key}
     return _map(title, caption, joints, steps, [cells])

@@ -67,11 +67,11 @@ def test_a_value_within_its_doubt_or_at_a_bound_is_not_determined(p: ParameterEs
 @pytest.mark.parametrize(
     ("p", "text"),
     [(estimate(1530.4, 1500.4, 1560.4), "1530 ± 30"),
-     (estimate(1391.3449, 1391.2849, 1530.511), "1391 (1391 … 1531)"),
-     (estimate(3.467, 2.717, 3.798), "3.467 (2.717 … 3.798)"),
+     (estimate(1391.3449, 1391.2849, 1530.511), "1391.345 −0.060/+139"),
+     (estimate(3.467, 2.717, 3.798), "3.47 −0.75/+0.33"),
      (estimate(3.0, -np.inf, np.inf), "3.000")],
 )  # fmt: skip
-def test_a_lopsided_interval_is_shown_by_its_ends(p: ParameterEstimate, text: str) -> None:
+def test_a_lopsided_interval_is_shown_by_its_sides(p: ParameterEstimate, text: str) -> None:
     assert "".join(value_text(p)) == text
     assert value_text(p)[1] in parameter_table([p])
 
