@@ -143,7 +143,7 @@ def test_an_offence_is_found(place, source):
     [
         ("rsea_ros/model/rig.py", "import numpy as np\nfrom rsea_ros.effects.effect import Effect"),
         ("rsea_ros/hardware/simulated.py", "from rsea_ros.model.simulation import Plant"),
-        ("rsea_ros/report/figures/bode.py", "import numpy\nfrom ...identification import result"),
+        ("rsea_ros/report/figures/response.py", "import numpy\nfrom ...identification import result"),
     ],
 )
 def test_an_allowed_import_passes(place, source):

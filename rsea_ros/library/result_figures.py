@@ -9,8 +9,8 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.identification.result import Identification, Overlay
 from rsea_ros.records.record import UNITS
 from rsea_ros.report import words
-from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import AFTER, BEFORE, MEASURED
+from rsea_ros.report.figures.response import bode_figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

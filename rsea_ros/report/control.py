@@ -12,9 +12,10 @@ from rsea_ros.control.robustness import Reach, Spread
 from rsea_ros.control.study import AtRate, Compensated, Study, TrialResult
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.transfer import end_response
+from rsea_ros.records.record import ComplexArray, FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures import figure as fig
-from rsea_ros.report.figures.response_curves import Band, Mark, ResponseCurve, response_figure
+from rsea_ros.report.figures.response import Band, Mark, ResponseCurve, response_figure
 from rsea_ros.report.page import Block, Html, bullets, key_numbers, page, section, table
 from rsea_ros.report.result_files import Provenance, pick
 
@@ -115,18 +116,17 @@ def _band(curve: Following, apart: Spread) -> Band:
 
 
 def _impedance_figure(study: Study) -> fig.Figure:
-    first, shades = study.rates[0].impedance, list(zip(study.rates, _COLOURS, strict=False))
-    items = [
-        (f"{at.design.rate:g} Hz", at.impedance.hz, at.impedance.controlled, c, "solid") for at, c in shades
-    ]
-    items += [("motor off", first.hz, first.motor_off, fig.QUIET, "dash"),
-              ("passive spring", first.hz, first.spring, fig.MEASURED, "dot")]  # fmt: skip
-    data = [
-        fig.band(at.softness.hz, at.softness.low, at.softness.high, fig.faint(c, 0.18)) for at, c in shades
-    ]
-    for name, hz, z, colour, dash in items:
+    first, bands, lines = study.rates[0].impedance, [], []
+
+    def drawn(name: str, hz: FloatArray, z: ComplexArray, colour: str, dash: str) -> fig.Json:
         look: fig.Json = {"line": {"color": colour, "width": 1.8, "dash": dash}}
-        data.append(fig.line(hz, np.abs(z), name, colour, hovertemplate="%{y:.3g} N·m per rad/s", **look))
+        return fig.line(hz, np.abs(z), name, colour, hovertemplate="%{y:.3g} N·m per rad/s", **look)
+
+    for rate, at, colour in zip(rates(study), study.rates, _COLOURS, strict=False):
+        bands.append(fig.band(at.softness.hz, at.softness.low, at.softness.high, fig.faint(colour, 0.18)))
+        lines.append(drawn(rate, at.impedance.hz, at.impedance.controlled, colour, "solid"))
+    lines.append(drawn("motor off", first.hz, first.motor_off, fig.QUIET, "dash"))
+    lines.append(drawn("passive spring", first.hz, first.spring, fig.MEASURED, "dot"))
     one = int(np.argmin(np.abs(first.hz - 1.0)))
     softer = abs(first.spring[one]) / abs(first.controlled[one])
     highest = max(float(at.impedance.hz[-1]) for at in study.rates)
@@ -134,11 +134,11 @@ def _impedance_figure(study: Study) -> fig.Figure:
         title=f"At 1 Hz the moved output is {softer:.0f} times softer than the spring alone",
         caption="Torque error for each rad/s of the distal side, housing clamped. Spring alone: K_s/s + b_s. "
         "Band: the locked benches of the set.",
-        data=data,
+        data=bands + lines,
         layout=fig.layout(
             xaxis=fig.frequency_axis(float(first.hz[0]), highest),
             yaxis=fig.axis("N·m per rad/s", type="log"),
-            annotations=fig.names_beside([(name, colour) for name, _, _, colour, _ in items], 0.08),
+            annotations=fig.names_beside(fig.named(lines), 0.08),
             margin={"l": 64, "r": 150, "t": 12, "b": 48},
         ),
         height=400,

@@ -26,7 +26,7 @@ from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z90
 from rsea_ros.report import words
 from rsea_ros.report.figures import figure as fig
-from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
+from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure
 from rsea_ros.report.figures.surface import Point, bandwidth_contours, log_marks
 from rsea_ros.report.page import Block, Html, equation, key_numbers, listed, page, section, table
 from rsea_ros.report.result_files import Provenance, pick

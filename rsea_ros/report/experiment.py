@@ -24,6 +24,7 @@ from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures import figure as fig
+from rsea_ros.report.figures.spectrum import in_bands
 from rsea_ros.report.page import Block, Html, bullets, key_numbers, page, section, table
 from rsea_ros.report.result_files import EXPERIMENT_JSON, MODEL, REPORT, Provenance, json_text, pick, strict
 
@@ -79,7 +80,7 @@ def _advice(advice: Advice) -> Iterator[Block]:
                 (f"{s:.3g}", f"S of {plain_name(true)} over {plain_name(rival)}, the worst pair")
             )
         yield key_numbers(
-            keys if len(p.names) == 1 else [*keys, (decided_words(p), "expected to be decided")]
+            keys if len(p.names) == 1 else [*keys, (f"{100.0 * p.decided:.0f} %", "expected to be decided")]
         )
     rows = possible_rows(advice)
     for name, left in advice.excluded.items():
@@ -131,33 +132,25 @@ def command_figure(p: Proposal) -> fig.Figure:
 
 def spectrum_figure(runs: Sequence[tuple[str, Proposal]]) -> fig.Figure:
     """Return the amplitude spectral densities of runs."""
-    traces, names = [], []
+    traces = []
     for k, (name, p) in enumerate(runs):
         f, density = density_of(p.command, p.rate)
         colour = (fig.AFTER, fig.BEFORE, fig.QUIET)[k % 3]
         look: fig.Json = {"line": {"color": colour, "width": 1.4, "dash": _DASH[k % 4]}}
         traces.append(fig.line(f, density, name, colour, hovertemplate="%{y:.3g} N·m/√Hz", **look))
-        names.append((name, colour))
     top = float(np.log10(max(y for trace in traces for y in trace["y"])))
     height = fig.axis("N·m/√Hz", type="log", range=[top - 3.0, top + 0.3])
     title = "Where the runs put their power" if len(runs) > 1 else "Where the run puts its power"
-    drawing = fig.layout(
-        xaxis=fig.frequency_axis(0.2, 140.0), yaxis=height, annotations=fig.names_beside(names, 0.075)
-    )
+    names = fig.names_beside(fig.named(traces), 0.075)
+    drawing = fig.layout(xaxis=fig.frequency_axis(0.2, 140.0), yaxis=height, annotations=names)
     return fig.Figure(title, "Amplitude spectral density of the command.", traces, drawing, height=320)
 
 
 def density_of(command: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Return frequency (Hz) and amplitude spectral density (N m/sqrt(Hz)) of a command, smoothed."""
-    n = len(command)
-    power = np.abs(np.fft.rfft(command)) ** 2 * 2.0 / (rate * n)
-    frequency = np.fft.rfftfreq(n, 1.0 / rate)
-    edges = np.unique(np.concatenate([np.arange(1, 8), np.geomspace(8, len(power) - 1, 60).astype(int)]))
-
-    def mean(values: FloatArray) -> FloatArray:
-        return np.asarray(np.add.reduceat(values[: edges[-1]], edges[:-1]) / np.diff(edges), float)
-
-    return mean(np.asarray(frequency, float)), np.sqrt(mean(np.asarray(power, float)))
+    """Return frequency (Hz) and amplitude spectral density (N m/sqrt(Hz)) of a command, in narrow bands."""
+    density = np.asarray(np.abs(np.fft.rfft(command)) * np.sqrt(2.0 / (rate * len(command))), float)
+    frequency = np.asarray(np.fft.rfftfreq(len(command), 1.0 / rate), float)
+    return in_bands(frequency[1:], density[1:])
 
 
 def _session(outcome: CampaignOutcome, limits: RunLimits) -> Iterator[Block]:
@@ -189,18 +182,17 @@ def probability_figure(outcome: CampaignOutcome) -> fig.Figure:
     x = np.arange(len(rounds), dtype=float)
     names = sorted({n for r in rounds for n, p in r.items() if p >= _SHOWN})
     names.sort(key=lambda n: -rounds[-1].get(n, 0.0))
-    traces, shown = [], []
+    traces = []
     for k, name in enumerate(names):
         colour = _COLOURS[k] if k < len(_COLOURS) else fig.QUIET
         y, dot = np.array([r.get(name, 0.0) for r in rounds]), {"size": 7, "color": colour}
         hover = {"mode": "lines+markers", "marker": dot, "hovertemplate": "probability %{y:.3f}"}
         traces.append(fig.line(x, y, plain_name(name), colour, 2.2, **hover))
-        shown.append((plain_name(name), colour))
     ticks = ["first records" if not k else f"after run {k}" for k in range(len(rounds))]
     drawing = fig.layout(
         xaxis=fig.axis(tickvals=fig.numbers(x), ticktext=ticks, range=[-0.2, float(x[-1]) + 0.2]),
         yaxis=fig.axis("probability", range=[-0.03, 1.06]),
-        annotations=fig.names_beside(shown, 0.075),
+        annotations=fig.names_beside(fig.named(traces), 0.075),
         margin={"l": 64, "r": 180, "t": 12, "b": 48},
     )
     caption = (
@@ -241,7 +233,7 @@ def verdict(advice: Advice) -> str:
         return f"No run within the limits separates {list_names(names)}"
     if len(names) == 1:
         return f"{_narrowing(advice.hypotheses[0], p)}: {shape_words(p)}"
-    between, share = list_names(names), decided_words(p)
+    between, share = list_names(names), f"{100.0 * p.decided:.0f} %"
     return f"The next run is expected to decide between {between} in {share} of cases: {shape_words(p)}"
 
 
@@ -253,11 +245,6 @@ def possible_rows(advice: Advice) -> list[tuple[str, str]]:
         (plain_name(h.name), f"probability {words.probability(h.probability)} among these")
         for h in advice.hypotheses
     ]
-
-
-def decided_words(p: Proposal) -> str:
-    """Return the share of the cases that a run is expected to decide."""
-    return f"{100.0 * p.decided:.0f} %"
 
 
 def _narrowing(hypothesis: Hypothesis, p: Proposal) -> str:
@@ -325,35 +312,29 @@ def size(weighing: RunWeighing, name: str) -> str:
     return f"{main.name.replace('_', ' ')} {text}"
 
 
+_ENDS = {
+    "confirmed": "{cause}, {size}: probability {sure} {spent}",
+    "nothing_wrong": "No cause: the rig with fitted values explains everything, probability {sure} {spent}",
+    "unexplained": "None of the causes explains the runs {spent}: the best, {cause}, leaves {left:.2f} times "
+    "the noise",
+    "undecidable": "No further run would help: {remain} {spent}",
+    "spent": "The budget is spent {spent}: {remain}",
+    "declined": "The next run was declined {spent}: {remain}",
+    "broken": "A run was aborted ({why}) and is not used; {remain}",
+}
+
+
 def end_sentence(outcome: CampaignOutcome) -> str:
     """Return how a session ended."""
-    cause = outcome.cause
-    sure = words.probability(outcome.weighing.probability[cause])
+    cause, weighing = outcome.cause, outcome.weighing
     spent = f"after {outcome.seconds:.3g} s of excitation in {' '.join(run_count(outcome))}"
-    likely = [f"{plain_name(n)} ({p:.2f})" for n, p in by_probability(outcome.weighing, 0.05)]
-    remain = f"{list_names(likely)} remain possible"
-    match outcome.end:
-        case "confirmed":
-            return f"{plain_name(cause)}, {size(outcome.weighing, cause)}: probability {sure} {spent}"
-        case "nothing_wrong":
-            return f"No cause: the rig with fitted values explains everything, probability {sure} {spent}"
-        case "unexplained":
-            return (
-                f"None of the causes explains the runs {spent}: the best, {plain_name(cause)}, leaves "
-                f"{outcome.weighing.left:.2f} times the noise"
-            )
-        case "undecidable" if outcome.shared is not None:
-            return shared_words(outcome, f" {spent}")
-        case "undecidable":
-            return f"No further run would help: {remain} {spent}"
-        case "spent":
-            return f"The budget is spent {spent}: {remain}"
-        case "declined":
-            return f"The next run was declined {spent}: {remain}"
-        case "broken":
-            return f"A run was aborted ({outcome.why}) and is not used; {remain}"
-        case _:
-            return f"The session could not continue ({outcome.why}): {remain}"
+    if outcome.end == "undecidable" and outcome.shared is not None:
+        return shared_words(outcome, f" {spent}")
+    likely = [f"{plain_name(n)} ({p:.2f})" for n, p in by_probability(weighing, 0.05)]
+    return _ENDS.get(outcome.end, "The session could not continue ({why}): {remain}").format(
+        cause=plain_name(cause), size=size(weighing, cause), spent=spent, why=outcome.why, left=weighing.left,
+        sure=words.probability(weighing.probability[cause]), remain=f"{list_names(likely)} remain possible",
+    )  # fmt: skip
 
 
 def shared_words(outcome: CampaignOutcome, spent: str = "") -> str:

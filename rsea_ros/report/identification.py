@@ -17,9 +17,9 @@ from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import SENSED, UNITS, FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import page as html, result_files as outputs, rig as rigs, words
-from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, MEASURED, QUIET, Curve, Figure, faint
 from rsea_ros.report.figures.overlay import overlay_figure
+from rsea_ros.report.figures.response import bode_figure
 from rsea_ros.report.figures.spectrum import density, finding, residual_figure
 from rsea_ros.report.remark_words import coloured_noise, fault_lines, remark_sentences
 

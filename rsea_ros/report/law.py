@@ -183,12 +183,12 @@ def _in_bins(x: FloatArray, y: FloatArray, law: FloatArray) -> FloatArray:
 def time_figure(written: WrittenLaw) -> fig.Figure:
     """Return the missing torque and the law over time."""
     shown, unit = written.shown, words.unit("rad" if written.law.place == "encoder" else "N m")
-    curves = (("missing", shown.values, fig.MEASURED, 1.0), ("law", shown.law, fig.AFTER, 1.4))
+    hover = {"hovertemplate": f"%{{y:.3g}} {unit}"}
     data = [
-        fig.line(shown.t, y, name, colour, w, hovertemplate=f"%{{y:.3g}} {unit}")
-        for name, y, colour, w in curves
+        fig.line(shown.t, shown.values, "missing", fig.MEASURED, 1.0, **hover),
+        fig.line(shown.t, shown.law, "law", fig.AFTER, 1.4, **hover),
     ]
-    names = fig.names_beside([(name, colour) for name, _, colour, _ in curves], 0.13)
+    names = fig.names_beside(fig.named(data), 0.13)
     middle = float(shown.t[len(shown.t) // 2])
     across = fig.axis("time, s", range=[middle, min(middle + 3.0, float(shown.t[-1]))])
     plane = fig.layout(xaxis=across, yaxis=fig.axis(unit), annotations=names)

@@ -5,7 +5,7 @@ import pytest
 
 from rsea_ros.control.following import Following
 from rsea_ros.report.figures.figure import AFTER
-from rsea_ros.report.figures.response_curves import ResponseCurve, response_figure
+from rsea_ros.report.figures.response import ResponseCurve, response_figure
 
 HZ = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0])
 FOLLOWED = np.array([1.0, 1.0, 0.7, 0.2]) * np.exp(-1j * np.radians([0.0, 5.0, 100.0, 200.0]))

@@ -172,6 +172,11 @@ def points(x: FloatArray | Sequence[Any], y: Sequence[float | None], name: str, 
     return {"type": "scatter", "mode": "markers", "x": list(x), "y": list(y), "name": name, **parts}
 
 
+def named(traces: Sequence[Json]) -> list[tuple[str, str]]:
+    """Return the name and the colour of each line."""
+    return [(trace["name"], trace["line"]["color"]) for trace in traces]
+
+
 def names_beside(items: Sequence[tuple[str, str]], step: float, x: float = 1.015) -> list[Json]:
     """Return the names of curves, each with its colour, one below the other right of the figure."""
     return [

@@ -17,9 +17,8 @@ from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.rival_models import MovingOutput, largest_gap, lumped_rig, readings, resonance_hz
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
-from rsea_ros.report.figures.bode import thin
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, INK, MEASURED, QUIET, TRUTH, Figure, faint
-from rsea_ros.report.figures.response_curves import Mark, ResponseCurve, response_figure
+from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure, thin
 from rsea_ros.report.figures.surface import Point, bandwidth_contours, slices
 
 _HZ: FloatArray = np.geomspace(0.1, 140.0, 500)

@@ -1,7 +1,7 @@
-"""Bode figure: measured response with its 95 % band, the model, their ratio, the coherence; its finding."""
+"""Frequency responses with bands and marks; a measured one beside its model, with ratio and coherence."""
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -24,7 +24,96 @@ _PER_DECADE = 50
 _SMALLEST = 1e-100
 """Standard deviation whose inverse square is still a number."""
 Values = TypeVar("Values", FloatArray, ComplexArray)
-Sides = tuple[FloatArray, FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class Band:
+    """Limits about a curve at hz, shape (n,): least and largest gain, dB, and phase, deg."""
+
+    hz: FloatArray
+    gain: tuple[FloatArray, FloatArray]
+    phase: tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class ResponseCurve:
+    """A curve: name in the legend at its end, hz and values of shape (n,).
+
+    phase: deg, shape (n,); by default that of the values, continuous from the first. opacity: of the line.
+    """
+
+    name: str
+    colour: str
+    hz: FloatArray
+    values: ComplexArray
+    width: float = 1.8
+    dash: str = "solid"
+    band: Band | None = None
+    phase: FloatArray | None = None
+    opacity: float = 1.0
+
+    @property
+    def degrees(self) -> FloatArray:
+        """The phase that is drawn, deg, shape (n,)."""
+        return np.degrees(np.unwrap(np.angle(self.values))) if self.phase is None else self.phase
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A frequency, Hz, its text, and the side of the text at the line."""
+
+    hz: float
+    text: str
+    anchor: str = "center"
+
+
+def response_figure(
+    title: str, responses: Sequence[ResponseCurve], marks: Sequence[Mark] = (), caption: str = "",
+    decibel: tuple[float, float] | None = None,
+) -> fig.Figure:  # fmt: skip
+    """Return gain and phase over frequency; marks are vertical lines. decibel: range of the gain axis."""
+    return fig.Figure(title, caption, list(_traces(responses)), _layout(responses, marks, decibel), 560)
+
+
+def _traces(responses: Sequence[ResponseCurve]) -> Iterator[fig.Json]:
+    """Yield the traces of gain, dB, and phase, deg, over frequency."""
+    for r in responses:
+        if r.band is not None:
+            shade = fig.faint(r.colour, 0.18)
+            yield fig.band(r.band.hz, *r.band.gain, shade)
+            yield fig.band(r.band.hz, *r.band.phase, shade, yaxis="y2")
+        look: fig.Json = {"line": {"color": r.colour, "width": r.width, "dash": r.dash}}
+        look |= {"opacity": r.opacity} if r.opacity < 1.0 else {}
+        gain = 20.0 * np.log10(np.abs(r.values))
+        yield fig.line(r.hz, gain, r.name, r.colour, hovertemplate="%{y:.2f} dB", **look)
+        yield fig.line(r.hz, r.degrees, r.name, r.colour, hovertemplate="%{y:.1f}°", yaxis="y2", **look)
+
+
+def _layout(
+    responses: Sequence[ResponseCurve], marks: Sequence[Mark], decibel: tuple[float, float] | None
+) -> fig.Json:
+    low, high = min(r.hz[0] for r in responses), max(r.hz[-1] for r in responses)
+    turned = [np.ptp(r.degrees) for r in responses]
+    turned += [np.ptp(np.concatenate(r.band.phase)) for r in responses if r.band is not None]
+    tick = 90.0 if max(turned) <= 720.0 else 180.0  # not more than eight marks
+    notes = [
+        fig.label(
+            m.text, float(np.log10(m.hz)), 1.0, fig.QUIET, yref="paper", yanchor="bottom", xanchor=m.anchor
+        )
+        for m in marks
+    ]
+    stroke: fig.Json = {"type": "line", "xref": "x", "yref": "paper"}
+    style = {"color": fig.QUIET, "width": 1, "dash": "dot"}
+    gain = fig.axis("gain, dB", domain=[0.44, 1.0])
+    return fig.layout(
+        xaxis=fig.frequency_axis(low, high, anchor="y2"),
+        yaxis={**gain, "range": list(decibel)} if decibel else gain,
+        yaxis2=fig.axis("phase, °", domain=[0.0, 0.36], dtick=tick),
+        annotations=[*fig.names_beside([(r.name, r.colour) for r in responses], 0.075), *notes],
+        shapes=[{**stroke, "x0": m.hz, "x1": m.hz, "y0": 0.0, "y1": 1.0, "line": style} for m in marks],
+        hoversubplots="axis",
+        margin={"l": 64, "r": 190, "t": 34, "b": 48},
+    )
 
 
 def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) -> fig.Figure:
@@ -35,12 +124,12 @@ def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) 
     low, high = _decibel(1.0 - side), _decibel(1.0 + side)
     gain = 20.0 * np.log10(np.abs(response))
     reference = response if fit is None else fit
-    smooth = np.unwrap(np.angle(reference))
-    phase = np.degrees(smooth + np.angle(response / reference))
+    phase = np.degrees(np.unwrap(np.angle(reference)) + np.angle(response / reference))
     turn = np.degrees(np.arcsin(np.minimum(side, 1.0)))
-    model_gain, model_phase = 20.0 * np.log10(np.abs(reference)), np.degrees(smooth)
-    data = list(_curves(hz, (gain + low, gain, gain + high), fit is not None, model_gain, "y", "%{y:.2f} dB"))
-    data += _curves(hz, (phase - turn, phase, phase + turn), fit is not None, model_phase, "y2", "%{y:.1f}°")
+    band = Band(hz, (gain + low, gain + high), (phase - turn, phase + turn))
+    curves = [ResponseCurve("measured", fig.MEASURED, hz, response, 5.0, "solid", band, phase, 0.55)]
+    curves += [] if fit is None else [ResponseCurve("model", fig.AFTER, hz, fit, 1.6)]
+    data = list(_traces(curves))
     limit = 1.0
     if fit is not None:  # the ratio shows small departures: of trusted lines, and the tolerance
         ratio, trusted = _decibel(np.abs(response / fit)), shown.coherence > 0.5
@@ -57,26 +146,15 @@ def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) 
         fig.line(hz, shown.coherence, "coherence", fig.QUIET, 1.2, yaxis="y4", hovertemplate="%{y:.3f}")
     )
     return fig.Figure(
-        finding(measured, model), _caption(measured), data, _layout(shown, fit is not None, limit), 720
+        finding(measured, model), _caption(measured), data, _four_panels(shown, fit is not None, limit), 720
     )
-
-
-def _curves(
-    hz: FloatArray, measured: Sides, has_model: bool, model: FloatArray, y: str, hover: str
-) -> Iterator[fig.Json]:
-    """Return the measured values with their band, and the model's on top. measured: low, middle, high."""
-    low, middle, high = measured
-    yield fig.band(hz, low, high, fig.faint(fig.MEASURED, 0.28), yaxis=y)
-    yield fig.line(hz, middle, "measured", fig.faint(fig.MEASURED, 0.55), 5.0, yaxis=y, hovertemplate=hover)
-    if has_model:
-        yield fig.line(hz, model, "model", fig.AFTER, 1.6, yaxis=y, hovertemplate=hover)
 
 
 def _decibel(ratio: FloatArray) -> FloatArray:
     return np.asarray(20.0 * np.log10(np.maximum(ratio, 0.05)))
 
 
-def _layout(shown: FrequencyResponse, has_model: bool, limit: float) -> fig.Json:
+def _four_panels(shown: FrequencyResponse, has_model: bool, limit: float) -> fig.Json:
     names = [*([("<b>model</b>", fig.AFTER)] if has_model else []), ("measured,<br>95 % band", fig.MEASURED)]
     above, below = (words.unit(UNITS[n]) for n in (shown.output, shown.input))
     reference = "" if above == below else f" re 1 {above} per {below}"
