@@ -34,11 +34,11 @@ TOPICS: Mapping[str, Mapping[str, str]] = {
     "calibration": _named("run", "make", "fit", "score"),
     "control": _mains("tables"),
     "experiment": _named("score", "causes", "summary", "limits"),
-    "fleet": {"cost": "cost", **_named("trends", "trends", "pages")},
+    "fleet": _named("trends", "trends", "pages"),
     "inputs": _mains("score"),
     "laws": _mains("score"),
     "mutants": _mains("score"),
-    "packaging": _mains("pythons", "watch"),
+    "packaging": _mains("pythons"),
     "peers": _mains("score"),
     "public": _mains("score", "emps"),
 }  # fmt: skip

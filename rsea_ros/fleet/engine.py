@@ -24,7 +24,7 @@ from rsea_ros.version import version
 ATTEMPTS = 5
 """Of a task whose worker is lost each time, before it counts as poison."""
 BASE, FACTOR = 350e6, 12.0
-"""Bytes that a worker takes beside a recording, and for each byte of it (bench fleet cost memory)."""
+"""Bytes that a worker takes beside a recording, and for each byte of it (measured on 26 November 2026)."""
 _TURN = 1.0
 """s that the loop waits at most before it looks at its clock and at the scheduler."""
 
