@@ -125,14 +125,8 @@ def _map(designs: Sequence[SpringDesign]) -> fig.Figure:
         f"{r.bandwidth:g} Hz, Eq. (7)": undamped_stiffness(r.bandwidth, j),
     }
     least = np.max(list(lines.values()), axis=0)
-    hidden: fig.Json = {"hoverinfo": "skip", "line": {"width": 0}}
     hover: fig.Json = {"hovertemplate": "%{y:.0f} N·m/rad"}
-    data: list[fig.Json] = [
-        fig.line(1e3 * j, np.full(len(j), _TOP), "", fig.TRUTH, **hidden),
-        fig.line(
-            1e3 * j, least, "", fig.TRUTH, fill="tonexty", fillcolor=fig.faint(fig.TRUTH, 0.12), **hidden
-        ),
-    ]
+    data = [fig.band(1e3 * j, least, np.full(len(j), _TOP), fig.faint(fig.TRUTH, 0.12))]
     middle = float(np.log10(1e3 * j[len(j) // 3]))
     names = [fig.label("<b>meets all demands</b>", middle, float(np.log10(0.6 * _TOP)), fig.TRUTH)]
     for (name, k), colour in zip(lines.items(), (fig.BEFORE, fig.INK, fig.QUIET, fig.AFTER), strict=True):

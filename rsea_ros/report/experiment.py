@@ -76,9 +76,7 @@ def _advice(advice: Advice) -> Iterator[Block]:
         ]
         if p.worst is not None:
             true, rival, s = p.worst
-            keys.append(
-                (f"{s:.3g}", f"S of {plain_name(true)} over {plain_name(rival)}, the worst pair")
-            )
+            keys.append((f"{s:.3g}", f"S of {plain_name(true)} over {plain_name(rival)}, the worst pair"))
         yield key_numbers(
             keys if len(p.names) == 1 else [*keys, (f"{100.0 * p.decided:.0f} %", "expected to be decided")]
         )

@@ -29,7 +29,8 @@ _WIDTH, _HEIGHT = 190.0, 26.0
 
 
 def write_results(
-    identification: Identification, out: Destination | str | Path,
+    identification: Identification,
+    out: Destination | str | Path,
     provenance: outputs.Provenance | None = None,
 ) -> Path:
     """Write identification.json, model.yaml and report.html, and return the report's path: all or none.
@@ -72,9 +73,7 @@ def _blocks(i: Identification) -> Iterator[html.Block]:
     yield rigs.right_rig_block(i.remarks)
     yield _parameters(i.parameters)
     if i.statics is not None:
-        yield html.section(
-            "Slow ramps against the locked output", html.bullets(statics_sentences(i.statics))
-        )
+        yield html.section("Slow ramps against the locked output", html.bullets(statics_sentences(i.statics)))
     models = i.models or (None,) * len(i.responses)
     yield from map(bode_figure, i.responses, models)
     by_name = {o.channel: o for o in i.overlays}  # the motor torque only repeats the command

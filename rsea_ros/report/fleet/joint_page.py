@@ -10,7 +10,6 @@ from rsea_ros.report import page as html, words
 from rsea_ros.report.fleet import words as say
 from rsea_ros.report.fleet.figures import determined_by, naming_figure, parameter_figure
 from rsea_ros.report.fleet.words import Links
-from rsea_ros.report.words import sentence as capital
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Interval, Steps, Trend
 from rsea_ros.trends.series import CLOCKS, Table
@@ -85,17 +84,8 @@ def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: St
     yield from _namings(joint, fleet, steps, known, appeared=True)
     yield from (parameter_figure(t, steps) for t in (*trends, *sized) if t.state == "steady")
     yield from _namings(joint, fleet, steps, known, appeared=False)
-    undetermined = [t for t in trends if t.state == "undetermined"]
-    groups: dict[tuple[str, str], list[str]] = {}  # by the reason why they have no trend
-    for t in undetermined:
-        if not np.isfinite(t.silent_since_s):
-            groups.setdefault((say.undetermined_state(t), t.reason), []).append(say.name(t.series.parameter))
-    for (state, reason), names in groups.items():
-        title = f"{names[0] if len(names) == 1 else f'{len(names)} parameters'}: {state}"
-        which = f"{'; '.join(names)}. " if len(names) > 1 else ""
-        yield html.section(title, f"{which}{capital(reason)}.")
-    silent = (t for t in undetermined if np.isfinite(t.silent_since_s))
-    yield from (html.section(say.finding(t), f"{capital(t.reason)}.") for t in silent)
+    if undetermined := [t for t in trends if t.state == "undetermined"]:
+        yield html.section("What these recordings cannot determine", undetermined_table(undetermined))
 
 
 def _namings(
@@ -227,17 +217,20 @@ def undated_rows(joint: str, history: Table) -> html.Html:
     return html.table(["Parameter", "#Median", "#Least", "#Most", "#Determined by"], rows)
 
 
-def undetermined_table(undetermined: Sequence[Trend], links: Links) -> html.Html:
-    """Return the parameters without a trend, or of which no later recording says anything, with reasons."""
+def undetermined_table(undetermined: Sequence[Trend], links: Links | None = None) -> html.Html:
+    """Return the parameters without a trend, or of which no later recording says anything, with reasons.
+
+    links: to the joints, where there are several.
+    """
 
     def why(t: Trend) -> str:
-        if t.state != "undetermined":
-            return f"Determined until {say.day(t.silent_since_s)}, but by no later recording"
-        return words.sentence(t.reason)
+        last = t.silent_since_s
+        silent = f"Determined until {say.day(last)}, but by no later recording" if math.isfinite(last) else ""
+        return ". ".join(filter(None, (words.sentence(t.reason), silent)))
 
     return html.listed(
         undetermined,
-        ("Joint", lambda t: links.joint(t.series.joint)),
+        *([("Joint", lambda t: links.joint(t.series.joint))] if links else []),
         ("Parameter", lambda t: say.name(t.series.parameter)),
         ("State", lambda t: say.undetermined_state(t) if t.state == "undetermined" else "silent"),
         ("Why", why),

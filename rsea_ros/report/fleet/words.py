@@ -20,21 +20,19 @@ from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import Appearance, Change, Interval, Trend
 from rsea_ros.trends.series import Table
 
-_MONTHS = ("January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
-           "November", "December")  # fmt: skip
 _MOST = 3
 """Changes that a title names."""
 
 
-def day(time_s: float, letters: int = 9) -> str:
-    """Return a date as `24 March 2025`. letters: of the month, at most."""
+def day(time_s: float, month: str = "%B") -> str:
+    """Return a date as `24 March 2025`. month: its form, of strftime."""
     t = datetime.fromtimestamp(time_s, timezone.utc)
-    return f"{t.day} {_MONTHS[t.month - 1][:letters]} {t.year}"
+    return f"{t.day} {t.strftime(month)} {t.year}"
 
 
 def short_day(time_s: float) -> str:
     """Return a date as `24 Mar 2025`."""
-    return day(time_s, 3)
+    return day(time_s, "%b")
 
 
 def dates(*time_s: float) -> list[str]:

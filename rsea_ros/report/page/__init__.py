@@ -18,15 +18,8 @@ from rsea_ros.report.result_files import Provenance, strict
 
 _FOLDER = Path(__file__).parent
 VENDOR = _FOLDER / "vendor"
-VERSION = "4.1.1"
-SHA256 = "79542150855a52c567260e3137095dbe2b744e6d702a5cabe67da246942fba7a"
-"""Of plotly-cartesian.min.js, the bundle of plane figures, as npm has it in plotly.js-cartesian-dist-min. It
-is packed, its MIT licence beside it."""
-PLANE = {
-    "bar", "box", "contour", "heatmap", "histogram", "histogram2d", "histogram2dcontour", "image", "pie",
-    "scatter", "scatterternary", "violin",
-}  # fmt: skip
-"""Types of traces that it draws, as its README lists them."""
+"""plotly.js 4.1.1, the bundle of plane figures as npm has it in plotly.js-cartesian-dist-min, packed; its MIT
+licence beside it."""
 _NUMBER = " class='number'"
 Item = TypeVar("Item")
 
