@@ -143,15 +143,9 @@ def with_doubt(value: float, low: float, high: float) -> tuple[str, str]:
     below, above = value - low, high - value
     if not half or max(below, above) <= LOPSIDED * min(below, above):
         return shown, f" ± {half}" if half else ""
-    exact = number(value, max(2, 2 + _digits_between(value, min(s for s in (below, above) if s > 0.0))))
+    nearer = min(side for side in (below, above) if side > 0.0)
+    exact = with_interval(value, value - nearer, value + nearer)[0]
     return exact, f" −{number(below, 2).lstrip('−')}/+{number(above, 2)}"
-
-
-def _digits_between(value: float, step: float) -> int:
-    """Return by how many decimal places a value is larger than a step."""
-    if value == 0.0:
-        return 0
-    return math.floor(math.log10(abs(value)) + 1e-6) - math.floor(math.log10(step) + 1e-6)
 
 
 def with_interval(value: float, low: float, high: float) -> tuple[str, str]:

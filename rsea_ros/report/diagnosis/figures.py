@@ -98,7 +98,8 @@ BINS = 16
 _FEWEST = 4 * BINS
 _DEPENDS = 1.5
 _GAP = 0.035
-_MARGIN, _MANY_DECADES = 0.15, 2.5
+_MARGIN, _MANY = 10.0**0.15, 10.0**2.5
+"""Factors of the axis of levels: around the levels, and from which on it has a mark a decade."""
 
 
 @dataclass(frozen=True)
@@ -213,9 +214,6 @@ def _level_axis(shown: Sequence[Profile]) -> fig.Json:
     Zero (a sensor at rest) has no place on it.
     """
     levels = np.concatenate([[0.6, 3.0], *([p.before, p.after] for p in shown)], axis=None)
-    values = np.log10(levels[levels > 0.0])
-    low, high = float(values.min()) - _MARGIN, float(values.max()) + _MARGIN
-    each = (1,) if high - low > _MANY_DECADES else (1, 2, 5)
-    marks = [m * 10.0**e for e in range(-2, 7) for m in each if low <= np.log10(m * 10.0**e) <= high]
-    text = [f"{m:g}" for m in marks]
-    return fig.axis("times the noise", type="log", range=[low, high], tickvals=marks, ticktext=text)
+    values = levels[levels > 0.0]
+    low, high = float(values.min()) / _MARGIN, float(values.max()) * _MARGIN
+    return fig.log_axis("times the noise", low, high, (1,) if high > _MANY * low else (1, 2, 5))

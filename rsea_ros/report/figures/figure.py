@@ -103,20 +103,23 @@ def axis(title: str = "", **parts: Any) -> Json:
     return {**base, **parts}
 
 
+def marks(low: float, high: float, each: Sequence[int] = (1, 2, 5)) -> list[float]:
+    """Return these numbers of each decade from low to high."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    return [m * 10.0**d for d in decades for m in each if 0.999 * low <= m * 10.0**d <= 1.001 * high]
+
+
+def log_axis(title: str, low: float, high: float, each: Sequence[int] = (1, 2, 5), **parts: Any) -> Json:
+    """Return a logarithmic axis from low to high; some numbers of each decade stand as plain numbers."""
+    shown, ends = marks(low, high, each), [math.log10(low), math.log10(high)]
+    text = [f"{m:g}" for m in shown]
+    return axis(title, **{"type": "log", "range": ends, "tickvals": shown, "ticktext": text, **parts})
+
+
 def frequency_axis(low: float, high: float, **parts: Any) -> Json:
-    """Return a logarithmic axis from low to high, Hz; 1, 2 and 5 of each decade stand as plain numbers."""
-    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    marks = [m * 10.0**d for d in decades for m in (1, 2, 5) if 0.999 * low <= m * 10.0**d <= 1.001 * high]
-    return axis(
-        "frequency, Hz",
-        type="log",
-        range=[float(np.log10(low)), float(np.log10(high))],
-        tickvals=marks,
-        ticktext=[f"{m:g}" for m in marks],
-        hoverformat=".3g",
-        unifiedhovertitle={"text": "%{x} Hz"},
-        **parts,
-    )
+    """Return a logarithmic axis from low to high, Hz."""
+    hover: Json = {"hoverformat": ".3g", "unifiedhovertitle": {"text": "%{x} Hz"}}
+    return log_axis("frequency, Hz", low, high, **hover, **parts)
 
 
 def line(x: FloatArray, y: FloatArray, name: str, colour: str, width: float = 1.6, **parts: Any) -> Json:

@@ -17,6 +17,7 @@ from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.rival_models import MovingOutput, largest_gap, lumped_rig, readings, resonance_hz
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
+from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, INK, MEASURED, QUIET, TRUTH, Figure, faint
 from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure, thin
 from rsea_ros.report.figures.surface import Point, bandwidth_contours, slices
@@ -229,10 +230,9 @@ def gain_svg(
     for db in np.arange(math.ceil(decibel[0] / 20) * 20, decibel[1] + 1, 20):
         parts.append(_stroke(_LEFT, y(db), x(high), y(db), GRID))
         parts.append(_text(words.minus(f"{db:.0f}"), _LEFT - 8, y(db) + 4, QUIET, "end"))
-    for hz in (m * 10.0**d for d in range(-2, 4) for m in (1, 2, 5)):
-        if 0.999 * low <= hz <= 1.001 * high:
-            parts.append(_stroke(x(hz), y(decibel[0]), x(hz), y(decibel[1]), GRID))
-            parts.append(_text(f"{hz:g}", x(hz), y(decibel[0]) + 18, QUIET, "middle"))
+    for hz in fig.marks(low, high):
+        parts.append(_stroke(x(hz), y(decibel[0]), x(hz), y(decibel[1]), GRID))
+        parts.append(_text(f"{hz:g}", x(hz), y(decibel[0]) + 18, QUIET, "middle"))
     for mark in marks:
         parts.append(
             _stroke(x(mark.hz), y(decibel[0]), x(mark.hz), y(decibel[1]), QUIET, 'stroke-dasharray="2 3"')
