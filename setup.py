@@ -47,7 +47,7 @@ setup(
     package_data={
         "": ["py.typed"],
         "rsea_ros.report.page": ["*.css", "*.js", "vendor/*"],
-        "rsea_ros.report.paper": ["*.svg"],
+        "rsea_ros.paper": ["*.svg"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
         "rsea_ros.nodes": ["*.xml"],
         "rsea_ros.watch": ["page/*"],

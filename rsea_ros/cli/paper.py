@@ -13,8 +13,8 @@ from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
 from rsea_ros.report.result_files import PAPER_JSON, REPORT, json_text
 
 if TYPE_CHECKING:
+    from rsea_ros.paper.page import PaperTests
     from rsea_ros.records.record import Record
-    from rsea_ros.report.paper.page import PaperTests
 
 HELP = "recompute every equation, table and figure of the paper beside the printed value"
 EXAMPLE = "rsea paper --out paper"
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate the tests, recompute the paper, write the results."""
-    from rsea_ros.report.paper.page import paper_json, paper_report
+    from rsea_ros.paper.page import paper_json, paper_report
 
     if args.figures:
         return _figures(args)
@@ -77,7 +77,7 @@ def _share(explained: float) -> str:
 
 
 def _figures(args: argparse.Namespace) -> int:
-    from rsea_ros.report.paper.figures import documentation_figures
+    from rsea_ros.paper.figures import documentation_figures
 
     figures = documentation_figures()
     check_free((args.figures / name for name in figures), force=args.force)
@@ -97,9 +97,9 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
     from rsea_ros.identification.frequency_response import estimate_response
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.model.simulation import synthesize
+    from rsea_ros.paper.page import PaperTests
     from rsea_ros.paper.rival_models import RATE, moving_output
     from rsea_ros.records.record import Channel
-    from rsea_ros.report.paper.page import PaperTests
 
     def bag(name: str, record: Record) -> Record:
         path = new.stage(f"{name}.mcap")

@@ -1,4 +1,4 @@
-"""The paper's statements recomputed: claims, findings, and the formulas as printed.
+"""The paper's statements recomputed: claims, findings, the formulas as printed, and their page.
 
 No other layer needs it.
 """

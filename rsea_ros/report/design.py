@@ -7,20 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.design.spring_design import (
-    Check,
-    Margin,
-    SpringDesign,
-    WithTrain,
-    by_train,
-    least_for_band,
-    margins,
-    rig_of,
-    sense_unknown,
-    spreads_of,
-    spring_design,
-    stiffness_bounds,
-)
+from rsea_ros.design import spring_design as springs
+from rsea_ros.design.spring_design import Check, Margin, SpringDesign, WithTrain
 from rsea_ros.model.transfer import end_response, end_to_end, undamped_stiffness
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z90
@@ -69,7 +57,7 @@ def _blocks(asked: SpringDesign, least: SpringDesign, robust: SpringDesign | Non
     ])  # fmt: skip
     yield _method(asked, least)
     yield checks_table(designs)
-    yield trains_table(by_train(asked.requirement, asked.unit, asked.stiffness), asked)
+    yield trains_table(springs.by_train(asked.requirement, asked.unit, asked.stiffness), asked)
     yield _map(designs)
     yield _surface(asked)
     yield _open_loop(designs)
@@ -95,7 +83,7 @@ def _method(asked: SpringDesign, least: SpringDesign) -> Html:
     r, spin = asked.requirement, 1e3 * asked.unit.spin
     signed = f"{'−' if spin < 0.0 else '+'} {abs(spin):.3f}"
     turns, train = words.signed_text(asked.unit.turns, 0), words.train(asked.unit.train)
-    bounds = stiffness_bounds(least.requirement, least.unit).items()
+    bounds = springs.stiffness_bounds(least.requirement, least.unit).items()
     why = "; ".join(f"{words.sentence(name)} asks for {value:.0f}" for name, value in bounds)
     return section(
         "Result of the method, and its gaps",
@@ -115,10 +103,10 @@ def _method(asked: SpringDesign, least: SpringDesign) -> Html:
 
 def _map(designs: Sequence[SpringDesign]) -> fig.Figure:
     r, unit = designs[0].requirement, designs[0].unit
-    j, bounds = np.geomspace(2e-4, 2e-2, 25), stiffness_bounds(r, unit)
+    j, bounds = np.geomspace(2e-4, 2e-2, 25), springs.stiffness_bounds(r, unit)
     lines = {
         f"{r.bandwidth:g} Hz, with spin": np.array(
-            [least_for_band(replace(r, inertia=float(v)), unit) for v in j]
+            [springs.least_for_band(replace(r, inertia=float(v)), unit) for v in j]
         ),
         f"{math.degrees(r.deflection):g}° at {r.torque:g} N·m": bounds["Deflection"] * np.ones(len(j)),
         f"K_s/2 = {r.torque:g} N·m": bounds["Torque, K_s/2"] * np.ones(len(j)),
@@ -174,7 +162,7 @@ def _open_loop(designs: Sequence[SpringDesign]) -> fig.Figure:
     hz: FloatArray = np.geomspace(0.5, 300.0, 500)
     curves = []
     for d, colour in zip(designs, _COLOURS, strict=False):
-        rig = rig_of(d.requirement, d.unit, d.stiffness)
+        rig = springs.rig_of(d.requirement, d.unit, d.stiffness)
         motor = end_response(rig, hz)
         curves.append(
             ResponseCurve(f"{d.stiffness:.0f}: T_d/T_p", colour, hz, end_to_end(rig)(2j * np.pi * hz))
@@ -240,7 +228,7 @@ def trains_table(rows: Sequence[WithTrain], d: SpringDesign) -> Html:
         "The sense of rotation is not known: both are shown",
         "Effect of the rotor's spin on the band",
     )
-    return section(unknown if sense_unknown(rows) else known, shown, caption=caption)
+    return section(unknown if springs.sense_unknown(rows) else known, shown, caption=caption)
 
 
 def springs_table(designs: Sequence[SpringDesign]) -> Html:
@@ -249,7 +237,7 @@ def springs_table(designs: Sequence[SpringDesign]) -> Html:
     for separation in sorted({r.separation, 0.0762, 0.1016}):
         if separation <= r.diameter:
             varied = replace(r, separation=separation)
-            rates = (spring_design(varied, d.unit, d.stiffness).rate for d in designs)
+            rates = (springs.spring_design(varied, d.unit, d.stiffness).rate for d in designs)
             travel = 0.5 * separation * math.sin(r.deflection)
             ends = words.number(1e3 * separation), words.number(1e3 * travel)
             rows.append([ends[0], *(f"{v / 1e3:.0f}" for v in rates), ends[1]])
@@ -273,8 +261,10 @@ def margins_table(d: SpringDesign) -> Html:
         values = ["not possible" if math.isinf(v) else f"{words.number(v)} {unit}" for v in m.percentiles]
         return [m.name, *values, f"{words.number(m.limit)} {unit}", share]
 
-    rows = margins(d)
-    spreads = ", ".join(f"{name.replace('_', ' ')} {100 * s:g} %" for name, s in spreads_of(d.unit).items())
+    rows = springs.margins(d)
+    spreads = ", ".join(
+        f"{name.replace('_', ' ')} {100 * s:g} %" for name, s in springs.spreads_of(d.unit).items()
+    )
     return section(
         f"With parts that scatter, {100 * rows[-1].share:.0f} % of the actuators with {d.stiffness:.0f} "
         "N·m/rad meet all demands",
@@ -293,8 +283,8 @@ def design_json(asked: SpringDesign, least: SpringDesign, robust: SpringDesign |
     )
     return {
         "schema": 1, **pick(asked, "requirement unit=unit.name train=unit.train"),
-        "by_train": [pick(row, train) for row in by_train(r, asked.unit, asked.stiffness)],
-        "least_stiffness_by_demand": stiffness_bounds(r, asked.unit), "asked": _design(asked),
+        "by_train": [pick(row, train) for row in springs.by_train(r, asked.unit, asked.stiffness)],
+        "least_stiffness_by_demand": springs.stiffness_bounds(r, asked.unit), "asked": _design(asked),
         "least": _design(least), "robust": _design(robust) if robust else None,
     }  # fmt: skip
 
@@ -309,5 +299,5 @@ def _design(d: SpringDesign) -> dict[str, Any]:
             "resonance_hz=resonance bandwidth_eq_7_hz=band_eq_7 bandwidth_exact_hz=band_exact feasible",
         ),
         "checks": [pick(c, "name value limit unit met") for c in d.checks],
-        "margins": [pick(m, "name percentiles_5_50_95=percentiles limit share") for m in margins(d)],
+        "margins": [pick(m, "name percentiles_5_50_95=percentiles limit share") for m in springs.margins(d)],
     }

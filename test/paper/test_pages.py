@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from rsea_ros.report.paper.figures import circuit, documentation_figures, figure_9
+from rsea_ros.paper.figures import circuit, documentation_figures, figure_9
 
-FIGURES = Path(__file__).parents[3] / "docs" / "figures"
+FIGURES = Path(__file__).parents[2] / "docs" / "figures"
 drawn = functools.cache(documentation_figures)
 
 

@@ -1,1 +1,0 @@
-"""The paper recomputed: page, figures, tables, drawings, paper.json."""
