@@ -15,12 +15,12 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.rival_models import MovingOutput, largest_gap, lumped_rig, readings, resonance_hz
+from rsea_ros.paper.surface import Point, bandwidth_contours, slices
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, INK, MEASURED, QUIET, TRUTH, Figure, faint
 from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure, thin
-from rsea_ros.report.figures.surface import Point, bandwidth_contours, slices
 
 _HZ: FloatArray = np.geomspace(0.1, 140.0, 500)
 

@@ -88,7 +88,12 @@ def test_the_bundle_is_npms_with_its_licence():
 
 def test_every_figure_is_plane():
     """A surface needed the whole bundle: 2 MB of each page of a design, and 40 MB of every environment."""
-    sources = (path.read_text(encoding="utf-8") for path in Path(report.__file__).parent.rglob("*.py"))
+    package = Path(report.__file__).parents[1]
+    sources = (
+        p.read_text(encoding="utf-8")
+        for part in ("report", "paper")
+        for p in package.rglob(f"{part}/**/*.py")
+    )
     drawn = {name for text in sources for name in re.findall(r'"type": "(\w+)"', text)}
     others = {"log", "linear", "rect", "line", "date", "category", "data"}
     assert "contour" in drawn and drawn <= PLANE | others

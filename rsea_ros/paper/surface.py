@@ -39,8 +39,8 @@ def bandwidth_contours(title: str, shown: Sequence[Point], caption: str = "") ->
         "hovertemplate": "K_s %{x:.0f} N·m/rad<br>inertia %{y:.2f} g·m²<br>%{z:.1f} Hz<extra></extra>",
     }
     plane = fig.layout(
-        xaxis=fig.axis("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
-        yaxis=fig.axis("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
+        xaxis=fig.log_axis("stiffness, N·m/rad", k[0], k[-1]),
+        yaxis=fig.log_axis("inertia, g·m²", 1e3 * j[0], 1e3 * j[-1]),
         hovermode="closest",
     )
     return fig.Figure(title, caption, [contours, *(_named(p) for p in shown)], plane, 480)
@@ -77,7 +77,8 @@ def slices(title: str, shown: Sequence[Point], caption: str = "") -> fig.Figure:
         z, dot = [float(undamped_band(p.stiffness, p.inertia))], {"size": 9, "color": p.colour}
         data.append(fig.points([1e3 * abs(p.inertia)], z, p.name, marker=dot))
         data.append(fig.points([p.stiffness], z, p.name, marker=dot, xaxis="x2", yaxis="y2"))
-    decades = {"type": "log"} | log_marks(0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
+    ticks = fig.marks(0.5, 2000.0)
+    decades = {"type": "log", "tickvals": ticks, "ticktext": [f"{v:g}" for v in ticks]}
     drawing = fig.layout(
         xaxis=fig.axis("inertia, g·m²", domain=[0.0, 0.4], anchor="y", **decades),
         yaxis=fig.axis("bandwidth, Hz", anchor="x", **decades),
@@ -87,11 +88,6 @@ def slices(title: str, shown: Sequence[Point], caption: str = "") -> fig.Figure:
         hovermode="closest",
     )
     return fig.Figure(title, caption, data, drawing, 400)
-
-
-def log_marks(*values: float) -> fig.Json:
-    """Return plain numbers on a logarithmic axis."""
-    return {"tickvals": list(values), "ticktext": [f"{v:g}" for v in values]}
 
 
 def _grid(shown: Sequence[Point]) -> tuple[FloatArray, FloatArray]:
